@@ -19,6 +19,7 @@ from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.fluid import LAWS, Fluid
 from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
+from fvsolve.parts.pipe.wall import softness
 from fvsolve.parts.table import plain
 from fvsolve.schemes import SCHEMES
 from fvsolve.shown import Shown
@@ -259,9 +260,7 @@ def wave_speed(pipe: Pipe, fluid: Any) -> float:
     """Speed of waves in a pipe full of a fluid [m/s]."""
     if pipe.wave_speed is not None:
         return pipe.wave_speed
-    wall = pipe.wall
-    softness = 0.0 if wall in (None, "stiff") else pipe.diameter / (wall.youngs_modulus * wall.thickness)
-    return math.sqrt(1.0 / (1.0 / fluid.bulk_modulus + softness) / fluid.density)
+    return math.sqrt(1.0 / (1.0 / fluid.bulk_modulus + softness(pipe)) / fluid.density)
 
 
 def default_cells(pipes: dict[str, Pipe], fluid: Any, cell_time: float | None) -> dict[str, int]:

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from fvsolve.case import defaults
 from fvsolve.case.case import Case
 from fvsolve.case.claims import COMPARE_KEYS, expect_keys
+from fvsolve.case.defaults import link_said
 from fvsolve.case.limits import limit_keys
 from fvsolve.case.load import TOP
 from fvsolve.case.placing import own_keys
@@ -43,7 +45,7 @@ def changes(case: Case, key: str) -> str:
 
 def classed(case: Case, keys: tuple[Any, ...]) -> str:
     """The class of a key as this case has it."""
-    found, links = declared(case.raw, keys).changes, case.raw.get("links", {}).values()
+    found, links = declared(case.raw, keys).changes, [link_said(case.raw, name) for name in case.raw.get("links", {})]
     if found == COUNTED:
         found = SHAPE if any(one["type"] == "pipe" and "cells" not in one for one in links) else PROFILE
     unsteady = any(one.get("friction", {}).get("model") == "unsteady" for one in links)
@@ -85,6 +87,7 @@ def known(raw: dict[str, Any]) -> dict[str, Value]:
     for group, kinds in KINDS.items():
         parts = raw.get(group, {}).items()
         found[group] = Keys({name: Keys({"type": Value(), **kinds[one["type"]].values()}) for name, one in parts})
+    found["defaults"] = Keys({kind: Keys(defaults.values(kind)) for kind in defaults.KINDS})
     said = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
     said |= {"routes": Route.values(), "limits": values_of(limit_keys("pressure", "pressure"))}
     return found | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(one))) for group, one in said.items()}

@@ -30,7 +30,7 @@ class Extent:
         quantity, dimension = ("pressure", "pressure") if pressed else (self.quantity, self.dimension)
         for group, name in self.parts:
             pipe = links.get(name) if group == "links" else None
-            if pipe is None or pipe.kind != "pipe":
+            if pipe is None or pipe.kind != "pipe" or not (pressed or self.quantity in pipe.along):
                 yield Probe(f"{group}.{name}.{quantity}", group, name, quantity, None, dimension)
             else:
                 shares = [] if pressed else [(k + 0.5) / pipe.cells for k in range(pipe.cells)]

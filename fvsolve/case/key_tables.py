@@ -24,7 +24,8 @@ from fvsolve.parts.connection.part import Connection
 from fvsolve.parts.disc.part import Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.node import Rider
-from fvsolve.parts.pipe.part import Wall
+from fvsolve.parts.pipe.materials import SI, materials
+from fvsolve.parts.pipe.wall import Lining, Wall
 from fvsolve.parts.table import Table, plain
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
 from fvsolve.parts.valve.part import Sized
@@ -32,8 +33,8 @@ from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": Rider, "every link": TwoPort, "friction": Friction, "connection": Connection,
-    "wall": Wall, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar, "fluid": FluidSpec,
-    "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
+    "wall": Wall, "lining": Lining, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar,
+    "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # whose keys -> the part that has them in full
 SHARED = {Node: "", Rider: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}
@@ -49,6 +50,8 @@ def page(text: str) -> str:
 
 def key_table(name: str) -> str:
     """The Markdown table of the keys of a part or another table of the case; FvsolveError where there is none such."""
+    if name == "materials":
+        return materials_table()
     if name == "case":
         found = {"ambient_pressure": (Quantity("pressure", about="absolute"), 101325.0), **TOP}
         rows = [row(key, value, default) for key, (value, default) in found.items()]
@@ -56,6 +59,18 @@ def key_table(name: str) -> str:
         rows = rows_of(name, model_of(name))
     lines = (" | ".join(cell.replace("|", "\\|") for cell in cells) for cells in (HEAD, ("---",) * len(HEAD), *rows))
     return "".join(f"| {line} |\n" for line in lines)
+
+
+def materials_table() -> str:
+    """What is known of materials: least to greatest of each figure, and where it was read."""
+    head = ("material", "modulus [GPa]", "Poisson's ratio", "roughness [mm]", "density [kg/m3]", "read in")
+    rows = [head, ("---",) * len(head)]
+    for name, one in materials().items():
+        found = [one.figures.get(key) for key in SI]
+        spans = ["" if it is None else it.span(" to ") for it in found]
+        read = dict.fromkeys(source for it in found if it for source in it.sources)
+        rows.append((f"`{name}`", *spans, ", ".join(read)))
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in rows)
 
 
 def model_of(name: str) -> type[Table]:

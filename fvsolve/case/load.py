@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, bodies, check, heights, placing, scalars, shipped, size, text
+from fvsolve.case import basins, bodies, check, defaults, heights, placing, scalars, shipped, size, text
 from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.extent import ALL
@@ -54,7 +54,7 @@ GROUPS = {
 ALONE = ("basin", "body")  # nodes that need no link
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
-    "signals", "scalars", "numerics", "output", "expect", "compare", "routes", "limits", "exact",
+    "signals", "scalars", "defaults", "numerics", "output", "expect", "compare", "routes", "limits", "exact",
 )  # fmt: skip
 TOP = {
     "schema": (Whole(between(SCHEMA, SCHEMA)), SCHEMA),
@@ -117,6 +117,7 @@ class _Reader:
         self.read: dict[tuple, tuple[Any, Any]] = {}  # place -> (what stands there, what it was read as)
         self.origin: dict[tuple, tuple] = {}  # (group, name) of what a cut pipe came to -> of what the file has
         self.pieces: dict[str, list[str]] = {}  # of cut pipes
+        self.said = raw.table  # before pipes are cut
         self.lumped: dict[str, Any] = {}  # meshes of basins whose water is but masses on a body
 
     def case(self) -> Case:
@@ -126,9 +127,12 @@ class _Reader:
         top = self.top()
         if self.before is not None and self.before.ambient_pressure != self.setting.ambient:
             self.before = None  # all that is gauge is other
+        if self.before is not None and self.before.raw.get("defaults") is not self.said.get("defaults"):
+            self.before = None  # every pipe may be other
         fluid, properties = self.kept(("fluid",), self.raw.table.get("fluid"), self.fluid)
         numerics = self.table("numerics", Numerics)
         self.setting.signals = self.group("signals")
+        self.add(defaults.misfits(self.raw.table, self.setting))
         whole, told = self.raw.table, self.cut(properties, numerics)
         carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
@@ -228,12 +232,15 @@ class _Reader:
 
     def cut(self, properties: Any, numerics: Numerics | None) -> list[Notice]:
         """Cut pipes at what is placed on them by chainage; what is to be told of it."""
-        table = self.raw.table
+        table = placing.bent(self.raw.table)
         if not placing.placed(table):
             return []
+        self.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
+                       for name, one in table["links"].items() if placing.is_pipe(one)
+                       for k in range(len(one["bends"]) if isinstance(one.get("bends"), list) else 0)}  # fmt: skip
         self.add(placing.faults(table))
         self.stop()
-        pipes = {}
+        pipes, table = {}, defaults.spread(table)
         for name, given in table["links"].items():
             if placing.is_pipe(given):
                 try:
@@ -247,7 +254,8 @@ class _Reader:
         exact = {name for name, pipe in pipes.items() if (pipe.line or numerics.line) == "delay"}
         made = placing.cut(table, pipes, counts, exact, self.fault)
         self.stop()
-        self.raw, self.origin, self.pieces = replace(self.raw, table=made.table), made.origin, made.pieces
+        self.raw, self.pieces = replace(self.raw, table=made.table), made.pieces
+        self.origin |= made.origin
         return made.told
 
     def kept(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
@@ -274,6 +282,7 @@ class _Reader:
         if ROOT in keys:
             keys = keys[len(keys) - keys[::-1].index(ROOT) :]
         keys = (*self.origin.get(keys[:2], keys[:2]), *keys[2:])
+        keys = defaults.place(self.said, keys)
         place = text.path(keys)
         if self.raw.is_override(keys):
             self.faults.append(Fault(place, message, override=True))
@@ -394,7 +403,7 @@ class _Reader:
 
     def part(self, kind: Any, given: dict[str, Any]) -> Any:
         """A part of a kind, as its table has it."""
-        rest = {key: value for key, value in given.items() if key != "type"}
+        rest = {key: value for key, value in defaults.filled(self.raw.table, given).items() if key != "type"}
         return kind.model_validate(rest, context=self.setting)
 
     def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from fvsolve.case import check, heights
 from fvsolve.case.case import Case
-from fvsolve.case.placing import placed
+from fvsolve.case.placing import bent, placed
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Quantity
@@ -64,7 +64,7 @@ def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dic
 
 def whole(case: Case) -> bool:
     """Whether nothing of a case comes from files or signals, and nothing looks at numbers of parts but parts."""
-    alone = not (placed(case.raw) or case.signals or case.scalars or case.compare or case.copies or case.found)
+    alone = not (placed(bent(case.raw)) or case.signals or case.scalars or case.compare or case.copies or case.found)
     settled = case.exact is None or "exact" in case.raw
     return alone and settled and not any(isinstance(node, Basin) for node in case.nodes.values())
 

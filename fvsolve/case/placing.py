@@ -20,7 +20,17 @@ from fvsolve.parts import KINDS, Pipe
 from fvsolve.units import show
 
 WHERE = ("on", "at")
-MADE = ("length", "cells", "minor_loss", "fittings", "profile", "from", "to", "pieces")  # keys that a piece has its own
+MADE = (
+    "length",
+    "cells",
+    "minor_loss",
+    "fittings",
+    "profile",
+    "from",
+    "to",
+    "pieces",
+    "bends",
+)  # keys that a piece has its own
 Say = Callable[[tuple, str], None]
 
 
@@ -78,10 +88,21 @@ def is_pipe(part: Any) -> bool:
     return isinstance(part, dict) and part.get("type") == "pipe"
 
 
+def bent(table: dict[str, Any]) -> dict[str, Any]:
+    """The same table, a junction at every bend of a pipe."""
+    nodes, links = table.get("nodes"), table.get("links")
+    found: dict[str, Any] = {}
+    for name, one in links.items() if isinstance(nodes, dict) and isinstance(links, dict) else ():
+        bends = one.get("bends") if is_pipe(one) else None
+        for k, at in enumerate(bends if isinstance(bends, list) else ()):
+            found[f"{name}-bend-{k + 1}"] = {"type": "junction", "on": name, "at": at}
+    return {**table, "nodes": {**nodes, **found}} if found else table
+
+
 def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
     """Whole pipe -> names of its pieces, as `cut` will make them."""
     many: dict[str, int] = {}
-    for _, _, part in placed(table):
+    for _, _, part in placed(bent(table)):
         if isinstance(part.get("on"), str):
             many[part["on"]] = many.get(part["on"], 1) + 1
     return {name: [f"{name}-{k + 1}" for k in range(n)] for name, n in many.items()}

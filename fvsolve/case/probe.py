@@ -124,6 +124,7 @@ def default_probes(kinds: Kinds) -> list[Probe]:
         other = kinds["links" if part == "nodes" else "nodes"]
         for name, kind in kinds[part].items():
             own = [one for one in quantities if one in kind.quantities] if kind is not None else []
+            own = [one for one in own if one not in getattr(kind, "asked", ())]
             for quantity in [*own, *_carried(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 found.append(_probe(text, part, name, quantity, None, kinds))

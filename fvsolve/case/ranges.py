@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
+from fvsolve.case import defaults
 from fvsolve.errors import Notice
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import Quantity, Usual
@@ -25,8 +26,9 @@ def notices(case: Any) -> list[Notice]:
     parts |= {(group, name): part for group in ("nodes", "links") for name, part in getattr(case, group).items()}
     found = [_notice((), (key,), case, *odd) for key, value in TOP.items()
              if (odd := _beyond(value, getattr(case, key), case.raw.get(key)))]  # fmt: skip
-    return found + [_notice(place, *odd[:1], case, *odd[1:]) for place, part in parts.items()
-                    for odd in _of_part(part, _said(case.raw, place))]  # fmt: skip
+    found += [_notice(place, *odd[:1], case, *odd[1:]) for place, part in parts.items()
+              for odd in _of_part(part, _said(case.raw, place))]  # fmt: skip
+    return list({(one.place, one.text): one for one in found}.values())
 
 
 def _of_part(part: Table, said: Any) -> list[tuple[tuple[Any, ...], float, float, str]]:
@@ -80,5 +82,6 @@ def _said(raw: Any, keys: tuple[Any, ...]) -> Any:
 
 
 def _notice(place: tuple, keys: tuple, case: Any, value: float, limit: float, text: str) -> Notice:
-    where, key = ".".join(place), ".".join(map(str, keys))
+    whole = defaults.place(case.raw, (*place, *keys))
+    where, key = ".".join(whole[: len(place)]), ".".join(map(str, keys))
     return Notice("range", where, f"{f'{where}.{key}' if where else key}: {text}", key, value, limit)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from fvsolve.case.defaults import place
 from fvsolve.case.lines import key_lines
 from fvsolve.errors import CaseError, Fault, did_you_mean
 from fvsolve.units import show
@@ -135,7 +136,8 @@ def located(error: CaseError, case: Any) -> CaseError:
     now = Raw(case.raw)
     faults = []
     for fault in error.faults:
-        keys = tuple(fault.place.split("."))
+        keys = place(case.raw, tuple(fault.place.split(".")))
+        fault = replace(fault, place=".".join(keys))
         found, before = now.get(keys), said.get(keys)
         whole = len(keys) == 2 and isinstance(found, dict)  # a part, of which some other key may be set
         if found is not None and (before is None or (found != before and not whole)):

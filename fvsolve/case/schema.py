@@ -7,6 +7,7 @@ from collections import Counter
 from json import dumps, loads
 from typing import Any
 
+from fvsolve.case import defaults
 from fvsolve.case.limits import limit_keys
 from fvsolve.case.load import ALONE, GROUPS, KEYS, TOP
 from fvsolve.case.routes import Route
@@ -27,8 +28,9 @@ def schema() -> dict[str, Any]:
 
 
 def printed(made: dict[str, Any]) -> str:
-    """A schema as text, lists of words or numbers in a line."""
-    return re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", dumps(made, indent=2))
+    """A schema as text, lists of words or numbers in a line, and bare references."""
+    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", dumps(made, indent=2))
+    return re.sub(r'\{\s+("\$ref": "[^"]*")\s+\}', r"{ \1 }", text)
 
 
 def whole() -> dict[str, Any]:
@@ -42,6 +44,7 @@ def whole() -> dict[str, Any]:
     for group, kinds in KINDS.items():
         any_kind = [_typed(kind, made, definitions) for kind, made in sorted(kinds.items())]
         properties[group] = {"type": "object", "additionalProperties": {"anyOf": any_kind}}
+    properties["defaults"] = _defaults(definitions)
     scalar = _hoisted(Scalar, definitions)
     properties["scalars"] = {"type": "object", "additionalProperties": scalar}
     properties["signals"] = {"type": "object", "additionalProperties": Scheduled("number").json()}
@@ -148,6 +151,16 @@ def _hoisted(model: Any, definitions: dict[str, Any]) -> dict[str, Any]:
     made = _without_titles(model.model_json_schema(by_alias=True))
     definitions |= made.pop("$defs", {})
     return made
+
+
+def _defaults(definitions: dict[str, Any]) -> dict[str, Any]:
+    """Keys of `[defaults.KIND]`: those of the parts, none of them needed."""
+    made = {}
+    for kind, model in defaults.KINDS.items():
+        keys = _hoisted(model, definitions)["properties"]
+        own = {key: _bare(one) for key, one in keys.items() if key not in defaults.OWN}
+        made[kind] = {"type": "object", "properties": own, "additionalProperties": False}
+    return {"type": "object", "properties": made, "additionalProperties": False}
 
 
 def _typed(kind: str, model: Any, definitions: dict[str, Any]) -> dict[str, Any]:

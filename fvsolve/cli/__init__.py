@@ -13,6 +13,7 @@ __all__ = ["main"]
 COMMANDS = (  # files that add commands to the application: those of one command each bear its name, but for `map`
     "commands",
     "chart",
+    "closing",
     "design",
     "energy",
     "failure_map",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from fvsolve.cli.terminal import console as _console
 from fvsolve.cli.terminal import line as _line
 from fvsolve.cli.terminal import table as _table
+from fvsolve.errors import listing
 from fvsolve.output.directory import pictures_there
 
 ROWS = 20  # of a table at most; the rest is on disk
@@ -116,6 +117,7 @@ def checks(case, found: dict, every: bool = False) -> None:
         _line(console, "")
     said = [f"friction of {name} remembers: {_memory(one['unsteady'])}"
             for name, one in found["pipes"].items() if "unsteady" in one]  # fmt: skip
+    said += _walls(case, found["pipes"])
     lines = {name: one for name, one in found["pipes"].items() if one["line"] == "delay"}
     said += [f"{name} is a delay line, off by at most {one['line_bound']:.2g} of the greatest jump: {one['line_why']}"
              for name, one in lines.items()]  # fmt: skip
@@ -127,6 +129,36 @@ def checks(case, found: dict, every: bool = False) -> None:
     if found["basins"]:
         _line(console, _threads(found["threads"]))
     _line(console, _step(found))
+
+
+def _walls(case, pipes: dict) -> list[str]:
+    """What walls are and whose figures these are, of pipes alike in one line."""
+    alike: dict[str, list[str]] = {}
+    for name, one in pipes.items():
+        if said := _wall(case, one):
+            alike.setdefault(said, []).append(name)
+    return [f"wall of {listing(names)}: {said}" for said, names in alike.items()]
+
+
+def _wall(case, one: dict) -> str:
+    from fvsolve.output.column import column
+
+    said = []
+    if "allowable_pressure" in one:
+        unit = column("allowable", "gauge_pressure", case)
+        said.append(f"bears {_number(_in(unit, one['allowable_pressure']))} {unit.unit}")
+    if "creep" in one:
+        said.append(
+            f"{one['creep']['elements']} elements creep, slow waves run at {one['creep']['slow_speed']:.4g} m/s"
+        )
+    if "restraint_factor" in one:
+        said.append(f"restraint {one['restraint_factor']:.4g}")
+    if "source" in one:
+        said.append(one["source"])
+    if one.get("unread"):
+        keys = listing(one["unread"]).replace("_", " ")
+        said.append(f"{keys} of {one['material']}: no source was read, so they are the user's to give")
+    return "; ".join(said)
 
 
 def _threads(found: dict) -> str:

@@ -13,7 +13,7 @@ OF_PRESSURE = ("pressure", "gauge_pressure", "head", "level")  # at a place that
 
 
 @dataclass
-class Line:
+class DrawnLine:
     """A curve: its column, what it is called, and which other quantities of its place go the same way."""
 
     column: int
@@ -26,15 +26,15 @@ class Line:
 
 
 @dataclass
-class Panel:
+class DrawnPanel:
     """Curves of one quantity and unit."""
 
     quantity: str
     unit: str
-    lines: list[Line]
+    lines: list[DrawnLine]
 
 
-def told(values: np.ndarray, probes, measured=()) -> tuple[list[Panel], list[tuple[str, str, float]]]:
+def told(values: np.ndarray, probes, measured=()) -> tuple[list[DrawnPanel], list[tuple[str, str, float]]]:
     """Panels of curves, and what stands still: (probe, unit, value).
 
     values : float64[k, n]; probes : their (name, unit); measured : names of probes that are held against something
@@ -43,30 +43,30 @@ def told(values: np.ndarray, probes, measured=()) -> tuple[list[Panel], list[tup
     still = [k for k, (name, _) in enumerate(probes) if swings[k] is None and name not in measured]
     if len(still) == len(probes):
         still = []  # a picture of rest
-    panels: dict[tuple[str, str], Panel] = {}
-    leaders: dict[str, list[tuple[int, Line]]] = {}
+    panels: dict[tuple[str, str], DrawnPanel] = {}
+    leaders: dict[str, list[tuple[int, DrawnLine]]] = {}
     for k, (name, unit) in enumerate(probes):
         if k in still:
             continue
         place, what = _parted(name)
-        line = Line(k, [place], [])
+        line = DrawnLine(k, [place], [])
         if name not in measured and what in OF_PRESSURE:
             first = next((one for j, one in leaders.get(place, []) if _alike(values[:, j], values[:, k])), None)
             if first is not None:
                 first.alike.append(what.replace("_", " "))
                 continue
             leaders.setdefault(place, []).append((k, line))
-        panels.setdefault((what, unit), Panel(what, unit, [])).lines.append(line)
+        panels.setdefault((what, unit), DrawnPanel(what, unit, [])).lines.append(line)
     for panel in panels.values():
         panel.lines = _without_doubles(panel.lines, values, probes, measured)
     return list(panels.values()), [(*probes[k], float(values[0, k])) for k in still if len(values)]
 
 
-def _without_doubles(lines: list[Line], values: np.ndarray, probes, measured) -> list[Line]:
+def _without_doubles(lines: list[DrawnLine], values: np.ndarray, probes, measured) -> list[DrawnLine]:
     """Curves of a panel, those that would lie on another called beside it."""
     seen = np.concatenate([values[:, one.column] for one in lines])
     room = SAME * np.ptp(seen[np.isfinite(seen)]) if np.isfinite(seen).any() else 0.0
-    kept: list[Line] = []
+    kept: list[DrawnLine] = []
     for one in lines:
         under = None
         if probes[one.column][0] not in measured and not one.alike:

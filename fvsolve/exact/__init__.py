@@ -12,6 +12,10 @@ __all__ = ["NAMES", "Solution", "Start", "misfits", "solution"]
 NAMES = {  # name in the case file -> (module of this room, what it solves)
     "rays": ("rays", "waves in frictionless pipes between reservoirs, junctions and valves, by ray tracing"),
     "laminar-line": ("laminar_line", "a laminar pipe from a reservoir to a demand, its velocity profile and all"),
+    "creeping-line": (
+        "creeping_line",
+        "a pipe whose wall creeps, from a reservoir to a demand, frictionless or laminar",
+    ),
     "levelling": ("levelling", "a tank or chamber on an orifice to a reservoir, or two on one: a parabola in time"),
     "column": ("column", "one rigid column between given pressures: tanh in time"),
     "oscillation": ("oscillation", "two open tanks, or a tank and a reservoir, joined by a frictionless rigid column"),

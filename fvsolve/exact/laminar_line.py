@@ -1,7 +1,8 @@
 """One laminar pipe between a reservoir and a changing demand, friction and all. Knows the exact profile of velocity.
 
 With the Laplace variable s and x = R sqrt(s / nu), momentum over the laminar profile is s M (I0(x) / I2(x)) = -A dp/dx
-(Zielke 1968), so waves run as exp(-G d), G = (s / a) sqrt(I0 / I2), with impedance Z = (a / A) sqrt(I0 / I2). A demand
+(Zielke 1968), so waves run as exp(-G d), G = (s / a) sqrt(I0 / I2), with impedance Z = (a / A) sqrt(I0 / I2); where
+liquid and wall take up C times what they do at once, sqrt(C I0 / I2) and sqrt(I0 / (C I2)) stand for these. A demand
 that jumps is answered by the series of all reflections, each inverted by itself once its pure delay exp(-s d / a) is
 split off (Talbot's contour); one that is smooth, by the whole tanh along a Bromwich line.
 """
@@ -39,6 +40,8 @@ def misfits(case):
                 f'the exact solution "{name}" wants a reservoir at one end and a junction at the other',
             )
             continue
+        if pipe.yielding and name == "laminar-line":
+            yield ("links", link, "wall", "creep"), f'the exact solution "{name}" holds for walls that do not creep'
         law = pipe.friction
         if law.model != "unsteady" or law.weighting == "vardy-brown" or law.roughness is None or pipe.minor_loss:
             message = f'the exact solution "{name}" wants "unsteady" friction by roughness, laminar, and no minor loss'
@@ -58,7 +61,12 @@ def reynolds(case, pipe) -> float:
 def solution(case, start: ExactStart) -> Solution:
     """Pressures and flows along the line of a case that `misfits` finds nothing in."""
     [(name, pipe)] = case.links.items()
-    line = LineDeviation(case, pipe)
+    return of_line(case, start, LineDeviation(case, pipe))
+
+
+def of_line(case, start: ExactStart, line: LineDeviation) -> Solution:
+    """Pressures and flows of a case of one line, from its deviations."""
+    [(name, pipe)] = case.links.items()
     drop = start.pressure[pipe.to] - start.pressure[pipe.from_]
     flow = start.flow[name]
 
@@ -81,8 +89,8 @@ class LineDeviation:
         self.gate = pipe.from_ if self.reversed else pipe.to
         self.demand, self.rho, self.t0 = case.nodes[self.gate].demand, case.properties.density, case.numerics.start
         self.end, self.length, self.a = case.numerics.end, pipe.length, case.wave_speed(case_name(case))
-        self.area, self.scale = math.pi / 4.0 * pipe.diameter**2, 0.25 * pipe.diameter**2 * self.rho
-        self.scale /= case.properties.viscosity  # R^2 / nu [s]
+        self.area, self.viscosity = math.pi / 4.0 * pipe.diameter**2, case.properties.viscosity
+        self.scale = 0.25 * pipe.diameter**2 * self.rho / (self.viscosity or 1.0)  # R^2 / nu [s]
 
     def waves(self, x, t):
         """(pressure [Pa], mass flow [kg/s]) at distances x and times t, one array each."""
@@ -110,8 +118,12 @@ class LineDeviation:
             if times[k] >= self.t0:
                 yield float(times[k]), self.rho * float(values[k] - values[k - 1])
 
+    def swelling(self, s):
+        """What liquid and wall take up with pressure over what they do at once."""
+        return 1.0
+
     def ratio(self, s):
-        """I0(x) / I2(x), x = R sqrt(s / nu)."""
+        """Inertia of the flow over that of a plug: I0(x) / I2(x), x = R sqrt(s / nu)."""
         from scipy.special import ive
 
         x = np.sqrt(s * self.scale)
@@ -142,24 +154,26 @@ class LineDeviation:
         node = np.concatenate([[1.0 + 0.0j], theta * (cot + 1j)]) * (0.4 * TALBOT)  # s tau
         weight = np.concatenate([[0.5 + 0.0j], 1.0 + 1j * (theta + (theta * cot - 1.0) * cot)]) * np.exp(node) * 0.4
         for s, w in zip(node, weight, strict=True):
-            ratio = self.ratio(s / tau)
+            inertia, swelling = self.ratio(s / tau), self.swelling(s / tau)
+            ratio = inertia * swelling
             root = np.sqrt(ratio)
             slow = np.exp(-(s / tau) * (d / self.a) * (ratio - 1.0) / (root + 1.0))  # without the pure delay
             m[here] += (w / s * slow).real
-            p[here] += (w / s * slow * root).real * (self.a / self.area)
+            p[here] += (w / s * slow * root / swelling).real * (self.a / self.area)
         return p, m
 
     # smooth: all at once -------------------------------------------------------------------------------------------
 
     def _smooth(self, x, t):
         s, input_, step = self._input()
-        root = np.sqrt(self.ratio(s))
+        swelling = self.swelling(s)
+        root = np.sqrt(self.ratio(s) * swelling)
         gamma, far = s / self.a * root, np.exp(-2.0 * s / self.a * root * self.length)
         p, m = np.empty(x.size), np.empty(x.size)
         for k, (place, age) in enumerate(zip(np.ravel(x), np.ravel(t) - self.t0, strict=True)):
             first, second = np.exp(-gamma * (self.length - place)), np.exp(-gamma * (self.length + place))
             turn = np.exp(s * age) * input_ / (1.0 + far)
-            p[k] = -(step / math.pi) * np.sum((turn * (first - second) * root).real) * self.a / self.area
+            p[k] = -(step / math.pi) * np.sum((turn * (first - second) * root / swelling).real) * self.a / self.area
             m[k] = (step / math.pi) * np.sum((turn * (first + second)).real)
         return p.reshape(x.shape), m.reshape(x.shape)
 

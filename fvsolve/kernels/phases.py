@@ -133,8 +133,15 @@ MEMBERS = {
     ),
     "scalars": Pieces(leave="scalars: clear_losses", observe="scalars: observe_scalars"),
     "carried": Pieces(leave="scalars: leave_pipes", carry="scalars: carry_in_pipes"),
+    "forces, linear": Pieces(observe="forces: observe_forces_linear"),
+    "forces, barotropic": Pieces(observe="forces: observe_forces_barotropic"),
+    "forces, cavitating": Pieces(observe="forces: observe_forces_cavitating"),
     "memory": Pieces(rates="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
+    "creep, barotropic": Pieces(rates="creep.barotropic: creep_walls_barotropic"),
+    "creep": Pieces(
+        rates="creep.wall: creep_walls", power="creep.energy: add_power", stored="creep.energy: add_stored",
+    ),
 }  # fmt: skip
 DELAYS = Pieces(
     offer="delay.lines: offer_lines", answer="delay.lines: answer_lines",
@@ -169,6 +176,7 @@ class Cast:
     bushings: bool = False
     rides: bool = False
     memory: bool = False
+    creep: bool = False
     devices: bool = False
     laws: tuple[str, ...] = ()
     basins: tuple[Pieces, ...] = ()
@@ -179,6 +187,7 @@ class Cast:
     alone: bool = False
     bands: bool = False
     together: bool = False
+    forces: bool = False
 
     def members(self) -> Iterator[Pieces]:
         """Of what it consists, in the order in which pieces of one phase run."""
@@ -225,6 +234,8 @@ class Cast:
             yield MEMBERS["devices"]
         if self.memory:
             yield MEMBERS["memory" if linear else "memory, barotropic"]
+        if self.creep:
+            yield MEMBERS["creep" if linear else "creep, barotropic"]
         yield from self.basins
         if self.scalars:  # which the flow carries that rates of waves now have
             yield MEMBERS["scalars"]
@@ -233,6 +244,8 @@ class Cast:
             if self.pipes:
                 yield MEMBERS["carried"]
         yield from self.carried
+        if self.forces:
+            yield MEMBERS[f"forces, {family}"]
         if self.pipes:
             yield MEMBERS["pipes"]
         yield ALWAYS

@@ -105,6 +105,12 @@ PIPE = np.dtype(  # what delay lines read comes first, in as few cache lines as 
         ("terms", "i8"),  # exponentials of its unsteady friction; 0 for none
         ("term", "i8"),  # offset in `floats` of pairs: drag per flow that is yet to follow [1/s], rate of following
         ("memory", "i8"),  # offset in y of the flows that follow, a row of cells for each term [kg/s]
+        ("elements", "i8"),  # Kelvin-Voigt elements of its wall; 0 for none
+        (
+            "element",
+            "i8",
+        ),  # offset in `floats` of pairs: what both waves lose per w yet to follow, rate [1/s]
+        ("strain", "i8"),  # offset in y of what follows w, the sum of both waves, a row of cells an element [kg/s]
         (
             "face",
             "i8",
@@ -433,6 +439,7 @@ LAYOUT = np.dtype(
         ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
         ("ride", "i8"),  # what drives stretches on bodies since the start [J/kg]
         ("rates", "i8"),  # in `work`: room for rates where `out` alone is asked for and hangs on them; else -1
+        ("forces", "i8"),  # in `work`: room for the rates that forces on pipes are read off; else -1
         ("tank", "i8"),  # of basins that ride on bodies, what their mass is along their normal
         ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
         ("travel", "i8"),  # of pushes, change of length since the start and its rate, of each [m, m/s]
@@ -475,6 +482,7 @@ GIVEN_FLOW = 18  # of a patch that a given velocity passes
 WALL_VALUE = 19  # of a wall that moves
 BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # `side` says which, see `mechanism.observe`
 SURFACE_VALUE = 24  # of water in modes
+PIPE_FORCE = 25  # on a whole pipe
 
 BASIN = np.dtype(
     [

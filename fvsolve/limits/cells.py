@@ -12,6 +12,7 @@ import numpy as np
 
 from fvsolve.kernels.friction import drag_slope
 from fvsolve.limits.symbol import symbol
+from fvsolve.model.creep import elements
 from fvsolve.schemes import SCHEMES
 
 PHASES = np.linspace(0.0, np.pi, 65)
@@ -49,12 +50,15 @@ def between_ends(weights: tuple, n: int) -> np.ndarray:
 
 
 def remembered(model) -> Modes:
-    """Unsteady friction: its quickest term, with the gain of all of them and the wall's friction."""
+    """Unsteady friction, and walls that creep: the quickest term, with the gain of all of them and the friction."""
     found, floats = [], model.tables.floats
     for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
         if row["terms"] > 0:
             gain, rate = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2).T
             found.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - slope(row)])))
+        if row["elements"] > 0:
+            gain, rate = elements(floats, row).T
+            found.append((f"{mesh.name}.creep", np.array([-rate.max() - gain.sum()])))
     return found
 
 

@@ -214,6 +214,7 @@ def layout_of(draft: Draft) -> np.ndarray:
     ):  # fmt: skip
         found[name], at = at, at + size
     found["size"] = at
+    found["forces"] = draft.to_work(draft.size) if (draft.probe_table["kind"] == rec.PIPE_FORCE).any() else -1
     found["rates"] = draft.to_work(draft.size) if draft.ride_table["heavy"].any() else -1
     return found
 

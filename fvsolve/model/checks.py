@@ -14,6 +14,8 @@ from fvsolve.case.basins import behind, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
+from fvsolve.parts.pipe.materials import materials
+from fvsolve.parts.pipe.wall import Wall, restraint_factor
 from fvsolve.steppers.automatic import first_method
 from fvsolve.steppers.methods import AUTO
 from fvsolve.steppers.tableau import method_named
@@ -42,7 +44,7 @@ def checks(model) -> dict[str, Any]:
         for name, row in zip(model.mass_names, model.tables.masses, strict=False)
     }
     bodies = {name: stands(pose) for name, pose in model.case.poses.items()}
-    pipes, remembered = {}, model.steady["unsteady"]
+    pipes, remembered, creeps = {}, model.steady["unsteady"], model.steady["creep"]
     for k, (mesh, row) in enumerate(zip(model.pipes, model.tables.pipes, strict=True)):
         velocity = row["flow"] / (rho * row["area"])
         dynamic = row["area"] * mesh.length / (mesh.diameter * row["area"]) * rho * velocity**2 / 2.0
@@ -57,6 +59,7 @@ def checks(model) -> dict[str, Any]:
             "from_head": nodes[mesh.from_]["head"], "to_head": nodes[mesh.to]["head"],
             **model.steady["lines"][mesh.name],
             **({"unsteady": remembered[mesh.name]} if mesh.name in remembered else {}),
+            **({"creep": creeps[mesh.name]} if mesh.name in creeps else {}), **wall_facts(link),
         }  # fmt: skip
     step, set_by = step_and_reason(model)
     numerics = model.case.numerics
@@ -74,6 +77,20 @@ def checks(model) -> dict[str, Any]:
         "moving": model.steady["moving"],
         "warnings": [one.plain() for one in (*model.warnings, *dear(model, steps, set_by))],
     }  # fmt: skip
+
+
+def wall_facts(link) -> dict[str, Any]:
+    """What a pipe's wall is and whose figures these are; nothing of one that says wall or wave_speed alone."""
+    found = {
+        key: one for key in ("material", "allowable_pressure", "source") if (one := getattr(link, key)) is not None
+    }
+    if link.material is not None:
+        known = vars(link.wall) | {"roughness": link.friction.roughness} if isinstance(link.wall, Wall) else {}
+        unread = materials()[link.material].unread
+        found["unread"] = [key for key in unread if key != "density" and known.get(key) is None]
+    if link.restraint is not None and isinstance(link.wall, Wall):
+        found["restraint_factor"] = restraint_factor(link.restraint, link.diameter, link.wall)
+    return found
 
 
 def stands(pose) -> dict[str, float]:
@@ -157,7 +174,8 @@ def step_and_reason(model) -> tuple[float | None, str]:
         return None, f"error control, rtol = {numerics.rtol:g}"
     if method_named(numerics.method).explicit:
         own = model.wave_rates * model.tables.pipes["quicker"]
-        own = np.maximum(own, [model.steady["unsteady"].get(pipe.name, {"rate": 0.0})["rate"] for pipe in model.pipes])
+        for found in (model.steady["unsteady"], model.steady["creep"]):
+            own = np.maximum(own, [found.get(pipe.name, {"rate": 0.0})["rate"] for pipe in model.pipes])
         rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE])
     else:  # waves alone: implicit steps cope with the rest
         own, rate = model.wave_rates, model.wave_rate

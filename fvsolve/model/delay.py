@@ -82,6 +82,8 @@ def what_needs_cells(case, link) -> str:
         return "scalars are carried in cells"
     if link.friction.model == "unsteady":
         return "unsteady friction remembers the flow of every cell"
+    if link.yielding:
+        return "its wall creeps in every cell"
     if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
         return "a body that it rides on drives its cells"
     return ""

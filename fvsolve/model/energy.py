@@ -10,6 +10,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
+from fvsolve.model.creep import elements
 from fvsolve.model.lowering import rows_in
 from fvsolve.model.scalars import bounds
 from fvsolve.model.statics import factored
@@ -79,10 +80,11 @@ class EnergyForm:
 def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
     """The energy of a deviation from the state y, that of the start if None.
 
-    A wave of r [kg/s] stores r^2 dx / (rho A), a flow that unsteady friction remembers (`kernels.unsteady`)
-    g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column M^2 L / (2 rho A), a mass m v^2 / 2,
-    bodies v' M v / 2, the spring of a joint k s^2 / 2, a spring and a stop in touch k (x_j - x_i)^2 / 2, a chamber of
-    a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0 its excess at y. Exact under `linear` about a profile at rest.
+    A wave of r [kg/s] stores r^2 dx / (rho A), what unsteady friction (`kernels.unsteady`) or a wall that creeps
+    (`kernels.creep`) remembers g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho), a rigid column
+    M^2 L / (2 rho A), a mass m v^2 / 2, bodies v' M v / 2, the spring of a joint k s^2 / 2, a spring and a stop in
+    touch k (x_j - x_i)^2 / 2, a chamber of a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0 its excess at y. Exact
+    under `linear` about a profile at rest.
     Devices store what their `squares` say, cells of basins what `basins.lower_energy` says. A scalar stores nothing; a
     deviation of its amount, over the greatest value that there can be, counts as 1e-6 of what so much mass would store,
     for nothing else hangs on it. Positions that nothing holds, one by one or together, store nothing: idle.
@@ -162,6 +164,9 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
         shares = memory_shares(tables.floats, row)
         kept = slice(row["memory"], row["memory"] + shares.size * row["cells"])
         found[kept] = 0.5 * row["dx"] / (rho * row["area"]) * np.repeat(shares, row["cells"])
+        for k, (gain, rate) in enumerate(elements(tables.floats, row)):
+            first = row["strain"] + k * row["cells"]
+            found[first : first + row["cells"]] = 0.5 * row["dx"] / (rho * row["area"]) * gain / rate
     for basin in model.basins:
         basin.own(found)[:] = basin.weights(basin.of(y))
         for q, amount in enumerate(basin.amounts(found) if basin.scalars else ()):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.riding_networks import unfelt
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import FvsolveError, listing
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import lowering_of, rows_in
 from fvsolve.model.slate import Slate
@@ -51,10 +51,10 @@ class Accounts:
         nodes = model.tables.nodes
         for row, (name, place) in zip(nodes, case.places.items(), strict=True):
             self.node(name, place, int(row["kind"]))
-        for pipe in model.pipes:
+        for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
             at = self.take(4)
             self.add("dissipated", pipe.name, "friction", at + 1)
-            self.add("dissipated", pipe.name, "jet", at + 2)
+            self.add("dissipated", pipe.name, "creep" if row["elements"] > 0 else "jet", at + 2)  # never both
             self.hold(pipe.name, "pipe", at + 3, 2)
             self.accounts.append(Account("scheme", pipe.name, "pipe", (at, at + 1, at + 2, at + 3), (1, -1, -1, -1)))
         self.valves()
@@ -198,7 +198,10 @@ class Accounts:
 
 
 def refuse_unfelt(case) -> None:
-    """FvsolveError where something rides whose energy is not booked."""
+    """FvsolveError where something rides, or a wall creeps, whose energy is not booked."""
+    creeping = [name for name, link in case.links.items() if getattr(link, "yielding", ())]
+    if creeping and not case.law.linear:
+        raise FvsolveError(f'the energy of walls that creep ({listing(creeping)}) is booked under law = "linear" alone')
     found = [f"{'.'.join(place)}: {text}" for place, text in unfelt(case.nodes, case.links)]
     if found:
         raise FvsolveError(f"the energy of this network that rides on a body is not booked; {'; '.join(found)}")

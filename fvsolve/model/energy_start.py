@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.creep import elements
 from fvsolve.model.lowering import rows_in
 from fvsolve.model.model import Model
 from fvsolve.model.unsteady import memory_shares
@@ -34,7 +35,7 @@ def available(model: Model) -> dict[str, float]:
         if above := device.above(model, part, row):
             found[name] = above
     for k, pipe in enumerate(model.pipes):
-        found[pipe.name] = pipe_above(model, k) + memory_above(model, k)
+        found[pipe.name] = pipe_above(model, k) + memory_above(model, k) + creep_above(model, k)
     for name, row in zip(model.column_names, tables.columns, strict=True):
         found[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
     for name, row in zip(model.mass_names, tables.masses, strict=False):
@@ -106,6 +107,17 @@ def memory_above(model: Model, k: int) -> float:
     if not model.case.law.linear:  # the velocity is remembered
         square = np.mean((full / model.tables.profile[row["center"] + np.arange(pipe.cells)]) ** 2)
     return float(0.5 * share * square * row["flow"] ** 2 * pipe.length / full)
+
+
+def creep_above(model: Model, k: int) -> float:
+    """What the wall of pipe k holds by creep at the start above that at P = 0 [J]."""
+    row = model.tables.pipes[k]
+    if row["elements"] == 0:
+        return 0.0
+    pairs, rest = elements(model.tables.floats, row), pipe_above(model, k)
+    area, rho, length = float(row["area"]), model.case.properties.density, model.pipes[k].length
+    moving = 0.5 * row["flow"] ** 2 * length / (rho * area)
+    return float(np.sum(pairs[:, 0] / pairs[:, 1])) * (rest - float(moving))
 
 
 def tank_above(model: Model, row) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import records as rec
+from fvsolve.model.creep import held_by_wall
 from fvsolve.model.past import without_past
 from fvsolve.model.scalars import node_values, pipe_values
 from fvsolve.model.slate import Slate
@@ -208,6 +209,11 @@ class Model(Shown):
         """Whether the friction of a pipe remembers the past of its flow."""
         return bool(self.tables.pipes["terms"].any())
 
+    @property
+    def creeps(self) -> bool:
+        """Whether the wall of a pipe gives way in time."""
+        return bool(self.tables.pipes["elements"].any())
+
     @cached_property
     def places(self) -> tuple:
         """Where its tables lie, as handles say it."""
@@ -229,8 +235,9 @@ class Model(Shown):
         alone = bool(self.basins) and not (self.pipes or valves or many.devices or any(there))
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
-        cast = Cast(self.case.law.family, cells, *there, self.unsteady, many.devices, tuple(self.laws),
-                    basins, carried, many.scalars, valves, many.delays, alone)  # fmt: skip
+        cast = Cast(self.case.law.family, cells, *there, self.unsteady, self.creeps, many.devices, tuple(self.laws),
+                    basins, carried, many.scalars, valves, many.delays, alone,
+                    forces=bool(self.layout["forces"] >= 0))  # fmt: skip
         return functions(cast)
 
     @property
@@ -407,6 +414,7 @@ class Model(Shown):
             initial += self.case.law.held_in_pipe(row, self.profiles[k], self.tables.profile)
             change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
             change += float(y[o]) if row["delay"] >= 0 else 0.0
+            change += held_by_wall(self.tables.floats, row, y)
         for row in self.tables.nodes:
             if row["y"] >= 0:
                 initial += float(row["mass"])

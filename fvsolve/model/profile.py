@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from fvsolve.model.creep import pace_creep
 from fvsolve.model.holding import find_shut, holding_pressures
 from fvsolve.model.probes import probe_offsets
 from fvsolve.model.start import Start
@@ -30,4 +31,5 @@ def start_profile(draft) -> dict[str, Any]:
     start.fill_valves()
     start.begin_devices()
     probe_offsets(draft, start)
-    return {**start.report(), "unsteady": add_terms(draft)}
+    remembered = add_terms(draft)
+    return {**start.report(), "unsteady": remembered, "creep": pace_creep(draft, remembered)}

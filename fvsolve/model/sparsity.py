@@ -65,6 +65,7 @@ class Couplings:
             yield from self.inside(pipe)
             yield from self.beyond(pipe)
             yield from self.remembered(pipe)
+            yield from self.crept(pipe)
         for basin in self.basins:
             yield pattern.inside(basin)
         yield from self.passing()
@@ -320,6 +321,20 @@ class Couplings:
                     yield wave + here, other + here + offset
                 for k in range(pipe["terms"]):
                     yield pipe["memory"] + k * n + here, wave + here + offset
+
+    def crept(self, pipe) -> Iterator[Pairs]:
+        """Walls that creep: waves and elements of a cell on each other, and on what its pressure is averaged by."""
+        n = int(pipe["cells"])
+        cells, waves = np.arange(n), (pipe["y"], pipe["y"] + n)
+        strains = [pipe["strain"] + k * n for k in range(pipe["elements"])]
+        for offset in [0] if self.linear else [-1, 0, 1]:
+            here = cells[(cells + offset >= 0) & (cells + offset < n)]
+            for one in (*waves, *strains) if strains else ():
+                for other in waves:
+                    yield one + here, other + here + offset
+        for wave in waves:
+            for strain in strains:
+                yield wave + cells, strain + cells
 
     def sides(self, pipe, right: int) -> tuple[np.ndarray, np.ndarray]:
         """(cells of the wave that enters by an end, cells of the one that leaves), nearest first."""

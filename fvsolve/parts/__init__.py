@@ -19,7 +19,8 @@ from fvsolve.parts.mass.part import Mass
 from fvsolve.parts.node import Node
 from fvsolve.parts.orifice.part import Orifice
 from fvsolve.parts.outside import declare_offered
-from fvsolve.parts.pipe.part import Pipe, Wall
+from fvsolve.parts.pipe.part import Pipe
+from fvsolve.parts.pipe.wall import Wall
 from fvsolve.parts.reservoir.part import Reservoir
 from fvsolve.parts.rigid_column.part import RigidColumn
 from fvsolve.parts.scalar import Scalar

@@ -23,6 +23,7 @@ class Link(Table):
     kind: ClassVar[str] = ""
     kinds: ClassVar[dict[str, type[Link]]] = {}
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
+    asked: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only where they are asked for
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> domain of the place it wants
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing

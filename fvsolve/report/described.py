@@ -10,7 +10,7 @@ from fvsolve.output.column import column
 from fvsolve.parts.table import Table as Keys
 from fvsolve.parts.table import plain
 from fvsolve.parts.value import Quantity
-from fvsolve.report.tables import Table, worded
+from fvsolve.report.tables import ReportTable, worded
 from fvsolve.units import DIMENSIONS, UNITS
 
 ELSEWHERE = "in case.toml and in the workbook (--xlsx)"
@@ -23,7 +23,7 @@ FLUID = (
 SILENT = ("position", "elevation", "type", "from", "to", "ports", "scalars")  # keys that stand elsewhere, or draw
 
 
-def fluid(result) -> Table:
+def fluid(result) -> ReportTable:
     """The liquid at its reference state, and where its numbers are from."""
     case, said = result.case, result.summary["fluid"]
     rows = []
@@ -35,10 +35,10 @@ def fluid(result) -> Table:
     gravity = column("", "acceleration", case)
     rows.append(["gravity", worded(float(gravity.from_si(case.gravity))), gravity.unit])
     rows += [["density law", case.fluid.law, ""], ["source", said["source"], ""]]
-    return Table(f"Fluid: {said['name']}", ("", "", ""), rows)
+    return ReportTable(f"Fluid: {said['name']}", ("", "", ""), rows)
 
 
-def pipes(result) -> Table | None:
+def pipes(result) -> ReportTable | None:
     """Every pipe: its ends, sizes, wave speed, friction and cells."""
     case = result.case
     found = {name: link for name, link in case.links.items() if link.kind == "pipe"}
@@ -60,14 +60,14 @@ def pipes(result) -> Table | None:
     heads = [*["elevation at from", "at to"] * stated, *["points of profile"] * profiled]
     heads = ("pipe", "from", "to", "length", "diameter", "wave speed", *heads, "friction", "cells")
     units = ("", "", "", length.unit, length.unit, speed.unit, *[height.unit] * (2 * stated))
-    return Table("Pipes", heads, rows, units, more=ELSEWHERE)
+    return ReportTable("Pipes", heads, rows, units, more=ELSEWHERE)
 
 
 def _friction(link, case) -> str:
     return _said(type(link).values()["friction"], plain(link.friction), case).removeprefix("(model ").removesuffix(")")
 
 
-def parts(result) -> Table:
+def parts(result) -> ReportTable:
     """Every other part: its kind, what it joins, and its keys."""
     case, rows = result.case, []
     height, stated = column("", "head", case), case.elevations_stated
@@ -79,7 +79,7 @@ def parts(result) -> Table:
         lies = [None if lies is None else float(height.from_si(lies))] if stated else []
         rows.append([name, part.kind, joins, *lies, keys(part, case)])
     heads = ("part", "kind", "joins", *["elevation"] * stated, "as understood")
-    return Table("Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=ELSEWHERE)
+    return ReportTable("Other parts", heads, rows, ("", "", "", *[height.unit] * stated, ""), more=ELSEWHERE)
 
 
 def keys(part: Keys, case) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from fvsolve.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.errors import visible
-from fvsolve.report.histories import Panel
+from fvsolve.report.histories import HistoryPanel
 from fvsolve.report.motion import Motion
 from fvsolve.report.section import Section
 
@@ -63,7 +63,30 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str, b
     return made
 
 
-def history_figure(panel: Panel, time_unit: str, doubt: float | None) -> dict[str, Any]:
+def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> dict[str, Any]:
+    """The same section of several runs: pipe, vapour line and limits once, heads of each by its colour."""
+    first = max((one for _, one in several), key=lambda one: len(one.devices))
+    k = first.picked()
+    x = numbers(first.chainage[k], "f4")
+    data = [_line("pipe", x, numbers(first.along["elevation"][k], "f4"), MUTED, width=3.5)]
+    for name, line in first.lines.items():
+        data.append(_line(name, x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
+    for n, (name, one) in enumerate(several):
+        colour, k = COLOURS[n % len(COLOURS)], one.picked()
+        x, group = numbers(one.chainage[k], "f4"), {"legendgroup": f"run {n}"}
+        high, low = (numbers(one.along[key][k], "f4") for key in ("greatest_head", "least_head"))
+        data.append(_line(name or "the case", x, high, colour, width=2, **group))
+        data.append(_line("", x, low, colour, width=2, dash="dash", showlegend=False, **group))
+    names = _names(first)
+    above = 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
+    layout = _layout(f"head [{unit}]", f"chainage [{along}]", 440)
+    layout |= {"annotations": names, "shapes": [_post(device.chainage) for device in first.devices],
+               "margin": {"l": 62, "r": 14, "t": above, "b": 50}}  # fmt: skip
+    layout["xaxis"]["range"] = [first.way.begin, first.way.end]
+    return {"data": data, "layout": layout}
+
+
+def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
     """Series of one quantity; from `doubt` on the ground is shaded."""
     data, names = [], [line.name for line in panel.lines if not line.measured]
     for line in panel.lines:
@@ -145,7 +168,7 @@ def _cut(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}\u2026"
 
 
-def _still(panel: Panel) -> dict[str, Any]:
+def _still(panel: HistoryPanel) -> dict[str, Any]:
     """A range for series at rest, whose round-off would else be magnified."""
     values = np.concatenate([line.values for line in panel.lines if line.seen] or [np.zeros(0)])
     values = values[np.isfinite(values)]

@@ -13,7 +13,7 @@ MOST = 48  # probes of a report; more stand in history.csv
 NUMBERS = 40_000  # of all series of a report together
 
 
-class Line(NamedTuple):
+class Series(NamedTuple):
     """A series: what it is of, times and values as they stand in history.csv, and whether it is seen at once."""
 
     name: str
@@ -23,15 +23,15 @@ class Line(NamedTuple):
     measured: bool = False
 
 
-class Panel(NamedTuple):
+class HistoryPanel(NamedTuple):
     """Series of one quantity and unit."""
 
     quantity: str
     unit: str
-    lines: list[Line]
+    lines: list[Series]
 
 
-def panels(result) -> list[Panel]:
+def panels(result) -> list[HistoryPanel]:
     """The histories of a run, in the order of its probes; of a panel of many the liveliest are seen."""
     groups: dict[tuple[str, str], list[str]] = {}
     for name in chosen(result):
@@ -41,10 +41,10 @@ def panels(result) -> list[Panel]:
     found = []
     for (what, unit), names in groups.items():
         seen = names if len(names) <= LINES else _liveliest(result, names)
-        lines = [Line(name, *thinned(result.t, result[name], points), name in seen) for name in names]
-        lines += [Line(name, *thinned(*measured[name], points), name in seen, True) for name in names
+        lines = [Series(name, *thinned(result.t, result[name], points), name in seen) for name in names]
+        lines += [Series(name, *thinned(*measured[name], points), name in seen, True) for name in names
                   if name in measured]  # fmt: skip
-        found.append(Panel(what, unit, lines))
+        found.append(HistoryPanel(what, unit, lines))
     return found
 
 

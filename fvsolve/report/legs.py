@@ -15,7 +15,7 @@ from fvsolve.case.routes import legs as legs_of
 MOST = 6  # sections of a run, unless it has more routes
 
 
-class Way(NamedTuple):
+class SectionWay(NamedTuple):
     """A section: its name, its legs in order, and the places where they meet with their chainages [m]."""
 
     name: str
@@ -38,10 +38,11 @@ class Way(NamedTuple):
         return self.end - self.begin
 
 
-def ways(result) -> list[Way]:
+def ways(result) -> list[SectionWay]:
     """The sections of a run, its routes first, then the longest; none of a case without pipes."""
     links = result.case.links
     found = [_way(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
+    found = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(found)}.values())[::-1]  # each but once
     strung = {leg.pipe for way in found for leg in way.legs}
     one = joined({name: link for name, link in links.items() if _in_line(link, result.case)})
     free = [name for name in result.envelope if name in links and name not in strung]
@@ -61,7 +62,7 @@ def _in_line(link, case) -> bool:
     return all(getattr(case.nodes.get(place), "kind", "") == "junction" for place in link.ports.values())
 
 
-def _chained(chain: list[tuple[str, bool, float]], result) -> Way:
+def _chained(chain: list[tuple[str, bool, float]], result) -> SectionWay:
     """A chain with its chainages, turned so that the head falls along it at the start."""
     first, last = chain[0], chain[-1]
     begins = _start_head(result, first[0], last=first[1])
@@ -80,13 +81,13 @@ def _chained(chain: list[tuple[str, bool, float]], result) -> Way:
     return way._replace(name=name)
 
 
-def _way(name: str, legs: list[Leg], links: dict) -> Way:
+def _way(name: str, legs: list[Leg], links: dict) -> SectionWay:
     """A section with the places where its pipes begin and end; what stands between two of them has both."""
     places = []
     for leg in legs:
         ends = (links[leg.pipe].from_, leg.chainage(0.0)), (links[leg.pipe].to, leg.chainage(links[leg.pipe].length))
         places += ends[::-1] if leg.backwards else ends
-    return Way(name, legs, list(dict.fromkeys((place, float(at)) for place, at in places)))
+    return SectionWay(name, legs, list(dict.fromkeys((place, float(at)) for place, at in places)))
 
 
 def _start_head(result, pipe: str, last: bool) -> float:

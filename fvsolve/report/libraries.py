@@ -1,4 +1,4 @@
-"""The only door to Jinja2, Plotly and XlsxWriter: the extra `report`. Knows what to install where one is missing."""
+"""The only door to Jinja2, Plotly, XlsxWriter and rainflow, the extra `report`; says what to install."""
 
 from __future__ import annotations
 

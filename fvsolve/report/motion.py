@@ -12,7 +12,7 @@ from fvsolve.case.case import default_cells
 from fvsolve.errors import RunError
 from fvsolve.output.fields import read_pipes, read_series
 from fvsolve.report.heads import in_units
-from fvsolve.report.legs import Way
+from fvsolve.report.legs import SectionWay
 
 POINTS = 240  # of a moving line at most
 NUMBERS = 45_000  # of all moving lines of a report at most: frames give way
@@ -26,7 +26,7 @@ class Motion(NamedTuple):
     heads: np.ndarray
 
 
-def motions(result, ways: Iterable[Way]) -> list[Motion]:
+def motions(result, ways: Iterable[SectionWay]) -> list[Motion]:
     """The moving lines of sections, none where no frames were stored; RunError where one cannot be read."""
     ways, frames = list(ways), _frames(result)
     if not frames or not ways:
@@ -51,7 +51,7 @@ def _frames(result) -> list[tuple[float, Path]]:
     return [(t, path) for t, path in read_series(listed) if path.stem.isdecimal()]
 
 
-def _spots(result, way: Way, counts: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
+def _spots(result, way: SectionWay, counts: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
     """Chainages of cells of a way, some evenly picked of many, and their numbers in a frame.
 
     counts : cells of all pipes, in the order of a frame

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from fvsolve.output.column import column
-from fvsolve.report.tables import Table, worded
+from fvsolve.report.tables import ReportTable, worded
 
 UNITS = {"mass": "kg", "energy": "J"}  # of ledgers; others are in the unit of their scalar
 TERMS = ("initial", "inflow", "outflow", "spilled", "made_up", "final")
 
 
-def settings(result) -> Table:
+def settings(result) -> ReportTable:
     """Scheme, method, step and what the run took."""
     said, numerics = result.summary, result.case.numerics
     steps = {"courant": "Courant number", "step": "given, s", "rtol": "by error, rtol"}
@@ -26,10 +26,10 @@ def settings(result) -> Table:
              ["seconds of stepping", said["seconds"]]]  # fmt: skip
     if "resolution" in said:
         rows.append(["errors of peaks (\u00b1)", said["resolution"]["words"]])
-    return Table("Method", ("", ""), [[key, worded(value)] for key, value in rows])
+    return ReportTable("Method", ("", ""), [[key, worded(value)] for key, value in rows])
 
 
-def ledgers(result) -> Table | None:
+def ledgers(result) -> ReportTable | None:
     """What came in, went out and is stored, and what does not add up."""
     found = {name: one for name, one in result.summary["ledgers"].items() if "remainder" in one}
     if not found:
@@ -38,38 +38,38 @@ def ledgers(result) -> Table | None:
     rows = [[name, UNITS.get(name, ""), *(one.get(term) for term in terms), f"{one['remainder']:.2e}",
              f"{one['relative']:.1e}" if "relative" in one else None] for name, one in found.items()]  # fmt: skip
     heads = ("ledger", "unit", *(term.replace("_", " ") for term in terms), "remainder", "of the largest term")
-    return Table("Ledgers", heads, rows)
+    return ReportTable("Ledgers", heads, rows)
 
 
-def versions(result) -> Table:
+def versions(result) -> ReportTable:
     """What made the numbers: versions, the case's hash, when."""
     rows = [["run ended", result.summary.get("ended", "not recorded")]]
     words = {"case": "hash of the case", "sources": "hash of compiled sources", "fluid": "fluid properties",
              "target": "machine"}  # fmt: skip
     rows += [[words.get(key, key), one] for key, one in result.summary["versions"].items()]
-    return Table("", ("", ""), rows)
+    return ReportTable("", ("", ""), rows)
 
 
-def events(result) -> Table | None:
+def events(result) -> ReportTable | None:
     """What parts did by themselves."""
     rows = [[one["time"], one["name"], one["what"]] for one in result.summary["events"]]
-    return Table("Events", ("time", "part", "what"), rows, ("s",), more="in summary.json") if rows else None
+    return ReportTable("Events", ("time", "part", "what"), rows, ("s",), more="in summary.json") if rows else None
 
 
-def cavities(result) -> Table | None:
+def cavities(result) -> ReportTable | None:
     """Where liquid parted, and how much of it."""
     rows = [[one["place"].removeprefix("links."), one["distance"], one["time"], one["volume"], one["t_volume"]]
             for one in result.summary["cavities"]]  # fmt: skip
     heads = ("pipe", "first at", "time", "greatest volume", "time")
-    return Table("Cavities", heads, rows, ("", "m", "s", "m3", "s")) if rows else None
+    return ReportTable("Cavities", heads, rows, ("", "m", "s", "m3", "s")) if rows else None
 
 
-def comparisons(result) -> Table | None:
+def comparisons(result) -> ReportTable | None:
     """Measured series beside their probes."""
     rows = [[one.probe, one.file, one.unit, one.rms, one.greatest_difference, one.measured_peak, one.computed_peak]
             for one in result.comparisons]  # fmt: skip
     heads = ("probe", "measured", "unit", "rms", "greatest difference", "peak measured", "computed")
-    return Table("Against measurements", heads, rows, loose=frozenset({3, 4, 5, 6})) if rows else None
+    return ReportTable("Against measurements", heads, rows, loose=frozenset({3, 4, 5, 6})) if rows else None
 
 
 def _scheme(numerics) -> str:

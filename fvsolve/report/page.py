@@ -12,18 +12,18 @@ from fvsolve.report import described, numerics, trust, worst
 from fvsolve.report.figures import history_figure, section_figure
 from fvsolve.report.heads import in_units
 from fvsolve.report.histories import chosen, panels
-from fvsolve.report.legs import Way
+from fvsolve.report.legs import SectionWay
 from fvsolve.report.libraries import charts, template
 from fvsolve.report.motion import motions
 from fvsolve.report.section import BINS, Section, section
-from fvsolve.report.tables import Table, worded
+from fvsolve.report.tables import ReportTable, worded
 
 HERE = Path(__file__).parent
 SHARED = 900  # bins of all sections together
 WARNINGS = 40  # on the page; all are in summary.json
 
 
-def page(result, ways: list[Way]) -> str:
+def page(result, ways: list[SectionWay]) -> str:
     """The report of a run as HTML."""
     sections = [section(result, way) for way in ways]
     figures: dict[str, Any] = {}
@@ -43,8 +43,14 @@ def page(result, ways: list[Way]) -> str:
                                                                                      numerics.events(result)]),
         "versions": numerics.versions(result),
     }  # fmt: skip
-    texts = {name: (HERE / f"page.{name}").read_text(encoding="utf-8") for name in ("css", "js", "html.j2")}
-    return template(texts["html.j2"]).render(
+    return rendered("page", filled, figures)
+
+
+def rendered(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> str:
+    """A page filled in, with its style, its script, the charting library and the figures within it."""
+    files = {"table": "table.html.j2", "page": f"{name}.html.j2", "css": "page.css", "js": "page.js"}
+    texts = {key: (HERE / file).read_text(encoding="utf-8") for key, file in files.items()}
+    return template(texts["table"] + texts["page"]).render(
         filled, css=texts["css"], script=texts["js"], library=charts(), figures=embedded(figures)
     )
 
@@ -84,7 +90,7 @@ def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
     return told
 
 
-def _there(tables: list[Table | None]) -> list[Table]:
+def _there(tables: list[ReportTable | None]) -> list[ReportTable]:
     return [one for one in tables if one is not None and one.rows]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from fvsolve.draw.plot import history_figure
 from fvsolve.draw.section import phase_figure, section_figure
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.report.legs import Way, ways
+from fvsolve.report.legs import SectionWay, ways
 from fvsolve.report.report import opened
 from fvsolve.report.section import section
 from fvsolve.shown import kept
@@ -76,7 +76,7 @@ def _none(result, name: str) -> str:
     return f"no probe {show(name)} was recorded{near}"
 
 
-def _sections(found: list[Way], route: str, others: bool, faults: list[str]) -> list[Way]:
+def _sections(found: list[SectionWay], route: str, others: bool, faults: list[str]) -> list[SectionWay]:
     """The sections that are to be drawn."""
     if not route:
         return [] if others else found
@@ -88,7 +88,7 @@ def _sections(found: list[Way], route: str, others: bool, faults: list[str]) -> 
     return named
 
 
-def _section_figure(result, way: Way):
+def _section_figure(result, way: SectionWay):
     one = section(result, way)
     k, title = one.picked(), "\n".join(filter(None, [result.summary["title"], way.name]))
     return section_figure(

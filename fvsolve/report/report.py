@@ -10,13 +10,15 @@ from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.envelope import QUANTITIES
 from fvsolve.report.heads import in_units
 from fvsolve.run import open_run
+from fvsolve.studies.design import STUDY
 
 PAGE = "report.html"
 ASKED = ("fluid", "cells", "methods", "steps", "rejections", "rhs", "seconds", "events", "cavities")
 
 
 def write_report(directory: str | Path, out: str | Path | None = None, xlsx: bool = False) -> list[Path]:
-    """Write the page of a run directory, RUN/report.html by default, and with `xlsx` its tables beside it; their paths.
+    """Write the page of a run directory, or of a study's, report.html there by default, and with `xlsx` its tables
+    beside it; their paths.
 
     Raises RunError where the directory holds no run that ended, FvsolveError where a library is missing or a file
     cannot be written.
@@ -29,14 +31,33 @@ def write_report(directory: str | Path, out: str | Path | None = None, xlsx: boo
     for name in ("jinja2", "plotly", *["xlsxwriter"] * xlsx):
         library(name)
     path = Path(out) if out is not None else Path(directory) / PAGE
+    if (Path(directory) / STUDY).is_file():
+        return _write_study(Path(directory), path, xlsx)
     result = opened(Path(directory))
     found = ways(result)
-    text = page(result, found)
+    written(path, page(result, found))
+    return [path, write_workbook(result, found, path.with_suffix(".xlsx"))] if xlsx else [path]
+
+
+def written(path: Path, text: str) -> None:
+    """Write a page; FvsolveError where that cannot be."""
     try:
         path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise FvsolveError(f"{path}: cannot be written: {error.strerror or error}; name another with --out") from None
-    return [path, write_workbook(result, found, path.with_suffix(".xlsx"))] if xlsx else [path]
+
+
+def _write_study(directory: Path, path: Path, xlsx: bool) -> list[Path]:
+    """The page of a study, and the workbook of its tables."""
+    from fvsolve.report.study import failing, matrix, study_page
+    from fvsolve.report.workbook import write_tables
+    from fvsolve.studies.design import open_study
+
+    said = open_study(directory)
+    runs = [(row, opened(Path(row["directory"]))) for row in said["runs"]]
+    written(path, study_page(said, runs))
+    tables = [one for one in (matrix(runs), failing(runs)) if one is not None]
+    return [path, write_tables(tables, path.with_suffix(".xlsx"))] if xlsx else [path]
 
 
 def opened(directory: Path):

@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.output.routes import strung
 from fvsolve.report.heads import head_of, in_units
-from fvsolve.report.legs import Way
+from fvsolve.report.legs import SectionWay
 from fvsolve.report.limits import limit_lines
 
 ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
@@ -19,7 +19,7 @@ APART = 0.035  # of the length: names nearer to each other than this would cover
 BINS = 150  # of a long line at most: of each the greatest and the least head and elevation stand, and where
 
 
-class Device(NamedTuple):
+class Standing(NamedTuple):
     """What stands at a place of a section."""
 
     chainage: float
@@ -36,14 +36,14 @@ class Section:
     vapour pressure was reached; beyond : (chainage, head, name) of what passes a limit
     """
 
-    way: Way
+    way: SectionWay
     chainage: np.ndarray
     pipe: np.ndarray
     along: dict[str, np.ndarray]
     lines: dict[str, np.ndarray]
     parted: list[tuple[float, float]]
     beyond: list[tuple[float, float, str]]
-    devices: list[Device]
+    devices: list[Standing]
 
     def picked(self, bins: int = BINS) -> np.ndarray:
         """Numbers of the points to be drawn: all, or of a long line the extremes of each bin."""
@@ -79,7 +79,7 @@ class Section:
         return [(chainage, ", ".join(names), stands) for chainage, names, stands in shown]
 
 
-def section(result, way: Way) -> Section:
+def section(result, way: SectionWay) -> Section:
     """The section of a way through a run."""
     distances = in_units(result, "distance")
     strung_up = strung(result.envelope, way.legs, distances)
@@ -100,7 +100,7 @@ def boiling(result) -> float | None:
     return None if boils is None else boils * (2.0 if result.case.law.cavitates else 1.0)
 
 
-def _parted(result, least: np.ndarray, chainage: np.ndarray, way: Way) -> list[tuple[float, float]]:
+def _parted(result, least: np.ndarray, chainage: np.ndarray, way: SectionWay) -> list[tuple[float, float]]:
     """Spans of chainage [m] about places whose pressure fell to that of vapour."""
     limit = boiling(result)
     if limit is None:
@@ -111,7 +111,7 @@ def _parted(result, least: np.ndarray, chainage: np.ndarray, way: Way) -> list[t
     return [(float(middles[a]), float(middles[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _beyond(result, way: Way, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
+def _beyond(result, way: SectionWay, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
     """Places of a way where a limit on pressure or head is passed: chainage [m], head there, name of the limit."""
     found = []
     for one in result.summary["verdicts"]:
@@ -129,7 +129,7 @@ def _beyond(result, way: Way, chainage: np.ndarray, along: dict) -> list[tuple[f
     return found
 
 
-def _devices(result, way: Way) -> list[Device]:
+def _devices(result, way: SectionWay) -> list[Standing]:
     """What stands at the places of a way: nodes that are more than joints, and links that are no pipes."""
     case, found = result.case, []
     for place, chainage in way.places:
@@ -138,5 +138,5 @@ def _devices(result, way: Way) -> list[Device]:
         parts = [] if kind in ("junction", "") else [f"{place} ({kind})"]
         parts += [f"{name} ({link.kind})" for name, link in case.links.items()
                   if link.kind != "pipe" and place in link.ports.values()]  # fmt: skip
-        found.append(Device(chainage, place, tuple(parts)))
+        found.append(Standing(chainage, place, tuple(parts)))
     return found

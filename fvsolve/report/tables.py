@@ -18,7 +18,7 @@ NARROW, FIGURE, POINT = "\u202f", "\u2007", "\u2008"  # spaces between thousands
 
 
 @dataclass(frozen=True)
-class Table:
+class ReportTable:
     """Rows of words, numbers, truths and None under headers.
 
     units : of each column, "" of words and pure numbers; bad : numbers of the rows that stand out

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fvsolve.output.column import column
-from fvsolve.report.tables import ERROR, Table, worded
+from fvsolve.report.tables import ERROR, ReportTable, worded
 
 HOLDS, FAILS, OPEN = "holds", "FAILS", "open"
 BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
@@ -82,7 +82,7 @@ def state(one) -> str:
     return HOLDS if one.ok else FAILS if one.margin < 0.0 else OPEN
 
 
-def verdicts(result) -> Table | None:
+def verdicts(result) -> ReportTable | None:
     """The table of verdicts, those that fail first; None where no limits were stated."""
     order = (FAILS, OPEN, HOLDS)
     found = sorted(result.verdicts, key=lambda one: order.index(state(one)))
@@ -97,10 +97,10 @@ def verdicts(result) -> Table | None:
     heads += ("chainage", "elevation", "time")
     bad = frozenset(k for k, one in enumerate(found) if state(one) == FAILS)
     units = ("",) * (7 + asked) + (length.unit, height.unit, time.unit)
-    return Table("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * asked})) if rows else None
+    return ReportTable("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * asked})) if rows else None
 
 
-def worst(result) -> list[Table]:
+def worst(result) -> list[ReportTable]:
     """Of each limit that more than one part has, its worst places."""
     length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
     made = []
@@ -110,17 +110,17 @@ def worst(result) -> list[Table]:
         bad = frozenset(k for k, row in enumerate(rows) if row[-1] is None or row[-1] < 0.0)
         units = ("", length.unit, height.unit, time.unit, one.unit, one.unit, one.unit)
         heads = ("place", "chainage", "elevation", "time", one.quantity.replace("_", " "), BOUNDS[one.bound], "margin")
-        made += [Table(f"Limit {one.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
+        made += [ReportTable(f"Limit {one.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
     return made
 
 
-def claims(result) -> Table | None:
+def claims(result) -> ReportTable | None:
     """What the case claims of its own results."""
     rows = [[one.text, one.claimed, one.found, one.tolerance, one.unit, "holds" if one.ok else "FAILS"]
             for one in result.expectations]  # fmt: skip
     bad = frozenset(k for k, one in enumerate(result.expectations) if not one.ok)
     heads = ("claim", "claimed", "found", "tolerance", "unit", "verdict")
-    return Table("What the case claims", heads, rows, bad=bad, loose=frozenset({1, 2, 3})) if rows else None
+    return ReportTable("What the case claims", heads, rows, bad=bad, loose=frozenset({1, 2, 3})) if rows else None
 
 
 def claim(one) -> str:

@@ -8,10 +8,10 @@ from pathlib import Path
 from fvsolve.errors import FvsolveError, visible
 from fvsolve.report import described, numerics, trust, worst
 from fvsolve.report.heads import in_units
-from fvsolve.report.legs import Way
+from fvsolve.report.legs import SectionWay
 from fvsolve.report.libraries import workbook
 from fvsolve.report.section import Section, section
-from fvsolve.report.tables import Table, is_number
+from fvsolve.report.tables import ReportTable, is_number
 
 WIDEST = 60  # letters of a column as it opens
 NAME = 31  # letters of a sheet's name, and these not among them:
@@ -22,12 +22,17 @@ ALONG = {"elevation": "elevation", "initial_head": "initial head", "least_head":
          "t_greatest": "time of the greatest"}  # fmt: skip
 
 
-def write_workbook(result, ways: list[Way], path: Path) -> Path:
+def write_workbook(result, ways: list[SectionWay], path: Path) -> Path:
     """Write the tables of a run, one sheet each; its path. FvsolveError where it cannot be written."""
+    return write_tables(tables(result, ways), path)
+
+
+def write_tables(found: list[ReportTable], path: Path) -> Path:
+    """Write tables, one sheet each; the path. FvsolveError where it cannot be written."""
     book = workbook(str(path))
     bold = book.add_format({"bold": True, "text_wrap": True, "valign": "bottom"})
     taken: set[str] = set()
-    for table in tables(result, ways):
+    for table in found:
         _sheet(book, table, _named(table.title, taken), bold)
     try:
         book.close()
@@ -36,10 +41,12 @@ def write_workbook(result, ways: list[Way], path: Path) -> Path:
     return path
 
 
-def tables(result, ways: list[Way]) -> list[Table]:
+def tables(result, ways: list[SectionWay]) -> list[ReportTable]:
     """All tables of a run, sections with every cell."""
-    words = Table("Summary", ("", ""), [[one.head, one.text] for one in trust.words(result)])
-    notes = Table("Warnings", ("kind", "place", "text"), [[one.kind, one.place, one.text] for one in result.warnings])
+    words = ReportTable("Summary", ("", ""), [[one.head, one.text] for one in trust.words(result)])
+    notes = ReportTable(
+        "Warnings", ("kind", "place", "text"), [[one.kind, one.place, one.text] for one in result.warnings]
+    )
     versions = numerics.versions(result)
     found = [
         words, trust.verdicts(result), *trust.worst(result),
@@ -47,22 +54,22 @@ def tables(result, ways: list[Way]) -> list[Table]:
         *(_along(result, section(result, way)) for way in ways), numerics.cavities(result), numerics.events(result),
         described.fluid(result), described.pipes(result), described.parts(result), numerics.settings(result),
         numerics.ledgers(result), trust.claims(result), numerics.comparisons(result), notes,
-        Table("Versions", versions.headers, versions.rows),
+        ReportTable("Versions", versions.headers, versions.rows),
     ]  # fmt: skip
     return [one for one in found if one is not None and one.rows]
 
 
-def _along(result, one: Section) -> Table:
+def _along(result, one: Section) -> ReportTable:
     """A long section, a row a cell."""
     head = in_units(result, "least_head").unit
     columns = [one.chainage, one.pipe, *(one.along[name] for name in ALONG), *one.lines.values()]
     heads = ["chainage", "pipe", *ALONG.values(), *one.lines]
     units = [in_units(result, "distance").unit, "", *(in_units(result, name).unit for name in ALONG)]
     rows = [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]
-    return Table(f"Section {one.way.name}", heads, rows, [*units, *[head] * len(one.lines)])
+    return ReportTable(f"Section {one.way.name}", heads, rows, [*units, *[head] * len(one.lines)])
 
 
-def _sheet(book, table: Table, name: str, bold) -> None:
+def _sheet(book, table: ReportTable, name: str, bold) -> None:
     sheet = book.add_worksheet(name)
     heads = [f"{head} [{unit}]" if unit else head for head, unit in table.heads]
     for k, head in enumerate(heads):

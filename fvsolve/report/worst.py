@@ -6,8 +6,8 @@ import numpy as np
 
 from fvsolve.case.routes import Leg
 from fvsolve.report.heads import in_units
-from fvsolve.report.legs import Way
-from fvsolve.report.tables import ERROR, Table
+from fvsolve.report.legs import SectionWay
+from fvsolve.report.tables import ERROR, ReportTable
 
 FIRST = 10  # rows of a ranking on the page
 EXTREMES = (  # quantity, its words, which end of it, when
@@ -18,7 +18,7 @@ EXTREMES = (  # quantity, its words, which end of it, when
 )
 
 
-def of_all(result, ways: list[Way]) -> Table | None:
+def of_all(result, ways: list[SectionWay]) -> ReportTable | None:
     """The worst of all pipes: each extreme, its pipe, where along it, chainage of the one section, elevation, time."""
     envelope = result.envelope
     if not envelope:
@@ -37,17 +37,17 @@ def of_all(result, ways: list[Way]) -> Table | None:
                      *chainage, float(arrays["elevation"][k]), float(arrays[when][k])])  # fmt: skip
     units = [in_units(result, one).unit for one in ("distance", *["distance"] * bool(legs), "elevation", "t_greatest")]
     heads = ("", "value", "unit", "pipe", "from its start", *["chainage"] * bool(legs), "elevation", "time")
-    return Table("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), loose=frozenset({1}))
+    return ReportTable("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), loose=frozenset({1}))
 
 
-def by_pipe(result) -> list[Table]:
+def by_pipe(result) -> list[ReportTable]:
     """Pipes by their greatest and by their least pressure, the worst first; none where there is but one pipe."""
     if len(result.envelope) < 2:
         return []
     return [_ranked(result, name, words, most, when) for name, words, most, when in EXTREMES[:2]]
 
 
-def _ranked(result, name: str, words: str, most, when: str) -> Table:
+def _ranked(result, name: str, words: str, most, when: str) -> ReportTable:
     rows = []
     for pipe, arrays in result.envelope.items():
         k = int(most(arrays[name]))
@@ -55,11 +55,11 @@ def _ranked(result, name: str, words: str, most, when: str) -> Table:
     rows.sort(key=lambda row: row[1], reverse=most is np.argmax)
     units = ["", *(in_units(result, one).unit for one in (name, "distance", "elevation", when))]
     heads = ("pipe", words, "from its start", "elevation", "time")
-    return Table(f"{words.capitalize()} by pipe", heads, rows, units, most=FIRST,
+    return ReportTable(f"{words.capitalize()} by pipe", heads, rows, units, most=FIRST,
                  more="in envelope.csv and in the workbook (--xlsx)")  # fmt: skip
 
 
-def of_probes(result) -> Table | None:
+def of_probes(result) -> ReportTable | None:
     """Least and greatest of each probe over all accepted steps, and when; how far off where it was asked for."""
     peaks, rows = result.summary.get("peaks", {}), []
     for name, one in result.extremes.items():
@@ -69,7 +69,7 @@ def of_probes(result) -> Table | None:
     heads = [column for side in ("least", "greatest") for column in (side, *[ERROR] * bool(peaks), "time")]
     units = ["s" if column == "time" else "" for column in heads]
     loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
-    return Table("Probes", ("probe", "unit", *heads), rows, ("", "", *units), loose=loose,
+    return ReportTable("Probes", ("probe", "unit", *heads), rows, ("", "", *units), loose=loose,
                  more="in summary.json and in the workbook (--xlsx)") if rows else None  # fmt: skip
 
 

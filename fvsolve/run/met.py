@@ -38,6 +38,7 @@ def part_of(model, summary, extent, whole: dict, group: str, name: str) -> Met:
         return Met(group, name, *(np.asarray(one[key]) for key in keys))
     quantity = "pressure" if extent.quantity in OF_PRESSURE else extent.quantity
     pipe = next((one for one in model.pipes if group == "links" and one.name == name), None)
+    pipe = pipe if pipe is None or quantity in model.case.links[name].along else None
     if pipe is None:
         found = [summary.watched[f"{group}.{name}.{quantity}"]]
         z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan

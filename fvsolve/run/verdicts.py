@@ -15,6 +15,7 @@ from fvsolve.run.met import Met, in_quantity, met
 
 ROUNDING = 1e-9  # of a limit and of what its quantity usually is, within which it holds
 SIZES = {"pressure": 1e5, "gauge_pressure": 1e5, "head": 10.0, "pressure_head": 10.0}
+MAGNITUDES = ("velocity", "force")  # of which a limit counts the magnitude
 WORST = 10  # places that a limit lists
 
 
@@ -79,11 +80,11 @@ def nearest(model, limit, part: Met):
 
 
 def extremes(model, quantity: str, part: Met):
-    """Least and greatest of a quantity in the places of a part, each with its times; of a velocity its magnitude's."""
+    """Least and greatest of a quantity in the places of a part, each with its times; or of its magnitude."""
     if quantity in OF_PRESSURE:
         low, high = (in_quantity(model, quantity, one, part.elevation) for one in (part.least, part.greatest))
         return (low, part.t_least), (high, part.t_greatest)
-    if quantity != "velocity":
+    if quantity not in MAGNITUDES:
         return (part.least, part.t_least), (part.greatest, part.t_greatest)
     turns, back = (part.least <= 0.0) & (part.greatest >= 0.0), -part.least > part.greatest
     low = np.where(turns, 0.0, np.minimum(abs(part.least), abs(part.greatest)))
@@ -117,6 +118,8 @@ class Chainages:
 
     def of(self, part: Met, at: int, on: tuple[str, ...]) -> float | None:
         """Chainage of a place of a part [m]; None of what lies on none."""
+        if part.group == "links" and not math.isfinite(part.distance[at]):
+            return None
         ordered = [*(name for name in on if name in self.legs), *self.legs]
         for name in ordered:
             for leg in self.legs[name]:

@@ -10,6 +10,7 @@ _HOMES = {  # public name -> module of this room
     "advection_limits": ".limits.grid",
     "calibrate": "calibrate",
     "chart": "accuracy.chart",
+    "optimise": "closing",
     "energy": "energy.energy",
     "failures": "failure.failure_map",
     "fit": "accuracy.fit",

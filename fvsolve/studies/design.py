@@ -156,6 +156,7 @@ class Studied:
         design = self.design
         return plain({"title": design.title, "study": design.name, "case": str(design.case), "ok": self.ok,
                       "events": list(design.events), "protections": list(design.protections), "holds": self.holds,
+                      "changes": {"events": design.events, "protections": design.protections},
                       "error": design.error, "runs": self.rows})  # fmt: skip
 
 

@@ -11,7 +11,7 @@ import fvsolve
 from fvsolve.report.legs import ways
 from fvsolve.report.report import write_report
 from fvsolve.report.section import section
-from fvsolve.report.tables import Table, aligned, worded
+from fvsolve.report.tables import ReportTable, aligned, worded
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +51,7 @@ def test_numbers_of_a_column_are_aligned_on_their_points():
     assert len({len(text.partition(".")[2]) for text in aligned([0.001, 12.0, 5.5])}) == 1
     assert worded(12345.678) == "12\u202f346" and worded(-0.0) == "0" and worded(1e-12) == "1e\u221212"
     assert worded(float("nan")) == worded(None) == "\u2013" and worded(True) == "yes"
-    assert Table("", ("name", "length"), [["a", 1.0], ["b", None]]).numeric == [False, True]
+    assert ReportTable("", ("name", "length"), [["a", 1.0], ["b", None]]).numeric == [False, True]
 
 
 def test_the_workbook_holds_every_row_and_no_formula(fork, tmp_path):

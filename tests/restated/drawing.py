@@ -147,10 +147,27 @@ def networks(draw, laws=tuple(FLUIDS), settings_of=None) -> dict:
         links[f"x{k}"] = draw(across(*ends))
     if draw(st.booleans()):
         links["hole"] = {"type": "leak", "from": draw(st.sampled_from(inner)), "coefficient": draw(between(1e-6, 5e-6))}
+    for link in links.values():
+        if hilly and link["type"] == "pipe" and draw(st.booleans()):
+            link["profile"] = draw(
+                profiles(link["length"], *(places[link[end]]["elevation"] for end in ("from", "to")))
+            )
     fluid = FLUIDS[draw(st.sampled_from(laws))]
     made = scene(places, links, 1.0, draw(settings_of or numerics()), probes(places, links), 0.05, fluid=fluid)
     made["output"]["fields"] = 0
     return made
+
+
+@st.composite
+def profiles(draw, length: float, low: float, high: float) -> dict:
+    """A line with one point off the straight one, not too steep; lengths are exact where they are added up."""
+    at, off, begin = (
+        draw(between(0.3, 0.7)) * length,
+        draw(between(-0.1, 0.1)) * length,
+        draw(st.sampled_from([0.0, 512.0])),
+    )
+    return {"chainage": [begin, begin + at, begin + length],
+            "elevation": [low, low + (high - low) * at / length + off, high]}  # fmt: skip
 
 
 def probes(places: dict, links: dict) -> list[str]:

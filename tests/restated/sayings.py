@@ -41,6 +41,10 @@ def swapped(case: dict, chosen: set[str]) -> dict:
     for name in chosen:
         link = said["links"][name]
         link["from"], link["to"] = link["to"], link["from"]
+        if "profile" in link:
+            chainage, elevation = link["profile"]["chainage"], link["profile"]["elevation"]
+            turned = [chainage[0] + chainage[-1] - one for one in reversed(chainage)]
+            link["profile"] = {"chainage": turned, "elevation": elevation[::-1]}
     said["output"]["probes"] = [from_other_end(probe, case, chosen) for probe in said["output"]["probes"]]
     return said
 
@@ -59,6 +63,17 @@ def raised(case: dict, height: float) -> dict:
         node["elevation"] = node.get("elevation", 0.0) + height
         if "head" in node:
             node["head"] += height
+    for link in said["links"].values():
+        if "profile" in link:
+            link["profile"]["elevation"] = [z + height for z in link["profile"]["elevation"]]
+    return said
+
+
+def straight(case: dict) -> dict:
+    """No pipe has a profile."""
+    said = copy.deepcopy(case)
+    for link in said["links"].values():
+        link.pop("profile", None)
     return said
 
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import tomllib
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from truth.scenes import GRAVITY, WATER
 
 import fvsolve
 from fvsolve.case.text import write
@@ -108,6 +110,36 @@ def test_links_drawn_from_the_other_end(case, data):
 def test_everything_higher(case, height):
     """Only differences of elevation drive; these are rounded by the height."""
     alike(told(case), told(sayings.raised(case, height)), near(case))
+
+
+@drawn(6)
+@given(case=networks(laws=("linear",)))
+def test_without_profiles(case):
+    """Under the linear law flows, and pressures at nodes, do not know of them; along pipes the weight below is all."""
+    weight, links = WATER["density"] * GRAVITY, case["links"]
+
+    def change(probe, values):
+        link = links.get(probe.split(".")[1], {}) if probe.endswith("pressure@0.37") else {}
+        if "profile" not in link:
+            return values
+        x, z = link["profile"]["chainage"], link["profile"]["elevation"]
+        bent = np.interp(x[0] + 0.37 * link["length"], x, z)
+        return values - weight * (bent - (z[0] + 0.37 * (z[-1] - z[0])))
+
+    alike(told(sayings.straight(case)), told(case), near(case), change=change)
+
+
+@drawn(6)
+@given(case=networks())
+def test_limits_and_points_that_are_watched_change_nothing(case):
+    """What is followed for its extremes alone is read off states, never written into them."""
+    limits = {"any": {"on": "pipes", "greatest": "1 GPa"},
+              "quick": {"on": "pipes", "quantity": "velocity", "greatest": 1e3},
+              "push": {"on": "pipes", "quantity": "force", "greatest": "1 GN"}}  # fmt: skip
+    watched = told(case | {"limits": limits})
+    alike(told(case), watched)
+    if watched.result and watched.result.ok:
+        assert [one.ok for one in watched.result.verdicts] == [True, True, True]
 
 
 @drawn(6)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.creep import add_creep
 from fvsolve.model.lowering import Lowering
 from fvsolve.model.model import PipeMesh
 from fvsolve.model.reading import along
@@ -44,6 +45,7 @@ class PipeRows(Lowering, kind="pipe"):
         else:
             names = [f"{name}.{wave}[{i}]" for wave in ("forward", "backward") for i in range(n)]
             row["y"] = draft.states(names, 0.5e5 * row["admittance"])
+            add_creep(draft, name, link, row)
         x = (np.arange(n) + 0.5) * (link.length / n)
         along_it = z[0] + row["slope"] * x if link.profile is None else link.profile.at(x)
         draft.meshes.append(
@@ -53,8 +55,19 @@ class PipeRows(Lowering, kind="pipe"):
             )
         )  # fmt: skip
 
+    def force(self, draft, name, row) -> None:
+        """A probe of the force on a whole pipe."""
+        row["kind"] = rec.PIPE_FORCE
+        pipe = draft.pipe_table[row["index"]]
+        if pipe["delay"] >= 0:
+            draft.fault(f"links.{name}", 'a delay line does not tell the force on it; give it line = "cells"')
+        elif pipe["ride"] >= 0:
+            draft.fault(f"links.{name}", "it rides on a body, whose joints tell the forces; leave its own out")
+
     def probe(self, draft, name, probe, row) -> None:
         row["index"] = draft.pipe_names.index(name)
+        if probe.quantity == "force":
+            return self.force(draft, name, row)
         row["kind"] = rec.PIPE_FLOW if probe.quantity in ("flow", "velocity") else rec.PIPE_PRESSURE
         if draft.pipe_table[row["index"]]["delay"] >= 0 and probe.fraction not in (0.0, 1.0):
             row["weights"] = len(draft.floats)

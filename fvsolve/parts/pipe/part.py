@@ -5,69 +5,44 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Literal
 
+from pydantic import Field
+
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.conduit import LENGTH, Conduit
 from fvsolve.parts.pipe.profile import Profile, ProfileValue
+from fvsolve.parts.pipe.wall import MODULI, Lining, OfCatalogue, Restraint, Wall, WallOrStiff, wall_faults, yielding
 from fvsolve.parts.scalar import Carried
-from fvsolve.parts.table import Table
+from fvsolve.parts.table import Inside
 from fvsolve.parts.value import (
     COUNTED,
+    SHAPE,
+    VALUE,
     Choice,
     Misfit,
     Number,
     Quantity,
+    Rows,
     Setting,
+    Text,
     Usual,
-    Value,
     Whole,
     between,
     positive,
 )
-from fvsolve.units import show
 
 MOST_CELLS = 10**8
+CATALOGUE = frozenset(("material", "class", "lining"))  # keys that stand for others, beside names of sizes
 SPANNED = 1e-6  # of its length, by which chainage may differ from it
 MET = 1e-6  # in elevation, by which a profile may miss its nodes [m]
 ENDS = {"from": "begins", "to": "ends"}
 LINES = ("cells", "delay", "auto")  # how waves in a pipe are followed
 
 
-MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
 WAVES = Usual(30.0, 2000.0, "soft hoses to stiff pipes")  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
 SOFT = (  # modulus [Pa], wall over bore below which no pipe of it stands: of the plastics SDR 26 is the thinnest
     (2e8, 0.1, "softer than any plastic, as rubber is"),
     (4e8, 0.04, "soft as low-density polyethylene"),
 )
-
-
-class Wall(Table):
-    """An elastic wall: 1/K = 1/beta + diameter / (youngs_modulus thickness), wave speed sqrt(K / rho)."""
-
-    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]", MODULI, COUNTED)]
-    thickness: Annotated[
-        float, Quantity("length", positive, "of the wall [m]", Usual(1e-6, 2.0, "foils to lined rock"), COUNTED)
-    ]
-
-
-class WallOrStiff(Value):
-    """The text "stiff" or the table of an elastic wall."""
-
-    about = 'elastic or stiff; "stiff" if left out'
-    takes = '`"stiff"`, or `{ youngs_modulus, thickness }`, Pa and m'
-    changes = COUNTED
-
-    def read(self, given: Any, setting: Setting) -> Wall | str:
-        if isinstance(given, Wall) or given == "stiff":
-            return given
-        if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is no wall; wanted "stiff" or {{ youngs_modulus, thickness }}')
-        return Wall.model_validate(given, context=setting)
-
-    def below(self, key: str) -> Value | None:
-        return Wall.values()[key]
-
-    def json(self) -> dict[str, Any]:
-        return {"anyOf": [{"const": "stiff"}, Wall.model_json_schema()]}
 
 
 class Pipe(Conduit, kind="pipe"):
@@ -78,8 +53,13 @@ class Pipe(Conduit, kind="pipe"):
     drop times flow [W].
     """
 
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow", "force": "force"}
+    asked: ClassVar[tuple[str, ...]] = ("force",)
     own_scalars: ClassVar[str] = "along"
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (*Conduit.alternatives, ("wave_speed", "wall"))
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
+        *Conduit.alternatives, ("wave_speed", "wall"), ("diameter", "class"), ("schedule", "class"),
+        ("wave_speed", "restraint"),
+    )  # fmt: skip
     along: ClassVar[dict[str, str]] = {
         "pressure": "pressure", "gauge_pressure": "gauge_pressure", "head": "head", "velocity": "velocity",
         "flow": "flow",
@@ -89,8 +69,24 @@ class Pipe(Conduit, kind="pipe"):
 
     length: Annotated[float, LENGTH] = None  # that of profile stands in for it
     profile: Annotated[Profile | None, ProfileValue()] = None
+    bends: Annotated[
+        tuple[float, ...] | None,
+        Rows("length", rising=True, about="chainages at which it is cut into legs", changes=SHAPE),
+    ] = None
     wave_speed: Annotated[float | None, Quantity("velocity", positive, "in place of wall [m/s]", WAVES, COUNTED)] = None
     wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
+    material: Annotated[str | None, OfCatalogue()] = None
+    class_: Annotated[
+        str | None,
+        Text('"K9", "C40", "SDR11", "PN16" or "schedule 40" of the nominal size: bore, wall, what it bears', COUNTED),
+        Field(alias="class"),
+    ] = None
+    restraint: Annotated[str | float | None, Restraint()] = None
+    lining: Annotated[Lining | None, Inside(Lining, "a second layer within the wall; diameter is within it")] = None
+    allowable_pressure: Annotated[
+        float | None, Quantity("gauge_pressure", positive, "that its class bears, above ambient [Pa]", changes=VALUE)
+    ] = None
+    source: Annotated[str | None, Text("whose figures these are; those of the catalogue if left out", VALUE)] = None
     cells: Annotated[
         int | None,
         Whole(between(1, MOST_CELLS), "finite volumes along it; as many as its travel time over cell_time if left out"),
@@ -106,20 +102,38 @@ class Pipe(Conduit, kind="pipe"):
     ] = None
     scalars: Annotated[dict[str, Any], Carried("of scalars in it at the start", Number())] = {}
 
+    @property
+    def yielding(self) -> tuple[tuple[float, float], ...]:
+        """(growth of the bore with pressure in the end [1/Pa], time [s]) of each element by which its wall creeps."""
+        return yielding(self)
+
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
-        found = super().in_numbers(given, setting)
-        if "profile" not in found:
-            return found
+        """Names of the catalogue and of sizes turned into numbers; Misfit where one means nothing."""
+        faults, found = [], given
         try:
-            found = {**found, "profile": ProfileValue().read(found["profile"], setting)}
+            if not CATALOGUE.isdisjoint(given):
+                from fvsolve.parts.pipe.catalogue import from_catalogue
+
+                found = from_catalogue(given)
         except Misfit as error:
-            raise Misfit([(("profile", *below), text) for below, text in error.faults]) from None
-        except ValueError as error:
-            raise Misfit([(("profile",), str(error))]) from None
-        return {"length": found["profile"].length, **found}
+            faults = error.faults
+            found = {key: one for key, one in given.items() if key not in ("nominal", "schedule", "class")}
+        for read in (super().in_numbers, along_profile):
+            try:
+                found = read(found, setting)
+            except Misfit as error:
+                faults = faults + error.faults
+        if faults:
+            raise Misfit(faults)
+        return found
 
     def faults(self, name: str, around: Around) -> Faults:
+        yield from wall_faults(self)
+        yield from self.profile_faults(around)
+
+    def profile_faults(self, around: Around) -> Faults:
+        """What is wrong of its profile beside its nodes."""
         if self.profile is None:
             return
         if abs(self.profile.length - self.length) > SPANNED * self.length:
@@ -144,3 +158,16 @@ class Pipe(Conduit, kind="pipe"):
                         f"{wall.thickness:g} m is too thin in a bore of {self.diameter:g} m; GPa meant?")  # fmt: skip
                 yield ("wall", "youngs_modulus"), wall.youngs_modulus, limit, text
                 return
+
+
+def along_profile(given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    """The length of a profile where none is stated; Misfit where it is none."""
+    if "profile" not in given:
+        return given
+    try:
+        profile = ProfileValue().read(given["profile"], setting)
+    except Misfit as error:
+        raise Misfit([(("profile", *below), text) for below, text in error.faults]) from None
+    except ValueError as error:
+        raise Misfit([(("profile",), str(error))]) from None
+    return {"length": profile.length, **given, "profile": profile}

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.case.defaults import link_said
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import (
@@ -75,7 +76,7 @@ def resolutions(case) -> dict[str, str]:
 
 def by_cell_time(case) -> list[str]:
     """Pipes that state no cells."""
-    return [name for name in in_cells(case) if "cells" not in case.raw["links"][name]]
+    return [name for name in in_cells(case) if "cells" not in link_said(case.raw, name)]
 
 
 def plan(

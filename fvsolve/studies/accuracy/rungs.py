@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.case.defaults import link_said
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.friction import drag
 from fvsolve.model.delay import what_needs_cells
@@ -113,7 +114,7 @@ def _survives(probe, pipes: dict) -> bool:
 def column(case, name: str) -> dict[str, Any]:
     """A pipe as a rigid column."""
     keys = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
-    said = case.raw["links"][name]
+    said = {"diameter": case.links[name].diameter, **link_said(case.raw, name)}
     found = {"type": "rigid-column", **{key: said[key] for key in keys if key in said}}
     if found.get("friction", {}).get("model") == "unsteady":  # a column has no memory
         kept = {key: value for key, value in found["friction"].items() if key in ("roughness", "factor")}
@@ -131,7 +132,7 @@ def resistance(case, model, name: str) -> dict[str, Any]:
     zeta = float(per * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
     if not zeta > 0.0:
         raise Unsayable(f"{name} has no friction, so nothing is left of it between two volumes")
-    said = case.raw["links"][name]
+    said = {"diameter": case.links[name].diameter, **link_said(case.raw, name)}
     return {"type": "orifice", "from": said["from"], "to": said["to"], "diameter": said["diameter"],
             "loss_coefficient": zeta}  # fmt: skip
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fvsolve.case.case import Case
+from fvsolve.case.defaults import link_said
 from fvsolve.case.sections import DEFAULT_COURANT, steps_by_error
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import basins, counts, in_cells, keys, scaled
@@ -69,7 +70,7 @@ def cell_keys(case: Case, cells: int) -> dict:
     if own is not None:
         return keys(scaled(counts(case), cells / own))
     pipes = in_cells(case)
-    stated = {name for name in pipes if case.raw["links"][name].get("cells") is not None}
+    stated = {name for name in pipes if link_said(case.raw, name).get("cells") is not None}
     factor = cells / pipes[main].cells
     found = {f"links.{name}.cells": max(1, round(pipes[name].cells * factor)) for name in stated}
     if main not in stated:

@@ -21,7 +21,7 @@ from fvsolve.units import DIMENSIONS
 EPS = ("eps_x", "eps_y", "eps_z")
 STATE_UNITS = {
     "mass": "kg", "excess": "kg", "air": "kg", "forward": "kg/s", "backward": "kg/s", "memory": "kg/s", "flow": "kg/s",
-    "position": "m", "velocity": "m/s", "speed": "-", "opening": "-",
+    "creep": "kg/s", "position": "m", "velocity": "m/s", "speed": "-", "opening": "-",
     "angle": "rad", "rate": "rad/s", "travel": "m", "travel_rate": "m/s", **dict.fromkeys(("eta", *EPS), "-"),
     **{f"spin_{axis}": "rad/s" for axis in "xyz"}, **{f"centre_{axis}": "m" for axis in "xyz"},
     **{f"centre_v{axis}": "m/s" for axis in "xyz"},

@@ -1,0 +1,60 @@
+"""Forces of the fluid on legs of pipe between bends and dead ends. Knows rates of cells; changes no state.
+
+What the momentum of the fluid in a pipe loses, - d/dt of the integral of M dx [N], its ends and wall gain beyond what
+they bear in the profile: positive from `from` to `to`.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.barotropic import rates_barotropic
+from fvsolve.kernels.cavitating import rates_cavitating
+from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.linear import wave_rates
+from fvsolve.kernels.records import PIPE_FORCE
+from fvsolve.kernels.unsteady.barotropic import remember_barotropic
+from fvsolve.kernels.unsteady.memory import remember_linear
+
+
+@njit
+def read_forces(dydt, tables, values):
+    """values[k] = - sum of dM/dt dx over the cells of a pipe, of every probe of a force."""
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == PIPE_FORCE:
+            pipe, total = tables.pipes[probe["index"]], 0.0
+            n, o = pipe["cells"], pipe["y"]
+            for i in range(n):
+                total += dydt[o + i] - dydt[o + n + i]
+            values[k] = (0.0 - total) * pipe["dx"]
+
+
+@njit
+def observe_forces_linear(t, y, out, handle, values):
+    """Forces on pipes under the linear law."""
+    tables = open_tables(handle)
+    at = tables.layout[0]["forces"]
+    dydt = tables.work[at : at + y.size]
+    wave_rates(t, y, dydt, out, handle)
+    remember_linear(t, y, dydt, out, handle)
+    read_forces(dydt, tables, values)
+
+
+@njit
+def observe_forces_barotropic(t, y, out, handle, values):
+    """Forces on pipes under the laws log and table."""
+    tables = open_tables(handle)
+    at = tables.layout[0]["forces"]
+    dydt = tables.work[at : at + y.size]
+    rates_barotropic(t, y, dydt, out, handle)
+    remember_barotropic(t, y, dydt, out, handle)
+    read_forces(dydt, tables, values)
+
+
+@njit
+def observe_forces_cavitating(t, y, out, handle, values):
+    """Forces on pipes under the law mixture where cavities open."""
+    tables = open_tables(handle)
+    at = tables.layout[0]["forces"]
+    dydt = tables.work[at : at + y.size]
+    rates_cavitating(t, y, dydt, out, handle)
+    remember_barotropic(t, y, dydt, out, handle)
+    read_forces(dydt, tables, values)

@@ -1,0 +1,141 @@
+"""The page of a study: which protection holds in which event, and the runs laid over one another. Runs nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fvsolve.draw.plot import quantity, thinned
+from fvsolve.draw.style import INK
+from fvsolve.errors import visible
+from fvsolve.report import described, numerics
+from fvsolve.report.figures import history_figure, study_section
+from fvsolve.report.heads import in_units
+from fvsolve.report.histories import HistoryPanel, Series
+from fvsolve.report.legs import ways
+from fvsolve.report.page import WARNINGS, rendered
+from fvsolve.report.section import section
+from fvsolve.report.tables import ERROR, ReportTable
+from fvsolve.report.trust import OPEN, Word, state
+
+POINTS = 400  # of a series
+PROBES, SECTIONS = 6, 2  # of an event at most, those of the first run
+FAILED = 200  # rows of what fails
+CAPTION = "Greatest (full) and least (dashed) head over every accepted step, by protection."
+
+
+def study_page(said: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
+    """The report of a study; said : as study.json has it, runs : (row, `Result`) of each."""
+    figures: dict[str, Any] = {}
+    first = runs[0][1]
+    events = [{"id": f"event-{k}", "name": visible(name or "All runs"), "figures": drawn(name, k, runs, figures)}
+              for k, name in enumerate(dict.fromkeys(row["event"] for row, _ in runs))]  # fmt: skip
+    filled = {
+        "title": visible(said["title"] or said["study"]), "said": said, "case": visible(first.summary["case"]),
+        "ended": max(result.summary.get("ended", "") for _, result in runs),
+        "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
+        "words": words(said, runs), "matrix": [matrix(runs)] if first.verdicts else [], "events": events,
+        "failing": failing(runs), "changes": changed(said), "first": name_of(runs[0][0]),
+        "model": [one for one in (described.fluid(first), described.pipes(first), described.parts(first)) if one],
+        "told": told(runs), "versions": numerics.versions(first), "ink": INK,
+    }  # fmt: skip
+    return rendered("study", filled, figures)
+
+
+def name_of(row: dict[str, Any]) -> str:
+    """`trip with vessel`."""
+    return visible(" with ".join(name for name in (row["event"], row["protection"]) if name) or "the case")
+
+
+def words(said: dict[str, Any], runs: list) -> list[Word]:
+    """The sentences at the top: runs that stopped, then which protection holds."""
+    found = [Word("bad", f"{name_of(row)} stopped early.", f"{result.reason}.")
+             for row, result in runs if result.reason != "finished"]  # fmt: skip
+    found += [Word("bad", f"{name_of(row)} is not to be trusted.", one.text)
+              for row, result in runs for one in result.warnings if not one.ok]  # fmt: skip
+    doubted = [name_of(row) for row, result in runs if result.marks]
+    if doubted:
+        text = "liquid below its vapour pressure, tanks dry or spilling: see the runs' own reports"
+        found.append(Word("doubt", f"In part not to be trusted: {', '.join(doubted)}.", text))
+    if not any(result.verdicts for _, result in runs):
+        return [
+            *found,
+            Word("none", "No limits were stated.", "The study says what happens, not whether it is allowed."),
+        ]
+    names = [visible(name) or "the case as it is" for name in said["holds"]]
+    unsure = [name_of(row) for row, result in runs for one in result.verdicts if state(one) == OPEN]
+    if names:
+        found.append(Word("good", f"All limits hold in all events with {', '.join(names)}.", ""))
+    else:
+        found.append(Word("bad", "No protection holds all limits in all events.", ""))
+    if unsure:
+        text = "a margin is smaller than the error of the numbers, or the run is not sound"
+        found.append(Word("doubt", f"Open: {', '.join(dict.fromkeys(unsure))}.", text))
+    return found
+
+
+def matrix(runs: list) -> ReportTable:
+    """A row a run: verdict, and the margin of every limit."""
+    names = {one.name: one.unit for _, result in runs for one in result.verdicts}
+    asked = any(one.error is not None for _, result in runs for one in result.verdicts)
+    rows, bad = [], set()
+    for k, (row, result) in enumerate(runs):
+        found = {one.name: one for one in result.verdicts}
+        holds = result.ok and all(one.ok for one in result.verdicts)
+        if not holds:
+            bad.add(k)
+        margins = [getattr(found.get(name), key, None) for name in names for key in ("margin", *["error"] * asked)]
+        rows.append([row["event"] or "", row["protection"] or "", "holds" if holds else "FAILS", *margins])
+    heads = ["event", "protection", "verdict"]
+    heads += [word for name in names for word in (f"margin of {name}", *[ERROR] * asked)]
+    units = ["", "", ""] + [unit for unit in names.values() for _ in range(1 + asked)]
+    return ReportTable("Margins", heads, rows, units, frozenset(bad))
+
+
+def failing(runs: list) -> ReportTable | None:
+    """Every limit that fails, where and when."""
+    rows = [[name_of(row), one.name, one.value, one.limit, one.margin, one.unit, one.place, one.chainage, one.time]
+            for row, result in runs for one in result.verdicts if not one.ok]  # fmt: skip
+    heads = ("run", "limit", "value", "allowed", "margin", "unit", "worst at", "chainage", "time")
+    units = ("", "", "", "", "", "", "", "m", "s")
+    return ReportTable("", heads, rows, units, loose=frozenset({2, 3, 4}), most=FAILED) if rows else None
+
+
+def changed(said: dict[str, Any]) -> list[ReportTable]:
+    """What events and protections set."""
+    made = []
+    for group in ("events", "protections"):
+        rows = [[name, key, str(value)] for name, keys in said["changes"][group].items() for key, value in keys.items()]
+        made += [ReportTable(group.capitalize(), (group[:-1], "key", "is"), rows)] if rows else []
+    return made
+
+
+def drawn(event: str | None, number: int, runs: list, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Figures of an event, the runs of all protections in each."""
+    own = [(row["protection"] or "", result) for row, result in runs if row["event"] == event]
+    made = []
+    for k, way in enumerate(ways(own[0][1])[:SECTIONS]):
+        several = [(name, section(result, one)) for name, result in own for one in ways(result) if one.name == way.name]
+        height, along = in_units(own[0][1], "greatest_head").unit, in_units(own[0][1], "distance").unit
+        figures[f"section-{number}-{k}"] = study_section(several, height, along)
+        made.append({"id": f"section-{number}-{k}", "name": visible(way.name), "caption": CAPTION})
+    shared = [name for name in own[0][1].probes if all(name in result.units for _, result in own)]
+    for k, probe in enumerate(shared[:PROBES]):
+        lines = [
+            Series(name or "the case", *thinned(result.t, result[probe], POINTS), seen=True) for name, result in own
+        ]
+        panel = HistoryPanel(quantity(probe), own[0][1].units[probe], lines)
+        figures[f"history-{number}-{k}"] = history_figure(panel, own[0][1].summary["time_unit"], None)
+        made.append({"id": f"history-{number}-{k}", "name": visible(probe), "caption": ""})
+    return made
+
+
+def told(runs: list) -> list[str]:
+    """Warnings of all runs, those of several once."""
+    by_text: dict[str, list[str]] = {}
+    for row, result in runs:
+        for one in result.warnings:
+            by_text.setdefault(one.text, []).append(name_of(row))
+    found = [
+        f"{text} ({', '.join(names) if len(names) < len(runs) else 'all runs'})" for text, names in by_text.items()
+    ]
+    return [visible(one) for one in found[:WARNINGS]]

@@ -1,0 +1,132 @@
+"""A law over time that makes a peak small: straight pieces between a few knots. Knows runs; knows no physics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case import Case, load
+from fvsolve.case.raw import dotted
+from fvsolve.errors import FvsolveError
+from fvsolve.parts.schedule import Schedule
+from fvsolve.run import run
+from fvsolve.units import show
+
+STARTS = (0.0, 1.0, -1.0)  # how much quicker, in logarithms, the first piece is than the last, of laws that begin
+REACH = 1.0  # of the first simplex about a start
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law and what it makes of the peak: times [s] and values [SI] of its knots, the peak in `unit`."""
+
+    time: list[float]
+    value: list[float]
+    peak: float | None
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The law of the key that makes `minimise` least, beside the linear one; runs : how many were made."""
+
+    key: str
+    minimise: str
+    unit: str
+    linear: Law
+    best: Law
+    runs: int
+    laws: list[Law] = field(default_factory=list)
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON says it."""
+        return {"key": self.key, "minimise": self.minimise, "unit": self.unit, "linear": vars(self.linear),
+                "best": vars(self.best), "runs": self.runs, "laws": [vars(law) for law in self.laws]}  # fmt: skip
+
+    @property
+    def schedule(self) -> str:
+        """What the case would say."""
+        times, values = ([float(f"{x:.6g}") for x in row] for row in (self.best.time, self.best.value))
+        return f"{self.key.rpartition('.')[2]} = {{ time = {times}, value = {values} }}"
+
+
+class Search:
+    """One search while it lasts: laws between two times and two values, by the logarithms of their pieces' rises."""
+
+    def __init__(self, case: Case, key: str, minimise: str, span: tuple, knots: int, progress: Callable | None) -> None:
+        self.case, self.key, self.minimise, self.knots, self.progress = case, key, minimise, knots, progress
+        self.begin, self.end, self.first, self.last = span
+        self.laws: list[Law] = []
+        self.unit = ""
+
+    def law(self, z: np.ndarray) -> tuple[list[float], list[float]]:
+        """Times and values of the knots; z : float64[knots], logarithms of rises over that of the last piece."""
+        rises = np.exp(np.clip(np.append(z, 0.0), -12.0, 12.0))
+        shares = np.concatenate([[0.0], np.cumsum(rises / rises.sum())])
+        shares[-1] = 1.0
+        times = np.linspace(self.begin, self.end, shares.size)
+        return times.tolist(), (self.first + (self.last - self.first) * shares).tolist()
+
+    def __call__(self, z: np.ndarray) -> float:
+        """The peak of a law; infinite where its run does not come to its end."""
+        time, value = self.law(z)
+        claim = {self.minimise: {"value": 1.0, "atol": 1.0}}
+        quiet = {"output.fields": 0, "output.lines": {}, "expect": claim}
+        result = run(load(self.case, {self.key: {"time": time, "value": value}, **quiet}))
+        if result.reason.startswith("interrupted"):
+            raise KeyboardInterrupt
+        found = result.expectations[0]
+        self.unit = found.unit
+        self.laws.append(Law(time, value, found.found if result.ok else None))
+        if self.progress is not None:
+            self.progress(len(self.laws), "no end" if self.laws[-1].peak is None else f"{found.found:.6g} {found.unit}")
+        return found.found if result.ok else np.inf
+
+
+def optimise(
+    case, key: str, minimise: str, knots: int = 3, runs: int = 60, set: Mapping[str, Any] | None = None,
+    progress: Callable | None = None,
+) -> Optimum:  # fmt: skip
+    """The law of a schedule between its two ends that makes a peak least, by straight pieces between inner knots.
+
+    key : of a schedule that goes from one value to another, such as a ramp; minimise : what `[expect]` knows,
+    "max(gate.pressure)" or "greatest(main.head)"; it goes one way, as its linear law does, and takes as long. Simplexes
+    of Nelder and Mead 1965 from laws that are linear, quick and slow at first. Raises FvsolveError for what is no such
+    schedule, CaseError for what is no case.
+    """
+    from scipy.optimize import minimize
+
+    if not 1 <= knots <= 12:
+        raise FvsolveError(f"knots = {knots}; wanted 1 to 12")
+    if runs < len(STARTS) * (knots + 2):
+        raise FvsolveError(f"runs = {runs}; wanted {len(STARTS) * (knots + 2)} or more for {knots} knots")
+    made = load(case, dict(set or {}))
+    search = Search(made, key, minimise, span_of(made, key), knots, progress)
+    search(np.zeros(knots))
+    for k, start in enumerate(STARTS):
+        z = start * np.linspace(2.0, 0.0, knots + 1)[:-1]
+        simplex = np.vstack([z, z + REACH * np.eye(knots)])
+        left = (runs - len(search.laws)) // (len(STARTS) - k)
+        minimize(search, z, method="Nelder-Mead",
+                 options={"maxfev": left, "initial_simplex": simplex, "xatol": 1e-2, "fatol": 0.0})  # fmt: skip
+    linear = search.laws[0]
+    best = min(search.laws, key=lambda law: np.inf if law.peak is None else law.peak)
+    return Optimum(key, minimise, search.unit, linear, best, len(search.laws), search.laws)
+
+
+def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
+    """(begin, end [s], first, last value [SI]) of the schedule under a key; FvsolveError where none moves there."""
+    keys = dotted(key)
+    part = getattr(case, keys[0], {}).get(keys[1]) if len(keys) == 3 and keys[0] in ("nodes", "links") else None
+    schedule = getattr(part, keys[2], None) if part is not None else None
+    if not isinstance(schedule, Schedule):
+        raise FvsolveError(f"{key} is no schedule of this case; wanted one such as links.gate.opening")
+    if schedule.constant or schedule.kind not in ("linear", "smooth", "ramp") or len(schedule.time) < 2:
+        example = '{ start = "1 s", duration = "10 s", value = [1, 0] }'
+        raise FvsolveError(f"{key} does not go from one value to another; wanted a ramp or a table, such as {example}")
+    ends = float(schedule.time[0]), float(schedule.time[-1]), float(schedule.value[0]), float(schedule.value[-1])
+    if ends[2] == ends[3]:
+        raise FvsolveError(f"{key} begins and ends at {show(ends[2])}; wanted a law from one value to another")
+    return ends
