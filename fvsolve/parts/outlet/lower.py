@@ -52,7 +52,7 @@ class OutletRows(Restriction, kind="outlet"):
         return opening(model, name)
 
 
-class Relieving(Device, kind=""):
+class RelievingRows(Device, kind=""):
     """What is shut at the start and opens to a place, by a root, or to ambient, by an outlet's law of exponent 1/2.
 
     mode : by how many numbers and flags of an outlet its own are preceded

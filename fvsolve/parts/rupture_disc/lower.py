@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from fvsolve.model.device import Device
 from fvsolve.parts.outlet.law import EVENTS
-from fvsolve.parts.outlet.lower import Relieving
+from fvsolve.parts.outlet.lower import RelievingRows
 from fvsolve.parts.rupture_disc import law, law_outside
 
 
-class RuptureDiscRows(Relieving, kind="rupture-disc"):
+class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
     """Between two places."""
 
     law, sudden = law, True
     events = ("bursts",)
 
     def of(self, part) -> Device:
-        return ToAmbient() if part.outward else self
+        return DiscToAmbient() if part.outward else self
 
     def own_numbers(self, draft, name, part) -> list[float]:
         return [part.burst_pressure]
@@ -29,7 +29,7 @@ class RuptureDiscRows(Relieving, kind="rupture-disc"):
         return []
 
 
-class ToAmbient(RuptureDiscRows, kind=""):
+class DiscToAmbient(RuptureDiscRows, kind=""):
     """To ambient."""
 
     law, mode = law_outside, EVENTS

@@ -5,11 +5,11 @@ from __future__ import annotations
 from fvsolve.errors import Notice
 from fvsolve.model.device import Device
 from fvsolve.parts.outlet.law import EVENTS
-from fvsolve.parts.outlet.lower import Relieving
+from fvsolve.parts.outlet.lower import RelievingRows
 from fvsolve.parts.surge_anticipating import law, law_outside
 
 
-class SurgeAnticipatingRows(Relieving, kind="surge-anticipating"):
+class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
     """Between two places."""
 
     law = law
@@ -18,7 +18,7 @@ class SurgeAnticipatingRows(Relieving, kind="surge-anticipating"):
     remedy = "give it a longer closing_time"
 
     def of(self, part) -> Device:
-        return ToAmbient() if part.outward else self
+        return AnticipatingToAmbient() if part.outward else self
 
     def own_numbers(self, draft, name, part) -> list[float]:
         if part.trip is not None and part.trip < draft.case.numerics.start:
@@ -51,7 +51,7 @@ class SurgeAnticipatingRows(Relieving, kind="surge-anticipating"):
         return [f"{name}: opens at once, at {p:.6g} Pa where {part.high_set:.6g} Pa are set"] if high else []
 
 
-class ToAmbient(SurgeAnticipatingRows, kind=""):
+class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
     """To ambient."""
 
     law, mode = law_outside, EVENTS
