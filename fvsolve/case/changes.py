@@ -12,7 +12,7 @@ from fvsolve.case.claims import COMPARE_KEYS, expect_keys
 from fvsolve.case.defaults import link_said
 from fvsolve.case.limits import limit_keys
 from fvsolve.case.load import TOP
-from fvsolve.case.placing import own_keys
+from fvsolve.case.placing import own_keys, pieces_of, placed
 from fvsolve.case.raw import dotted
 from fvsolve.case.routes import Route
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
@@ -20,7 +20,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import Inside
-from fvsolve.parts.value import COUNTED, PROFILE, SHAPE, VALUE, Quantity, Value
+from fvsolve.parts.value import COUNTED, PROFILE, SHAPE, VALUE, Quantity, Text, Value
 from fvsolve.units import show
 
 TABLES = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "exact": ExactSpec}
@@ -46,6 +46,8 @@ def changes(case: Case, key: str) -> str:
 def classed(case: Case, keys: tuple[Any, ...]) -> str:
     """The class of a key as this case has it."""
     found, links = declared(case.raw, keys).changes, [link_said(case.raw, name) for name in case.raw.get("links", {})]
+    if keys[0] == "links" and keys[2:3] == ("length",) and keys[1] in pieces_of(case.raw):
+        return SHAPE  # what stands along it by chainage cuts it between other cells
     if found == COUNTED:
         found = SHAPE if any(one["type"] == "pipe" and "cells" not in one for one in links) else PROFILE
     unsteady = any(one.get("friction", {}).get("model") == "unsteady" for one in links)
@@ -88,6 +90,9 @@ def known(raw: dict[str, Any]) -> dict[str, Value]:
         parts = raw.get(group, {}).items()
         found[group] = Keys({name: Keys({"type": Value(), **kinds[one["type"]].values()}) for name, one in parts})
     found["defaults"] = Keys({kind: Keys(defaults.values(kind)) for kind in defaults.KINDS})
+    for group, name, _ in placed(raw):
+        where = {"on": Text(), "at": Quantity("length", changes=SHAPE)}
+        found[group] = Keys({**found[group].values, name: Keys({**found[group].values[name].values, **where})})
     said = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
     said |= {"routes": Route.values(), "limits": values_of(limit_keys("pressure", "pressure"))}
     return found | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(one))) for group, one in said.items()}

@@ -521,7 +521,10 @@ class _Reader:
                 self.misfit(("routes", name), error)
         faulty = list(route_misfits(made, links, named))
         self.add(faulty)
-        return {name: None if any(keys[1] == name for keys, _ in faulty) else one for name, one in made.items()}
+        lost = {keys[1] for keys, _ in faulty}
+        pipes = {name for name, link in links.items() if isinstance(link, Pipe)}
+        lost |= {name for name, one in made.items() if one and not pipes.issuperset(one.pipes)}
+        return {name: None if name in lost else one for name, one in made.items()}
 
     def limits(
         self, kinds: dict, routes: dict, links: dict[str, Any], properties: Any

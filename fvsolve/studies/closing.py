@@ -20,7 +20,7 @@ REACH = 1.0  # of the first simplex about a start
 
 
 @dataclass(frozen=True)
-class Law:
+class ValveLaw:
     """A law and what it makes of the peak: times [s] and values [SI] of its knots, the peak in `unit`."""
 
     time: list[float]
@@ -35,10 +35,10 @@ class Optimum:
     key: str
     minimise: str
     unit: str
-    linear: Law
-    best: Law
+    linear: ValveLaw
+    best: ValveLaw
     runs: int
-    laws: list[Law] = field(default_factory=list)
+    laws: list[ValveLaw] = field(default_factory=list)
 
     def plain(self) -> dict[str, Any]:
         """As JSON says it."""
@@ -58,7 +58,7 @@ class Search:
     def __init__(self, case: Case, key: str, minimise: str, span: tuple, knots: int, progress: Callable | None) -> None:
         self.case, self.key, self.minimise, self.knots, self.progress = case, key, minimise, knots, progress
         self.begin, self.end, self.first, self.last = span
-        self.laws: list[Law] = []
+        self.laws: list[ValveLaw] = []
         self.unit = ""
 
     def law(self, z: np.ndarray) -> tuple[list[float], list[float]]:
@@ -79,7 +79,7 @@ class Search:
             raise KeyboardInterrupt
         found = result.expectations[0]
         self.unit = found.unit
-        self.laws.append(Law(time, value, found.found if result.ok else None))
+        self.laws.append(ValveLaw(time, value, found.found if result.ok else None))
         if self.progress is not None:
             self.progress(len(self.laws), "no end" if self.laws[-1].peak is None else f"{found.found:.6g} {found.unit}")
         return found.found if result.ok else np.inf

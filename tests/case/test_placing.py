@@ -105,6 +105,9 @@ def test_keys_of_the_whole_and_of_its_pieces_can_be_set() -> None:
     again = fvsolve.load(wide, {"links.hole.at": "2.8 km"})
     assert again.links["main-2"].cells == 30 and again.links["main-4"].length == pytest.approx(700.0)
     assert changes(case, "links.main-2.diameter") == changes(case, "links.main.diameter") == "profile"
+    assert (
+        changes(case, "links.main.length") == changes(case, "links.hole.at") == changes(case, "nodes.top.at") == "shape"
+    )
     found = sweep(placed(), {"links.main.diameter": [0.4, 0.5]}, set={"numerics.end": 0.5})
     assert [row["ok"] for row in found.rows] == [True, True]
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
+import shlex
+import shutil
 
 import numpy as np
 import pytest
+from truth.folders import DOCS
 from truth.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
@@ -115,6 +119,21 @@ def test_what_is_wrong_is_named(study, change, told: str) -> None:
         design.study(study, study.parent / "out")
     assert told in str(error.value)
     assert not (study.parent / "out").exists()
+
+
+@pytest.mark.slow
+def test_the_commands_of_the_page_say_what_it_says(fvs, tmp_path, monkeypatch) -> None:
+    """Each command of docs/designs.md, and of what it prints the words that the page has."""
+    text = (DOCS / "designs.md").read_text(encoding="utf-8")
+    lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.S) for line in block.splitlines()]
+    assert [line.split()[1] for line in lines] == ["study", "size", "optimise"]
+    shutil.copytree(DOCS.parent / "cases", tmp_path / "cases")
+    monkeypatch.chdir(tmp_path)
+    said = [fvs(*shlex.split(line.replace("--jobs 2", "--jobs 1"))[1:]) for line in lines]
+    assert [status for status, _, _ in said] == [0, 0, 0]
+    assert "all limits hold in all events: vessel" in said[0][1]
+    assert "least value that holds all limits: 25.1" in said[1][1]
+    assert re.search(r"^opening = .*$", text, re.M)[0] in said[2][1]
 
 
 # sizes ------------------------------------------------------------------------------------------------------------

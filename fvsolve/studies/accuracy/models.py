@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from fvsolve.case.placing import bent, placed
 from fvsolve.case.sloshing import slowest
 from fvsolve.doors import CALL, NUMBER, TABLE, door
 from fvsolve.errors import CaseError, FvsolveError
@@ -152,6 +153,13 @@ class Ladder:
 
 
 @door(set=TABLE, target=NUMBER, progress=CALL)
+def whole_pipes(case):
+    """The case, of one whose pipes are cut by what stands along them the one that says their pieces."""
+    from fvsolve.case import load
+
+    return load(case.table()) if placed(bent(case.raw)) else case
+
+
 def ladder(
     case,
     set: Mapping | None = None,
@@ -168,7 +176,7 @@ def ladder(
     """
     from fvsolve.case import load
 
-    case, tell = load(case, dict(set or {})), progress or (lambda *_: None)
+    case, tell = whole_pipes(load(case, dict(set or {}))), progress or (lambda *_: None)
     without_basins(case, "chart --models", riding=True)
     asked = [(rung, law) for rung in structures(case) for law in laws(case)]
     runs, dear = [], {}  # dear: law -> the rung with cells that was given up under it

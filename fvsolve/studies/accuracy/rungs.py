@@ -67,7 +67,7 @@ def restated(case, rung: str) -> dict[str, Any]:
     if rung.endswith(("cell", "cells")):
         count, most = int(rung.split()[0]), max(pipe.cells for pipe in pipes.values())
         return {f"links.{name}.cells": max(1, round(pipe.cells * count / most)) for name, pipe in pipes.items()}
-    found = {"expect": {}, "compare": {}, **WITHOUT_CELLS}
+    found = {"expect": {}, "compare": {}, "routes": {}, "limits": {}, **WITHOUT_CELLS}
     found["output.probes"] = [probe.text for probe in case.output.probes if _survives(probe, pipes)]
     if rung != "lumped volume":
         found |= {f"links.{name}": column(case, name) for name in pipes}
@@ -81,7 +81,7 @@ def restated(case, rung: str) -> dict[str, Any]:
 
 def sloshing(case, rung: str) -> dict[str, Any]:
     """Water of all tanks that ride as ice, by its modes, or by cells, those of the case or so many times as many."""
-    riding, found = tanks(case), {"expect": {}, "compare": {}}
+    riding, found = tanks(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
     if rung in ("frozen", "modes"):
         left = {"frozen": (), "modes": ("depth",)}[rung]
         found["output.probes"] = [
