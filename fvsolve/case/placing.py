@@ -46,7 +46,8 @@ class Placed:
     @property
     def inline(self) -> bool:
         """Whether it is a link that lies in the pipe."""
-        return self.group == "links" and "to" in KINDS["links"][self.said["type"]].joins and "to" not in self.said
+        kind = KINDS[self.group][self.said["type"]]
+        return self.group == "links" and "to" in kind.joins and "to" not in (*self.said, *kind.may_lack)
 
     @property
     def joins(self) -> tuple[str, str]:

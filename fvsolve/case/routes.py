@@ -108,7 +108,7 @@ def joined(links: dict[str, Any]) -> dict[str, str]:
         return name
 
     for link in links.values():
-        if link.kind != "pipe" and set(link.joins) == {"from", "to"}:
+        if link.kind != "pipe" and set(link.ports) == {"from", "to"}:
             first, second = find(link.ports["from"]), find(link.ports["to"])
             root[first] = second
     return {name: find(name) for name in list(root)}

@@ -81,7 +81,7 @@ class Device(Restriction):
         """What is to be known where its law's `outside` said PASSING, at first at that time."""
         raise NotImplementedError
 
-    def settle(self, slate, row, y: np.ndarray, scale: np.ndarray) -> None:
+    def settle(self, slate, row, t: float, y: np.ndarray, scale: np.ndarray) -> None:
         """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
 
     def resists(self, part: Any) -> bool:

@@ -179,7 +179,7 @@ class Loop:
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
         for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
-            device.settle(self.slate, row, self.now, self.stepper.scale)
+            device.settle(self.slate, row, self.t, self.now, self.stepper.scale)
 
     def switch(self, before: np.ndarray) -> bool:
         """Note the events that have just happened; False where they go to and fro at one time, or crowd."""

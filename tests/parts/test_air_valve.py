@@ -235,3 +235,101 @@ def test_what_is_wrong_with_such_a_demand_is_said(wrong, said):
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.load(scene(nodes, {"gap": valve("lake", "j", 2e-4)}, 1.0, {"step": 0.1}))
     assert said in str(error.value)
+
+
+STAGES = {"switch": 4e3, "throttled_outlet": 0.008, "automatic": 0.003}
+
+
+def staged(law="linear", beta=2.2e9, numerics=TIGHT, **more):
+    case = drained(0.04, 0.02, RETURN, law=law, numerics=numerics, **(STAGES | more))
+    case["fluid"]["bulk_modulus"] = beta
+    return case
+
+
+def by_stages(case):
+    """(what is off by: air, its pressure, flow of the column; time of throttling, SciPy's; the run): see `off_scipy`.
+
+    In by the inlet; out by the wide bore and the automatic one until 4 kPa, then by the small one and that.
+    """
+    result = fvsolve.run(case)
+    t, times = np.asarray(result.t), {e["what"]: e["time"] for e in reversed(result.summary["events"])}
+    rows = (t >= 0.6) & (t < times["shuts"] - 0.02)
+    y, at, off, parted = (
+        [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")],
+        t[rows][0],
+        [],
+        0.0,
+    )
+    for wide, end in ((0.02, t[rows][-1]), (0.008, t[rows][-1])):
+        out = math.hypot(wide, 0.003)
+
+        def rates(now, y, out=out):
+            p, v = y[2] * HEAT / y[1], y[0] / area(30.0 * 0.04)
+            low = np.interp(now, RETURN["time"], RETURN["value"])
+            return (p - 0.5 * RHO * v * abs(v) - low) / INERTIA, y[0], bores(p, 0.04, out)
+
+        def switches(now, y):
+            return y[2] * HEAT / y[1] - AMBIENT - 4e3
+
+        switches.terminal, switches.direction = wide == 0.02, 1.0
+        exact = solve_ivp(rates, (at, end), y, rtol=1e-11, atol=1e-14, max_step=0.01, method="DOP853",
+                          dense_output=True, events=switches)  # fmt: skip
+        here = rows & (t >= at) & (t <= exact.t[-1])
+        flow, volume, mass = exact.sol(t[here])
+        off += [np.abs(result["v.air_mass"][here] / mass - 1.0).max(),
+                np.abs(result["v.air_pressure"][here] * volume / (mass * HEAT) - 1.0).max(),
+                np.abs(result["c.flow"][here] - flow).max() / np.abs(flow).max()]  # fmt: skip
+        y, at, parted = exact.y[:, -1], exact.t[-1], parted or exact.t[-1]
+    return max(off), (times["throttles"], parted), result
+
+
+def test_its_three_stages_follow_scipy_and_it_throttles_when_scipy_says():
+    off, (found, true), result = by_stages(staged())
+    near = TIGHT["rtol"] * result.summary["steps"]
+    assert off < near and found == pytest.approx(true, abs=near)
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_throttled_it_stops_less_and_is_wide_again_once_air_comes_in():
+    twice = {"time": [0.0, 2.0, 3.0, 6.0, 7.0], "value": [0.4e5, 0.4e5, 6e5, 6e5, 0.4e5]}
+    result = fvsolve.run(drained(0.04, 0.02, twice, end=12.0, **STAGES))
+    assert [event["what"] for event in result.summary["events"]][:5] == [
+        "opens", "throttles", "shuts", "opens", "is wide again"
+    ]  # fmt: skip
+    stopped = []
+    for more in ({}, STAGES):
+        one = fvsolve.run(drained(0.04, 0.04, RETURN, **more))
+        (shuts,) = [event["time"] for event in one.summary["events"] if event["what"] == "shuts"]
+        stopped.append(-one["c.flow"][np.searchsorted(one.t, shuts) - 1])
+    assert 0.0 < stopped[1] < 0.7 * stopped[0]
+
+
+@pytest.mark.parametrize("law, method", [("linear", "rodas-5p"), ("linear", "radau-iia-5"), ("log", "dormand-prince")])
+def test_staged_its_energy_closes_and_its_bores_only_dissipate(law, method):
+    one = energy(staged(law, numerics={"method": method, "rtol": 1e-7}))
+    column = sum(loss[-1] for loss in one.law.values())
+    assert abs(one.made[-1] - column) < 2e-5 * one.through
+    assert (np.diff(one.dissipated["v.inside air valve"]) >= -1e-9 * one.through).all()
+
+
+@pytest.mark.parametrize("end", [2.4, 3.05])
+def test_staged_and_resumed_it_is_the_unbroken_run(tmp_path, end):
+    case = staged(numerics={"method": "rk4", "step": 0.005})
+    fvsolve.run(case, set={"numerics.end": end}, out=tmp_path / "run")
+    result, whole = fvsolve.run(case, out=tmp_path / "run", resume=True), fvsolve.run(case)
+    assert np.array_equal(result["v.air_mass"], whole["v.air_mass"])
+    assert result.summary["events"] == whole.summary["events"]
+
+
+@pytest.mark.parametrize(
+    "more, said",
+    [({"throttled_outlet": None}, "switch: says nothing without throttled_outlet"),
+     ({"switch": None}, "throttled_outlet: says nothing without switch"),
+     ({"throttled_outlet": 0.03}, "throttles nothing; wanted less than outlet")],
+)  # fmt: skip
+def test_what_is_wrong_with_its_stages_is_said(more, said):
+    case = staged(**more)
+    case["nodes"]["v"] = {key: value for key, value in case["nodes"]["v"].items() if value is not None}
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(case)
+    assert said in str(error.value)

@@ -9,6 +9,7 @@ from restated.drawing import FRICTIONS, between
 
 ONE, NONE = st.just(1.0), st.just(0.0)
 CRACKING = {"cracking_pressure": between(0.0, 5e3)}
+SLAMS = {"rate": [1.0, 10.0], "reverse_velocity": [0.05, 1.0]}
 SLOW = {"time_constant": between(0.1, 5.0)}
 SIZE = st.one_of(
     st.fixed_dictionaries({"area": between(1e-4, 5e-3)}),
@@ -47,8 +48,16 @@ LINKS = {
     "rigid-column": of("rigid-column", CONDUIT, {"minor_loss": between(0.0, 3.0)}),
     "valve": of("valve", {"opening": OPENING}, {"characteristic": st.just("equal-percentage")}, a=SIZE),
     "orifice": of("orifice", {}, {"laminar_reynolds": between(5.0, 100.0)}, a=SIZE),
-    "check-valve": of("check-valve", {}, CRACKING, a=SIZE, b=st.just({}) | MOVING).map(disc),
+    "check-valve": of("check-valve", {}, CRACKING, a=SIZE, b=st.just({}) | MOVING).map(disc)
+    | of("check-valve", {"area": between(1e-4, 5e-3), "deceleration": st.just(SLAMS)}, CRACKING),
     "relief-valve": of("relief-valve", {"set_pressure": between(1.5e5, 6e5)}, a=SIZE, b=st.just({}) | MOVING).map(disc),
+    "rupture-disc": of("rupture-disc", {"burst_pressure": between(1.1e5, 1.6e5)}, a=SIZE),
+    "surge-anticipating": of(
+        "surge-anticipating",
+        {"opening_time": between(0.05, 0.3), "closing_time": between(0.1, 0.5), "low_set": between(1.5e5, 2.8e5)},
+        {"high_set": between(3.2e5, 4e5), "trip": between(0.1, 0.6), "hold": between(0.0, 0.3)},
+        a=SIZE,
+    ),
     "pressure-reducing": of("pressure-reducing", {"set_pressure": between(1.5e5, 4e5)} | SLOW, a=SIZE),
     "pressure-sustaining": of("pressure-sustaining", {"set_pressure": between(1.5e5, 4e5)} | SLOW, a=SIZE),
     "flow-control": of("flow-control", {"set_flow": between(1e-3, 2e-2)} | SLOW, a=SIZE),
@@ -81,5 +90,10 @@ NODES = {
             {"exponent": between(1.0, 1.4)} | CONNECTION,
         ),
     ),
-    "air-valve": of("air-valve", {"inlet": between(0.02, 0.08), "outlet": between(0.005, 0.05)}),
+    "air-valve": of(
+        "air-valve",
+        {"inlet": between(0.02, 0.08), "outlet": between(0.005, 0.05)},
+        {"automatic": between(1e-3, 3e-3)},
+        a=st.sampled_from([{}, {"switch": 3e3, "throttled_outlet": 4e-3}]),
+    ),
 }  # fmt: skip

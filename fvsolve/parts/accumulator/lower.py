@@ -26,7 +26,7 @@ class AccumulatorRows(Device, kind="accumulator"):
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
 
-    def settle(self, slate, row, y, scale) -> None:
+    def settle(self, slate, row, t, y, scale) -> None:
         model = slate.model
         floats, at = model.tables.floats[row["data"] :], model.tables.nodes[row["node"]]["y"]
         scale[at] = model.scale[at]

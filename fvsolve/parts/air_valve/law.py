@@ -3,6 +3,8 @@
 p V = m R T, V = V0 - y / rho with y [kg] the fluid that came in; the flow of air is isentropic through an orifice each
 way, choked below r = 0.528 (Wylie and Streeter 1993, 7-4). Open (armed), fluid passes; shut, none does, and the place
 is a junction. It opens where the pressure there falls below ambient and shuts once V is V0 again and fluid still comes.
+One that throttles lets air out through its wide bore until the pressure inside is `SWITCH` above ambient, and from then
+on, armed[event + 2], through a small one, until it is at ambient; its automatic bore lets air out beside either.
 """
 
 from math import expm1, log1p, sqrt
@@ -15,9 +17,9 @@ from fvsolve.kernels.records import LAW_LINEAR, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.valves import flow_at_drop
 
-VOLUME, AIR, HEAT, IN, OUT = 0, 1, 2, 3, 4
-NUMBERS = 5
-"""of an air valve: V0 [m3], air in it at ambient [kg], R T [J/kg], Cd A in and out [m2]."""
+VOLUME, AIR, HEAT, IN, OUT, SWITCH, SLOW = 0, 1, 2, 3, 4, 5, 6
+"""numbers: V0 [m3], air in it at ambient [kg], R T [J/kg], Cd A in and out [m2]; pressure over ambient at which it
+throttles [Pa], 0 where it never does, and Cd A out from then on [m2]."""
 KAPPA = 1.4
 CHOKED = (2.0 / (KAPPA + 1.0)) ** (KAPPA / (KAPPA - 1.0))
 SMALL = 1e-3  # share of the pressure upstream below which the root of a difference is made a polynomial
@@ -46,18 +48,27 @@ def air_state(st, floats, node, at, y_fluid, y_air):
 
 
 @njit
-def air_inflow(st, floats, at, gauge):
-    """(mass flow of air into the chamber [kg/s], the greatest it could be per share of pressure)."""
+def way_out(tables, device):
+    """Cd A of what air leaves by now [m2]."""
+    floats, at = tables.floats, device["data"]
+    if floats[at + SWITCH] > 0.0 and tables.armed[device["event"] + 2] > 0.0:
+        return floats[at + SLOW]
+    return floats[at + OUT]
+
+
+@njit
+def air_inflow(st, floats, at, gauge, leaves):
+    """(mass flow of air into the chamber [kg/s], the greatest it could be per share of pressure); leaves : Cd A out."""
     p, root = st["ambient"] + gauge, sqrt(floats[at + HEAT])
     if gauge < 0.0:
         size = floats[at + IN] * st["ambient"] / root
         r, sign = p / st["ambient"], 1.0
     else:
-        size = floats[at + OUT] * p / root
+        size = leaves * p / root
         r, sign = st["ambient"] / p, -1.0
     x, widest = max(1.0 - r, SMALL), size
     if x < NEAR:
-        widest = max(floats[at + IN], floats[at + OUT]) * p / root
+        widest = max(floats[at + IN], leaves) * p / root
     return sign * size * orifice_air(r), 1.5 * widest * orifice_air(1.0 - x) / x
 
 
@@ -83,7 +94,7 @@ def air_rate(y, tables, device):
     st, floats, at = tables.settings[0], tables.floats, device["data"]
     node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, at, y[node["y"]], y[device["y"]])
-    flow, slope = air_inflow(st, floats, at, gauge)
+    flow, slope = air_inflow(st, floats, at, gauge, way_out(tables, device))
     even = st["ambient"] * volume / floats[at + HEAT]  # mass at which it would be at ambient pressure
     quick = slope / min(mass, even)
     if tables.armed[device["event"]] <= 0.0 and abs(flow) * LINGER >= abs(even - mass):
@@ -131,6 +142,9 @@ def events(t, y, out, tables, device, g):
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
         left = p - min(gauge, 0.0) + RELUCTANCE
     either(tables, g, at, left)
+    if floats[device["data"] + SWITCH] > 0.0:
+        gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
+        either(tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else floats[device["data"] + SWITCH] - gauge)
 
 
 @njit

@@ -21,6 +21,9 @@ class AirValveRows(Device, kind="air-valve"):
     events = ("opens", "shuts")
     remedy = "give it another volume"
 
+    def of(self, part) -> Device:
+        return self if part.switch is None else Throttling()
+
     def place(self, draft, name, node, row) -> None:
         super().place(draft, name, node, row)
         row["density"] = draft.case.law.open_density
@@ -35,8 +38,11 @@ class AirValveRows(Device, kind="air-valve"):
     def numbers(self, draft, name, part) -> list[float]:
         heat = GAS_CONSTANT * part.temperature
         held = draft.case.ambient_pressure * part.volume / heat
-        ways = [part.discharge_coefficient * math.pi / 4.0 * d**2 for d in (part.inlet, part.outlet)]
-        return [part.volume, held, heat, *ways]
+        into, wide, small, always = (
+            part.discharge_coefficient * math.pi / 4.0 * (d or 0.0) ** 2
+            for d in (part.inlet, part.outlet, part.throttled_outlet, part.automatic)
+        )
+        return [part.volume, held, heat, into, wide + always, part.switch or 0.0, small + always]
 
     def scales(self, draft, name, part) -> list[float]:
         return [self.numbers(draft, name, part)[law.AIR]]
@@ -67,3 +73,9 @@ class AirValveRows(Device, kind="air-valve"):
         _, volume, mass = law.air_state(st, floats, node, at, float(y[node["y"]]), float(y[row["y"]]))
         root = math.sqrt(floats[at + law.HEAT] / (2.0 * mass))
         return [{int(row["y"]): root, int(node["y"]): root * mass / (volume * float(node["density"]))}]
+
+
+class Throttling(AirValveRows, kind=""):
+    """One that lets air out through a small bore from `switch` on."""
+
+    events = (*AirValveRows.events, "throttles", "is wide again")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.connection.part import Connection, behind
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
@@ -22,7 +23,8 @@ class AirValve(Node, kind="air-valve"):
     Air flows isentropically through bores of their own each way, choked beyond their critical pressures, and stays at
     `temperature`: p V = m R T. The float's chamber, `volume`, holds air from the start; once the fluid has filled all
     else the valve shuts, with the blow that this makes. Ports: any number. Stored energy: m R T (ln(p / p_ambient) - 1)
-    + p_ambient V [J]. Dissipated power: R T ln(p_ambient / p) times the flow of air [W].
+    + p_ambient V [J]. Dissipated power: R T ln(p_ambient / p) times the flow of air [W]. With `switch` it
+    throttles what goes out, until the air inside is at ambient again.
     """
 
     no_scalars: ClassVar[str] = "its contents carry no scalars yet"
@@ -32,7 +34,22 @@ class AirValve(Node, kind="air-valve"):
 
     inlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air in [m]")]
     outlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air out [m]")]
-    discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "Cd of both bores")] = 0.6
+    switch: Annotated[
+        float | None,
+        Quantity(
+            "pressure_drop",
+            positive,
+            "of the air over ambient, from which on it goes out through throttled_outlet in place of outlet",
+            Usual(100.0, 1e5, "anti-slam discs"),
+        ),
+    ] = None
+    throttled_outlet: Annotated[
+        float | None, Quantity("length", BORE, "diameter of the small bore for air out beyond switch [m]")
+    ] = None
+    automatic: Annotated[
+        float | None, Quantity("length", BORE, "diameter of the automatic bore, by which air goes out at all times [m]")
+    ] = None
+    discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "Cd of all bores")] = 0.6
     volume: Annotated[
         float | None,
         Quantity("volume", positive, "of the float's chamber [m3]; a cylinder three inlets long and wide if left out"),
@@ -45,6 +62,19 @@ class AirValve(Node, kind="air-valve"):
     ] = 293.15
 
     initial_pressure: ClassVar[None] = None
+
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        faults = super().key_faults(given)
+        if ("switch" in given) != ("throttled_outlet" in given):
+            one, other = ("switch", "throttled_outlet") if "switch" in given else ("throttled_outlet", "switch")
+            faults.append(((one,), f"says nothing without {other}; give both, or leave it out"))
+        return faults
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if self.throttled_outlet is not None and not self.throttled_outlet < self.outlet:
+            text = f"{self.throttled_outlet:g} m throttles nothing; wanted less than outlet, {self.outlet:g} m"
+            yield ("throttled_outlet",), text
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         size = Connection.model_construct(area=None, diameter=WIDE * self.inlet, loss_in=1.0, loss_out=1.0)

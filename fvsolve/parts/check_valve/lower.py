@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from fvsolve.errors import Notice
 from fvsolve.model.device import Device
-from fvsolve.parts.check_valve import law
+from fvsolve.parts.check_valve import law, law_slam
 from fvsolve.parts.disc.law import CHECK
 from fvsolve.parts.disc.lower import Lifting
 
+SHORT = 1e-6  # time over which the deceleration of a flow is taken [s]
 SMALL_FLOW = 1e-9  # share of the flows of a scene below which a reversed one is rounding
 
 
@@ -67,6 +70,8 @@ class CheckValveRows(Device, kind="check-valve"):
     events = ("shuts", "opens")
 
     def of(self, part) -> Device:
+        if part.deceleration is not None:
+            return Slamming()
         return self if not part.moves else CheckLag() if part.natural_frequency is None else CheckSwing()
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -82,3 +87,38 @@ class CheckValveRows(Device, kind="check-valve"):
         shuts = start.valve_flows()[k] < -SMALL_FLOW * start.flow_scale
         start.shut |= {k} if shuts else set()
         return shuts
+
+
+class Slamming(CheckValveRows, kind=""):
+    """One that shuts at the reverse velocity that its maker's curve says."""
+
+    law = law_slam
+    states = ("slam_velocity", "deceleration")
+    events = ("flow turns", "shuts", "runs forward again", "flow turns quicker than its curve goes")
+    remedy = "give its curve a greater reverse_velocity"
+
+    def numbers(self, draft, name, part) -> list[float]:
+        return [part.cracking_pressure, draft.fluid.density * part.bore, part.deceleration.rate[-1]]
+
+    def scales(self, draft, name, part) -> list[float]:
+        return [1.0, 1.0]
+
+    def settle(self, slate, row, t, y, scale) -> None:
+        o, at, curve = row["y"], row["event"], slate.model.case.conduits[self.name(slate, row)].deceleration
+        if slate.armed[at + law_slam.TURNED] == 0.0:
+            y[o] = y[o + 1] = 0.0
+        elif y[o] == 0.0:
+            y[o + 1] = self.deceleration(slate, row, t, y)
+            y[o] = max(float(np.interp(y[o + 1], curve.rate, curve.reverse_velocity)), law_slam.LEAST)
+
+    def name(self, slate, row) -> str:
+        return slate.model.valve_names[row["valve"]]
+
+    def deceleration(self, slate, row, t: float, y) -> float:
+        """By how much its velocity falls a second, on the way on which the state has come [m/s2]."""
+        model, k = slate.model, int(slate.model.layout["valve"] + row["valve"])
+        dydt, now, before = np.zeros(y.size), model.new_out(), model.new_out()
+        model.functions.rhs(t, y, dydt, now, slate.handle)
+        model.functions.rhs(t - SHORT, y - SHORT * dydt, np.zeros(y.size), before, slate.handle)
+        full = model.tables.floats[row["data"] + law_slam.FULL]
+        return max(float(before[k] - now[k]) / (SHORT * full), 0.0)

@@ -32,7 +32,7 @@ class Lifting(Device, kind=""):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
-    def settle(self, slate, row, y, scale) -> None:
+    def settle(self, slate, row, t, y, scale) -> None:
         tables = slate.model.tables
         stop, seat = (slate.armed[row["event"] + k] > 0.0 for k in (0, 2))
         if self.states and seat and law.disc_lift(y, tables, row) > 0.0:  # it has slammed

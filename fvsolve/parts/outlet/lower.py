@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from fvsolve.kernels import records as rec
+from fvsolve.model.device import Device
 from fvsolve.model.inputs import opening
 from fvsolve.model.lowering import Lowering, Restriction
 from fvsolve.parts.outlet import law
 from fvsolve.parts.schedule import constant
+
+SPAN = 1e5  # drop at which an outlet has its flow, if nothing else is said [Pa]
 
 
 class OutsideRows(Lowering, kind="outside"):
@@ -43,7 +46,32 @@ class OutletRows(Restriction, kind="outlet"):
 
     def span(self, draft, link) -> float:
         """From there to the drop at which it lets out its flow [Pa]."""
-        return 1e5 if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
+        return SPAN if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
 
     def inputs(self, model, name, part):
         return opening(model, name)
+
+
+class RelievingRows(Device, kind=""):
+    """What is shut at the start and opens to a place, by a root, or to ambient, by an outlet's law of exponent 1/2.
+
+    mode : by how many numbers and flags of an outlet its own are preceded
+    """
+
+    quantities = ("opening",)
+
+    def own_numbers(self, draft, name, part) -> list[float]:
+        """Those of its own."""
+        raise NotImplementedError
+
+    def numbers(self, draft, name, part) -> list[float]:
+        return [0.5, 0.0, SPAN, law.NO_END][: self.mode] + self.own_numbers(draft, name, part)
+
+    def revise(self, start, part, row) -> bool:
+        k = int(row["valve"])
+        new = k not in start.shut
+        start.shut |= {k}
+        return new
+
+    def follow(self, start, k) -> None:
+        """Nothing: it carries none."""

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.link import TwoPort
+from pydantic import Field
+
+from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.link import Link, TwoPort
 from fvsolve.parts.node import Node
+from fvsolve.parts.value import Text
+from fvsolve.parts.valve.part import Sized
 
 
 class Outside(Node):
@@ -38,3 +43,35 @@ def out_of(name: str, place: str, **law: Any) -> tuple[dict[str, Node], dict[str
     """(places, links) of an outlet `name` at a place."""
     outlet = Outlet.model_construct(**{"from": place}, to=f"{name}.outside", **law)
     return {f"{name}.outside": Outside.model_construct(level_of=place)}, {name: outlet}
+
+
+class Relieving(Sized, Link):
+    """What is shut at the start and opens to another place, or, without `to`, to ambient."""
+
+    joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "hydraulic"}
+    may_lack: ClassVar[tuple[str, ...]] = ("to",)
+    quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
+
+    from_: Annotated[str, Text("the place that it guards"), Field(alias="from")]
+    to: Annotated[str | None, Text("the place it opens to; ambient if left out")] = None
+
+    @property
+    def ports(self) -> dict[str, str]:
+        """Port name -> place."""
+        return {"from": self.from_} | ({} if self.to is None else {"to": self.to})
+
+    @property
+    def outward(self) -> bool:
+        """Whether it opens to ambient."""
+        return self.to is None or self.to.endswith(".outside")
+
+    def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
+        if self.to is not None:
+            return {}, {name: self}
+        place = f"{name}.outside"
+        return {place: Outside.model_construct(level_of=self.from_)}, {name: self.model_copy(update={"to": place})}
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if self.to is None and getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
+            text = f"is a reservoir, whose pressure no {self.kind} relieves; wanted a junction, a tank or another place"
+            yield ("from",), f"{self.from_} {text}"

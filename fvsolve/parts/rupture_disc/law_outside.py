@@ -1,0 +1,6 @@
+"""A rupture disc to ambient. Knows where its functions stand."""
+
+from fvsolve.parts.outlet.law_root import bends, slope, step
+from fvsolve.parts.rupture_disc.law import events, set, value
+
+__all__ = ["bends", "events", "set", "slope", "step", "value"]

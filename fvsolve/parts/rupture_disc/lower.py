@@ -1,0 +1,36 @@
+"""Rupture discs in the tables of a scene: whole at the start."""
+
+from __future__ import annotations
+
+from fvsolve.model.device import Device
+from fvsolve.parts.outlet.law import EVENTS
+from fvsolve.parts.outlet.lower import RelievingRows
+from fvsolve.parts.rupture_disc import law, law_outside
+
+
+class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
+    """Between two places."""
+
+    law, sudden = law, True
+    events = ("bursts",)
+
+    def of(self, part) -> Device:
+        return DiscToAmbient() if part.outward else self
+
+    def own_numbers(self, draft, name, part) -> list[float]:
+        return [part.burst_pressure]
+
+    def begin(self, start, part, row) -> list[str]:
+        k = int(row["valve"])
+        drop, name = start.drive_of(k)[0], start.draft.valve_names[k]
+        if drop >= part.burst_pressure:
+            what = f"{drop:.6g} Pa across it at the start; it would have burst, set it higher or leave the disc out"
+            start.draft.fault(f"links.{name}.burst_pressure", what)
+        return []
+
+
+class DiscToAmbient(RuptureDiscRows, kind=""):
+    """To ambient."""
+
+    law, mode = law_outside, EVENTS
+    events = ("",) * EVENTS + ("bursts",)

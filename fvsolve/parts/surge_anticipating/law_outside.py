@@ -1,0 +1,6 @@
+"""A surge-anticipating valve to ambient. Knows where its functions stand."""
+
+from fvsolve.parts.outlet.law_root import bends, slope, step
+from fvsolve.parts.surge_anticipating.law import events, move, set, value
+
+__all__ = ["bends", "events", "move", "set", "slope", "step", "value"]

@@ -1,0 +1,58 @@
+"""Surge-anticipating valves in the tables of a scene: shut at the start."""
+
+from __future__ import annotations
+
+from fvsolve.errors import Notice
+from fvsolve.model.device import Device
+from fvsolve.parts.outlet.law import EVENTS
+from fvsolve.parts.outlet.lower import RelievingRows
+from fvsolve.parts.surge_anticipating import law, law_outside
+
+
+class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
+    """Between two places."""
+
+    law = law
+    states = ("opening", "held")
+    events = ("is shut", "opens", "is fully open", "begins to shut", "", "", "")
+    remedy = "give it a longer closing_time"
+
+    def of(self, part) -> Device:
+        return AnticipatingToAmbient() if part.outward else self
+
+    def own_numbers(self, draft, name, part) -> list[float]:
+        if part.trip is not None and part.trip < draft.case.numerics.start:
+            what = f"{part.trip:g} s lies before the start at {draft.case.numerics.start:g} s"
+            draft.fault(f"links.{name}.trip", f"{what}; wanted a later one")
+        low = -law.NEVER if part.low_set is None else part.low_set
+        high, trip = (law.NEVER if one is None else one for one in (part.high_set, part.trip))
+        place = float(draft.node_index[part.sensed])
+        return [part.opening_time, part.hold, part.closing_time, low, high, trip, place]
+
+    def scales(self, draft, name, part) -> list[float]:
+        return [0.1, part.hold + part.opening_time]
+
+    def settle(self, slate, row, t, y, scale) -> None:
+        at, o = row["event"] + row["mode"], row["y"]
+        if slate.armed[at + law.SHUT] > 0.0:
+            y[o] = 0.0
+        elif slate.armed[at + law.OPENING] > 0.0:
+            y[o + 1] = 0.0
+        elif slate.armed[at + law.OPEN] > 0.0:
+            y[o] = 1.0
+
+    def begin(self, start, part, row) -> list[str]:
+        name, place = start.draft.valve_names[row["valve"]], start.nodes[start.draft.node_index[part.sensed]]
+        p, high = float(place["pressure"]), part.high_set is not None and float(place["pressure"]) >= part.high_set
+        if part.low_set is not None and p < part.low_set:
+            text = (f"{name}: {part.sensed} has {p:.6g} Pa at the start, below low_set, {part.low_set:.6g} Pa: it "
+                    "waits until that has been exceeded")  # fmt: skip
+            start.draft.warnings.append(Notice("start", f"links.{name}", text, "low_set", p, part.low_set))
+        return [f"{name}: opens at once, at {p:.6g} Pa where {part.high_set:.6g} Pa are set"] if high else []
+
+
+class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
+    """To ambient."""
+
+    law, mode = law_outside, EVENTS
+    events = ("",) * EVENTS + SurgeAnticipatingRows.events
