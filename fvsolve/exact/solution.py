@@ -44,6 +44,8 @@ class Solution:
         name, quantity = probe.name, probe.quantity
         if probe.fraction is not None and self.pipe is not None:
             return self._along(probe, t)
+        if quantity == "force" and self.pipe is not None:
+            return self._force(self.case.links[name], t)
         laws = getattr(self, quantity if quantity in ("level", "flow", "position", "velocity") else "pressure")
         if name not in laws and quantity in ("pressure", "gauge_pressure", "head"):
             laws = reservoirs(self.case)
@@ -58,13 +60,22 @@ class Solution:
         cuts = np.unique(np.concatenate([edges, inner[(inner > edges[0]) & (inner < edges[-1])]]))
         return averages(lambda x: self.pipe(name, x, t), edges, cuts)
 
+    def _force(self, pipe, t):
+        """Unbalanced force on a pipe without friction [N]: what its ends bear beyond what they do at the start."""
+        start = np.array([self.case.numerics.start])
+        rise, first = (self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start))
+        return 0.25 * np.pi * pipe.diameter**2 * (rise - first)
+
     def _along(self, probe, t):
         link = self.case.links[probe.name]
         p, q = self.pipe(probe.name, np.full(t.shape, probe.fraction * link.length), t)
         if probe.quantity in ("flow", "velocity"):
             return q if probe.quantity == "flow" else q / (0.25 * np.pi * link.diameter**2)
         z = [self.case.elevation(end) for end in (link.from_, link.to)]
-        return self._counted(p, probe.quantity, z[0] + probe.fraction * (z[1] - z[0]))
+        here = z[0] + probe.fraction * (z[1] - z[0])
+        if link.profile is not None:
+            here = float(link.profile.at(probe.fraction * link.length))
+        return self._counted(p, probe.quantity, here)
 
     def _counted(self, pressure, quantity: str, z: float):
         """A pressure as gauge pressure or head; everything else as it is."""

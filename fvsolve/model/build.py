@@ -31,6 +31,7 @@ from fvsolve.model.rides import lower_rides
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schemes import scheme_settings
 from fvsolve.model.settling import settled
+from fvsolve.model.unsteady import MOST_TERMS
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 
@@ -214,9 +215,15 @@ def layout_of(draft: Draft) -> np.ndarray:
     ):  # fmt: skip
         found[name], at = at, at + size
     found["size"] = at
-    found["forces"] = draft.to_work(draft.size) if (draft.probe_table["kind"] == rec.PIPE_FORCE).any() else -1
-    found["rates"] = draft.to_work(draft.size) if draft.ride_table["heavy"].any() else -1
+    found["forces"] = draft.to_work(most_states(draft)) if (draft.probe_table["kind"] == rec.PIPE_FORCE).any() else -1
+    found["rates"] = draft.to_work(most_states(draft)) if draft.ride_table["heavy"].any() else -1
     return found
+
+
+def most_states(draft: Draft) -> int:
+    """How many states there may be once the start has chosen the terms of unsteady friction."""
+    unsteady = [mesh.cells for mesh in draft.meshes if draft.case.links[mesh.name].friction.model == "unsteady"]
+    return draft.size + MOST_TERMS * sum(unsteady)
 
 
 def marks_of(draft: Draft) -> int:

@@ -37,14 +37,14 @@ class Pump(TwoPort, kind="pump"):
     power: Annotated[float | None, Quantity("power", positive, "given to the fluid whatever its flow [W]")] = None
     suter: Annotated[SuterTable | None, Suter()] = None
     outside: Annotated[
-        str,
+        str | None,
         Choice(
             "law",
             ("suter", "parabola"),
             "outside of curve: the Suter table of its specific speed, joined to it, where rated_speed is given; or a "
             "parabola",
         ),
-    ] = "suter"
+    ] = None
     speed: Annotated[
         Schedule,
         Scheduled("number", nonnegative, "relative to that of the curve", Usual(0.0, 2.5, "of the rated speed")),
