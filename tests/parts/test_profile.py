@@ -76,11 +76,12 @@ def off_chain(law: str, scheme: str, heights: np.ndarray) -> float:
     return float(np.max(np.abs(one - chain)) / np.ptp(chain))
 
 
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("scheme", ["upwind", "weno5"])
+@pytest.mark.parametrize(
+    ("law", "scheme"), [("linear", "upwind"), ("linear", "weno5"), ("log", "upwind"), ("mixture", "weno5")]
+)
 def test_it_is_the_chain_of_300_pipes(law: str, scheme: str) -> None:
     """Under linear and upwind, whose cells know of no end, to round-off; else as far off as where both are straight."""
-    n = 300 if law == "linear" else 60
+    n = 300 if (law, scheme) == ("linear", "upwind") else 60
     hills = height(np.linspace(0.0, LENGTH, n + 1))
     hills[1:-1] += np.random.default_rng(7).uniform(-2.0, 2.0, n - 1)
     if (law, scheme) == ("linear", "upwind"):
