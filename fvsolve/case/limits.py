@@ -103,7 +103,7 @@ def read_limit(
             key = "quantity" if " without " in str(error) or "no node has" in str(error) else "on"
             faults.append(((key if key in given else "on",), str(error)))
     dimension = extent.dimension if extent is not None else "number"
-    keys = limit_keys(asked, dimension)
+    keys = limit_keys(asked if isinstance(asked, str) else "", dimension)
     if extent is None:
         keys |= dict.fromkeys(("least", "greatest"), (Anything(), None))
     try:

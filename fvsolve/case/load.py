@@ -233,8 +233,11 @@ class _Reader:
     def cut(self, properties: Any, numerics: Numerics | None) -> list[Notice]:
         """Cut pipes at what is placed on them by chainage; what is to be told of it."""
         table = placing.bent(self.raw.table)
-        if not placing.placed(table):
+        tables = (table.get("nodes"), table.get("links"), table.get("routes", {}))
+        if not all(isinstance(one, dict) for one in tables) or not placing.placed(table):
             return []
+        for group, name, part in placing.placed(table):
+            self.kind(group, name, part)
         self.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
                        for name, one in table["links"].items() if placing.is_pipe(one)
                        for k in range(len(one["bends"]) if isinstance(one.get("bends"), list) else 0)}  # fmt: skip
@@ -248,8 +251,6 @@ class _Reader:
                 except ValueError as error:
                     self.misfit(("links", name), error)
         self.stop()
-        if properties is None or numerics is None:
-            self.stop()
         counts = default_cells(pipes, properties, numerics.cell_time)
         exact = {name for name, pipe in pipes.items() if (pipe.line or numerics.line) == "delay"}
         made = placing.cut(table, pipes, counts, exact, self.fault)

@@ -20,17 +20,8 @@ from fvsolve.parts import KINDS, Pipe
 from fvsolve.units import show
 
 WHERE = ("on", "at")
-MADE = (
-    "length",
-    "cells",
-    "minor_loss",
-    "fittings",
-    "profile",
-    "from",
-    "to",
-    "pieces",
-    "bends",
-)  # keys that a piece has its own
+TIE = 1e-6  # of a cell, within which two faces are as near
+OWN = ("length", "cells", "minor_loss", "fittings", "profile", "from", "to", "pieces", "bends")  # keys of each piece
 Say = Callable[[tuple, str], None]
 
 
@@ -59,9 +50,10 @@ class Placed:
 
 @dataclass
 class Cutting:
-    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made, and notices."""
+    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made, notices."""
 
     table: dict[str, Any]
+    named: frozenset[str]  # links of the file
     pieces: dict[str, list[str]] = field(default_factory=dict)
     origin: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
     told: list[Notice] = field(default_factory=list)
@@ -154,7 +146,8 @@ def cut(table: dict[str, Any], wholes: dict[str, Pipe], cells: dict[str, int], e
     wholes : pipes as they are read; cells : of each; exact : those that are cut where it is said, between no cells;
     say : takes the keys and the text of a fault
     """
-    made = Cutting({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))})
+    made = Cutting({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
+                   frozenset(table["links"]))  # fmt: skip
     by_pipe: dict[str, list[Placed]] = {}
     for group, name, part in placed(table):
         one = Placed(group, name, part)
@@ -219,13 +212,38 @@ def cut_one(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Plac
             text = (f"{one.name}: moved by {abs(at - one.distance):.4g} m to chainage {begin + at:.10g} m of {name}, "
                     "where two of its cells meet")  # fmt: skip
             made.told.append(Notice("cells", f"{one.group}.{one.name}", text, "at", at - one.distance))
+    taken(made, name, given, parts, names, say)
     lay(made, name, given, whole, parts, edges, counts.tolist())
     made.table["routes"][name] = {"pipes": names, "start": begin}
 
 
+def taken(made: Cutting, name: str, given: dict, parts: list[Placed], names: list[str], say: Say) -> None:
+    """Faults of names that cutting a pipe would give twice, and of keys for pieces that it has not."""
+    for one in names:
+        if one in made.named:
+            say(("links", one), f"{name} is cut, and {show(one)} is the name of a piece of it; rename one")
+    if name in made.table["routes"]:
+        say(("routes", name), f"{name} is cut, and so a route by itself; rename this one")
+    for one in parts:
+        for place in dict.fromkeys(one.joins) if one.group == "links" else ():
+            if place in made.table["nodes"]:
+                say(("nodes", place), f"{one.name} joins {one.said['on']} at a place of that name; rename one")
+    own = given.get("pieces", {})
+    if not isinstance(own, dict) or not all(isinstance(one, dict) for one in own.values()):
+        say(("links", name, "pieces"), f"{show(own)} is no table of tables by the names of pieces")
+        return
+    for one in own:
+        if one not in names:
+            say(("links", name, "pieces", one), f"no piece of {name} has that name; they are {listing(names)}")
+
+
 def between(places: np.ndarray, cells: int) -> np.ndarray:
-    """Numbers of the faces between cells that are nearest to places in cells, rising : int[n]."""
-    faces = np.round(places).astype(int)
+    """Numbers of the faces between cells that are nearest to places in cells, rising : int[n].
+
+    What lies in the middle of a cell goes towards the middle of the pipe, so that it does from either end.
+    """
+    inward = np.where(places < 0.5 * cells, TIE, -TIE)
+    faces = np.round(places + inward).astype(int)
     for k in range(faces.size):
         faces[k] = max(faces[k], faces[k - 1] + 1 if k else 1)
     for k in reversed(range(faces.size)):
@@ -236,7 +254,7 @@ def between(places: np.ndarray, cells: int) -> np.ndarray:
 def lay(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], edges: np.ndarray, counts: list[int]):
     """Write the pieces of a pipe, the nodes between, and how high these lie."""
     links, nodes = made.table["links"], made.table["nodes"]
-    rest = {key: value for key, value in given.items() if key not in MADE}
+    rest = {key: value for key, value in given.items() if key not in OWN}
     joins = [one.joins for one in parts]
     starts, ends = [whole.from_, *(last for _, last in joins)], [*(first for first, _ in joins), whole.to]
     for k, (low, high) in enumerate(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)):
@@ -248,7 +266,7 @@ def lay(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed],
             piece["profile"] = part.said
             piece["length"] = part.length
         own = f"{name}-{k + 1}"
-        links[own] = piece | given.get("pieces", {}).get(own, {})
+        links[own] = piece | dict(own_of(given, own))
         made.origin["links", own] = ("links", name)
     heights = [height(nodes.get(end)) for end in (whole.from_, whole.to)]
     for one, at, (first, last) in zip(parts, edges[1:-1].tolist(), joins, strict=True):
@@ -261,6 +279,13 @@ def lay(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed],
             else:
                 nodes[place] = {"type": "junction", **z}
                 made.origin["nodes", place] = ("links", one.name)
+
+
+def own_of(given: dict, piece: str) -> Any:
+    """What a cut pipe says of one piece alone."""
+    own = given.get("pieces")
+    found = own.get(piece) if isinstance(own, dict) else None
+    return found if isinstance(found, dict) else {}
 
 
 def height(node: Any) -> float | None:

@@ -58,9 +58,9 @@ def by_hand() -> dict:
     return line(nodes, links)
 
 
-def placed(turned: bool = False, **more) -> dict:
+def placed(turned: bool = False, bends: list | None = None, **more) -> dict:
     at = {"half": 1500.0, "top": "2.2 km", "hole": "2950 m", "safe": 3500}
-    one = main()
+    one = main() | ({} if bends is None else {"bends": bends})
     if turned:
         mirrored = {
             "chainage": (5000.0 - np.array(HILL["chainage"][::-1])).tolist(),
@@ -184,6 +184,41 @@ def test_what_is_wrong_is_named_once(change, told: str) -> None:
         fvsolve.load(case)
     assert told in str(error.value)
     assert len(error.value.faults) == 1
+
+
+@pytest.mark.parametrize("cells", [7, 8])
+def test_what_lies_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end(cells: int) -> None:
+    said = {key: one for key, one in main(cells=cells).items() if key != "profile"}
+    for k in range(cells):
+        at = (k + 0.5) * LENGTH / cells
+        if abs(at - 0.5 * LENGTH) < 1.0:  # there is no nearer one
+            continue
+        lengths = []
+        for turned in (False, True):
+            one = said | ({"from": "gate", "to": "lake"} if turned else {})
+            spot = {"type": "junction", "on": "main", "at": LENGTH - at if turned else at}
+            found = fvsolve.load(line({"spot": spot}, {"main": one})).links
+            lengths.append([found[name].length for name in ("main-1", "main-2")][:: -1 if turned else 1])
+        assert lengths[0] == pytest.approx(lengths[1], rel=1e-12), k
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda case: case["links"].update({"main-2": valve("gate", "sea", 1e-4)}), "main-2"),
+        (lambda case: case["nodes"].update({"hole-at": junction(elevation=20.0)}), "hole joins main at a place"),
+        (lambda case: case.update(routes={"main": {"pipes": ["main"]}}), "main is cut, and so a route by itself"),
+        (lambda case: case["links"]["main"].update(pieces={"main-9": {"cells": 3}}), "no piece of main has that name"),
+        (lambda case: case["links"]["main"].update(pieces=3), "3 is no table of tables"),
+        (lambda case: case["links"]["hole"].update(type="laek"), 'no type "laek"'),
+    ],
+)  # fmt: skip
+def test_names_are_given_once_and_pieces_are_there(change, told: str) -> None:
+    case = placed()
+    change(case)
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(case)
+    assert told in str(error.value)
 
 
 def test_what_cannot_stand_in_a_pipe_is_named() -> None:
