@@ -9,11 +9,13 @@ import numpy as np
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.output.envelope import with_start
 
+ALONG = ("distance", "elevation", "least_pressure", "t_least", "greatest_pressure", "t_greatest")
+
 
 @dataclass(frozen=True)
 class Met:
-    """Places of one part: distance from a pipe's `from` end (nan of others), elevation [m], extremes [SI] and their
-    times [s], absolute pressures where `pressed`: float64[places]."""
+    """Places of one part: distance from a pipe's `from` end (nan of others), elevation [m], extremes [SI], pressures
+    absolute, and their times [s] : float64[places]."""
 
     group: str
     part: str
@@ -27,26 +29,32 @@ class Met:
 
 def met(model, summary, extent) -> list[Met]:
     """Of every part of an extent what its places met."""
-    whole = with_start(summary, model) if extent.quantity in OF_PRESSURE else {}
-    return [part_of(model, summary, extent, whole, group, name) for group, name in extent.parts]
+    pressed = extent.quantity in OF_PRESSURE
+    pipes = {pipe.name: pipe for pipe in model.pipes}
+    whole = with_start(summary, model) if pressed else {}
+    quantity = "pressure" if pressed else extent.quantity
+    rows: dict[str, list] = {}  # of what is watched along pipes
+    for one in model.watched:
+        if one.straight and one.quantity == quantity:
+            rows.setdefault(one.name, []).append(one)
+    made = []
+    for group, name in extent.parts:
+        if group == "links" and name in whole:
+            made.append(Met(group, name, *(np.asarray(whole[name][key]) for key in ALONG)))
+        elif group == "links" and name in rows:
+            made.append(along(summary, pipes[name], rows[name]))
+        else:
+            z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
+            found = summary.watched[f"{group}.{name}.{quantity}"]
+            made.append(Met(group, name, np.array([np.nan]), np.array([z]), *np.array([found]).T))
+    return made
 
 
-def part_of(model, summary, extent, whole: dict, group: str, name: str) -> Met:
-    if group == "links" and name in whole:
-        one = whole[name]
-        keys = ("distance", "elevation", "least_pressure", "t_least", "greatest_pressure", "t_greatest")
-        return Met(group, name, *(np.asarray(one[key]) for key in keys))
-    quantity = "pressure" if extent.quantity in OF_PRESSURE else extent.quantity
-    pipe = next((one for one in model.pipes if group == "links" and one.name == name), None)
-    pipe = pipe if pipe is None or quantity in model.case.links[name].along else None
-    if pipe is None:
-        found = [summary.watched[f"{group}.{name}.{quantity}"]]
-        z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
-        return Met(group, name, np.array([np.nan]), np.array([z]), *np.array(found).T)
-    rows = [one for one in model.watched if one.name == name and one.part == group and one.quantity == quantity]
+def along(summary, pipe, rows: list) -> Met:
+    """Of what is watched along a pipe."""
     distance = np.array([one.fraction for one in rows]) * pipe.length
     found = np.array([summary.watched[one.text] for one in rows])
-    return Met(group, name, distance, pipe.height(distance), *found.T)
+    return Met("links", pipe.name, distance, pipe.height(distance), *found.T)
 
 
 def in_quantity(model, quantity: str, pressure, elevation):

@@ -177,10 +177,11 @@ def find_points(slate: Slate) -> dict[str, dict[str, np.ndarray]]:
     """What `find_envelope` says of cells, and the pressure at the start, of watched places along pipes: their ends and
     the points of profiles."""
     model, few, found = slate.model, len(slate.model.probes), {}
-    rows = [k for k, probe in enumerate(model.watched) if np.isfinite(model.watched_start[k])]
-    for pipe in model.pipes if rows else ():
-        own = [k for k in rows if model.watched[k].name == pipe.name]
-        if not own:
+    rows: dict[str, list[int]] = {}
+    for k in np.flatnonzero(np.isfinite(model.watched_start)):
+        rows.setdefault(model.watched[k].name, []).append(int(k))
+    for pipe in model.pipes:
+        if not (own := rows.get(pipe.name)):
             continue
         distance = np.array([model.watched[k].fraction * pipe.length for k in own])
         low, t_low, high, t_high = slate.extremes[:, few + np.array(own)]

@@ -14,15 +14,15 @@ from typing import Any
 from fvsolve.case import Case, load, shipped
 from fvsolve.case.lines import key_lines
 from fvsolve.case.raw import dotted
-from fvsolve.errors import CaseError, Fault, FvsolveError, RunError, did_you_mean, listing
+from fvsolve.errors import CaseError, Fault, FvsolveError, RunError, did_you_mean
 from fvsolve.output.summary import plain, write_summary
-from fvsolve.run import open_run, run
+from fvsolve.run import run
 from fvsolve.studies.many import many
 from fvsolve.studies.sent import Sent
 from fvsolve.units import show
 
 KEYS = ("case", "title", "error", "events", "protections")
-DEEP = ("nodes", "links", "limits", "routes", "scalars", "signals", "expect", "compare")  # tables of named tables
+DEEP = ("nodes", "links", "limits", "routes", "scalars", "defaults")  # of named tables whose keys are set one by one
 STUDY = "study.json"
 
 
@@ -112,7 +112,7 @@ def keys_of(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
             yield first, inner
             continue
         for second, below in inner.items():
-            if first in DEEP and isinstance(below, dict) and first not in ("signals", "expect", "compare"):
+            if first in DEEP and isinstance(below, dict):
                 yield from ((path(first, second, third), value) for third, value in below.items())
             else:
                 yield path(first, second), below
@@ -268,13 +268,3 @@ def open_study(folder: str | Path) -> dict[str, Any]:
         return said
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise FvsolveError(f"{folder} holds no study that ended (no {STUDY}): {error}") from None
-
-
-def results(folder: str | Path):
-    """(row, `Result`) of every run of a study."""
-    return [(row, open_run(row["directory"])) for row in open_study(folder)["runs"]]
-
-
-def unknown(names: list[str], known: list[str], what: str) -> str:
-    """What to say of names that are none."""
-    return f"no {what} named {listing(names)}; there are {listing(known)}"
