@@ -88,7 +88,10 @@ def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any],
         on, dot, quantity = probe_text.rpartition(".")
         if not dot:
             raise ValueError(f"wanted {function}(PART.QUANTITY)")
-        extent = read_extent(on, quantity, kinds, routes)
+        try:
+            extent = read_extent(on, quantity, kinds, routes)
+        except Misfit as error:
+            raise ValueError(str(error)) from None
     else:
         probe = read_probe(probe_text, kinds)
     if probe is None and extent is None:

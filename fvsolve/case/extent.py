@@ -9,6 +9,7 @@ from typing import Any
 from fvsolve.case.probe import Kinds, Probe
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import Pipe
+from fvsolve.parts.value import Misfit
 from fvsolve.units import show
 
 ALL = {"pipes": "links", "nodes": "nodes"}  # words for all parts of a kind
@@ -53,7 +54,10 @@ def of_profiles(links: Mapping[str, Any]) -> Iterator[Probe]:
 
 
 def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> Extent | None:
-    """The extent of names; None where one of them is at fault itself. Raises ValueError."""
+    """The extent of names; None where one of them is at fault itself.
+
+    Raises ValueError for names that are none, Misfit (below the key `quantity`) where they have none such.
+    """
     names = [given] if isinstance(given, str) else given
     if not isinstance(names, (list, tuple)) or not names or not all(isinstance(one, str) for one in names):
         raise ValueError(f'{show(given)} names nothing; wanted a part, a route, "pipes" or "nodes", or a list of such')
@@ -74,7 +78,8 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
         group, name, known = lacking[0]
         more = f", and {len(lacking) - 1} more" if len(lacking) > 1 else ""
         has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "it has none"
-        raise ValueError(f"{name}{more} without {show(quantity)}: a {kinds[group][name].kind}; {has}")
+        text = f"{name}{more} without {show(quantity)}: a {kinds[group][name].kind}; {has}"
+        raise Misfit([(("quantity",), text)])
     return Extent(tuple(names), tuple(parts), quantity, dimensions.pop())
 
 
@@ -94,8 +99,9 @@ def parts_of(one: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -
         wanted = (lambda kind: kind is Pipe) if one == "pipes" else (lambda kind: quantity in quantities_of(kind))
         found = [(ALL[one], name) for name, kind in kinds[ALL[one]].items() if kind is not None and wanted(kind)]
         if not found:
-            what = f"{show(one)}: the case has no pipe" if one == "pipes" else f"no node has {show(quantity)}"
-            raise ValueError(what)
+            if one == "pipes":
+                raise ValueError(f"{show(one)}: the case has no pipe")
+            raise Misfit([(("quantity",), f"no node has {show(quantity)}")])
         return found
     known = [*kinds["nodes"], *kinds["links"], *routes, *ALL]
     raise ValueError(f"no part or route named {show(one)}{did_you_mean(one, known) or f'; there are {listing(known)}'}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -100,8 +100,8 @@ def read_limit(
         try:
             extent = read_extent(given["on"], asked, kinds, routes)
         except ValueError as error:
-            key = "quantity" if " without " in str(error) or "no node has" in str(error) else "on"
-            faults.append(((key if key in given else "on",), str(error)))
+            key = "quantity" if isinstance(error, Misfit) and "quantity" in given else "on"
+            faults.append(((key,), str(error)))
     dimension = extent.dimension if extent is not None else "number"
     keys = limit_keys(asked if isinstance(asked, str) else "", dimension)
     if extent is None:
@@ -123,6 +123,20 @@ def read_limit(
     if faults:
         raise Misfit(faults)
     return None if extent is None else DesignLimit(name, extent, **bounds)
+
+
+def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Iterator[tuple[tuple, str]]:
+    """What a limit asks that the fluid and gravity of its case do not tell."""
+    if limit is None:
+        return
+    if gravity == 0.0 and limit.extent.quantity in ("head", "pressure_head"):
+        yield (
+            ("quantity",),
+            f"nothing weighs where gravity is 0, so there is no {limit.extent.quantity}; wanted pressure",
+        )
+    for key in ("least", "greatest"):
+        if getattr(limit, key) == VAPOR and fluid is not None and not fluid.vapor_pressure:
+            yield (key,), 'the fluid has no vapour pressure; wanted vapor_pressure above 0 under [fluid], or "vacuum"'
 
 
 class Anything(Value):

@@ -15,7 +15,7 @@ from fvsolve.case import basins, bodies, check, defaults, heights, placing, scal
 from fvsolve.case.case import Case, default_cells, wave_speed
 from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
 from fvsolve.case.extent import ALL
-from fvsolve.case.limits import NAMED, VAPOR, DesignLimit, read_limit
+from fvsolve.case.limits import DesignLimit, limit_faults, read_limit
 from fvsolve.case.moved import moved
 from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, dotted, opened, override, read_raw
@@ -168,7 +168,7 @@ class _Reader:
         kinds["pipes"] = {name: link for name, link in parts["links"].items() if isinstance(link, Pipe)}
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds, routes), self.compare(kinds)
-        limits = self.limits(kinds, routes, parts["links"], properties)
+        limits = self.limits(kinds, routes, parts["links"], properties, top["gravity"])
         self.add(check.network(self.with_patches(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
         start = numerics.start if numerics is not None else 0.0
@@ -527,20 +527,15 @@ class _Reader:
         lost |= {name for name, one in made.items() if one and not pipes.issuperset(one.pipes)}
         return {name: None if name in lost else one for name, one in made.items()}
 
-    def limits(
-        self, kinds: dict, routes: dict, links: dict[str, Any], properties: Any
-    ) -> dict[str, DesignLimit | None]:
+    def limits(self, kinds: dict, routes: dict, links: dict[str, Any], *about: Any) -> dict[str, DesignLimit | None]:
         """Limits by name."""
         made = {}
         for name, given in self.group("limits").items():
             try:
                 made[name] = read_limit(name, given, kinds, routes, links, self.setting)
+                self.add((("limits", name, *keys), text) for keys, text in limit_faults(made[name], *about))
             except ValueError as error:
                 self.misfit(("limits", name), error)
-            said = given.get("least") if isinstance(given, dict) else None
-            boils = isinstance(said, str) and NAMED.get(said.casefold()) == VAPOR
-            if boils and properties is not None and properties.vapor_pressure is None:
-                self.fault(("limits", name, "least"), "the fluid states no vapor_pressure; give it under [fluid]")
         return made
 
     def expect(self, kinds: dict, routes: dict) -> dict[str, Expect]:

@@ -190,6 +190,23 @@ def test_what_is_wrong_is_named(limit, place: str, told: str) -> None:
     assert f"limits.one{'.' if place else ''}{place}" in str(error.value)
 
 
+DEEP = {"on": "high", "quantity": "pressure_head", "least": 1}
+
+
+def test_a_fluid_that_does_not_boil_limits_nothing_at_its_vapour() -> None:
+    case = shut(limits={"dry": {"on": "high", "least": "vapour"}})
+    case["fluid"] = case["fluid"] | {"vapor_pressure": 0.0}
+    with pytest.raises(fvsolve.CaseError, match="limits.dry.least: the fluid has no vapour pressure"):
+        fvsolve.load(case)
+
+
+def test_where_nothing_weighs_there_is_no_head() -> None:
+    weightless = shut(limits={"deep": DEEP}) | {"gravity": 0.0}
+    weightless["nodes"]["lake"] = reservoir(1.1e6, elevation=0.0)
+    with pytest.raises(fvsolve.CaseError, match="limits.deep.quantity: nothing weighs where gravity is 0"):
+        fvsolve.load(weightless)
+
+
 @pytest.mark.parametrize(
     ("route", "told"),
     [
