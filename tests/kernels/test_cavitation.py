@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth import scenes
+from truth import scenes, summit
 from truth.column_separation import cavity
 from truth.folders import CASES
 from truth.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, valve
@@ -275,3 +275,20 @@ def test_the_error_that_the_note_says_is_that_behind_a_stop(cells):
         pressures.append(model.tables.nodes[1]["pressure"] + out[model.layout["pressure"] + 1])
     short = 1.0 - (times[1 + np.argmax(np.array(pressures) > 1e5)] - back) / lasts
     assert short == approx(1.03 * cells**-0.7, rel=0.5)
+
+
+def test_a_line_over_a_summit_parts_there_and_meets_as_by_characteristics():
+    """One cavity at the summit of one pipe: when it opens, how large it is, when and how hard it shuts."""
+    rows, events = summit.line(reaches=480, end=40.0)
+    (opens, _, where), (meets, _, _) = events
+    assert where == summit.SUMMIT
+    result = fvsolve.run(CASES / "summit-cavity.toml")
+    (found,) = result.summary["cavities"]
+    assert found["distance"] == approx(where, abs=25.0) and found["time"] == approx(opens, abs=0.05)
+    assert found["volume"] == approx(rows[:, 3].max(), rel=0.01)
+    t, head = result.t, result["main.head@2500 m"]
+    assert t[(t > opens) & (head > 40.0)][0] == approx(meets, abs=0.3)
+    for time in (15.0, 20.0, 25.0, 34.0, 36.0):
+        for probe, column in (("pumps.head", 1), ("main.head@2500 m", 2)):
+            truth = np.interp(time, rows[:, 0], rows[:, column])
+            assert np.interp(time, t, result[probe]) == approx(truth, rel=0.01)
