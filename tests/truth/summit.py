@@ -1,4 +1,4 @@
-"""A line over a summit by characteristics at Courant 1, with vapour cavities at its nodes (Wylie and Streeter 1993, 8)."""
+"""A line over a summit by characteristics at Courant 1, with vapour cavities at its nodes (Wylie, Streeter 1993, 8)."""
 
 from __future__ import annotations
 
