@@ -292,3 +292,19 @@ def test_a_line_over_a_summit_parts_there_and_meets_as_by_characteristics():
         for probe, column in (("pumps.head", 1), ("main.head@2500 m", 2)):
             truth = np.interp(time, rows[:, 0], rows[:, column])
             assert np.interp(time, t, result[probe]) == approx(truth, rel=0.01)
+
+
+def test_cavitation_alone_brings_what_it_needs_and_a_scene_that_says_otherwise_is_told_so_at_once():
+    """Law, air, scheme, method and Courant number; what is said stands."""
+    gate = {"lake": lake(20.0), "gate": junction({"time": [0.0, 0.05], "value": [0.02, 0.0], "kind": "step"})}
+    case = scene(gate, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, 20)}, 0.3, {}, ["gate.pressure"])
+    case["fluid"] = scenes.WATER | {"cavitation": True}
+    del case["fluid"]["law"]
+    short = fvsolve.run(case)
+    said = WATER | {"air_fraction": 1e-7}
+    full = fvsolve.run(case | {"fluid": said, "numerics": {"end": 0.3, **PLAIN}})
+    assert np.array_equal(short["gate.pressure"], full["gate.pressure"]) and short.summary["cavities"]
+    assert fvsolve.run(case, set={"fluid.air_fraction": 1e-6}).case.properties.air.fraction == 1e-6
+    with pytest.raises(CaseError) as error:
+        fvsolve.run(case, set={"fluid.law": "linear", "numerics.scheme": "weno5"})
+    assert 'law = "linear" knows no gas' in str(error.value) and '"weno5" does not follow cavities' in str(error.value)
