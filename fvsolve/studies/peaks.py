@@ -32,7 +32,8 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     """Add to the summary of a run how far its peaks and verdicts may be off, from two more runs of its case.
 
     `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order}; `error` is None where another run did
-    not come to its end, `order` None where there is none to believe. Verdicts get their `error`; `resolution` says how.
+    not come to its end, `order` None where there is none to believe. Verdicts and expectations get their `error`;
+    `resolution` says how.
     """
     runs = {1.0: result}
     for times in (one for one in LEVELS if one != 1.0):
@@ -62,11 +63,18 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
         said["peaks"][name] = made
     for k, verdict in enumerate(said["verdicts"]):
         triple = values(runs, lambda one, k=k, verdict=verdict: of_bound(one.summary["verdicts"][k], verdict["bound"]))
-        alone = 0.0 if apart else pooled({0: ("", triple)})[""]
-        found = band(triple, shared.get(verdict["unit"], alone))
-        verdict["error"] = found["error"]
+        verdict["error"] = alone(triple, verdict["unit"], shared, apart)
+    for k, claim in enumerate(said["expectations"]):
+        triple = values(runs, lambda one, k=k: one.summary["expectations"][k]["found"])
+        claim["error"] = alone(triple, claim["unit"], shared, apart)
     said["resolution"] = {"levels": sorted(runs), "kept": kept(case), "words": words(runs, case)}
     return said
+
+
+def alone(triple: tuple[float | None, ...], unit: str, shared: dict[str, float], apart: bool) -> float | None:
+    """The band of what is no peak of a probe; its order is its own where none is shared in that unit."""
+    own = 0.0 if apart else pooled({0: ("", triple)})[""]
+    return band(triple, shared.get(unit, own))["error"]
 
 
 def parted(runs: dict[float, Result]) -> bool:

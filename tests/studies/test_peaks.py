@@ -56,11 +56,14 @@ def test_what_did_not_run_bounds_nothing() -> None:
 )
 def test_bands_of_shipped_cases_hold_what_four_times_the_resolution_gives(name: str) -> None:
     case = fvsolve.load(name)
-    peaks = peak_errors(fvsolve.run(case), case)["peaks"]
+    said = peak_errors(fvsolve.run(case), case)
+    peaks = said["peaks"]
     fine = fvsolve.run(case, set=finer(case, 4.0) | {"output.every": case.output.every / 4.0})
     for probe, one in peaks.items():
         for side, value in (("least", fine.extremes[probe].least), ("greatest", fine.extremes[probe].greatest)):
             assert abs(value - one[side]["value"]) <= one[side]["error"], (probe, side)
+    for claim, one in zip(said["expectations"], fine.expectations, strict=True):
+        assert abs(claim["found"] - one.found) <= claim["error"], claim["text"]
 
 
 def test_where_liquid_parts_no_order_is_believed() -> None:
