@@ -3,7 +3,8 @@
 python benchmarks/peak_bands.py [CASE]...
 
 Of every peak and claim the band, and how far it is from the run of four times the resolution (twice where there are
-basins, whose finest run then is one of the three). Prints those outside their band, and how wide bands are beside the difference.
+basins, whose finest run then is one of the three). Prints those outside their band, and how wide bands are beside the
+difference.
 """
 
 from __future__ import annotations
@@ -41,8 +42,8 @@ def main(names: list[str]) -> None:
     for what, band, off in misses:
         print(f"outside: {what}: off by {off:.3g}, band {band:.3g}")
     wide = sorted(band / off for _, band, off in rows if off > 1e-6 * band)
-    print(f"{len(rows)} peaks and claims of {len(names)} cases, {len(misses)} outside their band; band over difference: "
-          f"median {np.median(wide):.3g}, quarters {np.quantile(wide, 0.25):.3g} and {np.quantile(wide, 0.75):.3g}; "
+    print(f"{len(rows)} peaks and claims of {len(names)} cases, {len(misses)} outside their band; band over "
+          f"difference: median {np.median(wide):.3g}, quarters {np.quantile(wide, 0.25):.3g} and {np.quantile(wide, 0.75):.3g}; "
           f"{time.perf_counter() - began:.0f} s")  # fmt: skip
 
 
