@@ -43,8 +43,8 @@ def main(names: list[str]) -> None:
         print(f"outside: {what}: off by {off:.3g}, band {band:.3g}")
     wide = sorted(band / off for _, band, off in rows if off > 1e-6 * band)
     print(f"{len(rows)} peaks and claims of {len(names)} cases, {len(misses)} outside their band; band over "
-          f"difference: median {np.median(wide):.3g}, quarters {np.quantile(wide, 0.25):.3g} and {np.quantile(wide, 0.75):.3g}; "
-          f"{time.perf_counter() - began:.0f} s")  # fmt: skip
+          f"difference: median {np.median(wide):.3g}, quarters {np.quantile(wide, 0.25):.3g} and "
+          f"{np.quantile(wide, 0.75):.3g}; {time.perf_counter() - began:.0f} s")  # fmt: skip
 
 
 if __name__ == "__main__":
