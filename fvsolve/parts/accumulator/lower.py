@@ -19,9 +19,23 @@ class AccumulatorRows(Device, kind="accumulator"):
     events = ("is empty", "holds fluid again")
     remedy = "give it a connection, whose loss brakes what comes and goes"
 
+    def of(self, part) -> Device:
+        if not part.shaped:
+            return self
+        from fvsolve.parts.accumulator.lower_vessel import CompressedRows, ShapedRows
+
+        return ShapedRows() if part.compressor is None else CompressedRows()
+
     def place(self, draft, name, node, row) -> None:
         super().place(draft, name, node, row)
         row["y"] = draft.states([f"{name}.mass"], 0.1 * draft.fluid.density * node.volume)
+
+    def pressure_at_start(self, start, i, node, row) -> float | None:
+        if node.initial_pressure is None or not node.shaped:
+            return node.initial_pressure
+        from fvsolve.parts.accumulator.lower_vessel import Standing
+
+        return Standing(start, node).under(node.initial_pressure)
 
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
@@ -58,6 +72,16 @@ class AccumulatorRows(Device, kind="accumulator"):
             draft.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(first), float(p)))
         return []
 
+    def change(self, model, row, y: float) -> float:
+        """Pressure over that of the profile [Pa] once y [kg] came in."""
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return law.gas_and_pressure(st, floats, node, int(row["data"]), y)[1]
+
+    def energy(self, model, row, y: float) -> float:
+        """What it stores once y [kg] came in, over the profile [J]."""
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return law.accumulator_energy(st, floats, node, int(row["data"]), y)
+
     def above(self, model, part, row) -> float:
         """Over the state in which it could give no more: P = 0, or no fluid left."""
         from fvsolve.kernels.energy_barotropic import head_at
@@ -66,7 +90,7 @@ class AccumulatorRows(Device, kind="accumulator"):
         node, at = model.tables.nodes[row["node"]], int(row["data"])
 
         def head(y: float) -> float:
-            return head_at(st, floats, node, float(node["pressure"] + law.gas_and_pressure(st, floats, node, at, y)[1]))
+            return head_at(st, floats, node, float(node["pressure"] + self.change(model, row, y)))
 
         low = float(floats[at + law.EMPTY]) if not floats[at + law.NECK] else -0.999 * float(node["mass"])
         high = (1.0 - 1e-6) * model.case.properties.density * float(floats[at + law.GAS])
@@ -74,4 +98,4 @@ class AccumulatorRows(Device, kind="accumulator"):
             for _ in range(200):
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if head(middle) < 0.0 else (low, middle)
-        return -float(law.accumulator_energy(st, floats, node, at, low))
+        return -float(self.energy(model, row, low))

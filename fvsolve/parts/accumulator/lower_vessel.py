@@ -1,0 +1,123 @@
+"""Vessels with a shape in the tables of a scene: how high their fluid stands, and what their gas has left."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.parts.accumulator import law, law_shape, law_vessel
+from fvsolve.parts.accumulator.lower import AccumulatorRows
+from fvsolve.parts.accumulator.shape import UPRIGHT, height_of, length_of
+
+FLAT = 1e-6  # rise of a cylinder's axis over its length, in radii, below which it lies; likewise, upright
+
+
+class ShapedRows(AccumulatorRows, kind=""):
+    """An air vessel with a shape: the weight of its fluid counts."""
+
+    law = law_vessel
+    quantities = (*AccumulatorRows.quantities, "level")
+
+    def numbers(self, draft, name, part) -> list[float]:
+        lift = [0.0, 0.0, 0.0]
+        if part.compressor is not None:
+            lift = [0.0, part.compressor.start, part.compressor.stop]
+        return [0.0] * law.NUMBERS + [0.0, 0.0, part.bottom or 0.0, *lift] + shape_of(part)
+
+    def begin(self, start, part, row) -> list[str]:
+        draft, n = start.draft, part.exponent
+        node, at = draft.node_table[row["node"]], row["data"]
+        stands = Standing(start, part)
+        p, mass = stands.gas_pressure(float(node["pressure"]))
+        if not p > 0.0:
+            name = list(draft.case.places)[row["node"]].removesuffix(".inside")
+            text = (f"no pressure is left for its gas, {node['pressure']:.6g} Pa at its place less the weight of "
+                    f"{stands.level + (part.bottom or 0.0):.4g} m; set bottom or level lower")  # fmt: skip
+            draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
+            draft.check()
+        floats = draft.tables.floats
+        empty = -draft.fluid.density * stands.held if start.law.linear else -mass
+        floats[at : at + law.NUMBERS] = [n, stands.gas, part.volume, 0.0, empty, 0.0]
+        floats[at + law_vessel.FIRST], floats[at + law_vessel.LEVEL] = p, stands.level
+        if part.compressor is not None:
+            floats[at + law_vessel.BRINGS] = part.compressor.flow * start.case.ambient_pressure / (p * stands.gas)
+        node["mass"] = mass
+        st = draft.tables.settings[0]
+        node["stiffness"] = law_vessel.pressure_and_stiffness(st, floats, node, int(at), 0.0, 0.0)[1]
+        return []
+
+    def change(self, model, row, y: float) -> float:
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return law_vessel.pressure_and_stiffness(st, floats, node, int(row["data"]), y, 0.0)[0]
+
+    def energy(self, model, row, y: float) -> float:
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return law_vessel.energy_since(st, floats, node, int(row["data"]), y, 0.0)
+
+
+class CompressedRows(ShapedRows, kind=""):
+    """One whose compressor keeps the level down."""
+
+    states = ("gas",)
+    events = (*ShapedRows.events, "compressor starts", "compressor stops")
+
+    def scales(self, draft, name, part) -> list[float]:
+        return [0.1]
+
+
+class Standing:
+    """Gas and fluid of a vessel with a shape at the start.
+
+    gas : its volume [m3]; level : of the fluid [m]; centroid : of the fluid, above the bottom [m]
+    """
+
+    def __init__(self, start, part) -> None:
+        self.law, self.gravity, self.bottom = start.law, start.case.gravity, part.bottom or 0.0
+        shape = np.array(shape_of(part))
+        self.gas = part.gas_volume
+        if self.gas is None:
+            self.gas = part.volume - float(law_shape.volume_below(shape, 0, part.level))
+        self.held = part.volume - self.gas
+        self.level = float(law_shape.level_at(shape, 0, self.held))
+        below = float(law_shape.moment_below(shape, 0, self.level))
+        self.centroid = below / self.held if self.held > 0.0 else 0.0
+
+    def gas_pressure(self, p: float) -> tuple[float, float]:
+        """(pressure of the gas [Pa], mass of the fluid [kg]) where the place has p."""
+        if self.law.linear:
+            rho = self.law.rho
+            return p - rho * self.gravity * (self.bottom + self.level), rho * self.held
+        above = self.gravity * (self.bottom + self.centroid)
+        q = float(self.law.pressure_of_enthalpy(self.law.enthalpy(p) - above))
+        rho = float(self.law.density(q))
+        return q - rho * self.gravity * (self.level - self.centroid), rho * self.held
+
+    def under(self, gas: float) -> float:
+        """Pressure of the place [Pa] where the gas has a pressure."""
+        if self.law.linear:
+            return gas + self.law.rho * self.gravity * (self.bottom + self.level)
+        q = gas
+        for _ in range(20):
+            q = gas + float(self.law.density(q)) * self.gravity * (self.level - self.centroid)
+        return float(self.law.pressure_of_enthalpy(self.law.enthalpy(q) + self.gravity * (self.bottom + self.centroid)))
+
+
+def shape_of(part) -> list[float]:
+    """Numbers of the shape of a vessel, as `law_shape` reads them."""
+    top = height_of(part)
+    if part.diameter is None:
+        if not hasattr(part.area, "level") or len(part.area.level) == 1:
+            area = part.area if not hasattr(part.area, "level") else part.area.area[0]
+            return [law_shape.PRISM, top, float(area), 0.0, 0.0]
+        level, area = part.area.level, part.area.area
+        steps = [
+            0.5 * (a + b) * (high - low) for low, high, a, b in zip(level, level[1:], area, area[1:], strict=False)
+        ]
+        volume = [math.fsum(steps[:k]) for k in range(len(level))]
+        return [law_shape.TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
+    radius, length, slope = 0.5 * part.diameter, length_of(part), UPRIGHT if part.slope is None else part.slope
+    if radius * math.cos(slope) <= FLAT * length * math.sin(slope):
+        return [law_shape.PRISM, top, math.pi * radius**2, 0.0, 0.0]
+    kind = law_shape.LYING if length * math.sin(slope) <= FLAT * radius * math.cos(slope) else law_shape.SLOPED
+    return [kind, top, radius, length, 0.0 if kind == law_shape.LYING else slope]
