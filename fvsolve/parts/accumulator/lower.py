@@ -20,11 +20,7 @@ class AccumulatorRows(Device, kind="accumulator"):
     remedy = "give it a connection, whose loss brakes what comes and goes"
 
     def of(self, part) -> Device:
-        if not part.shaped:
-            return self
-        from fvsolve.parts.accumulator.lower_vessel import CompressedRows, ShapedRows
-
-        return ShapedRows() if part.compressor is None else CompressedRows()
+        return self if not part.shaped else ShapedRows() if part.compressor is None else CompressedRows()
 
     def place(self, draft, name, node, row) -> None:
         super().place(draft, name, node, row)
@@ -33,7 +29,7 @@ class AccumulatorRows(Device, kind="accumulator"):
     def pressure_at_start(self, start, i, node, row) -> float | None:
         if node.initial_pressure is None or not node.shaped:
             return node.initial_pressure
-        from fvsolve.parts.accumulator.lower_vessel import Standing
+        from fvsolve.parts.accumulator.lower_shape import Standing
 
         return Standing(start, node).under(node.initial_pressure)
 
@@ -99,3 +95,65 @@ class AccumulatorRows(Device, kind="accumulator"):
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if head(middle) < 0.0 else (low, middle)
         return -float(self.energy(model, row, low))
+
+
+class ShapedRows(AccumulatorRows, kind=""):
+    """An air vessel with a shape: the weight of its fluid counts."""
+
+    quantities = (*AccumulatorRows.quantities, "level")
+
+    @property
+    def law(self):
+        from fvsolve.parts.accumulator import law_vessel
+
+        return law_vessel
+
+    def numbers(self, draft, name, part) -> list[float]:
+        from fvsolve.parts.accumulator.lower_shape import shape_of
+
+        lift = [0.0, 0.0, 0.0]
+        if part.compressor is not None:
+            lift = [0.0, part.compressor.start, part.compressor.stop]
+        return [0.0] * law.NUMBERS + [0.0, 0.0, part.bottom or 0.0, *lift] + shape_of(part)
+
+    def begin(self, start, part, row) -> list[str]:
+        from fvsolve.parts.accumulator.lower_shape import Standing
+
+        draft, n = start.draft, part.exponent
+        node, at = draft.node_table[row["node"]], row["data"]
+        stands = Standing(start, part)
+        p, mass = stands.gas_pressure(float(node["pressure"]))
+        if not p > 0.0:
+            name = list(draft.case.places)[row["node"]].removesuffix(".inside")
+            text = (f"no pressure is left for its gas, {node['pressure']:.6g} Pa at its place less the weight of "
+                    f"{stands.level + (part.bottom or 0.0):.4g} m; set bottom or level lower")  # fmt: skip
+            draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
+            return []
+        floats = draft.tables.floats
+        empty = -draft.fluid.density * stands.held if start.law.linear else -mass
+        floats[at : at + law.NUMBERS] = [n, stands.gas, part.volume, 0.0, empty, 0.0]
+        floats[at + self.law.FIRST], floats[at + self.law.LEVEL] = p, stands.level
+        if part.compressor is not None:
+            floats[at + self.law.BRINGS] = part.compressor.flow * start.case.ambient_pressure / (p * stands.gas)
+        node["mass"] = mass
+        st = draft.tables.settings[0]
+        node["stiffness"] = self.law.pressure_and_stiffness(st, floats, node, int(at), 0.0, 0.0)[1]
+        return []
+
+    def change(self, model, row, y: float) -> float:
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return self.law.pressure_and_stiffness(st, floats, node, int(row["data"]), y, 0.0)[0]
+
+    def energy(self, model, row, y: float) -> float:
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return self.law.energy_since(st, floats, node, int(row["data"]), y, 0.0)
+
+
+class CompressedRows(ShapedRows, kind=""):
+    """One whose compressor keeps the level down."""
+
+    states = ("gas",)
+    events = (*ShapedRows.events, "compressor starts", "compressor stops")
+
+    def scales(self, draft, name, part) -> list[float]:
+        return [0.1]

@@ -1,4 +1,4 @@
-"""Vessels with a shape in the tables of a scene: how high their fluid stands, and what their gas has left."""
+"""How high the fluid of a vessel stands at the start, and what its gas has left. Knows its shape; fills no table."""
 
 from __future__ import annotations
 
@@ -6,64 +6,10 @@ import math
 
 import numpy as np
 
-from fvsolve.parts.accumulator import law, law_shape, law_vessel
-from fvsolve.parts.accumulator.lower import AccumulatorRows
+from fvsolve.parts.accumulator import law_shape
 from fvsolve.parts.accumulator.shape import UPRIGHT, height_of, length_of
 
 FLAT = 1e-6  # rise of a cylinder's axis over its length, in radii, below which it lies; likewise, upright
-
-
-class ShapedRows(AccumulatorRows, kind=""):
-    """An air vessel with a shape: the weight of its fluid counts."""
-
-    law = law_vessel
-    quantities = (*AccumulatorRows.quantities, "level")
-
-    def numbers(self, draft, name, part) -> list[float]:
-        lift = [0.0, 0.0, 0.0]
-        if part.compressor is not None:
-            lift = [0.0, part.compressor.start, part.compressor.stop]
-        return [0.0] * law.NUMBERS + [0.0, 0.0, part.bottom or 0.0, *lift] + shape_of(part)
-
-    def begin(self, start, part, row) -> list[str]:
-        draft, n = start.draft, part.exponent
-        node, at = draft.node_table[row["node"]], row["data"]
-        stands = Standing(start, part)
-        p, mass = stands.gas_pressure(float(node["pressure"]))
-        if not p > 0.0:
-            name = list(draft.case.places)[row["node"]].removesuffix(".inside")
-            text = (f"no pressure is left for its gas, {node['pressure']:.6g} Pa at its place less the weight of "
-                    f"{stands.level + (part.bottom or 0.0):.4g} m; set bottom or level lower")  # fmt: skip
-            draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
-            draft.check()
-        floats = draft.tables.floats
-        empty = -draft.fluid.density * stands.held if start.law.linear else -mass
-        floats[at : at + law.NUMBERS] = [n, stands.gas, part.volume, 0.0, empty, 0.0]
-        floats[at + law_vessel.FIRST], floats[at + law_vessel.LEVEL] = p, stands.level
-        if part.compressor is not None:
-            floats[at + law_vessel.BRINGS] = part.compressor.flow * start.case.ambient_pressure / (p * stands.gas)
-        node["mass"] = mass
-        st = draft.tables.settings[0]
-        node["stiffness"] = law_vessel.pressure_and_stiffness(st, floats, node, int(at), 0.0, 0.0)[1]
-        return []
-
-    def change(self, model, row, y: float) -> float:
-        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
-        return law_vessel.pressure_and_stiffness(st, floats, node, int(row["data"]), y, 0.0)[0]
-
-    def energy(self, model, row, y: float) -> float:
-        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
-        return law_vessel.energy_since(st, floats, node, int(row["data"]), y, 0.0)
-
-
-class CompressedRows(ShapedRows, kind=""):
-    """One whose compressor keeps the level down."""
-
-    states = ("gas",)
-    events = (*ShapedRows.events, "compressor starts", "compressor stops")
-
-    def scales(self, draft, name, part) -> list[float]:
-        return [0.1]
 
 
 class Standing:
