@@ -125,8 +125,9 @@ class ShapedRows(AccumulatorRows, kind=""):
         p, mass = stands.gas_pressure(float(node["pressure"]))
         if not p > 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
-            text = (f"no pressure is left for its gas, {node['pressure']:.6g} Pa at its place less the weight of "
-                    f"{stands.level + (part.bottom or 0.0):.4g} m; set bottom or level lower")  # fmt: skip
+            high = stands.level + stands.bottom
+            text = (f"no steady state: {node['pressure']:.6g} Pa at its place are less than the weight of the fluid, "
+                    f"{high:.4g} m high, and leave its gas none; set bottom or level lower")  # fmt: skip
             draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
             return []
         floats = draft.tables.floats
