@@ -177,7 +177,7 @@ OTHERS = scene(  # keys that no shipped case gives
                    "compressor": {"start": 0.5, "stop": 0.45, "flow": 1e-3}},
         "urn": {"type": "accumulator", "volume": 0.5, "level": 0.4, "area": {"level": [0.0, 0.5], "area": [0.3, 0.5]}},
         "air": {"type": "air-valve", "inlet": 0.05, "outlet": 0.01, "discharge_coefficient": 0.5, "volume": 1e-3,
-                "temperature": 290.0},
+                "temperature": 290.0, "switch_velocity": 0.5, "throttled_outlet": 5e-3},
         "pond": {"type": "tank", "area": {"level": [0.0, 5.0], "area": [2.0, 3.0]}, "level": 1.0},
     },
     {

@@ -11,6 +11,7 @@ ONE, NONE = st.just(1.0), st.just(0.0)
 CRACKING = {"cracking_pressure": between(0.0, 5e3)}
 SLAMS = {"rate": [1.0, 10.0], "reverse_velocity": [0.05, 1.0]}
 COMPRESSOR = {"start": 0.28, "stop": 0.2, "flow": 1e-3}
+SWITCHES = {"switch": 3e3, "switch_velocity": 0.1}
 SLOW = {"time_constant": between(0.1, 5.0)}
 SIZE = st.one_of(
     st.fixed_dictionaries({"area": between(1e-4, 5e-3)}),
@@ -100,6 +101,6 @@ NODES = {
         "air-valve",
         {"inlet": between(0.02, 0.08), "outlet": between(0.005, 0.05)},
         {"automatic": between(1e-3, 3e-3)},
-        a=st.sampled_from([{}, {"switch": 3e3, "throttled_outlet": 4e-3}]),
+        a=st.sampled_from([{}, *({key: value, "throttled_outlet": 4e-3} for key, value in SWITCHES.items())]),
     ),
 }  # fmt: skip
