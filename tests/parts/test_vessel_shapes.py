@@ -248,6 +248,21 @@ def test_the_pattern_holds_every_coupling():
         assert not np.any((np.abs(model.jacobian(0.0, np.array([0.1, 0.3, 0.01]))) > 1e-9) & ~pattern)
 
 
+def test_its_norm_is_what_its_energy_is_bent_by():
+    """Of a small deviation in mass and gas: half of what it and its opposite store."""
+    model = model_of(swing(0.0, 1.0, compressor={"start": 0.5, "stop": 0.1, "flow": 1e-3}))
+    names, y = list(model.state_names), np.zeros(model.y_size)
+    y[names.index("a.mass")], y[names.index("a.gas")] = 2e-3, -3e-5
+    ((_, part, device),), (row,) = model.devices, model.tables.devices
+    out = model.evaluate(0.0, np.zeros(model.y_size))[1]
+    found = sum(sum(factor * y[k] for k, factor in one.items()) ** 2 for one in
+                device.squares(model, part, row, np.zeros(model.y_size), out))  # fmt: skip
+    tables, node = model.tables, model.tables.nodes[row["node"]]
+    both = [law_vessel.energy_since(tables.settings[0], tables.floats, node, int(row["data"]), sign * y[node["y"]],
+                                    sign * y[row["y"]]) for sign in (1.0, -1.0)]  # fmt: skip
+    assert found == pytest.approx(0.5 * sum(both), rel=1e-4)
+
+
 def test_limits_and_claims_look_at_its_level():
     limits = {"full": {"on": "a", "quantity": "level", "greatest": 0.35},
               "empty": {"on": "a", "quantity": "level", "least": 0.1}}  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from fvsolve.errors import Notice
 from fvsolve.model.device import Device
 from fvsolve.parts.accumulator import law
@@ -29,9 +31,9 @@ class AccumulatorRows(Device, kind="accumulator"):
     def pressure_at_start(self, start, i, node, row) -> float | None:
         if node.initial_pressure is None or not node.shaped:
             return node.initial_pressure
-        from fvsolve.parts.accumulator.lower_shape import Standing
+        from fvsolve.parts.accumulator.lower_shape import VesselStart
 
-        return Standing(start, node).under(node.initial_pressure)
+        return VesselStart(start, node).under(node.initial_pressure)
 
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
@@ -117,11 +119,11 @@ class ShapedRows(AccumulatorRows, kind=""):
         return [0.0] * law.NUMBERS + [0.0, 0.0, part.bottom or 0.0, *lift] + shape_of(part)
 
     def begin(self, start, part, row) -> list[str]:
-        from fvsolve.parts.accumulator.lower_shape import Standing
+        from fvsolve.parts.accumulator.lower_shape import VesselStart
 
         draft, n = start.draft, part.exponent
         node, at = draft.node_table[row["node"]], row["data"]
-        stands = Standing(start, part)
+        stands = VesselStart(start, part)
         p, mass = stands.gas_pressure(float(node["pressure"]))
         if not p > 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
@@ -158,3 +160,14 @@ class CompressedRows(ShapedRows, kind=""):
 
     def scales(self, draft, name, part) -> list[float]:
         return [0.1]
+
+    def squares(self, model, part, row, y, out):
+        """n p V / 2 (da / (1 + a) + dy / (rho V))^2, and g / (2 rho surface) dy^2: what gas and weight take up."""
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
+        u, change, _, _ = self.law.standing(st, floats, node, at, float(y[mass]), a)
+        gas, p = floats[at + law.GAS] * math.exp(u), floats[at + self.law.FIRST] + change
+        root = math.sqrt(0.5 * part.exponent * p * gas)
+        whole = super().squares(model, part, row, y, out)[0][mass]
+        rest = math.sqrt(max(0.0, whole**2 - (root / (rho * gas)) ** 2))
+        return [{int(row["y"]): root / (1.0 + a), mass: root / (rho * gas)}, {mass: rest}]

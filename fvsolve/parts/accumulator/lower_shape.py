@@ -12,7 +12,7 @@ from fvsolve.parts.accumulator.shape import UPRIGHT, height_of, length_of
 FLAT = 1e-6  # rise of a cylinder's axis over its length, in radii, below which it lies; likewise, upright
 
 
-class Standing:
+class VesselStart:
     """Gas and fluid of a vessel with a shape at the start.
 
     gas : its volume [m3]; level : of the fluid [m]; centroid : of the fluid, above the bottom [m]
