@@ -1,0 +1,100 @@
+"""Turbines in the tables of a scene, and how they start. Knows one turbine at a time; computes no chart."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.model.device import Device
+from fvsolve.model.inputs import TURNING, Input, opening
+from fvsolve.parts.pump.law import INERTIA, RATED
+from fvsolve.parts.pump.lower_turning import Turning, numbers_of
+from fvsolve.parts.turbine import law
+from fvsolve.parts.turbine import law_chart as charts
+from fvsolve.parts.turbine.lower_chart import chart_numbers
+from fvsolve.steady import Edge
+
+SMALL = 1e-6  # share of a pressure that is none
+
+
+class TurbineRows(Turning, Device, kind="turbine"):
+    """A restriction that follows its hill chart; its flow at the start is that at which pressures and chart agree."""
+
+    law = law
+    quantities = ("head", "speed", "torque", "power", "opening")
+    small = 1.0  # rad/s
+
+    def inputs(self, model, name, part):
+        found = opening(model, name)
+        return found | {"speed": Input(TURNING, int(self.row_of(model, name)["schedule"]))}
+
+    def restriction(self, draft, name, link, row) -> None:
+        density = draft.fluid.density
+        row["data"], row["schedule"] = len(draft.floats), draft.schedules.add(link.opening)
+        draft.floats += chart_numbers(link, density * draft.case.gravity)
+        row["conductance"] = density * draft.floats[row["data"] + charts.FLOW] ** 2 / draft.case.gravity
+
+    def numbers(self, draft, name, part) -> list[float]:
+        found = self.turning(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
+        return numbers_of(found, self.given(draft, name), [])
+
+    def squares(self, model, part, row, y, out) -> list[dict[int, float]]:
+        return [{int(row["y"]): math.sqrt(0.5 * part.inertia)}] if row["y"] >= 0 else []
+
+    def above(self, model, part, row) -> float:
+        speed = float(model.tables.valves[row["valve"]]["drive"])
+        return 0.5 * part.inertia * speed**2 if row["y"] >= 0 else 0.0
+
+    def passing(self, model, name, part, time) -> Notice:
+        text = (f"{name}: it leaves its hill chart at {time:.6g} s; outside of it straight lines go on to its "
+                "flow at rest and its speed without flow; more points would tell")  # fmt: skip
+        return Notice("range", f"links.{name}", text, "hill_chart")
+
+    def edge(self, start, k: int):
+        row = start.valves[k]
+        i, j = int(row["from_node"]), int(row["to_node"])
+        row["drive"] = omega = self.speed_at(start, k)
+        vanes = float(start.given(row["schedule"]))
+        row["open"] = g = row["conductance"] * vanes * vanes
+        if vanes <= 0.0:
+            return Edge(i, j, None, 0.0, shut=True)
+        if start.rest:
+            row["open"] = 0.0
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        floats, at, rho = start.draft.tables.floats, int(row["data"]), start.density_at(i)
+        weight, ratio = rho * start.case.gravity, rho / start.draft.fluid.density
+
+        def newton(flow, present):
+            present = float(present * ratio)
+            a, s = charts.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present)
+            return 1.0 / s, ratio, a / s
+
+        first = rho * floats[at + charts.FLOW] * charts.capacity(floats, at, vanes)
+        return Edge(i, j, newton, float(first), drives=omega != 0.0)
+
+    def follow(self, start, k) -> None:
+        """Nothing: `begin` sees to it."""
+
+    def begin(self, start, part, row) -> list[str]:
+        draft, valve, moving = start.draft, start.valves[int(row["valve"])], []
+        if valve["open"] > 0.0:
+            rho, floats = start.density_at(int(valve["from_node"])), draft.tables.floats
+            vanes = float(start.given(valve["schedule"]))
+            at = floats, int(valve["data"]), vanes, float(valve["drive"])
+            drop = rho * start.case.gravity * charts.chart_head(*at, float(valve["flow"]) / rho)[0]
+            ratio = rho / draft.fluid.density
+            if abs(drop - valve["drop"] * ratio) > SMALL * (abs(drop) + abs(valve["drop"])) + 1e-3:
+                name = draft.valve_names[row["valve"]]
+                moving.append(f"turbine {name}: its flow is not that of its hill chart")
+                valve["open"] = 0.0
+            elif draft.case.law.linear:
+                valve["drop"] = drop
+        return moving + self.let_go(start, part, row, valve)
+
+    def asked(self, start, row, valve) -> float:
+        rho = start.density_at(int(valve["from_node"]))
+        vanes, omega = float(start.given(valve["schedule"])), float(valve["drive"])
+        floats, dense = start.draft.tables.floats, rho / start.draft.fluid.density
+        return -dense * charts.chart_torque(floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho)
