@@ -162,4 +162,4 @@ def turbine_step(tables, out, k, rho, g, m, drop):
     """`chart_step` of a turbine whose fluid has the density rho [kg/m3], at the speed that it has."""
     weight, omega = rho * tables.settings[0]["gravity"], out[tables.layout[0]["drive"] + k]
     opening, stiff = vanes(tables, k, g), stiffness(tables, k)
-    return chart_step(tables.floats, tables.valves[k]["data"], opening, omega, rho, weight, stiff, g, m, drop)
+    return chart_step(tables.floats, tables.valves[k]["data"], opening, omega, rho, weight, stiff, g, m, drop, m / rho)

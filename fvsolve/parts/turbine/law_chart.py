@@ -11,6 +11,7 @@ from math import atan2, copysign, pi, sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.valves import LEAST
 
+LEAST_ROOT = 0.1  # of what weighs a ray's torque; greater wherever a chart gives points
 NEAR = 1e-9  # change of flow, relative, over which a chord is a tangent
 
 # Numbers of a chart: how many curves and rays, speed [rad/s] and flow [m3/s] at 1 m, torque behind shut vanes over
@@ -21,13 +22,9 @@ CURVES, RAYS, SPEED, FLOW, STILL, OWN = 0, 1, 2, 3, 4, 5
 
 @njit
 def shared(one, two, root_one, root_two, torque_one, torque_two):
-    """T at shares of two rays; where one of them has no head, that of the other."""
-    if root_one > 0.0 and root_two > 0.0:
-        total = one * root_one + two * root_two
-        return (one * root_one * torque_one + two * root_two * torque_two) / total
-    if root_one > 0.0:
-        return torque_one
-    return torque_two
+    """T at shares of two rays, straight along the line between their points at 1 m."""
+    first, second = one * max(root_one, LEAST_ROOT), two * max(root_two, LEAST_ROOT)
+    return (first * torque_one + second * torque_two) / (first + second)
 
 
 @njit
@@ -98,13 +95,12 @@ def chart_at(floats, at, opening, omega, flow):
     t_one, t_two = mixed(floats, torques, rays, k, share), mixed(floats, torques + 1, rays, k, share)
     root = one * root_one + two * root_two
     by_n, by_u = (root_one * d - root_two * b) / turn, (root_two * a - root_one * c) / turn
-    head, torque, steep = max(root, 0.0), 0.0, 0.0
-    if head > 0.0:
+    torque, steep = 0.0, 0.0
+    if root > 0.0:
         t = shared(one, two, root_one, root_two, t_one, t_two)
-        torque = head * head * t
-        steep = 2.0 * head * by_n * t
-        if root_one > 0.0 and root_two > 0.0:
-            steep = by_n * head * t + head * (root_one * t_one * d - root_two * t_two * b) / turn
+        first, second = max(root_one, LEAST_ROOT), max(root_two, LEAST_ROOT)
+        bends = (first * d * (t_one - t) - second * b * (t_two - t)) / (turn * (first * one + second * two))
+        torque, steep = root * root * t, 2.0 * root * by_n * t + root * root * bends
     speed, still = floats[at + SPEED], floats[at + STILL]
     torque = least * torque + (1.0 - least) * still * abs(omega) * omega
     steep = least * steep / speed + 2.0 * (1.0 - least) * still * abs(omega)
@@ -139,13 +135,18 @@ def is_outside(floats, at, opening, omega, flow):
 
 
 @njit
-def chart_flow(floats, at, opening, omega, weight, stiff, drop, flow):
-    """The flow [m3/s] at which weight H + stiff (flow - start) = drop [Pa], by safeguarded Newton from its start.
+def greatest(floats, at, opening, weight, drop):
+    """A flow beyond those at a drop and a common speed [m3/s]."""
+    return floats[at + FLOW] * capacity(floats, at, opening) * (1.0 + sqrt(abs(drop) / weight))
+
+
+@njit
+def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
+    """The flow [m3/s] at which weight H + stiff (flow - start) = drop [Pa], by safeguarded Newton from `flow`.
 
     weight : rho g [N/m3]; stiff : what pressures beside it fall by as it takes more [Pa s/m3]
     """
-    low, high, start = -1e300, 1e300, flow
-    scale = floats[at + FLOW] * capacity(floats, at, opening) * (1.0 + sqrt(abs(drop) / weight))
+    low, high, scale = -1e300, 1e300, greatest(floats, at, opening, weight, drop)
     for _ in range(200):
         head, slope = chart_head(floats, at, opening, omega, flow)
         left = weight * head + stiff * (flow - start) - drop
@@ -169,17 +170,18 @@ def chart_flow(floats, at, opening, omega, weight, stiff, drop, flow):
 
 
 @njit
-def chart_step(floats, at, opening, omega, rho, weight, stiff, g, m, drop):
+def chart_step(floats, at, opening, omega, rho, weight, stiff, g, m, drop, first):
     """a, s with dM = a + s d(drop) for the next Newton step of a turbine that carries m [kg/s] at a drop [Pa].
 
     The chord of its curve between the flow now and the flow at which it and what lies beside it agree stands for its
-    slope; where the curve falls as the flow rises, so may the chord. g : its conductance, of which one is no flatter.
+    slope; where the curve falls as the flow rises, so may the chord.
+    g : its conductance, of which one is no flatter; first : flow from which that other is looked for [m3/s]
     """
     q = m / rho
     head, slope = chart_head(floats, at, opening, omega, q)
     rest = drop - weight * head
     chord = slope * weight / rho
-    new = chart_flow(floats, at, opening, omega, weight, stiff * rho, drop, q)
+    new = chart_flow(floats, at, opening, omega, weight, stiff * rho, drop, q, first)
     if abs(new - q) > NEAR * (abs(q) + floats[at + FLOW] * capacity(floats, at, opening)):
         chord = weight * (chart_head(floats, at, opening, omega, new)[0] - head) / (rho * (new - q))
     least = LEAST / sqrt(g)

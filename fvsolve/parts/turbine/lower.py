@@ -68,7 +68,8 @@ class TurbineRows(Turning, Device, kind="turbine"):
 
         def newton(flow, present):
             present = float(present * ratio)
-            a, s = charts.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present)
+            first = charts.greatest(floats, at, vanes, weight, present)  # of several flows the greatest
+            a, s = charts.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present, first)
             return 1.0 / s, ratio, a / s
 
         first = rho * floats[at + charts.FLOW] * charts.capacity(floats, at, vanes)

@@ -14,6 +14,7 @@ from fvsolve.parts.turbine import law_chart as law
 MERGED = 1e-7  # angle between rays that are one [rad]
 SPACING = math.pi / 24.0  # of rays where the chart says nothing and a turning runner drives flow back
 PUMPED = 2.0  # shaft power there over that of the flow
+STEEPEST = 10.0  # flow over speed up to which it rises; beyond there is no head
 STANDING, BACKWARD = 0.5 * math.pi, math.pi  # angles
 
 
@@ -81,7 +82,7 @@ def behind(last, n: float, u: float, torque: float, drawn: float) -> list:
     if angle < STANDING:
         found.append((STANDING, 1.0 / u, 2.0 * max(torque, 0.0)))
     if angle < BACKWARD:
-        return [*found, (BACKWARD, 0.0, 0.0), (3.0 * STANDING, -1.0, 0.0)]
+        return [*found, (BACKWARD, 0.0, 0.0), *pumping(0.0, 0.0, 0.0, drawn, 1.0)]
     return pumping(angle - BACKWARD, root, torque, drawn, 1.0)
 
 
@@ -89,15 +90,14 @@ def pumping(angle: float, root: float, torque: float, drawn: float, way: float) 
     """Nodes from a ray on which a turning runner has a head to flow backwards at rest, whose root is -1.
 
     way : -1 of one that turns forward, 1 backward. The shaft brings PUMPED times what the flow takes up, and what it
-    brought at the ray; `zero` is the angle at which there is no head.
+    brought at the ray.
     """
     tilt = -angle if way < 0.0 else angle
     many = max(2, math.ceil((STANDING - tilt) / SPACING))
-    zero = math.atan(math.tan(tilt) + root / math.cos(tilt))
     taken = abs(torque) - PUMPED * drawn * math.tan(tilt)
     found = []
     for one in np.linspace(tilt, STANDING, many + 1)[1:]:
-        share = math.tan(min(one, zero))
+        share = min(math.tan(one), STEEPEST)
         found.append((one, straight(tilt, root, one), way * (PUMPED * drawn * share + max(taken, 0.0))))
     return [(-one if way < 0.0 else BACKWARD + one, value, brought) for one, value, brought in found]
 
