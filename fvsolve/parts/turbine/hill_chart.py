@@ -13,6 +13,7 @@ from fvsolve.parts.turbine.points import EFFICIENCY, FLOW, SPEED, TORQUE, faults
 from fvsolve.parts.value import NEEDED, Misfit, Number, Rows, Setting, Value, between
 from fvsolve.units import show
 
+WITHIN = between(-1e4, 1e4)  # n11 and Q11 of any machine
 UNITS = {SPEED: "rpm m^(1/2)", FLOW: "m^(1/2)/s", TORQUE: "N/m3"}
 EXAMPLE = "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], efficiency = [0.88, 0.85] }"
 
@@ -66,8 +67,9 @@ class HillChartValue(Value):
         "list of `{ opening, unit_speed = [...], unit_flow = [...], efficiency or unit_torque = [...] }`, or `{ file }`"
     )
     keys = {
-        "opening": (Number(between(0, 1)), NEEDED), SPEED: (Rows("number"), NEEDED), FLOW: (Rows("number"), NEEDED),
-        EFFICIENCY: (Rows("number", between(0, 1)), None), TORQUE: (Rows("number"), None),
+        "opening": (Number(between(0, 1)), NEEDED),
+        SPEED: (Rows("number", WITHIN), NEEDED), FLOW: (Rows("number", WITHIN), NEEDED),
+        EFFICIENCY: (Rows("number", between(0, 1)), None), TORQUE: (Rows("number", between(-1e8, 1e8)), None),
     }  # fmt: skip
 
     def read(self, given: Any, setting: Setting) -> HillChart:
@@ -116,15 +118,15 @@ def from_file(given: dict[str, Any], setting: Setting) -> HillChart:
     points: dict[float, list] = {}
     for opening, *point in zip(*columns, strict=True):
         points.setdefault(opening, []).append(point)
-    curves = {opening: Curve(opening, *zip(*rows, strict=True), word) for opening, rows in points.items()}
-    faults = []
-    for opening, one in curves.items():
-        if not 0.0 <= opening <= 1.0:
-            faults.append((("file",), f"{path.name}: opening {opening:g} is out of range; wanted one between 0 and 1"))
-        elif word == EFFICIENCY and not all(0.0 <= eta <= 1.0 for eta in one.value):
-            wrong = next(eta for eta in one.value if not 0.0 <= eta <= 1.0)
-            said = f"{path.name}, opening {opening:g}: efficiency {wrong:g} is out of range; wanted 0 to 1"
-            faults.append((("file",), said))
+    curves, faults = {}, []
+    for opening, rows in points.items():
+        try:
+            given = dict(zip((SPEED, FLOW, word), map(list, zip(*rows, strict=True)), strict=True))
+            curves[opening] = HillChartValue().curve({"opening": opening, **given}, setting)
+        except Misfit as error:
+            faults += [
+                (("file",), f"{path.name}, opening {opening:g}: {below[0]}: {text}") for below, text in error.faults
+            ]
     said = {"file": copy_name(path, setting)}
     return chart_of(curves, dict.fromkeys(curves, ("file",)), faults, said, f"{path.name}, ")
 

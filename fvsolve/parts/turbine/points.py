@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+LEAST = 1e-3  # unit speed, unit flow and opening that count
 NEAR = 1e-6  # an angle between points that is none
 SPEED, FLOW, EFFICIENCY, TORQUE = "unit_speed", "unit_flow", "efficiency", "unit_torque"
 
@@ -14,8 +15,8 @@ def faults_of_still(one) -> list[tuple[str, str]]:
     if not len(one.speed) == len(one.flow) == len(one.value) == 1 or one.word != TORQUE:
         return [("", f"vanes at opening 0 let nothing pass; wanted no curve, or one point with a {TORQUE}")]
     faults = [(FLOW, f"{one.flow[0]:g} flows through shut vanes; wanted 0")] * (one.flow[0] != 0.0)
-    if not one.speed[0] > 0.0:
-        faults.append((SPEED, f"{one.speed[0]:g} is out of range; wanted a value above 0"))
+    if not one.speed[0] >= LEAST:
+        faults.append((SPEED, f"{one.speed[0]:g} is out of range; wanted a value of at least {LEAST:g}"))
     if one.value[0] > 0.0:
         faults.append((TORQUE, f"{one.value[0]:g} drives the runner behind shut vanes; wanted 0 or one below it"))
     return faults
@@ -29,11 +30,13 @@ def faults_of_curve(one) -> list[tuple[str, str]]:
     if len(one.speed) < 2:
         return [("", "has one point; wanted two at least")]
     points, faults = list(zip(one.speed, one.flow, strict=True)), []
+    if one.opening < LEAST:
+        faults.append(("opening", f"{one.opening:g} is all but shut; wanted one of at least {LEAST:g}, or 0"))
     if one.word == EFFICIENCY and not all(n > 0.0 and q > 0.0 for n, q in points):
         k = next(k for k, (n, q) in enumerate(points) if not (n > 0.0 and q > 0.0))
         faults.append((EFFICIENCY, f"says no torque at point {k + 1}, {at(points[k])}; wanted {TORQUE} of such points"))
-    if not any(q > 0.0 for _, q in points):
-        faults.append((FLOW, "is nowhere above 0; flow that drives the turbine is positive"))
+    if not any(q >= LEAST for _, q in points):
+        faults.append((FLOW, f"is nowhere {LEAST:g} or more; flow that drives the turbine is positive"))
     if (dead := next((p for p in points if p[0] == 0.0 and p[1] <= 0.0), None)) is not None:
         faults.append(("", f"{at(dead)} is no point of a curve: flow is not driven back through a standing runner"))
     return faults or turns(points)
@@ -54,8 +57,8 @@ def turns(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
         if (n > 0.0) != (m > 0.0) and (q * abs(m) + r * abs(n)) <= 0.0:
             return [("", f"passes from {at((n, q))} to {at((m, r))} across a standing runner that flow is driven back "
                          "through; no head that drives it is there")]  # fmt: skip
-    if not (points[0] if way > 0.0 else points[-1])[0] > 0.0:
-        return [(SPEED, "is nowhere above 0 where its angle is least; a turbine turns forward as it drives")]
+    if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:
+        return [(SPEED, f"is nowhere {LEAST:g} or more where its angle is least; a turbine turns forward as it drives")]
     return []
 
 
