@@ -27,13 +27,16 @@ from fvsolve.parts.pump.law import (
 from fvsolve.parts.pump.law import stored as stored
 from fvsolve.parts.turbine.law_chart import chart_at, chart_head, chart_step, chart_torque, is_outside
 
+SHUT = 1e-12  # square of an opening that is none
+
 
 @njit
 def set(t, y, out, tables, device):
     """Its speed, and how far its vanes are open."""
     layout, k = tables.layout[0], device["valve"]
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
-    out[layout["conductance"] + k] = valve_conductance(tables, k, t)
+    g = valve_conductance(tables, k, t)
+    out[layout["conductance"] + k] = g if g >= SHUT * tables.valves[k]["conductance"] else 0.0
 
 
 @njit

@@ -57,8 +57,8 @@ class TurbineRows(Turning, Device, kind="turbine"):
         i, j = int(row["from_node"]), int(row["to_node"])
         row["drive"] = omega = self.speed_at(start, k)
         vanes = float(start.given(row["schedule"]))
-        row["open"] = g = row["conductance"] * vanes * vanes
-        if vanes <= 0.0:
+        row["open"] = g = row["conductance"] * vanes * vanes if vanes * vanes >= law.SHUT else 0.0
+        if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
         if start.rest:
             row["open"] = 0.0
