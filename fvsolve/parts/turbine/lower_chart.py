@@ -117,16 +117,12 @@ def merged(angles: np.ndarray) -> np.ndarray:
 
 def along(at: np.ndarray, rays: np.ndarray, angles, directions, roots, torques) -> tuple[np.ndarray, np.ndarray]:
     """(roots, torques over the head) of a curve at rays, on the straight lines between its own."""
-    found = np.zeros(len(rays)), np.zeros(len(rays))
-    for k, angle in enumerate(rays):
-        own = np.abs(angles - angle)
-        if own.min() <= MERGED:
-            i = int(own.argmin())
-            found[0][k], found[1][k] = roots[i], torques[i]
-            continue
-        i = int(np.searchsorted(angles, angle)) - 1
-        (a, b), (c, d), (x, y) = directions[i], directions[i + 1], at[k]
-        one, two = (x * d - y * c) / (a * d - b * c), (a * y - b * x) / (a * d - b * c)
-        root = one * roots[i] + two * roots[i + 1]
-        found[0][k], found[1][k] = root, law.shared(one, two, roots[i], roots[i + 1], torques[i], torques[i + 1])
-    return found
+    i = np.clip(np.searchsorted(angles, rays) - 1, 0, len(angles) - 2)
+    (a, b), (c, d), (x, y) = directions[i].T, directions[i + 1].T, at.T
+    one, two = (x * d - y * c) / (a * d - b * c), (a * y - b * x) / (a * d - b * c)
+    heavy = one * np.maximum(roots[i], law.LEAST_ROOT), two * np.maximum(roots[i + 1], law.LEAST_ROOT)
+    root = one * roots[i] + two * roots[i + 1]
+    torque = (heavy[0] * torques[i] + heavy[1] * torques[i + 1]) / (heavy[0] + heavy[1])
+    own = np.abs(rays[:, None] - angles).argmin(axis=1)
+    mine = np.abs(rays - angles[own]) <= MERGED
+    return np.where(mine, roots[own], root), np.where(mine, torques[own], torque)
