@@ -19,7 +19,7 @@ EXAMPLE = "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], eff
 
 
 @dataclass(frozen=True)
-class Curve:
+class OpeningCurve:
     """Points of one opening in their order: n11 = N D / sqrt(H), Q11 = Q / (D^2 sqrt(H)), and efficiency or T11.
 
     speed [rpm m^(1/2)]; flow [m^(1/2)/s]; value : efficiency [-], or T11 = T / (D^3 H) [N/m3]; word : which
@@ -47,7 +47,7 @@ class Curve:
 class HillChart:
     """Curves by rising openings above 0; still : (n11, T11) that brakes the runner behind shut vanes, or none."""
 
-    curves: tuple[Curve, ...]
+    curves: tuple[OpeningCurve, ...]
     still: tuple[float, float] | None
     said: Any
 
@@ -90,7 +90,7 @@ class HillChartValue(Value):
         found = {k: (k,) for k in curves}
         return chart_of(curves, found, faults, [one.table() for one in curves.values()])
 
-    def curve(self, given: Any, setting: Setting) -> Curve:
+    def curve(self, given: Any, setting: Setting) -> OpeningCurve:
         """One of the list."""
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is no table; wanted one such as {EXAMPLE}")
@@ -99,7 +99,7 @@ class HillChartValue(Value):
         if len(words) != 1:
             said = f"{EFFICIENCY} and {TORQUE} are given; keep one" if words else f"wanted {EFFICIENCY} or {TORQUE}"
             raise Misfit([(tuple(words[1:]), said)])
-        return Curve(found["opening"], found[SPEED], found[FLOW], found[words[0]], words[0])
+        return OpeningCurve(found["opening"], found[SPEED], found[FLOW], found[words[0]], words[0])
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [{"type": "array", "items": keys_json(self.keys), "minItems": 1}, {"type": "object"}]}

@@ -11,7 +11,7 @@ from pydantic import Field
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.turbine.hill_chart import Curve, HillChart, HillChartValue
+from fvsolve.parts.turbine.hill_chart import HillChart, HillChartValue, OpeningCurve
 from fvsolve.parts.value import VALUE, Quantity, Usual, anything, between, positive
 
 RUNNERS = Usual(0.05, 12.0, "pico turbines to great Kaplan runners")
@@ -63,7 +63,7 @@ class Turbine(TwoPort, kind="turbine"):
                 yield ("hill_chart",), f"opening {one.opening:g}: {text}"
 
 
-def overdrawn(one: Curve, weight: float) -> str | None:
+def overdrawn(one: OpeningCurve, weight: float) -> str | None:
     """Where the shaft gets more than the water gives, at a point or on the line to the next; None where nowhere."""
     points = list(zip(one.speed, one.flow, (t * pi / 30.0 for t in one.torques(weight)), strict=True))
     for n, q, t in points:
