@@ -50,6 +50,10 @@ def _show(found) -> None:
     for row in found.rows:
         if not row["ok"]:
             terminal.line(console, f"{name_of(row)}: {row['reason']}", "bold red")
+        if row["marks"]:
+            first = min(row["marks"], key=lambda mark: mark["time"])
+            text = f"{first['text']}: results from {first['time']:.6g} s on are not to be trusted"
+            terminal.line(console, f"{name_of(row)}: {text}", "yellow")
         for one in row["verdicts"]:
             if not one["ok"]:
                 at = "" if one["chainage"] is None else f" at {one['chainage']:.6g} m"

@@ -291,6 +291,7 @@ def _claim(one: dict) -> str:
     return (
         f"{verdict}: {one['text']} = {_number(one['claimed'])} {one['unit']} within "
         f"{_number(one['tolerance'])}: found {_number(one['found'])}"
+        f"{'' if one['error'] is None else f' +- {_off(one)}'}"
     )
 
 
