@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from fvsolve.parts.csv_rows import Misread, read_rows, split
 from fvsolve.parts.series import copy_name, find_file
@@ -18,8 +17,7 @@ UNITS = {SPEED: "rpm m^(1/2)", FLOW: "m^(1/2)/s", TORQUE: "N/m3"}
 EXAMPLE = "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], efficiency = [0.88, 0.85] }"
 
 
-@dataclass(frozen=True)
-class OpeningCurve:
+class OpeningCurve(NamedTuple):
     """Points of one opening in their order: n11 = N D / sqrt(H), Q11 = Q / (D^2 sqrt(H)), and efficiency or T11.
 
     speed [rpm m^(1/2)]; flow [m^(1/2)/s]; value : efficiency [-], or T11 = T / (D^3 H) [N/m3]; word : which
@@ -43,8 +41,7 @@ class OpeningCurve:
         return [eta * weight * q * 30.0 / math.pi / n for n, q, eta in points]
 
 
-@dataclass(frozen=True)
-class HillChart:
+class HillChart(NamedTuple):
     """Curves by rising openings above 0; still : (n11, T11) that brakes the runner behind shut vanes, or none."""
 
     curves: tuple[OpeningCurve, ...]
