@@ -242,6 +242,14 @@ def test_behind_a_pipe_it_swings_through_them_under_every_law(law):
     assert abs(coarse.ledger["mass"]["relative"]) < 1e-12
 
 
+def test_an_s_between_given_pressures_starts_at_the_greatest_flow_and_is_noted():
+    case = direct(200.0, hill_chart=[folded(160)], diameter=3.0, speed=FOLD["speed"])
+    found = fvsolve.run(case)
+    assert found["unit.flow"][0] == approx(85.06, rel=1e-4)
+    assert [one.key for one in found.warnings] == ["hill_chart"] and "its hill chart folds" in found.warnings[0].text
+    assert not fvsolve.run(direct(HEAD, hill_chart=CHART, speed="300 rpm")).warnings
+
+
 def test_said_another_way_it_is_the_same(tmp_path):
     """Curves and points in other orders, other units, columns of a file."""
     numerics = {"method": "rk4", "step": 0.05}

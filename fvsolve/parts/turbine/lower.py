@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
 from fvsolve.errors import Notice
+from fvsolve.kernels import records as rec
 from fvsolve.model.device import Device
 from fvsolve.model.inputs import TURNING, Input, opening
 from fvsolve.parts.pump.law import INERTIA, RATED
@@ -92,6 +94,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
                 valve["open"] = 0.0
             elif draft.case.law.linear:
                 valve["drop"] = drop
+        draft.warnings += torn(start, draft.valve_names[row["valve"]], part, valve)
         return moving + self.let_go(start, part, row, valve)
 
     def asked(self, start, row, valve) -> float:
@@ -99,3 +102,22 @@ class TurbineRows(Turning, Device, kind="turbine"):
         vanes, omega = float(start.given(valve["schedule"])), float(valve["drive"])
         floats, dense = start.draft.tables.floats, rho / start.draft.fluid.density
         return -dense * charts.chart_torque(floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho)
+
+
+def torn(start, name: str, part, valve) -> list[Notice]:
+    """A note on a turbine whose curves fold, with a pressure given on both sides."""
+    ends = (start.nodes["kind"][int(valve[key])] for key in ("from_node", "to_node"))
+    if rec.JUNCTION in ends or not any(map(folds, part.hill_chart.curves)):
+        return []
+    ways = f"between {part.from_} and {part.to} nothing holds its flow"
+    text = (f"{name}: its hill chart folds, and {ways}: it takes one of several and may jump to and fro; a pipe or "
+            "rigid-column that leads to it would hold it")  # fmt: skip
+    return [Notice("range", f"links.{name}", text, "hill_chart")]
+
+
+def folds(one) -> bool:
+    """Whether n11 of a forward runner rises with the angle of a curve somewhere."""
+    points = list(zip(one.speed, one.flow, strict=True))
+    rising = points[0][0] * points[1][1] > points[0][1] * points[1][0]
+    ahead = points if rising else points[::-1]
+    return any(n < m for (n, _), (m, _) in pairwise(ahead) if n > 0.0 and m > 0.0)
