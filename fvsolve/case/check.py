@@ -90,7 +90,9 @@ def parts(
     """Faults of elevations, and what each part finds wrong beside the others."""
     poses = bodies.poses(nodes, start)
     high = {name: node for name, node in nodes.items() if riding_networks.has_height(node, poses)}
-    yield from _elevations({name: riding_networks.standing(node, poses) for name, node in high.items()}, links)
+    said = {} if raw is None else _dict(raw.table.get("links"))
+    lends = any("profile" in _dict(link) for name, link in said.items() if name not in links)  # and is at fault itself
+    yield from _elevations({name: riding_networks.standing(node, poses) for name, node in high.items()}, links, lends)
 
     def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Found:
         if fluid is not None:
@@ -287,13 +289,13 @@ def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[st
             yield ("nodes", name), message
 
 
-def _elevations(nodes: dict[str, Any], links: dict[str, Any]) -> Found:
+def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Found:
     wet = {("nodes", name): node for name, node in nodes.items() if node.domain == "hydraulic"}
     wet |= {("links", name): link for name, link in links.items() if chambers_of(link)}
     stated = dict.fromkeys(name for (_, name), part in wet.items() if part.elevation is not None)
     for (group, name), part in wet.items():
         elsewhere = getattr(part, "head", None) is not None or getattr(part, "on", None) is not None
-        if stated and name not in stated and not elsewhere:
+        if stated and name not in stated and not elsewhere and not lends:
             yield (group, name), f"elevation is missing: {listing(stated)} state one, so all must, or none"
     heights_of = {name: node.elevation for name, node in nodes.items()}
     heights_of |= {f"{name}.{place}": link.elevation for name, link in links.items() for place in chambers_of(link)}

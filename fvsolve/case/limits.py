@@ -151,8 +151,8 @@ def unclassed(extent: Extent, links: Mapping[str, Any]):
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
         yield ("share_of_class",), f"a class limits pressure, not {extent.quantity}; leave quantity out"
         return
-    parts = [name for group, name in extent.parts if getattr(links.get(name), "allowable_pressure", None) is None
-             or group != "links"]  # fmt: skip
+    bare = {name for name, link in links.items() if getattr(link, "allowable_pressure", None) is None}
+    parts = [name for group, name in extent.parts if group != "links" or name in bare]
     if parts:
         more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
         yield ("share_of_class",), f"{parts[0]}{more} without a class; give it class or allowable_pressure"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -100,13 +99,17 @@ def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kind
 
 
 def share_of(place: str, length: float | None, begin: float) -> float:
-    """A place as a share of a length [m] that begins at a chainage [m]; ValueError where it is none."""
+    """A place as a share of a length [m] that begins at a chainage [m]; ValueError where it is none.
+
+    length : None of a pipe that is at fault itself, along which any chainage will do
+    """
     try:
         found = float(place)
         said = f'"@{place}" is no fraction of the length; wanted 0 to 1'
     except ValueError:
         try:
-            found = math.nan if length is None else (units.parse(place, "length") - begin) / length
+            found = units.parse(place, "length") - begin
+            found = 0.0 if length is None else found / length
         except ValueError:
             raise ValueError(
                 f'"@{place}" is no fraction of the length; wanted 0 to 1, or a chainage with its unit'

@@ -71,16 +71,22 @@ def spread(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) ->
     return options[0]
 
 
+def is_pipe(given: Any) -> bool:
+    """Whether a table of a file says that it is a pipe."""
+    return isinstance(given, dict) and given.get("type") == "pipe"
+
+
 def misfits(routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any]) -> Iterator[tuple]:
     """Faults of routes: what is no pipe, and pipes that do not follow each other; named : links, those at fault too."""
     for name, route in routes.items():
         if route is None:
             continue
         unknown = False
-        pipes = [one for one, link in links.items() if link.kind == "pipe"]
+        pipes = [one for one, given in named.items() if one not in links and is_pipe(given)]
+        pipes += [one for one, link in links.items() if link.kind == "pipe"]
         for k, pipe in enumerate(route.pipes):
-            if pipe in pipes or (pipe in named and pipe not in links):
-                unknown = unknown or pipe not in pipes
+            if pipe in pipes:
+                unknown = unknown or pipe not in links
                 continue
             unknown = True
             if pipe in links:

@@ -38,6 +38,7 @@ BASIN = {
     "wave_speed": "wave speed [m/s]", "memory": "memory [B]",
 }  # fmt: skip
 PATCH = {"faces": "faces", "length": "length [m]", "area": "cells behind [m2]", "reflects": "waves reflected"}
+PLACES_SHOWN = 3
 EVENTS_SHOWN = 12
 
 
@@ -48,8 +49,8 @@ def result(one) -> None:
     if said["title"]:
         _line(console, said["title"], "bold")
     _extremes(console, one)
-    for mark in said["marks"]:
-        _line(console, f"{mark['text']}: results from {mark['time']:.6g} s on are not to be trusted", "yellow")
+    for text in marks_of(said["marks"]):
+        _line(console, text, "yellow")
     for cavity in said["cavities"]:
         _line(console, cavity["text"])
     for event in said["events"][:EVENTS_SHOWN]:
@@ -315,6 +316,20 @@ def _verdict(one: dict, said: dict) -> str:
         return said
     doubt = ", which leaves it open" if abs(one["margin"]) < one["error"] else ""
     return f"{said} within {one['error']:.2g}{doubt}"
+
+
+def marks_of(marks: list[dict]) -> list[str]:
+    """What the model carried on through, each said once with the places that met it, the first one first."""
+    alike: dict[str, list[dict]] = {}
+    for mark in sorted(marks, key=lambda mark: mark["time"]):
+        alike.setdefault(mark["text"].partition(": ")[2], []).append(mark)
+    found = []
+    for text, those in alike.items():
+        names = [mark["text"].partition(": ")[0] for mark in those]
+        more = f" and {len(names) - PLACES_SHOWN} more" if len(names) > PLACES_SHOWN else ""
+        where = ", ".join(names[:PLACES_SHOWN]) + more
+        found.append(f"{where}: {text}: results from {those[0]['time']:.6g} s on are not to be trusted")
+    return found
 
 
 def why_open(said: dict) -> str:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fvsolve.errors import listing
 from fvsolve.kernels import records as rec
 from fvsolve.steady import union
 
@@ -63,7 +64,7 @@ def sort_nodes(draft) -> None:
             clusters.append((len(integers), 1, len(integers) + 1, 0, 0, 0, -1))
             integers.append(int(i))
     gates(draft)
-    refuse_loose_air_valves(draft, members)
+    refuse_loose_groups(draft, members)
     for k in np.flatnonzero(known):
         soften(draft, [k])
     draft.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
@@ -111,18 +112,23 @@ def gates(draft) -> None:
             draft.integers += held
 
 
-def refuse_loose_air_valves(draft, members) -> None:
-    """Places that valves join to one another and to nothing else: rigid columns alone lead to an air valve there."""
+def refuse_loose_groups(draft, members) -> None:
+    """Places that valves join to one another and to nothing else, but for air valves: rigid columns alone lead on."""
     nodes, valves, names = draft.node_table, draft.valve_table, list(draft.case.places)
     for group in members.values():
         ways = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
         air = [v for v in ways if v["device"] >= 0 and draft.devices[v["device"]][2].vessel]
         known = [v for v in ways if not {int(v["from_node"]), int(v["to_node"])} <= set(group)]
-        if len(group) > 1 and air and len(known) == len(air) and not np.any(nodes["admittance"][group] > 0.0):
-            place, other = (names[i] for i in sorted(group, key=lambda i: i != air[0]["from_node"])[:2])
-            draft.fault(f"nodes.{place}", f"a valve joins this air valve to {other}, and only rigid columns lead on, "
-                        f"so nothing sets their pressure while it is shut; give {other} a chamber volume, or make one "
-                        "of the columns a pipe")  # fmt: skip
+        if len(group) < 2 or len(known) > len(air) or np.any(nodes["admittance"][group] > 0.0):
+            continue
+        first = int(air[0]["from_node"]) if air else group[0]
+        place, other = (names[i] for i in sorted(group, key=lambda i: i != first)[:2])
+        what, span = "a valve joins this air valve", " while it is shut"
+        if not air:
+            joins = [name for name, v in zip(draft.valve_names, valves, strict=True) if int(v["from_node"]) in group]
+            what, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} it", ""
+        draft.fault(f"nodes.{place}", f"{what} to {other}, and only rigid columns lead on, so nothing sets their "
+                    f"pressure{span}; give {other} a chamber volume, or make one of the columns a pipe")  # fmt: skip
 
 
 def senses(draft, device: int) -> bool:

@@ -56,8 +56,12 @@ def rendered(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> str:
 
 
 def embedded(data: Any) -> str:
-    """JSON that no text within can end or escape: it stands in a <script> of the page."""
-    text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    """JSON that no text within can end or escape: it stands in a <script> of the page. What is no number is null."""
+    try:
+        text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    except ValueError:  # of a run that stopped on one
+        data = json.loads(json.dumps(data), parse_constant=lambda _: None)
+        text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
     for sign in "<>&\u2028\u2029":
         text = text.replace(sign, f"\\u{ord(sign):04x}")
     return text

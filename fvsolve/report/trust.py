@@ -65,7 +65,9 @@ def verdict(result) -> Word:
         return Word("bad", f"{many} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed))
     unsure = [one.name for one, how in zip(verdicts, states, strict=True) if how == OPEN]
     if unsure:
-        why = "their margins are smaller than the error of the numbers" if result.ok else "the run is not sound"
+        why = "their margins are smaller than the error of the numbers"
+        if not result.ok or result.marks:
+            why = "the run is not sound" if not result.ok else "from a time on the numbers are not to be trusted"
         return Word("doubt", f"Whether {'limits hold' if len(unsure) > 1 else 'a limit holds'} is open.",
                     f"{', '.join(unsure)}: {why}.")  # fmt: skip
     every = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"

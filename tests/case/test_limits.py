@@ -139,6 +139,38 @@ def test_a_run_that_stops_passes_no_limit(fvs, tmp_path) -> None:
     assert found.verdicts[0].until < 4.0
 
 
+def test_where_numbers_are_not_to_be_trusted_no_limit_holds(fvs, tmp_path, monkeypatch) -> None:
+    """Below the vapour pressure at every place: one line, the first place first, and a limit is open or fails."""
+    monkeypatch.chdir(tmp_path)
+    limits = {"top": {"on": "pipes", "greatest": "100 bar"}, "low": {"on": "pipes", "greatest": "5 bar"}}
+    case = shut(limits=limits)
+    case["nodes"]["lake"] = lake(30.0, elevation=0.0)
+    (tmp_path / "scene.toml").write_text(fvsolve.load(case).resolved())
+    status, text, _ = fvs("run", "scene.toml", "--no-pictures")
+    assert status == 1 and text.count("pressure falls below vapour pressure") == 1
+    assert "high, gate, low and 1 more: pressure falls" in text
+    assert "OPEN, as results from" in text and "on are not to be trusted: top: " in text and "FAILS: low: " in text
+    found = fvsolve.open_run("runs/scene")
+    assert found.ok and [one.ok for one in found.verdicts] == [False, False] and found.verdicts[0].margin > 0.0
+
+
+def test_what_goes_on_after_the_end_is_noted_and_nothing_is_sized_by_it(fvs, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    case = shut(limits={"top": {"on": "pipes", "greatest": "14 bar"}})
+    flow = VELOCITY * area(DIAMETER)
+    case["nodes"]["gate"]["demand"] = {"start": SHUT, "duration": 1.0, "value": [flow, 0.0]}
+    (tmp_path / "scene.toml").write_text(fvsolve.load(case).resolved())
+    late = {"nodes.gate.demand.duration": 30.0}
+    (note,) = [one for one in fvsolve.run(case, set=late).warnings if one.kind == "end"]
+    assert note.text == "nodes.gate.demand: goes on to 30.1 s, after the end of the run at 4 s"
+    held = {"nodes.gate.demand": {"time": [0.0, 30.0], "value": [flow, flow]}}  # goes on, but changes nothing
+    assert [one for one in fvsolve.run(case, set=held).warnings if one.kind == "end"] == []
+    status, text, _ = fvs("size", "scene.toml", "--vary", "nodes.gate.demand.duration=0.1 s,30 s", "--goal", "least")
+    assert status == 0 and "open: nodes.gate.demand: goes on to 30.1 s" in text
+    value = float(text.split("holds all limits: ")[1].split(" s;")[0])
+    assert 2.0 < value < 4.0 - SHUT and "open" in text
+
+
 def test_the_command_line_fails_where_a_limit_does(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     case = fvsolve.load(shut(limits={"top": {"on": "pipes", "greatest": "14 bar"}}))

@@ -14,7 +14,7 @@ from truth.scenes import junction, lake, pipe, ramp, scene, tank, valve
 import fvsolve
 from fvsolve.report.figures import as_it_stands
 from fvsolve.report.legs import ways
-from fvsolve.report.page import page
+from fvsolve.report.page import embedded, page
 from fvsolve.report.report import write_report
 from fvsolve.run.result import Result
 
@@ -185,8 +185,15 @@ def test_verdicts_stand_first_those_that_fail_before_others(closure):
     assert text.index("FAILS") < text.index("vacuum") < text.index("Worst of all pipes")
     early = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False}], ok=False)).text
     assert "Whether a limit holds is open. vacuum: the run is not sound." in early and "FAILS" not in early
+    mark = {"what": "below vapor pressure", "place": "links.main", "time": 1.0, "text": "main: below"}
+    later = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False}], marks=[mark])).text
+    assert "vacuum: from a time on the numbers are not to be trusted." in later
     unsure = read(changed(closure, verdicts=[VERDICT | {"error": 4.0}])).text
     assert "open. class: their margins are smaller than the error" in unsure and "open 13.5 4" in unsure
+
+
+def test_what_is_no_number_is_none_in_the_page():
+    assert embedded({"a": [1.0, float("nan")], "b": "<"}) == '{"a":[1.0,null],"b":"\\u003c"}'
 
 
 def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):

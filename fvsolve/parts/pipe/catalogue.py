@@ -26,6 +26,9 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
     if material is None and "class" not in given and "lining" not in given:
         return given
     found, said = {**given}, []
+    if name is not None and material is None:  # blamed where it is read; nothing follows from it
+        sized_by = {"class", "nominal"} & set(found)
+        return {key: one for key, one in found.items() if key not in sized_by} | ({"diameter": 1.0} if sized_by else {})
     if isinstance(found.get("class"), str):
         _add_class(found, said, name if isinstance(name, str) else None)
     if isinstance(found.get("nominal"), str) and "diameter" not in found:

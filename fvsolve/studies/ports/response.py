@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -150,8 +151,9 @@ def _density(found, row) -> float:
 def _dense(a) -> np.ndarray:
     """A as a full array, before which its size is looked at."""
     if a.shape[0] > LARGEST:
+        share = math.floor(100 * LARGEST / a.shape[0])
         raise FvsolveError(f"the case has {a.shape[0]} states, a verdict is found up to {LARGEST}: give its pipes "
-                           "fewer cells, --set links.NAME.cells=100")  # fmt: skip
+                           f"{share} % of their cells, --set links.NAME.cells=...")  # fmt: skip
     return a if isinstance(a, np.ndarray) else a.toarray()
 
 
