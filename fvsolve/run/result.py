@@ -287,6 +287,7 @@ class Result(Shown):
 
     def _draw(self, times: list[float], field: str | None, path, suffix: str, contours: int) -> Path:
         from fvsolve.draw.view import view
+        from fvsolve.run.drawn import scene_of
 
         if field is None:
             pipes = any(link.kind == "pipe" for link in self.case.links.values())
@@ -295,13 +296,9 @@ class Result(Shown):
             field = "pressure" if pipes or not basins else next(iter(basins[0].own.fields), "pressure")
             field = "speed" if bodies and not pipes and not basins else field
         out = Path(path) if path else self.directory / f"{field}{suffix}"
-        frames, what = self._frames(), f"{self.summary['title']}\n{field.replace('_', ' ')}"
-        view(
-            [(f"{what} at t = {t:.6g} s", [file for at, file in frames if at == t]) for t in times],
-            field,
-            out,
-            contours,
-        )
+        frames = self._frames()
+        found = [(t, [file for at, file in frames if at == t]) for t in times]
+        view(scene_of(self.case, self.summary["title"], field, found, contours), out)
         return out
 
     def _measured(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
