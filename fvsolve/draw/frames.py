@@ -14,11 +14,11 @@ from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import span
 from fvsolve.errors import did_you_mean, listing
 
-TUBE = 0.006  # radius of a pipe as part of the picture's diagonal
+TUBE = 0.008  # radius of a pipe as part of the picture's diagonal
 
 
 def measured(scene: DrawnScene) -> tuple[tuple[float, float], np.ndarray, bool]:
-    """Range of a field over all frames, their box float64[6], whether there is water; exits where none has the field."""
+    """Range of a field over all frames, their box float64[6], whether there is water; exits where no field is."""
     known, lows, highs, boxes, wet, field = {}, [], [], [], False, scene.quantity.name
     for file in (file for _, files in scene.frames for file in files):
         mesh = read(file, scene)

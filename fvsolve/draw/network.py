@@ -81,7 +81,7 @@ class Network:
         """Limits and axes with units."""
         unit = "" if self.scene.plan == "own scale" else f" [{self.scene.length.unit}]"
         axes, seen, high = self.axes, self.aspect.on_sheet(self.all), self.scene.height.unit
-        self.texts, self.cover = [], np.zeros((0, 2))
+        self.texts, self.cover, self.labels = [], np.zeros((0, 2)), []
         if self.aspect.kind == "aslant":
             axes.set_axis_off()
             box = self.all.min(axis=0), self.all.max(axis=0)

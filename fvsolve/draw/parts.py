@@ -24,11 +24,11 @@ EDGE = 5.0  # of the sheet that stays free [pixels]
 def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int]:
     """Symbols and names of a scene's parts over what is drawn; how many names are there, and how many there could be.
 
-    stage : its `sheet`, `axes`, `aspect`, `half` of a symbol [points], `texts` that no name covers, and `cover`,
-    float64[k, 2], points of the sheet that names had better not cover
+    stage : its `sheet`, `axes`, `aspect`, `half` of a symbol [points], `texts` that no name covers, `cover`,
+    float64[k, 2], points of the sheet that names had better not cover, `labels`, other names with their points
     segments : float64[c, 2, 2], pipes on the sheet
     """
-    if not (scene.parts or scene.pipes):
+    if not (scene.parts or scene.pipes or stage.labels):
         return 0, 0
     axes, half, aspect = stage.axes, stage.half, stage.aspect
     point = stage.sheet.figure.dpi / 72.0  # [pixels]
@@ -93,6 +93,8 @@ def _names(stage, scene: DrawnScene, segments, at, blocks) -> tuple[int, int]:
     axes, figure = stage.axes, stage.sheet.figure
     pixels = axes.transData.transform(segments.reshape(-1, 2)).reshape(-1, 2, 2)
     wanted, renderer = _wanted(scene, at, pixels, stage.half), figure.canvas.get_renderer()
+    look = {"color": style.INK, "fontsize": 8}
+    wanted += [DrawnName(name, axes.transData.transform(place), 6.0, look) for name, place in stage.labels]
     halo = [withStroke(linewidth=HALO, foreground="white")]
     always = {"zorder": 7, "parse_math": False, "va": "bottom", "path_effects": halo}
     texts = [axes.text(0.0, 0.0, visible(one.text), **always, **one.look) for one in wanted]
@@ -118,7 +120,7 @@ def _wanted(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
     plain, small = {"color": style.INK, "fontsize": 8}, {"color": style.INK, "fontsize": 7.5}
     parts = [DrawnName(one.name, at[one.key], half + 3.0, plain) for one in scene.parts if not one.joint]
     joints = [DrawnName(one.name, at[one.key], 5.0, small) for one in scene.parts if one.joint]
-    if len(scene.names) > FEW or not scene.pipes:
+    if len(scene.names) > FEW or not scene.pipes or not scene.names:
         return parts + joints
     look = {"color": style.MUTED, "fontsize": 7.5, "fontstyle": "italic"}
     middles = {name: pixels[scene.pipes[0][3] == k].reshape(-1, 2) for k, name in enumerate(scene.names)}

@@ -56,6 +56,7 @@ class DrawnScene:
     frames: list[tuple[str, list[Path]]]
     pipes: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=list)
     names: list[str] = field(default_factory=list)  # of pipes
+    bodies: list[str] = field(default_factory=list)  # by their numbers
     parts: list[DrawnPart] = field(default_factory=list)
     anchors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # patches, that links go to [m]
     plan: str = "given"

@@ -102,6 +102,8 @@ def stamp(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF, shift=(0.
 def span(low: float, high: float) -> tuple[float, float]:
     """Ends of the colours of a field: its own, or some way about an even one."""
     most = max(abs(low), abs(high))
+    if most == 0.0:
+        return 0.0, 1.0
     if high - low > EVEN * most:
         return tuple(0.0 if abs(end) < NONE * (high - low) else end for end in (low, high))
     middle, half = 0.5 * (low + high), LEAST * most or 0.5

@@ -24,8 +24,8 @@ HIGH = 0.12  # as high as this part
 OVER = 5e-4  # of its diagonal that lines are drawn above a surface
 BESIDE = 0.04  # of parts about a basin, of its size
 ABOVE = 0.25  # of a house, over the highest water, of the height of all
-BED, DEEP, HOUSE = "#c9b99a", "#5b87a6", "#a8705a"
-SHADE = 0.35  # light that reaches all sides of a house
+BED, DEEP, HOUSE, LIMB = "#c9b99a", "#5b87a6", "#a8705a", "#4b5563"
+SHADE = 0.35  # light that reaches all sides
 MARGINS = (62.0, 44.0, 50.0, 14.0)  # about a box [points]
 
 
@@ -62,7 +62,7 @@ class Stage:
         self._camera()
         self.image = axes.imshow(np.zeros((2, 2, 4)), extent=(*axes.get_xlim(), *axes.get_ylim()), aspect="auto",
                                  zorder=1, interpolation="antialiased")  # fmt: skip
-        draw_parts(self, scene, self._pipes())
+        draw_parts(self, scene, self._lines())
         self.sheet.bar(self.limits, scene.quantity.label)
         self.sheet.legend(scene.parts)
 
@@ -111,18 +111,31 @@ class Stage:
         camera.parallel_scale = 0.5 * (high - low)
         camera.clipping_range = (0.1 * far, 2.5 * far)
 
-    def _pipes(self) -> np.ndarray:
-        """Pipes of the first frame on the sheet : float64[c, 2, 2]."""
-        self.cover = np.zeros((0, 2))
+    def _lines(self) -> np.ndarray:
+        """Pipes and bodies of the first frame on the sheet : float64[c, 2, 2]; what names stand beside and over."""
+        self.cover, self.labels, found = np.zeros((0, 2)), [], [np.zeros((0, 2, 2))]
         for file in self.scene.frames[0][1]:
             mesh = read(file, self.scene)
+            points = self.aspect.on_sheet(mesh.points)
             if 3 not in mesh.celltypes:
                 self.cover = np.vstack([self.cover, self.aspect.on_sheet(mesh.cell_centers().points)])
+                continue
+            lines = mesh.cells_dict[3]
+            found.append(points[lines])
             if "pipe" in mesh.cell_data:
-                lines = mesh.cells_dict[3]
                 self.scene.pipes = [(np.asarray(mesh.points), lines, np.zeros(0), np.asarray(mesh["pipe"]))]
-                return self.aspect.on_sheet(mesh.points)[lines]
-        return np.zeros((0, 2, 2))
+            elif len(self.scene.frames) == 1:  # bodies move
+                self.labels = self._bodies(found[-1], np.asarray(mesh["body"]))
+        return np.concatenate(found)
+
+    def _bodies(self, lines: np.ndarray, whose: np.ndarray) -> list[tuple[str, np.ndarray]]:
+        """Names of bodies with the middles of their longest lines."""
+        long, found = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), []
+        for k, name in enumerate(self.scene.bodies):
+            own = np.flatnonzero(whose == k)
+            if len(own) and long[own].max() > 0.0:
+                found.append((name, lines[own[long[own].argmax()]].mean(axis=0)))
+        return found
 
     def _add(self, mesh: Any) -> None:
         field = self.scene.quantity.name
@@ -132,7 +145,7 @@ class Stage:
         if "body" in mesh.cell_data and (field != "speed" or self.wet):
             shape = tubes(mesh, self.box)
             if shape.n_points:  # there are bodies without extent
-                self.plotter.add_mesh(shape, color=style.INK)
+                self.plotter.add_mesh(shape, color=LIMB, ambient=SHADE)
         elif field in mesh.cell_data:
             plane = 3 not in mesh.celltypes
             self._coloured(mesh.cell_data_to_point_data() if plane else tubes(mesh, self.box), plane)
@@ -156,7 +169,7 @@ class Stage:
             self.plotter.add_mesh(mesh.extract_cells(block), color=HOUSE, ambient=SHADE)
         if not surface.n_cells:
             return None
-        self.plotter.add_mesh(water.sides(surface, rise), color=DEEP, lighting=False)
+        self.plotter.add_mesh(water.sides(surface, water.upright(mesh) * (1.0, 1.0, rise)), color=DEEP, lighting=False)
         if field in surface.point_data:
             self._coloured(surface, True)
         else:
@@ -167,7 +180,8 @@ class Stage:
         """A shape in the colours of its field, with lines of equal values where it is plane."""
         (low, high), field, many = self.limits, self.scene.quantity.name, self.scene.contours
         self.plotter.add_mesh(shape, scalars=field, cmap=COLOURS, clim=self.limits, smooth_shading=True,
-                              show_scalar_bar=False, lighting=not plane or self.wet)  # fmt: skip
+                              show_scalar_bar=False, lighting=not plane or self.wet,
+                              ambient=0.0 if plane else SHADE)  # fmt: skip
         if plane and many and field in shape.point_data:
             levels = [low + (high - low) * (k + 1) / (many + 1) for k in range(many)]
             lines = shape.contour(levels, scalars=field)

@@ -1,9 +1,9 @@
 """A symbol for each kind of part, as pipework and fluid power draw them. Knows names of kinds; knows no part.
 
 A symbol is strokes in a square from -1 to 1, the way of the flow along x: `M` and `L` go to points, `Z` closes,
-`O x y r` is a circle. What closes is white; after `*` it is ink, after `~` water. A kind that is not here has the symbol
-of the kind that it is made of (an orifice is a valve), else OTHER_NODE or OTHER_LINK: a new part needs no entry, and one
-line gives it its own.
+`O x y r` is a circle. What closes is white; after `*` it is ink, after `~` water. A kind that is not here has the
+symbol of the kind that it is made of (an orifice is a valve), else OTHER_NODE or OTHER_LINK: a new part needs no entry,
+and one line gives it its own.
 """
 
 from __future__ import annotations

@@ -18,15 +18,15 @@ def water(mesh: Any, rise: float, fields: tuple[str, ...], least: float = WET) -
     front on level ground, the shore lies half way into them. From a depth of `least` there is water. Fields at points
     are means over wet cells.
     """
-    cells, depth = _cells(mesh), mesh.cell_data["depth"]
-    wet = depth > least
-    rides = "normal" in mesh.cell_data
-    bed = mesh.points[:, 2].copy()
-    level = depth if rides else mesh.cell_data["surface"]
-    at = _at_points(cells, wet, level, mesh.n_points)
+    cells, wet = _cells(mesh), mesh.cell_data["depth"] > least
+    up = upright(mesh)
+    bed = mesh.points @ up
+    if "normal" in mesh.cell_data:  # levels are told in axes of what it rides on
+        bed += np.mean(mesh.cell_data["bed"] - mesh.cell_centers().points @ up)
+    at = _at_points(cells, wet, mesh.cell_data["surface"], mesh.n_points)
     known = np.isfinite(at)
     beyond = _carried(cells, ~wet, at, mesh.n_points)
-    height = np.where(known, at, beyond) - (0.0 if rides else bed)
+    height = np.where(known, at, beyond) - bed
     height = np.where(known, height, -np.abs(height))
     height = np.where(np.isfinite(height), height, -1.0)
     made = mesh.copy()
@@ -36,26 +36,25 @@ def water(mesh: Any, rise: float, fields: tuple[str, ...], least: float = WET) -
         if name in mesh.cell_data:
             values = _at_points(cells, wet, mesh.cell_data[name], mesh.n_points)
             made.point_data[name] = np.nan_to_num(np.where(known, values, _carried(cells, ~wet, values, mesh.n_points)))
-    if rides:
-        normal = mesh.cell_data_to_point_data().point_data["normal"]
-        made.point_data["normal"] = normal
-        made.points = made.points + np.maximum(height, 0.0)[:, None] * normal
-    else:
-        top = np.where(known, at, np.where(np.isfinite(beyond), beyond, bed))
-        made.points = np.column_stack([mesh.points[:, :2], rise * top])
+    lift = np.where(known, at, np.where(np.isfinite(beyond), beyond, bed)) - bed
+    made.points = (mesh.points + lift[:, None] * up) * (1.0, 1.0, rise)
     return made.clip_scalar(scalars="height", value=0.0, invert=False)
 
 
-def sides(surface: Any, rise: float) -> Any:
-    """What upright walls see of water: from its rim down to the bed."""
+def sides(surface: Any, up: np.ndarray) -> Any:
+    """What upright walls see of water: from its rim down to the bed; up : float64[3], heights as they are drawn."""
     import pyvista
 
     rim = edges(surface)
-    down = np.maximum(rim.point_data["height"], 0.0)[:, None]
-    low = rim.points - (down * rim.point_data["normal"] if "normal" in rim.point_data else down * (0.0, 0.0, rise))
+    low = rim.points - np.maximum(rim.point_data["height"], 0.0)[:, None] * up
     ends = rim.lines.reshape(-1, 3)[:, 1:]
     faces = np.column_stack([np.full(len(ends), 4), ends, ends[:, ::-1] + rim.n_points])
     return pyvista.PolyData(np.vstack([rim.points, low]), faces.ravel())
+
+
+def upright(mesh: Any) -> np.ndarray:
+    """Along which depths of a basin count, upwards or what it rides on has there : float64[3]."""
+    return mesh.cell_data["normal"].mean(axis=0) if "normal" in mesh.cell_data else np.array([0.0, 0.0, 1.0])
 
 
 def houses(mesh: Any, top: float) -> list[Any]:

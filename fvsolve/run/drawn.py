@@ -37,6 +37,7 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
         scene.pipes = [read_lines(files[0], field) for _, files in frames]
         if scene.plan == "given" and not _to_scale(scene, lengths):
             scene.plan = "own scale"
+    scene.bodies = list(case.poses) if bodies else []
     if not bodies:
         plan = layout.positions(case, lengths) if pipes else _about_basins(case)
         scene.parts, scene.anchors = parts_of(case, plan), _anchors(case, plan)

@@ -111,6 +111,16 @@ def test_the_shore_is_where_the_surface_meets_the_bed_to_a_part_of_a_cell(bowl):
     assert np.asarray(found.points)[:, 2] == approx(np.full(found.n_points, 0.1 * radius), abs=1e-6)
 
 
+def test_the_shore_of_a_basin_that_rides_is_as_good_in_its_own_axes(bowl):
+    mesh, radius, cell = bowl
+    turn, place = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]), (3.0, 4.0, 5.0)
+    mesh.points = mesh.points @ turn.T + place
+    mesh.cell_data["normal"] = np.tile(turn[:, 2], (mesh.n_cells, 1))
+    shore = (np.vstack(water.loops(water.water(mesh, 1.0, ()))) - place) @ turn
+    assert np.abs(np.hypot(shore[:, 0], shore[:, 1]) - radius).max() < 0.15 * cell
+    assert shore[:, 2] == approx(np.full(len(shore), 0.1 * radius), abs=1e-3)
+
+
 def test_what_is_cut_out_of_a_basin_and_what_rises_from_its_bed_are_houses(bowl):
     mesh, _, _ = bowl
     middle = mesh.cell_centers().points
