@@ -7,6 +7,7 @@ from fvsolve.cli.terminal import line as _line
 from fvsolve.cli.terminal import table as _table
 from fvsolve.errors import listing
 from fvsolve.output.directory import pictures_there
+from fvsolve.units import span
 
 ROWS = 20  # of a table at most; the rest is on disk
 MANY = 40  # rows of a table of `check`: beyond, those that stand out
@@ -14,7 +15,7 @@ FLUID = {
     "density": "density", "bulk_modulus": "modulus", "sound_speed": "velocity", "viscosity": "viscosity",
     "vapor_pressure": "pressure",
 }  # fmt: skip
-NODE = {"elevation": ("elevation", "length"), "pressure": ("pressure", "pressure"), "head": ("head", "head")}
+NODE = {"elevation": ("elevation", "head"), "pressure": ("pressure", "pressure"), "head": ("head", "head")}
 MASS = {
     "position": ("position", "position"), "velocity": ("velocity", "velocity"), "force": ("net force", "force")
 }  # fmt: skip
@@ -34,26 +35,29 @@ PIPE = {
 }
 
 BASIN = {
-    "physics": "physics", "cells": "cells", "path": "kernels over", "area": "area [m2]", "depth": "depth [m]",
-    "wave_speed": "wave speed [m/s]", "memory": "memory [B]",
+    "physics": ("physics", ""), "cells": ("cells", ""), "path": ("kernels over", ""), "area": ("area", "area"),
+    "depth": ("depth", "level"), "wave_speed": ("wave speed", "velocity"), "memory": ("memory [B]", ""),
 }  # fmt: skip
-PATCH = {"faces": "faces", "length": "length [m]", "area": "cells behind [m2]", "reflects": "waves reflected"}
+PATCH = {
+    "faces": ("faces", ""), "length": ("length", "length"), "area": ("cells behind", "area"),
+    "reflects": ("waves reflected", ""),
+}  # fmt: skip
 EVENTS_SHOWN = 12
 
 
 def result(one) -> None:
     """Least and greatest of every probe, marks, ledgers, expectations, comparisons, steps."""
-    said = one.summary
+    said, when = one.summary, _when(one.summary)
     console = _console()
     if said["title"]:
         _line(console, said["title"], "bold")
     _extremes(console, one)
     for mark in said["marks"]:
-        _line(console, f"{mark['text']}: results from {mark['time']:.6g} s on are not to be trusted", "yellow")
+        _line(console, f"{mark['text']}: results from {when(mark['time'])} on are not to be trusted", "yellow")
     for cavity in said["cavities"]:
         _line(console, cavity["text"])
     for event in said["events"][:EVENTS_SHOWN]:
-        _line(console, f"{event['name']} {event['what']} at t = {event['time']:.6g} s")
+        _line(console, f"{event['name']} {event['what']} at t = {when(event['time'])}")
     if len(said["events"]) > EVENTS_SHOWN:
         _line(console, f"and {len(said['events']) - EVENTS_SHOWN} more events; all stand in summary.json")
     for name, ledger in said["ledgers"].items():
@@ -63,12 +67,20 @@ def result(one) -> None:
     for verdict in said["verdicts"]:
         _line(console, _verdict(verdict, said), "green" if verdict["ok"] else "bold red")
     for measured in said["comparisons"]:
-        _line(console, _comparison(measured))
+        _line(console, _comparison(measured, said))
     _notices(console, said["warnings"])
     if "resolution" in said:
         _line(console, said["resolution"]["words"])
-    when = "" if "at t = " in said["reason"] else f" at t = {said['t']:.6g} s"
-    _line(console, f"{said['reason']}{when}; {_cost(said)}", None if one.ok else "bold red")
+    end = "" if "at t = " in said["reason"] else f" at t = {when(said['t'])}"
+    _line(console, f"{said['reason']}{end}; {_cost(said)}", None if one.ok else "bold red")
+
+
+def _when(said: dict):
+    """What tells times [s] in the unit of a run."""
+    from fvsolve.output.column import UnitColumn
+
+    clock = UnitColumn("t", "time", said["time_unit"])
+    return lambda t: f"{_number(float(clock.from_si(t)))} {clock.unit}"
 
 
 def files(one) -> None:
@@ -103,18 +115,10 @@ def checks(case, found: dict, every: bool = False) -> None:
         _states(
             console, case, word, found[group], keys, every, {name for name in found[group] if f"{place}.{name}" in odd}
         )
-    rows = [[name, *(_number(one.get(key)) for key in BASIN)] for name, one in found["basins"].items()]
-    if rows:
-        _table(["basin", *BASIN.values()], rows, console)
-        _line(console, "")
-    rows = [
-        [f"{name}.{patch}", *(_number(faces[key]) for key in PATCH)]
-        for name, one in found["basins"].items()
-        for patch, faces in one["patches"].items()
-    ]
-    if rows:
-        _table(["patch", *PATCH.values()], rows, console)
-        _line(console, "")
+    basins = found["basins"]
+    _rows(console, case, "basin", basins, BASIN)
+    patches = {f"{name}.{patch}": faces for name, one in basins.items() for patch, faces in one["patches"].items()}
+    _rows(console, case, "patch", patches, PATCH)
     said = [f"friction of {name} remembers: {_memory(one['unsteady'])}"
             for name, one in found["pipes"].items() if "unsteady" in one]  # fmt: skip
     said += _walls(case, found["pipes"])
@@ -129,6 +133,19 @@ def checks(case, found: dict, every: bool = False) -> None:
     if found["basins"]:
         _line(console, _threads(found["threads"]))
     _line(console, _step(found))
+
+
+def _rows(console, case, word: str, found: dict, keys: dict) -> None:
+    """A table of basins or patches in the units of `[output]`, none of none."""
+    from fvsolve.output.column import column
+
+    columns = [column(said, dimension, case) if dimension else None for said, dimension in keys.values()]
+    heads = [said if one is None else one.header for (said, _), one in zip(keys.values(), columns, strict=True)]
+    rows = [[name, *(_number(one.get(key) if unit is None else _in(unit, one.get(key)))
+                     for key, unit in zip(keys, columns, strict=True))] for name, one in found.items()]  # fmt: skip
+    if rows:
+        _table([word, *heads], rows, console)
+        _line(console, "")
 
 
 def _walls(case, pipes: dict) -> list[str]:
@@ -148,9 +165,8 @@ def _wall(case, one: dict) -> str:
         unit = column("allowable", "gauge_pressure", case)
         said.append(f"bears {_number(_in(unit, one['allowable_pressure']))} {unit.unit}")
     if "creep" in one:
-        said.append(
-            f"{one['creep']['elements']} elements creep, slow waves run at {one['creep']['slow_speed']:.4g} m/s"
-        )
+        speed = case.amount(one["creep"]["slow_speed"], "velocity")
+        said.append(f"{one['creep']['elements']} elements creep, slow waves run at {speed}")
     if "restraint_factor" in one:
         said.append(f"restraint {one['restraint_factor']:.4g}")
     if "source" in one:
@@ -200,13 +216,12 @@ def _outstanding(found: dict, keys: dict, odd: set[str]) -> list[str]:
 def _fluid(case, found: dict) -> str:
     """The fluid in the units of `[output]`; its modulus in that of pressures."""
     from fvsolve.output.column import column
-    from fvsolve.units import UNITS
 
     said = []
     for key, dimension in FLUID.items():
         one = column(key, dimension, case)
-        if dimension == "modulus" and (UNITS[one.unit].gauge or UNITS[one.unit].absolute):
-            one = column(key, dimension, case, one.unit[:-1])
+        if dimension == "modulus":
+            one = column(key, dimension, case, span(one.unit))
         said.append(f"{key.replace('_', ' ')} {'unknown' if found[key] is None else _number(_in(one, found[key]))}"
                     f"{'' if found[key] is None else ' ' + one.unit}")  # fmt: skip
     name = "" if found["name"] == found["source"] else f" ({found['source']})"
@@ -215,6 +230,8 @@ def _fluid(case, found: dict) -> str:
 
 def _in(column, value):
     """A number in the unit of a column; None where there is none."""
+    if isinstance(value, list):  # a range
+        return [_in(column, one) for one in value]
     return value if value is None or column.plain else float(column.from_si(value))
 
 
@@ -248,7 +265,7 @@ def titles(found: dict[str, str]) -> None:
 def differences(found: dict) -> None:
     """Differences of two runs, per shared probe."""
     rows = [
-        [name, one["unit"], _number(one["greatest"]), _number(one["t_greatest"]), _number(one["rms"])]
+        [name, span(one["unit"]), _number(one["greatest"]), _number(one["t_greatest"]), _number(one["rms"])]
         for name, one in found["probes"].items()
     ]
     _table(["probe", "unit", "greatest difference", "at [s]", "rms"], rows)
@@ -258,10 +275,14 @@ def differences(found: dict) -> None:
 
 
 def _extremes(console, one) -> None:
-    rows = [[name, one.units[name], *map(_number, found)] for name, found in one.extremes.items()]
-    heads = ["probe", "unit", "least", "at [s]", "greatest", "at [s]"]
+    from fvsolve.output.column import UnitColumn
+
+    clock = UnitColumn("at", "time", one.summary["time_unit"])
+    rows = [[name, one.units[name], _number(found.least), _number(_in(clock, found.t_least)), _number(found.greatest),
+             _number(_in(clock, found.t_greatest))] for name, found in one.extremes.items()]  # fmt: skip
+    heads = ["probe", "unit", "least", clock.header, "greatest", clock.header]
     if "peaks" in one.summary:
-        heads = ["probe", "unit", "least", "+-", "at [s]", "greatest", "+-", "at [s]"]
+        heads = ["probe", "unit", "least", "+-", clock.header, "greatest", "+-", clock.header]
         for row, peak in zip(rows, one.summary["peaks"].values(), strict=True):
             row[3:3] = [_off(peak["least"])]
             row[6:6] = [_off(peak["greatest"])]
@@ -290,7 +311,7 @@ def _claim(one: dict) -> str:
     verdict = "holds" if one["ok"] else "FAILS"
     return (
         f"{verdict}: {one['text']} = {_number(one['claimed'])} {one['unit']} within "
-        f"{_number(one['tolerance'])}: found {_number(one['found'])}"
+        f"{_number(one['tolerance'])} {span(one['unit'])}: found {_number(one['found'])}"
     )
 
 
@@ -300,29 +321,34 @@ def _off(peak: dict) -> str:
 
 
 def _verdict(one: dict, said: dict) -> str:
-    where = one["place"] + ("" if one["chainage"] is None else f" at {_number(one['chainage'])} m")
-    when = "" if one["time"] is None else f", {_number(one['time'])} s"
+    from fvsolve.output.column import UnitColumn
+
+    along = UnitColumn("chainage", "length", said["envelope_units"]["distance"])
+    where = one["place"]
+    where += "" if one["chainage"] is None else f" at {_number(_in(along, one['chainage']))} {along.unit}"
+    when = "" if one["time"] is None else f", {_when(said)(one['time'])}"
     beside = "at least" if one["bound"] == "least" else "at most"
     found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where}{when})"
     held = "holds" if one["ok"] else "FAILS"
     if not one["ok"] and one["margin"] is not None and one["margin"] >= 0.0:
         held = f"OPEN, as the run is not ok ({said['reason']})"
-    said = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {_number(one['margin'])}"
+    margin = "-" if one["margin"] is None else f"{_number(one['margin'])} {span(one['unit'])}"
+    said = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {margin}"
     if one["error"] is None or one["margin"] is None:
         return said
     doubt = ", which leaves it open" if abs(one["margin"]) < one["error"] else ""
     return f"{said} within {one['error']:.2g}{doubt}"
 
 
-def _comparison(one: dict) -> str:
+def _comparison(one: dict, said: dict) -> str:
     if one["rms"] is None:
         return f"{one['probe']} against {one['file']}: no measured time lies within the run"
-    unit = one["unit"]
+    unit, apart, when = one["unit"], span(one["unit"]), _when(said)
     return (
-        f"{one['probe']} against {one['file']}: rms {_number(one['rms'])} {unit}, greatest difference "
-        f"{_number(one['greatest_difference'])} {unit} at {_number(one['t_greatest_difference'])} s; peak "
-        f"{_number(one['computed_peak'])} at {_number(one['t_computed_peak'])} s, measured "
-        f"{_number(one['measured_peak'])} at {_number(one['t_measured_peak'])} s"
+        f"{one['probe']} against {one['file']}: rms {_number(one['rms'])} {apart}, greatest difference "
+        f"{_number(one['greatest_difference'])} {apart} at {when(one['t_greatest_difference'])}; peak "
+        f"{_number(one['computed_peak'])} {unit} at {when(one['t_computed_peak'])}, measured "
+        f"{_number(one['measured_peak'])} {unit} at {when(one['t_measured_peak'])}"
     )
 
 
