@@ -10,7 +10,7 @@ from fvsolve.case import basins, bodies, riding_networks, sloshing
 from fvsolve.case.bodies import WORLD
 from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
-from fvsolve.case.sections import CAVITY_SCHEMES, Numerics
+from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Chamber
 from fvsolve.parts.around import Around
@@ -143,10 +143,14 @@ def numerics(numerics: Numerics, has_cells: bool) -> Found:
         yield ("numerics", "method" if numerics.rtol is None else "rtol"), message
 
 
-def cavities(numerics: Numerics, has_cells: bool, fluid: Any) -> Found:
+def follows_cavities(fluid: FluidSpec | None, has_cells: bool) -> bool:
+    """Whether cavities are followed in pipes; fluid : None where it is at fault."""
+    return has_cells and fluid is not None and bool(fluid.cavitation)
+
+
+def cavities(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) -> Found:
     """Faults of schemes that cannot follow the edge of a cavity."""
-    air = fluid.air if fluid is not None else None
-    if has_cells and air is not None and air.cavitation and numerics.scheme not in CAVITY_SCHEMES:
+    if follows_cavities(fluid, has_cells) and numerics.scheme not in (None, *CAVITY_SCHEMES):
         able = " or ".join(map(show, CAVITY_SCHEMES))
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; wanted {able}"
 

@@ -175,12 +175,12 @@ class _Reader:
         self.add(check.parts(*parts.values(), *about, start, meshes, self.lumped))
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
-            self.add(check.cavities(numerics, has_cells, properties))
+            self.add(check.cavities(numerics, has_cells, fluid))
             self.add(basins.misfits(*parts.values(), meshes, properties, (numerics.start, numerics.end),
                                      self.group("nodes")))  # fmt: skip
             self.add(check.claims(expect, numerics))
             carries = bool(carried) and any(parts["nodes"][name].own.carries for name in meshes)
-            numerics = numerics.filled(has_cells, carries)
+            numerics = numerics.filled(has_cells, carries, check.follows_cavities(fluid, has_cells))
         self.add(scalars.misfits(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)
         if None not in (numerics, output, properties) and not self.faults:

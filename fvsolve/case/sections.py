@@ -47,6 +47,8 @@ CAVITY_SCHEMES = tuple(name for name, one in SCHEMES.items() if one.cavities)
 DEFAULT_SCHEME, DEFAULT_LIMITER = "weno5", "van-leer"
 DEFAULT_METHOD, DEFAULT_COURANT = "rk4", 0.9
 DEFAULT_METHOD_CARRIED = "ssp-rk3"  # where basins carry scalars, whose bounds rk4 does not keep
+CAVITY_SCHEME, CAVITY_METHOD, CAVITY_COURANT = "muscl", "ssp-rk2", 0.5  # where cavities are followed in pipes
+CAVITY_AIR = 1e-7  # of a degassed liquid, what they grow from
 DEFAULT_METHOD_RTOL, DEFAULT_RTOL = AUTO, 1e-6
 DEFAULT_CELLS = 100  # in the pipe that takes a wave longest; the others get cells of the same travel time
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
@@ -70,17 +72,28 @@ class FluidSpec(Table):
     pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]", changes=COUNTED)] = (
         101325.0
     )
-    law: Annotated[str, Choice("density law", tuple(LAWS), "one for the case")] = "linear"
+    law: Annotated[
+        str, Choice("density law", tuple(LAWS), "one for the case; linear (with cavitation mixture) if left out")
+    ] = "linear"
     density: Annotated[float | None, Quantity("density", positive, "[kg/m3]", DENSITIES, COUNTED)] = None
     bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]", MODULI, COUNTED)] = None
     viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "[Pa s]", VISCOSITIES)] = None
     vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "[Pa]")] = None
-    air_fraction: Annotated[float | None, Number(between(0, 1), "of the volume at 1 atm, law mixture")] = None
+    air_fraction: Annotated[
+        float | None,
+        Number(between(0, 1), f"of the volume at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out"),
+    ] = None
     gas_exponent: Annotated[float | None, Number(between(1, 2), "polytropic, 1 isothermal, 1.4 adiabatic")] = None
     saturation_pressure: Annotated[float | None, Quantity("pressure", positive, "where all gas is dissolved [Pa]")] = (
         None
     )
     cavitation: Annotated[bool | None, Flag("vapour pressure adds to that of the gas, law mixture")] = None
+
+    @classmethod
+    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+        cavities = {"law": "mixture", "air_fraction": CAVITY_AIR}
+        follows = given.get("cavitation") is True and given.get("law", "mixture") == "mixture"
+        return cavities | given if follows else given
 
     @classmethod
     def wanted(cls, given: Any) -> str:
@@ -128,14 +141,22 @@ class Numerics(Table):
             changes=PROFILE,
         ),
     ] = "steady"
-    scheme: Annotated[str, Choice("scheme", tuple(SCHEMES), "reconstruction in the cells")] = DEFAULT_SCHEME
+    scheme: Annotated[
+        str | None,
+        Choice(
+            "scheme",
+            tuple(SCHEMES),
+            f"reconstruction in the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
+        ),
+    ] = None
     limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "of the scheme muscl")] = DEFAULT_LIMITER
     method: Annotated[
         str | None,
         Choice(
             "method",
             MethodNames(),
-            f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}) if left out",
+            f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}) "
+            "if left out",
             changes=PROFILE,
         ),
     ] = None
@@ -143,7 +164,8 @@ class Numerics(Table):
         float | None,
         Number(
             positive,
-            f"step over the travel time of the quickest cell; {DEFAULT_COURANT} where there are cells if left out",
+            f"step over the travel time of the quickest cell; {DEFAULT_COURANT} where there are cells (with cavitation "
+            f"{CAVITY_COURANT}) if left out",
             changes=VALUE,
         ),
     ] = None
@@ -183,15 +205,21 @@ class Numerics(Table):
     ] = DEFAULT_ACCURACY
     below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = "continue"
 
-    def filled(self, has_cells: bool, carries: bool) -> Numerics:
-        """The same with the step control and method that are the default; carries : whether basins carry scalars."""
+    def filled(self, has_cells: bool, carries: bool, parts: bool) -> Numerics:
+        """The same with the scheme, step control and method that are the default.
+
+        carries : whether basins carry scalars; parts : whether cavities are followed in pipes.
+        """
         changes: dict[str, Any] = {}
+        if self.scheme is None:
+            changes["scheme"] = CAVITY_SCHEME if parts else DEFAULT_SCHEME
         if self.courant is self.step is self.rtol is None:
             by_courant = has_cells and not steps_by_error(self.method)
-            changes = {"courant": DEFAULT_COURANT} if by_courant else {"rtol": DEFAULT_RTOL}
+            courant = CAVITY_COURANT if parts else DEFAULT_COURANT
+            changes |= {"courant": courant} if by_courant else {"rtol": DEFAULT_RTOL}
         adaptive = self.rtol is not None or "rtol" in changes
         if self.method is None:
-            by_step = DEFAULT_METHOD_CARRIED if carries else DEFAULT_METHOD
+            by_step = CAVITY_METHOD if parts else DEFAULT_METHOD_CARRIED if carries else DEFAULT_METHOD
             changes["method"] = DEFAULT_METHOD_RTOL if adaptive else by_step
         return self.model_copy(update=changes)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from fvsolve.cli.terminal import console as _console
 from fvsolve.cli.terminal import line as _line
 from fvsolve.cli.terminal import table as _table
@@ -47,17 +49,17 @@ EVENTS_SHOWN = 12
 
 def result(one) -> None:
     """Least and greatest of every probe, marks, ledgers, expectations, comparisons, steps."""
-    said, when = one.summary, _when(one.summary)
+    said, told = one.summary, when(one.summary)
     console = _console()
     if said["title"]:
         _line(console, said["title"], "bold")
     _extremes(console, one)
     for mark in said["marks"]:
-        _line(console, f"{mark['text']}: results from {when(mark['time'])} on are not to be trusted", "yellow")
+        _line(console, f"{mark['text']}: results from {told(mark['time'])} on are not to be trusted", "yellow")
     for cavity in said["cavities"]:
         _line(console, cavity["text"])
     for event in said["events"][:EVENTS_SHOWN]:
-        _line(console, f"{event['name']} {event['what']} at t = {when(event['time'])}")
+        _line(console, f"{event['name']} {event['what']} at t = {told(event['time'])}")
     if len(said["events"]) > EVENTS_SHOWN:
         _line(console, f"and {len(said['events']) - EVENTS_SHOWN} more events; all stand in summary.json")
     for name, ledger in said["ledgers"].items():
@@ -71,11 +73,11 @@ def result(one) -> None:
     _notices(console, said["warnings"])
     if "resolution" in said:
         _line(console, said["resolution"]["words"])
-    end = "" if "at t = " in said["reason"] else f" at t = {when(said['t'])}"
+    end = "" if "at t = " in said["reason"] else f" at t = {told(said['t'])}"
     _line(console, f"{said['reason']}{end}; {_cost(said)}", None if one.ok else "bold red")
 
 
-def _when(said: dict):
+def when(said: dict) -> Callable[[float], str]:
     """What tells times [s] in the unit of a run."""
     from fvsolve.output.column import UnitColumn
 
@@ -312,6 +314,7 @@ def _claim(one: dict) -> str:
     return (
         f"{verdict}: {one['text']} = {_number(one['claimed'])} {one['unit']} within "
         f"{_number(one['tolerance'])} {span(one['unit'])}: found {_number(one['found'])}"
+        f"{'' if one['error'] is None else f' +- {_off(one)}'}"
     )
 
 
@@ -320,15 +323,18 @@ def _off(peak: dict) -> str:
     return "?" if peak["error"] is None else f"{peak['error']:.2g}"
 
 
-def _verdict(one: dict, said: dict) -> str:
+def where_and_when(one: dict, said: dict) -> str:
+    """Where and when a verdict is nearest to its limit, in the units of a run's summary."""
     from fvsolve.output.column import UnitColumn
 
     along = UnitColumn("chainage", "length", said["envelope_units"]["distance"])
-    where = one["place"]
-    where += "" if one["chainage"] is None else f" at {_number(_in(along, one['chainage']))} {along.unit}"
-    when = "" if one["time"] is None else f", {_when(said)(one['time'])}"
+    where = "" if one["chainage"] is None else f" at {_number(_in(along, one['chainage']))} {along.unit}"
+    return one["place"] + where + ("" if one["time"] is None else f", {when(said)(one['time'])}")
+
+
+def _verdict(one: dict, said: dict) -> str:
     beside = "at least" if one["bound"] == "least" else "at most"
-    found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where}{when})"
+    found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where_and_when(one, said)})"
     held = "holds" if one["ok"] else "FAILS"
     if not one["ok"] and one["margin"] is not None and one["margin"] >= 0.0:
         held = f"OPEN, as the run is not ok ({said['reason']})"
@@ -343,12 +349,12 @@ def _verdict(one: dict, said: dict) -> str:
 def _comparison(one: dict, said: dict) -> str:
     if one["rms"] is None:
         return f"{one['probe']} against {one['file']}: no measured time lies within the run"
-    unit, apart, when = one["unit"], span(one["unit"]), _when(said)
+    unit, apart, told = one["unit"], span(one["unit"]), when(said)
     return (
         f"{one['probe']} against {one['file']}: rms {_number(one['rms'])} {apart}, greatest difference "
-        f"{_number(one['greatest_difference'])} {apart} at {when(one['t_greatest_difference'])}; peak "
-        f"{_number(one['computed_peak'])} {unit} at {when(one['t_computed_peak'])}, measured "
-        f"{_number(one['measured_peak'])} {unit} at {when(one['t_measured_peak'])}"
+        f"{_number(one['greatest_difference'])} {apart} at {told(one['t_greatest_difference'])}; peak "
+        f"{_number(one['computed_peak'])} {unit} at {told(one['t_computed_peak'])}, measured "
+        f"{_number(one['measured_peak'])} {unit} at {told(one['t_measured_peak'])}"
     )
 
 

@@ -81,7 +81,7 @@ def _text(path: Path, network: Any, made: Translation, hour: float, time: float,
         f'cell_time = "{1e3 * time:.10g} ms"  # pipes that are shorter get one cell',
         'line = "auto"' + (f"  # {_short(made, short)}" if short else ""),
     ]
-    lines += ["", "[output]", f"probes = {text.inline(_probes(made))}", 'units = { flow = "l/s" }']
+    lines += ["", "[output]", f"probes = {text.inline(_probes(made))}", 'units = { flow = "l/s", pressure = "barg" }']
     return "\n".join(lines) + "\n"
 
 

@@ -97,7 +97,7 @@ class Law:
     @property
     def to_cavitate(self) -> str:
         """What must stand in [fluid] before `cavitation = true`."""
-        return 'law = "mixture", air_fraction = 1e-7 and '
+        return 'law = "mixture" and '
 
     @property
     def advice(self) -> str:

@@ -43,6 +43,7 @@ def ways(result) -> list[SectionWay]:
     links = result.case.links
     found = [_way(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
     found = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(found)}.values())[::-1]  # each but once
+    found = [way for way in found if not _within(way, found)]
     strung = {leg.pipe for way in found for leg in way.legs}
     one = joined({name: link for name, link in links.items() if _in_line(link, result.case)})
     free = [name for name in result.envelope if name in links and name not in strung]
@@ -55,6 +56,13 @@ def ways(result) -> list[SectionWay]:
             del pipes[pipe]
         others.append(_chained(chain, result))
     return [*found, *sorted(others, key=lambda one: -one.length)]
+
+
+def _within(way: SectionWay, ways: list[SectionWay]) -> bool:
+    """Whether it is a cut pipe, a route by itself, whose pieces all lie on another route."""
+    pipes = [leg.pipe for leg in way.legs]
+    cut = pipes == [f"{way.name}-{k + 1}" for k in range(len(pipes))]
+    return cut and any(set(pipes) <= {leg.pipe for leg in one.legs} for one in ways if one is not way)
 
 
 def _in_line(link, case) -> bool:

@@ -94,8 +94,8 @@ def matrix(runs: list) -> ReportTable:
 
 def failing(runs: list) -> ReportTable | None:
     """Every limit that fails, where and when."""
-    rows = [[name_of(row), one.name, one.value, one.limit, one.unit, one.margin, span(one.unit), one.place, one.chainage,
-             one.time]
+    rows = [[name_of(row), one.name, one.value, one.limit, one.unit, one.margin, span(one.unit), one.place,
+             one.chainage, one.time]
             for row, result in runs for one in result.verdicts if not one.ok]  # fmt: skip
     heads = ("run", "limit", "value", "allowed", "unit", "margin", "unit", "worst at", "chainage", "time")
     units = ("", "", "", "", "", "", "", "", "m", "s")

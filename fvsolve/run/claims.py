@@ -40,7 +40,7 @@ def expectation(text: str, expect, column: UnitColumn, found: float) -> dict:
     """One line of `[expect]`: claimed, found, tolerance in the unit of the probe, and whether it holds.
 
     `max` and `min` are over all steps and rows, as are `greatest` and `least`, over all places of a part as well;
-    `mean` is over time (trapezoids), `at` is between rows.
+    `mean` is over time (trapezoids), `at` is between rows. `error` is for who asks how far `found` is off.
     """
     tolerance = expect.atol + expect.rtol * abs(expect.value)
     return {
@@ -50,6 +50,7 @@ def expectation(text: str, expect, column: UnitColumn, found: float) -> dict:
         "tolerance": float(column.span_from_si(tolerance)),
         "unit": column.unit,
         "ok": bool(abs(found - expect.value) <= tolerance),
+        "error": None,
     }
 
 

@@ -36,7 +36,10 @@ class Extremes(NamedTuple):
 
 
 class Expectation(NamedTuple):
-    """A claim of the case; `claimed`, `found` and `tolerance` in `unit`."""
+    """A claim of the case; `claimed`, `found`, `tolerance` and `error` in `unit`.
+
+    error : how far `found` may be off, None where nobody asked
+    """
 
     text: str
     claimed: float
@@ -44,6 +47,7 @@ class Expectation(NamedTuple):
     tolerance: float
     unit: str
     ok: bool
+    error: float | None
 
 
 class LimitVerdict(NamedTuple):

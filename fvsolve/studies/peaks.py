@@ -3,8 +3,9 @@
 Of values c, m, f at half, one and twice the resolution an order q = log2(|m - c| / |f - m|) of 1 to 2 is believed
 where the differences agree in sign and those of all peaks in that unit together show as much. Then m is off by
 (f - m) 2^q / (2^q - 1), or (m - c) / (2^q - 1), whichever is more (Richardson 1927), times 1.25 (Roache 1994). Where
-there is no such order, the band is that of order one half: 3.4 times the greater difference. Where nothing has cells,
-a peak between rows is missed by an eighth of their second difference.
+there is no such order, the band is that of order one half: 3.4 times the greater difference; so it is where liquid
+parts, as blows of cavities come to their limit at an order below one (docs/cavitation.md), whatever three grids show.
+Where nothing has cells, a peak between rows is missed by an eighth of their second difference.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     """Add to the summary of a run how far its peaks and verdicts may be off, from two more runs of its case.
 
     `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order}; `error` is None where another run did
-    not come to its end, `order` None where there is none to believe. Verdicts get their `error`; `resolution` says how.
+    not come to its end, `order` None where there is none to believe. Verdicts and expectations get their `error`;
+    `resolution` says how.
     """
     runs = {1.0: result}
     for times in (one for one in LEVELS if one != 1.0):
@@ -45,6 +47,9 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     triples = {(name, side): values(runs, lambda one, n=name, s=side: one.summary["extremes"][n][s])
                for name in said["extremes"] for side in SIDES}  # fmt: skip
     shared = pooled({key: (said["extremes"][key[0]]["unit"], triple) for key, triple in triples.items()})
+    apart = parted(runs)
+    if apart:
+        shared = dict.fromkeys(shared, 0.0)
     smooth, largest = not said["cells"], {}
     for one in said["extremes"].values():
         largest[one["unit"]] = max([largest.get(one["unit"], 0.0), *(abs(one[side] or 0.0) for side in SIDES)])
@@ -58,10 +63,23 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
         said["peaks"][name] = made
     for k, verdict in enumerate(said["verdicts"]):
         triple = values(runs, lambda one, k=k, verdict=verdict: of_bound(one.summary["verdicts"][k], verdict["bound"]))
-        found = band(triple, shared.get(verdict["unit"], pooled({0: ("", triple)})[""]))
-        verdict["error"] = found["error"]
+        verdict["error"] = alone(triple, verdict["unit"], shared, apart)
+    for k, claim in enumerate(said["expectations"]):
+        triple = values(runs, lambda one, k=k: one.summary["expectations"][k]["found"])
+        claim["error"] = alone(triple, claim["unit"], shared, apart)
     said["resolution"] = {"levels": sorted(runs), "kept": kept(case), "words": words(runs, case)}
     return said
+
+
+def alone(triple: tuple[float | None, ...], unit: str, shared: dict[str, float], apart: bool) -> float | None:
+    """The band of what is no peak of a probe; its order is its own where none is shared in that unit."""
+    own = 0.0 if apart else pooled({0: ("", triple)})[""]
+    return band(triple, shared.get(unit, own))["error"]
+
+
+def parted(runs: dict[float, Result]) -> bool:
+    """Whether liquid parted in one of them."""
+    return any(one.summary["cavities"] for one in runs.values())
 
 
 def of_bound(verdict: dict[str, Any], bound: str) -> float | None:
@@ -125,6 +143,8 @@ def words(runs: dict[float, Result], case: Any) -> str:
     said = f"peaks beside those of {others} times the resolution"
     if kept(case):
         said += f"; cells of {', '.join(kept(case))} come from files and stayed, so their part is not in it"
+    if parted(runs):
+        said += "; liquid parts, so no order is believed"
     stopped = [f"{one:g}" for one in sorted(runs) if runs[one].reason != "finished"]
     if stopped:
         said += f"; the run of {' and '.join(stopped)} did not come to its end"

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth import scenes
+from truth import scenes, summit
 from truth.column_separation import cavity
 from truth.folders import CASES
 from truth.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, valve
@@ -275,3 +275,36 @@ def test_the_error_that_the_note_says_is_that_behind_a_stop(cells):
         pressures.append(model.tables.nodes[1]["pressure"] + out[model.layout["pressure"] + 1])
     short = 1.0 - (times[1 + np.argmax(np.array(pressures) > 1e5)] - back) / lasts
     assert short == approx(1.03 * cells**-0.7, rel=0.5)
+
+
+def test_a_line_over_a_summit_parts_there_and_meets_as_by_characteristics():
+    """One cavity at the summit of one pipe: when it opens, how large it is, when and how hard it shuts."""
+    rows, events = summit.line(reaches=480, end=40.0)
+    (opens, _, where), (meets, _, _) = events
+    assert where == summit.SUMMIT
+    result = fvsolve.run(CASES / "summit-cavity.toml")
+    (found,) = result.summary["cavities"]
+    assert found["distance"] == approx(where, abs=25.0) and found["time"] == approx(opens, abs=0.05)
+    assert found["volume"] == approx(rows[:, 3].max(), rel=0.01)
+    t, head = result.t, result["main.head@2500 m"]
+    assert t[(t > opens) & (head > 40.0)][0] == approx(meets, abs=0.3)
+    for time in (15.0, 20.0, 25.0, 34.0, 36.0):
+        for probe, column in (("pumps.head", 1), ("main.head@2500 m", 2)):
+            truth = np.interp(time, rows[:, 0], rows[:, column])
+            assert np.interp(time, t, result[probe]) == approx(truth, rel=0.01)
+
+
+def test_cavitation_alone_brings_what_it_needs_and_a_scene_that_says_otherwise_is_told_so_at_once():
+    """Law, air, scheme, method and Courant number; what is said stands."""
+    gate = {"lake": lake(20.0), "gate": junction({"time": [0.0, 0.05], "value": [0.02, 0.0], "kind": "step"})}
+    case = scene(gate, {"main": pipe("lake", "gate", LENGTH, 0.1, SPEED, 20)}, 0.3, {}, ["gate.pressure"])
+    case["fluid"] = scenes.WATER | {"cavitation": True}
+    del case["fluid"]["law"]
+    short = fvsolve.run(case)
+    said = WATER | {"air_fraction": 1e-7}
+    full = fvsolve.run(case | {"fluid": said, "numerics": {"end": 0.3, **PLAIN}})
+    assert np.array_equal(short["gate.pressure"], full["gate.pressure"]) and short.summary["cavities"]
+    assert fvsolve.run(case, set={"fluid.air_fraction": 1e-6}).case.properties.air.fraction == 1e-6
+    with pytest.raises(CaseError) as error:
+        fvsolve.run(case, set={"fluid.law": "linear", "numerics.scheme": "weno5"})
+    assert 'law = "linear" knows no gas' in str(error.value) and '"weno5" does not follow cavities' in str(error.value)

@@ -51,6 +51,15 @@ def test_without_a_route_a_section_runs_through_a_link_between_junctions(main, t
     assert [(leg.pipe, leg.backwards) for leg in way.legs] == [("hill", False), ("last", True)]
 
 
+def test_a_pipe_that_is_cut_has_a_section_where_no_route_has_all_of_it(tmp_path):
+    tap = {"type": "junction", "on": "hill", "at": "200 m"}
+    for routes, named in (({}, ["hill", "last"]), ({"line": {"pipes": ["hill", "last"]}}, ["line"])):
+        case = over_a_hill(routes=routes)
+        case["nodes"]["tap"] = tap
+        found = ways(fvsolve.run(case, out=tmp_path / named[0], pictures=False))
+        assert [way.name for way in found] == named
+
+
 def test_limits_are_lines_and_what_passes_one_is_marked_where_it_is_worst(main):
     one = section(main, ways(main)[0])
     bar = 1e6 / (RHO * GRAVITY)

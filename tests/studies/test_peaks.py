@@ -56,11 +56,27 @@ def test_what_did_not_run_bounds_nothing() -> None:
 )
 def test_bands_of_shipped_cases_hold_what_four_times_the_resolution_gives(name: str) -> None:
     case = fvsolve.load(name)
-    peaks = peak_errors(fvsolve.run(case), case)["peaks"]
+    said = peak_errors(fvsolve.run(case), case)
+    peaks = said["peaks"]
     fine = fvsolve.run(case, set=finer(case, 4.0) | {"output.every": case.output.every / 4.0})
     for probe, one in peaks.items():
         for side, value in (("least", fine.extremes[probe].least), ("greatest", fine.extremes[probe].greatest)):
             assert abs(value - one[side]["value"]) <= one[side]["error"], (probe, side)
+    for claim, one in zip(said["expectations"], fine.expectations, strict=True):
+        assert abs(claim["found"] - one.found) <= claim["error"], claim["text"]
+
+
+def test_where_liquid_parts_no_order_is_believed() -> None:
+    """A pumping main after a trip: three grids show order two, and four times the resolution is beyond its band."""
+    trip = {"links.pump.trip": 1.0, "links.main.cells": 60, "numerics.end": 14.0, "expect": {}}
+    way = {"fluid.law": "mixture", "fluid.cavitation": True, "numerics.scheme": "muscl", "numerics.courant": 0.9}
+    case = fvsolve.load("pumping-main", set=trip | way)
+    said = peak_errors(fvsolve.run(case), case)
+    fine = fvsolve.run(case, set={"links.main.cells": 240})
+    assert said["cavities"] and "liquid parts" in said["resolution"]["words"]
+    for probe, one in said["peaks"].items():
+        assert one["greatest"]["order"] is one["least"]["order"] is None
+        assert abs(fine.extremes[probe].greatest - one["greatest"]["value"]) <= one["greatest"]["error"], probe
 
 
 def throttled(**more) -> dict:
