@@ -22,34 +22,40 @@ class Network:
     """The sheet of a scene of pipes; `show` puts one of its frames on it."""
 
     def __init__(self, scene: DrawnScene, film: bool) -> None:
-        from matplotlib.collections import LineCollection
-
-        self.scene = scene
-        values = [self._shown(one[2]) for one in scene.pipes]
-        self.limits = span(min(float(one.min()) for one in values), max(float(one.max()) for one in values))
+        self.scene, lines = scene, scene.pipes[0][1]
         points = scene.shown(scene.pipes[0][0])
         self.nodes = scene.shown([part.at for part in scene.parts if not part.link])
         self.all = np.vstack([points, self.nodes])
         self.aspect = aspect_of(self.all, len(scene.parts) > MANY, scene.slant)
         if self.aspect.kind == "profile" and scene.plan == "laid out":  # the first pipe begins at 0
-            self.aspect.begin = float(self.aspect.on_sheet(points)[:, 0].min())
+            self.aspect.begin = float(self.aspect.on_sheet(points if len(points) else self.all)[:, 0].min())
         line = self.aspect.kind == "profile"
         self.level = line and not np.ptp(self.all[:, 2]) > 0.0
         self.sheet = Sheet(film, ruled=self.aspect.kind != "aslant", high=LOW if self.level else SIZE[1])
-        axes = self.axes = self.sheet.axes
-        segments = self.aspect.on_sheet(points)[scene.pipes[0][1]]
-        thin = 1.0 if len(scene.names) <= MANY else 0.6
-        axes.add_collection(
-            LineCollection(segments, colors=style.INK, linewidths=thin * CASE, capstyle="round", zorder=2)
-        )
-        self.lines = LineCollection(segments, cmap=COLOURS, linewidths=thin * PIPE, capstyle="round", zorder=3)
-        self.lines.set_clim(self.limits)
-        axes.add_collection(self.lines)
+        self.axes, self.half = self.sheet.axes, HALF if len(scene.parts) <= MANY else 0.7 * HALF
+        segments = self.aspect.on_sheet(points)[lines]
+        self.lines = self._pipes(segments)
         self._axes()
         self.sheet.figure.canvas.draw()  # limits stand from here on
-        self.named, self.wanted = self._parts(points, segments)
-        self.sheet.bar(self.limits, scene.quantity.label)
+        self.named, self.wanted = draw_parts(self, scene, segments)
+        if len(lines):
+            values = np.concatenate([self._shown(one[2]) for one in scene.pipes])
+            self.limits = span(float(values.min()), float(values.max()))
+            self.lines.set_clim(self.limits)
+            self.sheet.bar(self.limits, scene.quantity.label)
         self.sheet.legend(scene.parts)
+
+    def _pipes(self, segments: np.ndarray):
+        """Pipes with their edges; the lines that take colours."""
+        from matplotlib.collections import LineCollection
+
+        thin = 1.0 if len(self.scene.names) <= MANY else 0.6
+        round_ends = {"capstyle": "round"}
+        edge = LineCollection(segments, colors=style.INK, linewidths=thin * CASE, zorder=2, **round_ends)
+        inner = LineCollection(segments, cmap=COLOURS, linewidths=thin * PIPE, zorder=3, **round_ends)
+        for one in (edge, inner):
+            self.axes.add_collection(one)
+        return inner
 
     def show(self, k: int) -> None:
         """Put frame `k` on the sheet."""
@@ -63,14 +69,10 @@ class Network:
     def _notes(self) -> list[str]:
         found = []
         if self.aspect.kind == "aslant":
-            own = self.scene.plan == "own scale"
-            found.append(
-                "heights on a scale of their own"
-                if own
-                else f"heights drawn {self.aspect.rise / self.scene.slant:g} times"
-            )
+            own, times = self.scene.plan == "own scale", self.aspect.rise / self.scene.slant
+            found.append("heights on a scale of their own" if own else f"heights drawn {times:g} times")
         if self.scene.plan == "laid out":
-            found.append("laid out by the lengths of its pipes")
+            found.append("laid out by lengths")
         if self.scene.plan == "own scale":
             found.append("the plan is not to scale")
         if self.named < self.wanted:
@@ -104,6 +106,8 @@ class Network:
             names = f"{along}{unit}", f"elevation [{high}]"
         axes.set_xlabel(names[0], fontsize=8.5, color=style.INK)
         axes.set_ylabel("" if self.level else names[1], fontsize=8.5, color=style.INK)
+        if self.scene.plan == "schematic":  # distances mean nothing
+            axes.set_axis_off()
         if self.level:
             axes.set_yticks([])
             axes.spines["left"].set_visible(False)
@@ -119,8 +123,3 @@ class Network:
         foot = self.nodes * (1.0, 1.0, 0.0) + (0.0, 0.0, floor)
         posts = np.stack([self.aspect.on_sheet(self.nodes), self.aspect.on_sheet(foot)], axis=1)
         self.axes.add_collection(LineCollection(posts, colors=style.MUTED, linewidths=0.5, zorder=0.6))
-
-    def _parts(self, points: np.ndarray, segments: np.ndarray) -> tuple[int, int]:
-        """Symbols and names; how many names are there, and how many there could be."""
-        self.half = HALF if len(self.scene.parts) <= MANY else 0.7 * HALF
-        return draw_parts(self, self.scene, segments)

@@ -46,7 +46,7 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
     back = axes.transData.inverted().transform
     for a, b in ties:
         axes.plot(*back(np.array([a, b])).T, color=style.INK, linewidth=1.1, zorder=5)
-    return _names(stage, scene, segments, at, np.array(blocks).reshape(-1, 4))
+    return _names(stage, scene, segments, at, np.array(blocks).reshape(-1, 4), np.reshape(ties, (-1, 2, 2)))
 
 
 def positions(scene: DrawnScene, aspect: Aspect, axes, apart: float) -> dict[str, np.ndarray]:
@@ -86,7 +86,7 @@ class DrawnName:
     look: dict[str, Any]
 
 
-def _names(stage, scene: DrawnScene, segments, at, blocks) -> tuple[int, int]:
+def _names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[int, int]:
     """Write the names that find room; how many do, and of how many."""
     from matplotlib.patheffects import withStroke
 
@@ -104,7 +104,7 @@ def _names(stage, scene: DrawnScene, segments, at, blocks) -> tuple[int, int]:
     found = naming.beside(
         [one.at for one in wanted], sizes, [point * one.gap for one in wanted],
         np.vstack([blocks, np.reshape(ticks, (-1, 4))]),
-        np.vstack([naming.dotted(pixels), axes.transData.transform(stage.cover)]),
+        np.vstack([naming.dotted(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]),
         (EDGE, axes.bbox.y0 - EDGE, figure.bbox.x1 - EDGE, axes.bbox.y1 + EDGE),
     )  # fmt: skip
     for text, corner in zip(texts, found, strict=True):

@@ -46,7 +46,8 @@ class DrawnScene:
     """Frames of a field and what stands about it.
 
     frames : (caption, files) of each time; pipes : the same as (points float64[p, 3] [m], lines int[c, 2],
-    values float64[c] in SI, pipe int[c]), of networks that need no files; plan : "given", "laid out" or "own scale"
+    values float64[c] in SI, pipe int[c]), of networks that need no files; plan : "given", "laid out", "own scale" or
+    "schematic"
     """
 
     title: str

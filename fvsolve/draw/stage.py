@@ -21,7 +21,7 @@ from fvsolve.draw.symbols import WATER
 FLAT = 0.08  # bodies lower than this part of their width are looked at from above
 LOW = 0.05  # basins lower than this part of their width are drawn higher than they are,
 HIGH = 0.12  # as high as this part
-OVER = 5e-4  # of its diagonal that lines are drawn above a surface
+OVER = 2e-3  # of its diagonal that lines are drawn above a surface
 BESIDE = 0.04  # of parts about a basin, of its size
 ABOVE = 0.25  # of a house, over the highest water, of the height of all
 BED, DEEP, HOUSE, LIMB = "#c9b99a", "#5b87a6", "#a8705a", "#4b5563"

@@ -13,13 +13,14 @@ from functools import cache
 
 BOW = "M -1 -.6 L 1 .6 L 1 -.6 L -1 .6 Z"
 STEM = "M 0 0 L 0 .7"
+CAPSULE = "M -.7 -.9 L .7 -.9 L .7 .4 L .55 .75 L .3 .93 L 0 1 L -.3 .93 L -.55 .75 L -.7 .4 Z"
 BOX = "M -.8 -.8 L -.8 .8 L .8 .8 L .8 -.8 Z"
 SYMBOLS = {
     "junction": "* O 0 0 .32",
     "reservoir": "M -.9 .7 L .9 .7 L 0 -.5 Z M -.6 -.75 L .6 -.75 M -.3 -1 L .3 -1",  # a free surface
     "tank": "M -.75 .9 L -.75 -.9 L .75 -.9 L .75 .9 Z ~ M -.75 .2 L -.75 -.9 L .75 -.9 L .75 .2 Z",
     "basin": "M -1 .5 L -1 -.6 L 1 -.6 L 1 .5 Z ~ M -1 .1 L -.5 .25 L 0 .1 L .5 .25 L 1 .1 L 1 -.6 L -1 -.6 Z",
-    "accumulator": "O 0 .3 .7 M -.7 .3 L -.7 -.9 L .7 -.9 L .7 .3 ~ M -.7 -.1 L -.7 -.9 L .7 -.9 L .7 -.1 Z",
+    "accumulator": f"{CAPSULE} ~ M -.7 0 L -.7 -.9 L .7 -.9 L .7 0 Z",
     "chamber": "O 0 0 .8",
     "inflow": "* M -.2 -.5 L -.2 .5 L .9 0 Z M -1 0 L -.2 0",
     "air-valve": "O 0 -.2 .65 M 0 .45 L 0 1 M -.3 .7 L 0 1 L .3 .7",

@@ -22,7 +22,7 @@ SILENT = {"pressure": "bar"}  # units of pictures where `[output]` is silent: si
 
 
 def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]], contours: int) -> DrawnScene:
-    """The scene of frames (time [s], files) of a run; FvsolveError where pipes have no such field."""
+    """The scene of frames (time [s], files) of a run, of none its parts; FvsolveError where there is no such field."""
     clock = column("t", "time", case)
     said = [(f"{field.replace('_', ' ')} at t = {clock.from_si(t):.6g} {clock.unit}", files) for t, files in frames]
     pipes = [name for name, link in case.links.items() if link.kind == "pipe"]
@@ -30,7 +30,12 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
     bodies = any(node.kind == "body" for node in case.nodes.values())
     scene = DrawnScene(title, unit_of(case, field), *lengths_of(case), said, names=pipes, contours=contours)
     scene.plan = "given" if all(node.position is not None for node in case.nodes.values()) else "laid out"
-    if pipes and not case.meshes and not bodies:
+    if not frames:
+        none = np.zeros(0, int)
+        scene.frames, scene.pipes = [("parts", [])], [(np.zeros((0, 3)), none.reshape(0, 2), np.zeros(0), none)]
+        lengths = {name: link.length for name, link in case.links.items() if hasattr(link, "length")}
+        scene.plan = "schematic" if scene.plan != "given" and not lengths else scene.plan
+    elif pipes and not case.meshes and not bodies:
         known = [*UNITS, *case.scalars]
         if field not in known:
             raise FvsolveError(f"no field {field!r}{did_you_mean(field, known)}; fields are {listing(known)}")
@@ -39,7 +44,7 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
             scene.plan = "own scale"
     scene.bodies = list(case.poses) if bodies else []
     if not bodies:
-        plan = layout.positions(case, lengths) if pipes else _about_basins(case)
+        plan = layout.positions(case, lengths) if pipes or not frames else _about_basins(case)
         scene.parts, scene.anchors = parts_of(case, plan), _anchors(case, plan)
     return scene
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 from pytest import approx
@@ -52,6 +55,34 @@ def test_a_network_is_drawn_with_its_names_units_and_how_much_heights_are_stretc
     psi = 0.45359237 * 9.80665 / 0.0254**2
     low, high = (1e3 * 9.80665 * h / psi for h in (30.0 - 30.0, 60.0 - 5.0))  # from the works' free end to the mill
     assert low <= network.limits[0] < network.limits[1] <= high
+
+
+def test_lumped_parts_are_drawn_without_a_field(fvs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    fvs("run", "two-tanks", "--no-pictures")
+    code, out, err = fvs("view", "runs/two-tanks")
+    assert (code, err) == (0, "") and Path(out.strip()).name == "parts.png"
+    assert Path(out.strip()).read_bytes().startswith(b"\x89PNG")
+    case = fvsolve.load("two-tanks")
+    said = {part.name: part.kinds[0] for part in scene_of(case, "", "parts", [], 0).parts}
+    assert said == {name: part.kind for name, part in {**case.nodes, **case.links}.items()}
+    code, _, err = fvs("view", "runs/two-tanks", "--field", "head")
+    assert code == 2 and "no frames to draw" in err
+
+
+def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(fvs, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    units = 'output.units={pressure="psig",head="ft",length="ft",time="min",velocity="ft/s",level="ft",flow="gpm"}'
+    _, said, _ = fvs("run", "pumping-main", "--no-pictures", "--set", units, "--set", "numerics.end=1")
+    found = json.loads(Path("runs/pumping-main/summary.json").read_text())["verdicts"]
+    assert [one["unit"] for one in found] == ["psig", "psig"]
+    for one in found:
+        assert f"margin {one['margin']:.6g} psi\n" in said.replace("psi;", "psi\n")
+    assert "at 7874.02 ft, 0 min)" in said and "finished at t = 0.0166667 min" in said  # 2400 m
+    _, said, _ = fvs("check", "pumping-main", "--set", units)
+    assert "196.85" in said and " m]" not in said.replace("[min]", "") and "elevation [ft]" in said
+    _, said, _ = fvs("check", "two-tanks", "--set", units)
+    assert "mm/s" not in said and said.count(" ft/s") >= 2
 
 
 def test_names_cover_neither_each_other_nor_symbols_and_what_finds_no_room_is_left_out():
