@@ -66,8 +66,10 @@ def positions(scene: DrawnScene, aspect: Aspect, axes, apart: float) -> dict[str
             if np.linalg.norm(way) < apart and last not in held:
                 far = way if np.linalg.norm(way) > 1.0 else at[first] - middle
                 far = far if np.linalg.norm(far) > 1.0 else np.array([1.0, 0.0])
-                far = np.array([far[0] or 1.0, 0.0]) if aspect.kind == "profile" else far  # its height stays
-                at[last] = at[first] + apart * far / np.linalg.norm(far)
+                if aspect.kind == "profile":  # its height stays
+                    at[last] = np.array([at[first][0] + np.copysign(apart, far[0]), at[last][1]])
+                else:
+                    at[last] = at[first] + apart * far / np.linalg.norm(far)
                 held.add(last)
         if ends and not part.own_place:
             at[part.key] = np.mean([at[name] for name in ends], axis=0)
@@ -105,7 +107,7 @@ def _names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[int, i
         [one.at for one in wanted], sizes, [point * one.gap for one in wanted],
         np.vstack([blocks, np.reshape(ticks, (-1, 4))]),
         np.vstack([naming.dotted(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]),
-        (EDGE, axes.bbox.y0 - EDGE, figure.bbox.x1 - EDGE, axes.bbox.y1 + EDGE),
+        (EDGE + axes.bbox.x0 * axes.axison, axes.bbox.y0 - EDGE, figure.bbox.x1 - EDGE, axes.bbox.y1 + EDGE),
     )  # fmt: skip
     for text, corner in zip(texts, found, strict=True):
         if corner is None:
