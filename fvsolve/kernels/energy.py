@@ -6,10 +6,10 @@ rigid column M^2 L / (2 rho A), and what friction takes is M drag / (rho A) per 
 from the values at three Gauss points of a polynomial of the scheme's degree through neighbouring cells. Stored energies
 are changes since the profile, a cross term and a square: no small difference of large numbers.
 
-Rows of `power` [W], table by table: NODE supply, rate of storage; PIPE in, friction, jets, rate;
-VALVE loss; COLUMN in, friction, rate; MASS rate; BRACE what it takes up (a spring, a damper) or gives (a force); STOP
-rate, loss; PISTON leak, friction, what the linear law makes where a volume moves. Rows of `stored` [J]: node; pipe
-kinetic, elastic and height (a delay line: forward, backward wave); column; mass; brace; stop.
+Rows of `power` [W], table by table: NODE supply, rate of storage; PIPE in, friction, jets, rate, creep, what the law
+leaves of it; VALVE loss; COLUMN in, friction, rate; MASS rate; BRACE what it takes up (a spring, a damper) or gives
+(a force); STOP rate, loss; PISTON leak, friction, what the linear law makes where a volume moves. Rows of `stored` [J]:
+node; pipe kinetic, elastic and height (a delay line: forward, backward wave); column; mass; brace; stop.
 """
 
 import numpy as np
@@ -24,7 +24,8 @@ from fvsolve.kernels.records import CHAMBER, MUSCL, SHORT, TANK, UPWIND, WENO5
 from fvsolve.kernels.rigid import column_drag
 from fvsolve.kernels.tanks import tank_level
 
-NODE, PIPE, VALVE, COLUMN, MASS, BRACE, STOP, PISTON = 2, 4, 1, 3, 1, 1, 2, 3  # rows of `power` a part
+NODE, PIPE, VALVE, COLUMN, MASS, BRACE, STOP, PISTON = 2, 6, 1, 3, 1, 1, 2, 3  # rows of `power` a part
+CREEP = 4  # of those of a pipe
 WIDEST = 5
 
 
@@ -138,7 +139,7 @@ def power_linear(t, y, dydt, out, handle, power):
         start = (first["pressure"] - st["ambient"]) + height_pressure(st, first)
         into = potential(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
         into -= potential(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
-        power[at] = into * per
+        power[at], power[at + CREEP : at + PIPE] = into * per, 0.0
         if pipe["delay"] >= 0:
             line_power(t, out, tables, pipe["delay"], power[at : at + PIPE])
         else:

@@ -11,6 +11,7 @@ from fvsolve.kernels.density.profile import rise_to
 from fvsolve.kernels.energy import (
     BRACE,
     COLUMN,
+    CREEP,
     MASS,
     NODE,
     PIPE,
@@ -146,6 +147,7 @@ def power_barotropic(t, y, dydt, out, handle, power):
         power[at] = total_head(tables, out, pipe["from_node"]) * (pipe["flow"] + (out[end] - out[end + 1]))
         power[at] -= total_head(tables, out, pipe["to_node"]) * (pipe["flow"] + (out[end + 2] - out[end + 3]))
         power[at + 2] = jets(profile, pipe, out, end, nodes)
+        power[at + CREEP : at + PIPE] = 0.0
         z = nodes[pipe["from_node"]]["elevation"] - st["datum"]
         pipe_power_barotropic(
             st, floats, profile, pipe, z, y[o : o + n], y[o + n : o + 2 * n], dydt[o : o + n],

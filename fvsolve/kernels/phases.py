@@ -138,7 +138,11 @@ MEMBERS = {
     "forces, cavitating": Pieces(observe="forces: observe_forces_cavitating"),
     "memory": Pieces(rates="unsteady.memory: remember_linear", **MEMORY),
     "memory, barotropic": Pieces(rates="unsteady.barotropic: remember_barotropic", **MEMORY),
-    "creep, barotropic": Pieces(rates="creep.barotropic: creep_walls_barotropic"),
+    "creep, barotropic": Pieces(
+        rates="creep.barotropic: creep_walls_barotropic",
+        power="creep.energy_barotropic: add_power_barotropic",
+        stored="creep.energy_barotropic: add_stored_barotropic",
+    ),
     "creep": Pieces(
         rates="creep.wall: creep_walls", power="creep.energy: add_power", stored="creep.energy: add_stored",
     ),

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.riding_networks import unfelt
-from fvsolve.errors import FvsolveError, listing
+from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.model.lowering import lowering_of, rows_in
 from fvsolve.model.slate import Slate
@@ -52,11 +52,14 @@ class Accounts:
         for row, (name, place) in zip(nodes, case.places.items(), strict=True):
             self.node(name, place, int(row["kind"]))
         for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
-            at = self.take(4)
+            at = self.take(6)
             self.add("dissipated", pipe.name, "friction", at + 1)
-            self.add("dissipated", pipe.name, "creep" if row["elements"] > 0 else "jet", at + 2)  # never both
+            self.add("dissipated", pipe.name, "jet", at + 2)
+            if row["elements"] > 0:
+                self.add("dissipated", pipe.name, "creep", at + 4)
+                self.add("law", pipe.name, "creep", at + 5)
             self.hold(pipe.name, "pipe", at + 3, 2)
-            self.accounts.append(Account("scheme", pipe.name, "pipe", (at, at + 1, at + 2, at + 3), (1, -1, -1, -1)))
+            self.accounts.append(Account("scheme", pipe.name, "pipe", tuple(range(at, at + 6)), (1, *[-1] * 5)))
         self.valves()
         for name in model.column_names:
             at = self.take(3)
@@ -198,10 +201,7 @@ class Accounts:
 
 
 def refuse_unfelt(case) -> None:
-    """FvsolveError where something rides, or a wall creeps, whose energy is not booked."""
-    creeping = [name for name, link in case.links.items() if getattr(link, "yielding", ())]
-    if creeping and not case.law.linear:
-        raise FvsolveError(f'the energy of walls that creep ({listing(creeping)}) is booked under law = "linear" alone')
+    """FvsolveError where something rides whose energy is not booked."""
     found = [f"{'.'.join(place)}: {text}" for place, text in unfelt(case.nodes, case.links)]
     if found:
         raise FvsolveError(f"the energy of this network that rides on a body is not booked; {'; '.join(found)}")

@@ -116,8 +116,16 @@ def creep_above(model: Model, k: int) -> float:
         return 0.0
     pairs, rest = elements(model.tables.floats, row), pipe_above(model, k)
     area, rho, length = float(row["area"]), model.case.properties.density, model.pipes[k].length
-    moving = 0.5 * row["flow"] ** 2 * length / (rho * area)
-    return float(np.sum(pairs[:, 0] / pairs[:, 1])) * (rest - float(moving))
+    if model.case.law.linear:
+        pressed = rest - float(0.5 * row["flow"] ** 2 * length / (rho * area))
+    else:
+        from fvsolve.kernels.density import pressure_of_mass
+
+        st, floats, profile = model.tables.settings[0], model.tables.floats, model.tables.profile
+        p = [pressure_of_mass(st, floats, row, float(m)) for m in profile[row["center"] + np.arange(row["cells"])]]
+        excess = np.array(p) - st["ambient"] + rho * st["gravity"] * (model.pipes[k].elevation - st["datum"])
+        pressed = float(0.5 * row["dx"] * area / rho * np.sum((excess / row["speed"]) ** 2))
+    return float(np.sum(pairs[:, 0] / pairs[:, 1])) * pressed
 
 
 def tank_above(model: Model, row) -> float:

@@ -1,0 +1,87 @@
+"""Power and stored energy of walls that creep under the laws log, table and mixture. Knows the tables.
+
+What comes off a cell carries h(p) - h(p_ambient) + g z - v^2 / 2, h [J/kg], and is in the bore as liquid of the
+reference density, P / rho. Elements take and store what they do of P (`energy.py`); the difference is of the law, a
+part p / K of what passes and less, and has a row of its own.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.creep.barotropic import pressed
+from fvsolve.kernels.creep.energy import creep_energy, creep_power, grown
+from fvsolve.kernels.density import pressure_of_mass
+from fvsolve.kernels.density.profile import rise_to
+from fvsolve.kernels.energy import CREEP, NODE, PIPE, PLACES, SHARES, at_point, width_of
+from fvsolve.kernels.energy_barotropic import height_of, held, profile_mass
+from fvsolve.kernels.handle import open_tables
+
+
+@njit(forceinline=True)
+def lifted(st, profile, pipe, z, i, g):
+    """g z at a Gauss point of cell i [J/kg]; z : height of the pipe's `from` end [m]."""
+    return st["gravity"] * (z + rise_to(profile, pipe, (i + 0.5 + PLACES[g]) * pipe["dx"]))
+
+
+@njit(forceinline=True)
+def beginning(st, floats, profile, pipe, z, i, g):
+    """P of the profile at a Gauss point of cell i [Pa]."""
+    p = pressure_of_mass(st, floats, pipe, profile_mass(profile, pipe, i, g))
+    return p - st["ambient"] + st["rho"] * lifted(st, profile, pipe, z, i, g)
+
+
+@njit
+def against_barotropic(st, floats, profile, pipe, z, y):
+    """What elements store against P of the profile [J], or its rate [W] of rates."""
+    sum_ = 0.0
+    for i in range(pipe["cells"]):
+        for g in range(3):
+            sum_ += SHARES[g] * beginning(st, floats, profile, pipe, z, i, g) * grown(st, floats, pipe, i, g, y)
+    return sum_ * pipe["dx"] / (st["rho"] * pipe["speed"])
+
+
+@njit
+def law_power(st, floats, profile, pipe, z, w, y, dydt):
+    """What liquid that leaves a cell carries, less what it is in the bore [W]."""
+    n, o, width, sum_ = w.size, pipe["y"], width_of(st, w.size), 0.0
+    r, l = y[o : o + n], y[o + n : o + 2 * n]
+    for i in range(n):
+        for g in range(3):
+            a, b = at_point(r, width, i, g), at_point(l, width, i, g)
+            m = held(st, profile, pipe, i, g, (a + b) / pipe["speed"])
+            v = (pipe["flow"] + (a - b)) / m
+            carried = height_of(st, floats, pressure_of_mass(st, floats, pipe, m)) - 0.5 * v * v
+            carried += lifted(st, profile, pipe, z, i, g)
+            P = beginning(st, floats, profile, pipe, z, i, g) + at_point(w, width, i, g) / pipe["admittance"]
+            sum_ += SHARES[g] * (carried - P / st["rho"]) * grown(st, floats, pipe, i, g, dydt)
+    return sum_ * pipe["dx"] / pipe["speed"]
+
+
+@njit
+def add_power_barotropic(t, y, dydt, out, handle, power):
+    """What the walls of all pipes take, and what the law leaves, into their rows of power."""
+    tables = open_tables(handle)
+    st, pipes, nodes, at = tables.settings[0], tables.pipes, tables.nodes, NODE * tables.nodes.size
+    floats, profile = tables.floats, tables.profile
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        if pipe["elements"] > 0:
+            n, o, z = pipe["cells"], pipe["y"], nodes[pipe["from_node"]]["elevation"] - st["datum"]
+            w = tables.scratch[:n]
+            pressed(st, floats, profile, pipe, y[o : o + n], y[o + n : o + 2 * n], w)
+            taken, rate = creep_power(st, floats, pipe, w, y, dydt)
+            power[at + CREEP] += taken
+            power[at + CREEP + 1] += law_power(st, floats, profile, pipe, z, w, y, dydt)
+            power[at + 3] += rate + against_barotropic(st, floats, profile, pipe, z, dydt)
+        at += PIPE
+
+
+@njit
+def add_stored_barotropic(t, y, dydt, out, handle, stored):
+    """What the walls of all pipes hold, into their rows of stored energy."""
+    tables = open_tables(handle)
+    st, floats, pipes, nodes = tables.settings[0], tables.floats, tables.pipes, tables.nodes
+    for i in range(pipes.size):
+        pipe = pipes[i]
+        if pipe["elements"] > 0:
+            z = nodes[pipe["from_node"]]["elevation"] - st["datum"]
+            more = against_barotropic(st, floats, tables.profile, pipe, z, y)
+            stored[nodes.size + 2 * i + 1] += creep_energy(st, floats, pipe, y) + more
