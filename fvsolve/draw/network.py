@@ -8,7 +8,7 @@ from fvsolve.draw import style
 from fvsolve.draw.aspect import aspect_of, corners, fit, frame
 from fvsolve.draw.parts import MANY, draw_parts
 from fvsolve.draw.scene import DrawnScene
-from fvsolve.draw.sheet import COLOURS, HALF, SIZE, Sheet, span
+from fvsolve.draw.sheet import COLOURS, HALF, SIZE, PictureSheet, span
 
 PIPE, CASE = 3.6, 4.8  # widths of a pipe and of its edge [points]
 LOW = 3.2  # height of a sheet whose network is one level line [inch]
@@ -31,7 +31,7 @@ class Network:
             self.aspect.begin = float(self.aspect.on_sheet(points if len(points) else self.all)[:, 0].min())
         line = self.aspect.kind == "profile"
         self.level = line and not np.ptp(self.all[:, 2]) > 0.0
-        self.sheet = Sheet(film, ruled=self.aspect.kind != "aslant", high=LOW if self.level else SIZE[1])
+        self.sheet = PictureSheet(film, ruled=self.aspect.kind != "aslant", high=LOW if self.level else SIZE[1])
         self.axes, self.half = self.sheet.axes, HALF if len(scene.parts) <= MANY else 0.7 * HALF
         segments = self.aspect.on_sheet(points)[lines]
         self.lines = self._pipes(segments)

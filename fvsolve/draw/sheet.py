@@ -20,7 +20,7 @@ EVEN, NONE = 1e-9, 1e-3
 ROWS = 4  # of the legend
 
 
-class Sheet:
+class PictureSheet:
     """A figure with its main axes, `ruled` where ticks stand outside of them."""
 
     def __init__(self, film: bool, ruled: bool = False, high: float = SIZE[1]) -> None:

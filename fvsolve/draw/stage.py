@@ -15,7 +15,7 @@ from fvsolve.draw.film import write
 from fvsolve.draw.frames import measured, read, tubes
 from fvsolve.draw.parts import draw_parts
 from fvsolve.draw.scene import DrawnScene
-from fvsolve.draw.sheet import COLOURS, HALF, Sheet
+from fvsolve.draw.sheet import COLOURS, HALF, PictureSheet
 from fvsolve.draw.symbols import WATER
 
 FLAT = 0.08  # bodies lower than this part of their width are looked at from above
@@ -37,7 +37,7 @@ class Stage:
 
         self.scene, self.half, self.texts = scene, HALF, []
         self._measure()
-        self.sheet = Sheet(film, ruled=self.aspect.kind != "aslant")
+        self.sheet = PictureSheet(film, ruled=self.aspect.kind != "aslant")
         self.axes = axes = self.sheet.axes
         self._widen()
         low, high = self.box[::2], self.box[1::2]

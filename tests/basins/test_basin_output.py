@@ -20,7 +20,7 @@ from fvsolve.basins.liquid.observe import observe_liquid
 from fvsolve.basins.observe import observe_dense_flows, observe_flows
 from fvsolve.draw import frames as of_view
 from fvsolve.draw.scene import DrawnScene
-from fvsolve.draw.sheet import Sheet, span
+from fvsolve.draw.sheet import PictureSheet, span
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.mesh import read, rectangle
 from fvsolve.mesh.points import MeshPoints
@@ -354,7 +354,7 @@ def test_pipes_end_at_the_patches_of_a_basin_where_it_is_drawn(tmp_path):
 )  # fmt: skip
 def test_the_labels_of_a_bar_of_colours_differ(low, high):
     ends = span(low, high)
-    sheet = Sheet(film=True)
+    sheet = PictureSheet(film=True)
     labels = sheet.bar(ends, "pressure [bar]")
     assert len(set(labels)) == len(labels) >= 3 and ends[0] < ends[1]
 
