@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.draw import style
 from fvsolve.draw.aspect import aspect_of, corners, fit, frame
-from fvsolve.draw.parts import MANY, draw_parts
+from fvsolve.draw.parts import CROWD, MANY, draw_parts
 from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import COLOURS, HALF, SIZE, PictureSheet, span
 
@@ -49,7 +49,8 @@ class Network:
         """Pipes with their edges; the lines that take colours."""
         from matplotlib.collections import LineCollection
 
-        thin = 1.0 if len(self.scene.names) <= MANY else 0.6
+        many = len(self.scene.names)
+        thin = 1.0 if many <= MANY else 0.6 if many <= CROWD else 0.3
         round_ends = {"capstyle": "round"}
         edge = LineCollection(segments, colors=style.INK, linewidths=thin * CASE, zorder=2, **round_ends)
         inner = LineCollection(segments, cmap=COLOURS, linewidths=thin * PIPE, zorder=3, **round_ends)

@@ -17,6 +17,7 @@ from fvsolve.errors import visible
 
 APART = 4.8  # halves of a symbol between two
 MANY, FEW = 40, 14  # parts from which symbols are small, pipes up to which they are named
+CROWD = 400  # parts up to which joints have symbols and names
 HALO = 2.2  # white about a name [points]
 EDGE = 5.0  # of the sheet that stays free [pixels]
 
@@ -34,7 +35,7 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
     point = stage.sheet.figure.dpi / 72.0  # [pixels]
     at = positions(scene, aspect, axes, APART * half * point)
     blocks, ties = [], []
-    for part in scene.parts:
+    for part in [part for part in scene.parts if not (part.joint and len(scene.parts) > CROWD)]:
         ends = [at[name] for name in part.between if name in at]
         ties += [(at[part.key], end) for end in ends]
         along = ends[-1] - ends[0] if len(ends) > 1 else np.array([1.0, 0.0])
@@ -114,7 +115,8 @@ def _names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[int, i
             text.remove()
         else:
             text.set_position(axes.transData.inverted().transform(corner))
-    return sum(one is not None for one in found), len(wanted)
+    without = sum(one.joint for one in scene.parts) if len(scene.parts) > CROWD else 0
+    return sum(one is not None for one in found), len(wanted) + without
 
 
 def _wanted(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
@@ -122,6 +124,7 @@ def _wanted(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
     plain, small = {"color": style.INK, "fontsize": 8}, {"color": style.INK, "fontsize": 7.5}
     parts = [DrawnName(one.name, at[one.key], half + 3.0, plain) for one in scene.parts if not one.joint]
     joints = [DrawnName(one.name, at[one.key], 5.0, small) for one in scene.parts if one.joint]
+    joints = joints if len(scene.parts) <= CROWD else []
     if len(scene.names) > FEW or not scene.pipes or not scene.names:
         return parts + joints
     look = {"color": style.MUTED, "fontsize": 7.5, "fontstyle": "italic"}

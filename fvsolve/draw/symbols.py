@@ -35,6 +35,7 @@ SYMBOLS = {
     "pressure-sustaining": f"{BOW} {STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z * M 0 0 L -1 .6 L -1 -.6 Z",
     "flow-control": f"{BOW} {STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z",
     "pump": "O 0 0 .9 * M -.4 .7 L -.4 -.7 L .85 0 Z",
+    "turbine": "O 0 0 .9 * M .4 .7 L .4 -.7 L -.85 0 Z",
     "spool-valve": "M -1 -.4 L -1 .4 L 1 .4 L 1 -.4 Z M -.35 -.4 L -.35 .4 M .35 -.4 L .35 .4 M -.8 -.3 L -.5 .3",
     "cylinder": "M -1 -.5 L -1 .5 L .6 .5 L .6 -.5 Z * M -.25 -.5 L -.25 .5 L -.05 .5 L -.05 -.5 Z M 0 0 L 1 0",
     "rigid-column": "* M -1 -.2 L -1 .2 L 1 .2 L 1 -.2 Z",
