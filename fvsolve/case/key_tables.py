@@ -17,6 +17,7 @@ from fvsolve.case.sections import FluidSpec, Line, Numerics, Output
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
+from fvsolve.parts.accumulator.shape import Compressor
 from fvsolve.parts.attitude import Attitude
 from fvsolve.parts.basin.part import Patch, StartOfFields
 from fvsolve.parts.body.part import Joint
@@ -33,6 +34,7 @@ from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": Rider, "every link": TwoPort, "friction": Friction, "connection": Connection,
+    "compressor": Compressor,
     "wall": Wall, "lining": Lining, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar,
     "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip

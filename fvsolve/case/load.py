@@ -28,6 +28,7 @@ from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
 from fvsolve.parts.body.part import Body, BodyPoint
 from fvsolve.parts.meant import MEANT
+from fvsolve.parts.node import Node
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import misfits, read_keys
@@ -378,6 +379,8 @@ class _Reader:
         for name, part in self.group(group).items():
             kind = part.get("type") if isinstance(part, dict) else None
             found[name] = KINDS[group].get(kind) if isinstance(kind, str) else None
+            if group == "nodes" and found[name] is not None:
+                found[name] = found[name].variant(part)
         return found
 
     def parts(self, group: str) -> dict[str, Any]:
@@ -405,6 +408,7 @@ class _Reader:
     def part(self, kind: Any, given: dict[str, Any]) -> Any:
         """A part of a kind, as its table has it."""
         rest = {key: value for key, value in defaults.filled(self.raw.table, given).items() if key != "type"}
+        kind = kind.variant(rest) if issubclass(kind, Node) else kind
         return kind.model_validate(rest, context=self.setting)
 
     def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:

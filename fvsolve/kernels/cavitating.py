@@ -7,7 +7,7 @@ profile's; so a front moves at its own speed, be it sound's in the liquid or a c
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic import wall_force
-from fvsolve.kernels.density import force_of_mass, local_speed, pressure_of_mass
+from fvsolve.kernels.density import force_of_mass, local_speed, mass_of_pressure, pressure_of_mass
 from fvsolve.kernels.density.mixture import relative_volume
 from fvsolve.kernels.density.profile import lean
 from fvsolve.kernels.handle import open_tables
@@ -15,6 +15,7 @@ from fvsolve.kernels.reconstruction import value_muscl
 from fvsolve.kernels.records import RATE, UPWIND
 from fvsolve.kernels.riemann import face_flux
 
+SPARSE = 0.99  # of a pipe's content at the reference: what holds less has gas in it
 DRY = 1e-8  # of a pipe's content at the reference: what a cell holds below it gets no velocity of its own
 
 
@@ -61,14 +62,20 @@ def face_value(st, a, k, ahead):
 def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
     """(pressure, velocity, whether they are the profile's) at face i from cell k - 1 beside it.
 
-    The profile carries the deviation, but not where it would lead the gas far from its pressure in the cell.
+    The profile carries the deviation, but not where it would lead the gas far from its pressure in the cell, nor at an
+    end of the pipe, where a cavity lies at the face and no liquid whose weight or friction could squeeze it. And a face
+    has not more than twice what a cell with gas holds, lest more should leave it than there is.
     """
     found, change = face_value(st, dp, k, ahead), face_value(st, dv, k, ahead)
     still = found == 0.0 and change == 0.0
     m0 = profile[pipe["face"] + i]
-    q = pressure_of_mass(st, floats, pipe, m0) + found
-    if q - st["floor"] < 0.5 * (p[k] - st["floor"]):
-        q = max(face_value(st, p, k, ahead), st["floor"] + 0.5 * (p[k] - st["floor"]))
+    q, gas = pressure_of_mass(st, floats, pipe, m0) + found, 0.5 * (p[k] - st["floor"])
+    held = mass_of_pressure(st, floats, pipe, p[k])[0]
+    sparse = held < SPARSE * st["rho"] * pipe["area"]
+    if q - st["floor"] < gas or (sparse and (i == 0 or i == pipe["cells"])):
+        q = max(face_value(st, p, k, ahead), st["floor"] + gas)
+    if sparse:
+        q = min(q, pressure_of_mass(st, floats, pipe, 2.0 * held))
     return q, pipe["flow"] / m0 + change, still
 
 

@@ -26,6 +26,8 @@ MEANT = {
     "surge-tank": 'a "tank", with a connection for its throttle',
     "air-vessel": 'an "accumulator" with gas_volume',
     "air-chamber": 'an "accumulator" with gas_volume',
+    "surge-vessel": 'an "accumulator" with gas_volume or level',
+    "hydropneumatic-tank": 'an "accumulator" with gas_volume or level',
     "bladder": 'an "accumulator" with precharge',
     "lake": 'a "reservoir" with head',
     "demand": 'a "junction" with demand',

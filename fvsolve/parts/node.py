@@ -44,6 +44,11 @@ class Node(Table):
     scalars: Annotated[dict[str, Any], Carried("of scalars that flow in from it, or that it holds at the start")] = {}
 
     @classmethod
+    def variant(cls, given: dict[str, Any]) -> type[Node]:
+        """Its kind as its keys make it: itself, or one of which more can be read."""
+        return cls
+
+    @classmethod
     def own_places(cls, given: dict[str, Any]) -> tuple[str, ...] | None:
         """Names of places in its stead, as the file says them; None where it is a place itself."""
         return None

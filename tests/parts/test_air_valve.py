@@ -241,19 +241,21 @@ STAGES = {"switch": 4e3, "throttled_outlet": 0.008, "automatic": 0.003}
 
 
 def staged(law="linear", beta=2.2e9, numerics=TIGHT, **more):
-    case = drained(0.04, 0.02, RETURN, law=law, numerics=numerics, **(STAGES | more))
+    stages = {key: value for key, value in (STAGES | more).items() if value is not None}
+    case = drained(0.04, 0.02, RETURN, law=law, numerics=numerics, **stages)
     case["fluid"]["bulk_modulus"] = beta
     return case
 
 
-def by_stages(case):
+def by_stages(case, speed: float | None = None):
     """(what is off by: air, its pressure, flow of the column; time of throttling, SciPy's; the run): see `off_scipy`.
 
-    In by the inlet; out by the wide bore and the automatic one until 4 kPa, then by the small one and that.
+    In by the inlet; out by the wide bore and the automatic one until 4 kPa, or until the column comes at a speed while
+    its air is 10 Pa above ambient, then by the small one and that.
     """
     result = fvsolve.run(case)
     t, times = np.asarray(result.t), {e["what"]: e["time"] for e in reversed(result.summary["events"])}
-    rows = (t >= 0.6) & (t < times["shuts"] - 0.02)
+    rows = (t >= 0.6) & (t < times.get("shuts", np.inf) - 0.02)
     y, at, off, parted = (
         [result[name][rows][0] for name in ("c.flow", "v.air_volume", "v.air_mass")],
         t[rows][0],
@@ -269,7 +271,8 @@ def by_stages(case):
             return (p - 0.5 * RHO * v * abs(v) - low) / INERTIA, y[0], bores(p, 0.04, out)
 
         def switches(now, y):
-            return y[2] * HEAT / y[1] - AMBIENT - 4e3
+            gauge = y[2] * HEAT / y[1] - AMBIENT
+            return gauge - 4e3 if speed is None else min(-y[0] / area(DIAMETER) - speed, gauge - 10.0)
 
         switches.terminal, switches.direction = wide == 0.02, 1.0
         exact = solve_ivp(rates, (at, end), y, rtol=1e-11, atol=1e-14, max_step=0.01, method="DOP853",
@@ -288,6 +291,16 @@ def test_its_three_stages_follow_scipy_and_it_throttles_when_scipy_says():
     near = TIGHT["rtol"] * result.summary["steps"]
     assert off < near and found == pytest.approx(true, abs=near)
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+def test_by_velocity_it_throttles_when_scipy_says_the_fluid_comes_so_quickly():
+    """At 0.35 m/s the air is above ambient by then; at 0.01 m/s it throttles as soon as its air is."""
+    for speed in (0.35, 0.01):
+        off, (found, true), result = by_stages(staged(switch=None, switch_velocity=speed), speed)
+        near = TIGHT["rtol"] * result.summary["steps"]
+        assert off < near and found == pytest.approx(true, abs=near)
+        at = np.searchsorted(result.t, found)
+        assert (abs(-result["c.flow"][at] / area(DIAMETER) - speed) < 0.01) == (speed == 0.35)
 
 
 def test_throttled_it_stops_less_and_is_wide_again_once_air_comes_in():
@@ -324,12 +337,14 @@ def test_staged_and_resumed_it_is_the_unbroken_run(tmp_path, end):
 @pytest.mark.parametrize(
     "more, said",
     [({"throttled_outlet": None}, "switch: says nothing without throttled_outlet"),
-     ({"switch": None}, "throttled_outlet: says nothing without switch"),
+     ({"switch": None}, "throttled_outlet: says nothing without switch or switch_velocity"),
+     ({"switch_velocity": 0.5}, "switch and switch_velocity are given; keep one"),
+     ({"switch": None, "switch_velocity": -1.0}, "out of range"),
+     ({"switch": None, "switch_velocity": 0.5, "throttled_outlet": None}, "switch_velocity: says nothing without"),
      ({"throttled_outlet": 0.03}, "throttles nothing; wanted less than outlet")],
 )  # fmt: skip
 def test_what_is_wrong_with_its_stages_is_said(more, said):
     case = staged(**more)
-    case["nodes"]["v"] = {key: value for key, value in case["nodes"]["v"].items() if value is not None}
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.load(case)
     assert said in str(error.value)

@@ -94,6 +94,7 @@ def nodes(hilly: bool) -> st.SearchStrategy[dict]:
         st.builds(tank, between(0.5, 3.0), between(15.0, 25.0), **high),
         st.builds(inflow, between(0.0, 3e-3), **high),
         st.builds(vessel, between(0.2, 1.0), between(0.05, 0.1), **high),
+        st.builds(vessel, between(0.2, 1.0), between(0.05, 0.1), diameter=between(0.4, 0.8), slope=LEANS, **high),
     ]
     return st.one_of(plain, plain, plain, *others)
 
@@ -103,6 +104,7 @@ def vessel(volume: float, gas: float, **more) -> dict:
     return {"type": "accumulator", "volume": volume, "gas_volume": gas, **more}
 
 
+LEANS = st.sampled_from([0.0, 0.5])
 MOVING = st.fixed_dictionaries({"time_constant": between(0.02, 0.5)})
 
 

@@ -10,6 +10,8 @@ from restated.drawing import FRICTIONS, between
 ONE, NONE = st.just(1.0), st.just(0.0)
 CRACKING = {"cracking_pressure": between(0.0, 5e3)}
 SLAMS = {"rate": [1.0, 10.0], "reverse_velocity": [0.05, 1.0]}
+COMPRESSOR = {"start": 0.28, "stop": 0.2, "flow": 1e-3}
+SWITCHES = {"switch": 3e3, "switch_velocity": 0.1}
 SLOW = {"time_constant": between(0.1, 5.0)}
 SIZE = st.one_of(
     st.fixed_dictionaries({"area": between(1e-4, 5e-3)}),
@@ -86,6 +88,11 @@ NODES = {
         of("accumulator", {"volume": between(0.1, 1.0), "gas_volume": between(0.02, 0.09)}, CONNECTION),
         of(
             "accumulator",
+            {"volume": between(0.1, 1.0), "diameter": between(0.3, 0.6), "level": between(0.05, 0.25)},
+            {"slope": between(0.0, 1.0), "bottom": between(-1.0, 2.0), "compressor": st.just(COMPRESSOR)} | CONNECTION,
+        ),
+        of(
+            "accumulator",
             {"volume": between(0.1, 1.0), "precharge": between(1.2e5, 4e5)},
             {"exponent": between(1.0, 1.4)} | CONNECTION,
         ),
@@ -94,6 +101,6 @@ NODES = {
         "air-valve",
         {"inlet": between(0.02, 0.08), "outlet": between(0.005, 0.05)},
         {"automatic": between(1e-3, 3e-3)},
-        a=st.sampled_from([{}, {"switch": 3e3, "throttled_outlet": 4e-3}]),
+        a=st.sampled_from([{}, *({key: value, "throttled_outlet": 4e-3} for key, value in SWITCHES.items())]),
     ),
 }  # fmt: skip

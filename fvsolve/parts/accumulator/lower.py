@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from fvsolve.errors import Notice
 from fvsolve.model.device import Device
 from fvsolve.parts.accumulator import law
@@ -19,9 +21,19 @@ class AccumulatorRows(Device, kind="accumulator"):
     events = ("is empty", "holds fluid again")
     remedy = "give it a connection, whose loss brakes what comes and goes"
 
+    def of(self, part) -> Device:
+        return self if not part.shaped else ShapedRows() if part.compressor is None else CompressedRows()
+
     def place(self, draft, name, node, row) -> None:
         super().place(draft, name, node, row)
         row["y"] = draft.states([f"{name}.mass"], 0.1 * draft.fluid.density * node.volume)
+
+    def pressure_at_start(self, start, i, node, row) -> float | None:
+        if node.initial_pressure is None or not node.shaped:
+            return node.initial_pressure
+        from fvsolve.parts.accumulator.lower_shape import VesselStart
+
+        return VesselStart(start, node).under(node.initial_pressure)
 
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
@@ -58,6 +70,16 @@ class AccumulatorRows(Device, kind="accumulator"):
             draft.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(first), float(p)))
         return []
 
+    def change(self, model, row, y: float) -> float:
+        """Pressure over that of the profile [Pa] once y [kg] came in."""
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return law.gas_and_pressure(st, floats, node, int(row["data"]), y)[1]
+
+    def energy(self, model, row, y: float) -> float:
+        """What it stores once y [kg] came in, over the profile [J]."""
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return law.accumulator_energy(st, floats, node, int(row["data"]), y)
+
     def above(self, model, part, row) -> float:
         """Over the state in which it could give no more: P = 0, or no fluid left."""
         from fvsolve.kernels.energy_barotropic import head_at
@@ -66,7 +88,7 @@ class AccumulatorRows(Device, kind="accumulator"):
         node, at = model.tables.nodes[row["node"]], int(row["data"])
 
         def head(y: float) -> float:
-            return head_at(st, floats, node, float(node["pressure"] + law.gas_and_pressure(st, floats, node, at, y)[1]))
+            return head_at(st, floats, node, float(node["pressure"] + self.change(model, row, y)))
 
         low = float(floats[at + law.EMPTY]) if not floats[at + law.NECK] else -0.999 * float(node["mass"])
         high = (1.0 - 1e-6) * model.case.properties.density * float(floats[at + law.GAS])
@@ -74,4 +96,78 @@ class AccumulatorRows(Device, kind="accumulator"):
             for _ in range(200):
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if head(middle) < 0.0 else (low, middle)
-        return -float(law.accumulator_energy(st, floats, node, at, low))
+        return -float(self.energy(model, row, low))
+
+
+class ShapedRows(AccumulatorRows, kind=""):
+    """An air vessel with a shape: the weight of its fluid counts."""
+
+    quantities = (*AccumulatorRows.quantities, "level")
+
+    @property
+    def law(self):
+        from fvsolve.parts.accumulator import law_vessel
+
+        return law_vessel
+
+    def numbers(self, draft, name, part) -> list[float]:
+        from fvsolve.parts.accumulator.lower_shape import shape_of
+
+        lift = [0.0, 0.0, 0.0]
+        if part.compressor is not None:
+            lift = [0.0, part.compressor.start, part.compressor.stop]
+        return [0.0] * law.NUMBERS + [0.0, 0.0, part.bottom or 0.0, *lift] + shape_of(part)
+
+    def begin(self, start, part, row) -> list[str]:
+        from fvsolve.parts.accumulator.lower_shape import VesselStart
+
+        draft, n = start.draft, part.exponent
+        node, at = draft.node_table[row["node"]], row["data"]
+        stands = VesselStart(start, part)
+        p, mass = stands.gas_pressure(float(node["pressure"]))
+        if not p > 0.0:
+            name = list(draft.case.places)[row["node"]].removesuffix(".inside")
+            high = stands.level + stands.bottom
+            text = (f"no steady state: {node['pressure']:.6g} Pa at its place are less than the weight of the fluid, "
+                    f"{high:.4g} m high, and leave its gas none; set bottom or level lower")  # fmt: skip
+            draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
+            return []
+        floats = draft.tables.floats
+        empty = -draft.fluid.density * stands.held if start.law.linear else -mass
+        floats[at : at + law.NUMBERS] = [n, stands.gas, part.volume, 0.0, empty, 0.0]
+        floats[at + self.law.FIRST], floats[at + self.law.LEVEL] = p, stands.level
+        if part.compressor is not None:
+            floats[at + self.law.BRINGS] = part.compressor.flow * start.case.ambient_pressure / (p * stands.gas)
+        node["mass"] = mass
+        st = draft.tables.settings[0]
+        node["stiffness"] = self.law.pressure_and_stiffness(st, floats, node, int(at), 0.0, 0.0)[1]
+        return []
+
+    def change(self, model, row, y: float) -> float:
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return self.law.pressure_and_stiffness(st, floats, node, int(row["data"]), y, 0.0)[0]
+
+    def energy(self, model, row, y: float) -> float:
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        return self.law.energy_since(st, floats, node, int(row["data"]), y, 0.0)
+
+
+class CompressedRows(ShapedRows, kind=""):
+    """One whose compressor keeps the level down."""
+
+    states = ("gas",)
+    events = (*ShapedRows.events, "compressor starts", "compressor stops")
+
+    def scales(self, draft, name, part) -> list[float]:
+        return [0.1]
+
+    def squares(self, model, part, row, y, out):
+        """n p V / 2 (da / (1 + a) + dy / (rho V))^2, and g / (2 rho surface) dy^2: what gas and weight take up."""
+        st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
+        at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
+        u, change, _, _ = self.law.standing(st, floats, node, at, float(y[mass]), a)
+        gas, p = floats[at + law.GAS] * math.exp(u), floats[at + self.law.FIRST] + change
+        root = math.sqrt(0.5 * part.exponent * p * gas)
+        whole = super().squares(model, part, row, y, out)[0][mass]
+        rest = math.sqrt(max(0.0, whole**2 - (root / (rho * gas)) ** 2))
+        return [{int(row["y"]): root / (1.0 + a), mass: root / (rho * gas)}, {mass: rest}]

@@ -1,51 +1,92 @@
-"""A vessel with gas over its fluid. Knows sizes and pressures; computes nothing."""
+"""A vessel with gas over its fluid. Knows sizes, shapes and pressures; computes nothing."""
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar
 
+from fvsolve.parts.accumulator.shape import LEVELS, UPRIGHT, Compressor, height_of
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.connection.part import Connection, Joined, joined
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
-from fvsolve.parts.table import at_least_one
-from fvsolve.parts.value import Number, Quantity, Range, Usual, positive
+from fvsolve.parts.table import Inside, at_least_one
+from fvsolve.parts.tank.part import Surface
+from fvsolve.parts.value import Number, Quantity, Range, Usual, nonnegative, positive
 
 VOLUMES = Usual(1e-7, 1e5, "pilot accumulators to air cushions in rock")
 GAS = Usual(1e4, 2e8, "vacuum to test rigs")
 EXPONENTS = Usual(1.0, 2.0, "isothermal to adiabatic real gases")
+FORMS = ("diameter", "area")  # keys that give it a shape
+OF_SHAPE = ("level", "slope", "bottom", "compressor")  # keys that say nothing without one
+START = ("precharge", "gas_volume", "level")  # keys that say how much gas there is
 
 
 class Accumulator(Node, kind="accumulator"):
-    """A bladder accumulator (`precharge`) or an air vessel (`gas_volume`): p V^n constant in the gas over its fluid.
+    """A bladder accumulator (`precharge`) or an air vessel (`gas_volume`, `level`): p V^n constant in its gas.
 
-    Ports: any number, at one pressure, that of the gas: the height of the fluid inside is left out. Stored energy, p
-    from ambient: the gas's, p0 V0 ((V0 / V)^(n-1) - 1) / (n - 1) less the work of ambient [J]. Dissipated energy: that
-    of its connection.
+    Ports: any number, at one pressure, that of the gas; with a shape, `diameter` or `area`, that and the weight of the
+    fluid that stands above. Stored energy, p from ambient: the gas's, p0 V0 ((V0 / V)^(n-1) - 1) / (n - 1) less the
+    work of ambient, and the fluid's height [J]. Dissipated energy: that of its connection.
 
     A bladder fills `volume` at `precharge`; below it nothing but the hundredth part of `volume`, of fluid in the neck,
     feels the pressure. An air vessel that runs empty lets its air into the place it is joined to.
     """
 
     no_scalars: ClassVar[str] = "its contents carry no scalars yet"
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("precharge", "gas_volume"),)
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (START, FORMS)
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
     fixes_pressure: ClassVar[bool] = True
+    meant: ClassVar[dict[str, str]] = {
+        "height": "volume, of which it follows", "length": "volume, of which it follows", "inclination": "slope",
+        "base": "bottom", "initial_level": "level", "liquid_level": "level", "gas_exponent": "exponent",
+    }  # fmt: skip
 
     volume: Annotated[float, Quantity("volume", positive, "that gas and fluid share [m3]", VOLUMES)]
     precharge: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="of the gas when it fills volume [Pa]: a bladder; gas_volume is needed if left out",
+            about="of the gas when it fills volume [Pa]: a bladder; gas_volume or level is needed if left out",
             usual=GAS,
         ),
     ] = None
     gas_volume: Annotated[
         float | None,
         Quantity(
-            "volume", positive, "of the gas at the start [m3]: an air vessel; precharge is needed if left out", VOLUMES
+            "volume",
+            positive,
+            "of the gas at the start [m3]: an air vessel; precharge or level is needed if left out",
+            VOLUMES,
         ),
+    ] = None
+    level: Annotated[
+        float | None,
+        Quantity(
+            "level",
+            nonnegative,
+            "of the fluid at the start, above the bottom [m]; precharge or gas_volume is needed if left out",
+            LEVELS,
+        ),
+    ] = None
+    diameter: Annotated[
+        float | None,
+        Quantity("length", positive, "of a cylinder with flat ends, as long as volume says [m]",
+                 Usual(0.01, 10.0, "pilot vessels to field-built ones")),
+    ] = None  # fmt: skip
+    slope: Annotated[
+        float | None,
+        Quantity("angle", nonnegative, "of its axis, 0 where it lies [rad]; upright if left out",
+                 Usual(0.0, UPRIGHT, "lying to upright")),
+    ] = None  # fmt: skip
+    area: Annotated[Any, Surface()] = None
+    bottom: Annotated[
+        float | None,
+        Quantity("length", about="its lowest point, above its place [m]; 0 if left out",
+                 usual=Usual(-50.0, 50.0, "below or above the line")),
+    ] = None  # fmt: skip
+    compressor: Annotated[
+        Compressor | None, Inside(Compressor, "that brings gas where the level is high; none if left out")
     ] = None
     exponent: Annotated[float, Number(Range(1.0), "n of p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)] = 1.2
     initial_pressure: Annotated[
@@ -54,9 +95,28 @@ class Accumulator(Node, kind="accumulator"):
     connection: Annotated[Connection | None, Joined()] = None
 
     @classmethod
+    def variant(cls, given: dict[str, Any]) -> type[Node]:
+        return Vessel if any(key in given for key in FORMS) else Accumulator
+
+    @property
+    def shaped(self) -> bool:
+        """Whether the height of its fluid is known."""
+        return self.diameter is not None or self.area is not None
+
+    @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
-        missing = at_least_one(given, ("precharge", "gas_volume"))
-        return super().key_faults(given) + [(keys, f"no gas; {message}") for keys, message in missing]
+        faults = super().key_faults(given)
+        faults += [(keys, f"no gas; {message}") for keys, message in at_least_one(given, START)]
+        formed = [key for key in FORMS if key in given]
+        if not formed:
+            text = "says nothing of a vessel without a shape; give diameter or area, or leave it out"
+            faults += [((key,), text) for key in OF_SHAPE if key in given]
+        elif "precharge" in given:
+            text = "a bladder has no level; give gas_volume or level in place of precharge, or leave it out"
+            faults += [((key,), text) for key in formed]
+        if "slope" in given and formed == ["area"]:
+            faults.append((("slope",), "goes with diameter; area says all levels by itself"))
+        return faults
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         return joined(name, self, Junction.model_construct(elevation=self.elevation))
@@ -66,3 +126,24 @@ class Accumulator(Node, kind="accumulator"):
             yield ("gas_volume",), f"{self.gas_volume:g} m3 is more than its volume of {self.volume:g} m3"
         if self.initial_pressure is not None:
             yield from around.vacuum("nodes", name, "initial_pressure", [self.initial_pressure])
+        if not self.shaped:
+            return
+        if self.slope is not None and self.slope > UPRIGHT:
+            text = f"{math.degrees(self.slope):g} deg is steeper than upright; wanted 0 to 90 deg"
+            yield ("slope",), text + f', did you mean "{self.slope:g} deg"' * (self.slope <= 90.0)
+            return
+        top = height_of(self)
+        if self.level is not None and self.level >= top:
+            yield ("level",), f"{self.level:g} m leaves no room for gas; it is full at {top:.6g} m"
+        if self.compressor is not None:
+            start, stop = self.compressor.start, self.compressor.stop
+            if stop >= start:
+                yield ("compressor", "stop"), f"{stop:g} m is not below its start at {start:g} m; set it lower"
+            if start >= top:
+                yield ("compressor", "start"), f"{start:g} m is never reached; the vessel is full at {top:.6g} m"
+
+
+class Vessel(Accumulator):
+    """One with a shape, whose level can be read."""
+
+    quantities: ClassVar[dict[str, str]] = {**Accumulator.quantities, "level": "level"}

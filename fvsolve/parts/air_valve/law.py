@@ -3,8 +3,9 @@
 p V = m R T, V = V0 - y / rho with y [kg] the fluid that came in; the flow of air is isentropic through an orifice each
 way, choked below r = 0.528 (Wylie and Streeter 1993, 7-4). Open (armed), fluid passes; shut, none does, and the place
 is a junction. It opens where the pressure there falls below ambient and shuts once V is V0 again and fluid still comes.
-One that throttles lets air out through its wide bore until the pressure inside is `SWITCH` above ambient, and from then
-on, armed[event + 2], through a small one, until it is at ambient; its automatic bore lets air out beside either.
+One that throttles lets air out through its wide bore until the pressure inside is `SWITCH` above ambient, or it is
+above ambient while fluid comes on at `COMING`, and from then on, armed[event + 2], through a small one, until it is at
+ambient; its automatic bore lets air out beside either.
 """
 
 from math import expm1, log1p, sqrt
@@ -17,14 +18,16 @@ from fvsolve.kernels.records import LAW_LINEAR, RATE
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.valves import flow_at_drop
 
-VOLUME, AIR, HEAT, IN, OUT, SWITCH, SLOW = 0, 1, 2, 3, 4, 5, 6
+VOLUME, AIR, HEAT, IN, OUT, SWITCH, SLOW, COMING = 0, 1, 2, 3, 4, 5, 6, 7
 """numbers: V0 [m3], air in it at ambient [kg], R T [J/kg], Cd A in and out [m2]; pressure over ambient at which it
-throttles [Pa], 0 where it never does, and Cd A out from then on [m2]."""
+throttles [Pa], 0 for none, and Cd A out from then on [m2]; flow of fluid at which it does [kg/s], 0 for none."""
 KAPPA = 1.4
 CHOKED = (2.0 / (KAPPA + 1.0)) ** (KAPPA / (KAPPA - 1.0))
 SMALL = 1e-3  # share of the pressure upstream below which the root of a difference is made a polynomial
 NEAR = 0.02  # the same below which a step may turn the flow: the quicker way sets how quick it is
-RELUCTANCE = 10.0  # by which pressure must fall below ambient before it opens [Pa]
+RELUCTANCE = (
+    10.0  # by which pressure must fall below ambient before it opens, or exceed it before fluid throttles it [Pa]
+)
 LAX = 1e-9  # share of V0 by which it must be overfull before it shuts
 LINGER = 0.02  # s, in which the air that is left when it shuts comes to ambient pressure, at the quickest
 
@@ -48,10 +51,16 @@ def air_state(st, floats, node, at, y_fluid, y_air):
 
 
 @njit
+def throttles(floats, at):
+    """Whether it has a small bore for air out."""
+    return floats[at + SWITCH] > 0.0 or floats[at + COMING] > 0.0
+
+
+@njit
 def way_out(tables, device):
     """Cd A of what air leaves by now [m2]."""
     floats, at = tables.floats, device["data"]
-    if floats[at + SWITCH] > 0.0 and tables.armed[device["event"] + 2] > 0.0:
+    if throttles(floats, at) and tables.armed[device["event"] + 2] > 0.0:
         return floats[at + SLOW]
     return floats[at + OUT]
 
@@ -142,9 +151,21 @@ def events(t, y, out, tables, device, g):
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
         left = p - min(gauge, 0.0) + RELUCTANCE
     either(tables, g, at, left)
-    if floats[device["data"] + SWITCH] > 0.0:
+    if throttles(floats, device["data"]):
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
-        either(tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else floats[device["data"] + SWITCH] - gauge)
+        either(tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else until_throttled(out, tables, device, gauge))
+
+
+@njit
+def until_throttled(out, tables, device, gauge):
+    """What is left until it throttles: pressure [Pa], or flow of fluid [kg/s] once its air is RELUCTANCE above ambient.
+
+    At ambient itself it is wide again, and would be neither.
+    """
+    floats, at = tables.floats, device["data"]
+    if floats[at + SWITCH] > 0.0:
+        return floats[at + SWITCH] - gauge
+    return max(floats[at + COMING] - out[tables.layout[0]["valve"] + device["valve"]], RELUCTANCE - gauge)
 
 
 @njit

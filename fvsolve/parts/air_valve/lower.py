@@ -22,7 +22,7 @@ class AirValveRows(Device, kind="air-valve"):
     remedy = "give it another volume"
 
     def of(self, part) -> Device:
-        return self if part.switch is None else Throttling()
+        return self if part.throttled_outlet is None else Throttling()
 
     def place(self, draft, name, node, row) -> None:
         super().place(draft, name, node, row)
@@ -42,7 +42,7 @@ class AirValveRows(Device, kind="air-valve"):
             part.discharge_coefficient * math.pi / 4.0 * (d or 0.0) ** 2
             for d in (part.inlet, part.outlet, part.throttled_outlet, part.automatic)
         )
-        return [part.volume, held, heat, into, wide + always, part.switch or 0.0, small + always]
+        return [part.volume, held, heat, into, wide + always, part.switch or 0.0, small + always, 0.0]
 
     def scales(self, draft, name, part) -> list[float]:
         return [self.numbers(draft, name, part)[law.AIR]]
@@ -76,6 +76,15 @@ class AirValveRows(Device, kind="air-valve"):
 
 
 class Throttling(AirValveRows, kind=""):
-    """One that lets air out through a small bore from `switch` on."""
+    """One that lets air out through a small bore from `switch` or `switch_velocity` on."""
 
     events = (*AirValveRows.events, "throttles", "is wide again")
+
+    def begin(self, start, part, row) -> list[str]:
+        place, widest = start.valves[row["valve"]]["from_node"], 0.0
+        for table in (start.pipes, start.columns):
+            joins = (table["from_node"] == place) | (table["to_node"] == place)
+            widest = max(widest, *table["area"][joins], 0.0)
+        density = start.nodes[row["node"]]["density"]
+        start.draft.tables.floats[row["data"] + law.COMING] = (part.switch_velocity or 0.0) * density * widest
+        return super().begin(start, part, row)

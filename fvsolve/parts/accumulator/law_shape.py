@@ -1,0 +1,145 @@
+"""What a vessel holds below a level: prisms, cylinders at any slope, tables of areas. Knows one shape; knows no gas.
+
+Of a cylinder with flat ends, radius R, length L, its axis at `slope` to the horizontal, a level z is the depth
+d = z / (R cos) at its lower end and d - (L / R) tan at the other, in radii. With S(d) the wetted segment of the unit
+circle, T and U its first and second integral over d, V = R^3 cot (T(d) - T(d')), dV/dz = R^2 (S(d) - S(d')) / sin.
+"""
+
+from math import acos, cos, pi, sin, sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.energy import level_moment
+from fvsolve.kernels.tanks import level_of_volume
+
+KIND, TOP, FIRST, SECOND, THIRD = 0, 1, 2, 3, 4
+"""numbers of a shape: its kind, the level at which it is full [m]; then an area [m2], or the radius and length [m] and
+the slope [rad] of a cylinder, or how many levels, areas and volumes follow."""
+PRISM, LYING, SLOPED, TABLE = 0, 1, 2, 3
+NUMBERS = 5
+NARROW = 1e-6  # of the greatest surface: a lesser one counts as this where a level is sought
+
+
+@njit
+def segment(d):
+    """S(d): wetted area of the unit circle up to depth d, 0 to pi."""
+    if d <= 0.0:
+        return 0.0
+    if d >= 2.0:
+        return pi
+    x = 1.0 - d
+    return acos(x) - x * sqrt(d * (2.0 - d))
+
+
+@njit
+def segment_once(d):
+    """T(d): integral of S from 0 to d."""
+    if d <= 0.0:
+        return 0.0
+    if d >= 2.0:
+        return pi * (d - 1.0)
+    x, s = 1.0 - d, sqrt(d * (2.0 - d))
+    return s - s * s * s / 3.0 - x * acos(x)
+
+
+@njit
+def segment_twice(d):
+    """U(d): integral of T from 0 to d."""
+    if d <= 0.0:
+        return 0.0
+    if d >= 2.0:
+        return pi * (0.625 + 0.5 * d * (d - 2.0))
+    x, s = 1.0 - d, sqrt(d * (2.0 - d))
+    return (0.5 * x * x + 0.125) * acos(x) - 0.625 * x * s + x * s * s * s / 12.0
+
+
+@njit
+def depths(floats, at, z):
+    """(d at the lower end, d at the other, tangent of the slope) of a sloped cylinder."""
+    radius, length, slope = floats[at + FIRST], floats[at + SECOND], floats[at + THIRD]
+    rise = sin(slope) / cos(slope)
+    d = z / (radius * cos(slope))
+    return d, d - length / radius * rise, rise
+
+
+@njit
+def volume_below(floats, at, z):
+    """Volume below level z [m3]; levels within the vessel."""
+    kind, first = int(floats[at + KIND]), floats[at + FIRST]
+    if kind == PRISM:
+        return first * z
+    if kind == LYING:
+        return first * first * floats[at + SECOND] * segment(z / first)
+    if kind == SLOPED:
+        d, other, rise = depths(floats, at, z)
+        return first * first * first / rise * (segment_once(d) - segment_once(other))
+    rows, o, k = int(first), at + NUMBERS, 0
+    while k < rows - 2 and z >= floats[o + k + 1]:
+        k += 1
+    low, high = floats[o + rows + k], floats[o + rows + k + 1]
+    s, span = z - floats[o + k], floats[o + k + 1] - floats[o + k]
+    if s > span:
+        return floats[o + 3 * rows - 1] + (s - span) * high
+    return floats[o + 2 * rows + k] + s * (low + 0.5 * s * (high - low) / span)
+
+
+@njit
+def surface_at(floats, at, z):
+    """Free surface at level z [m2]."""
+    kind, first = int(floats[at + KIND]), floats[at + FIRST]
+    if kind == PRISM:
+        return first
+    if kind == LYING:
+        d = z / first
+        return 2.0 * first * floats[at + SECOND] * sqrt(max(0.0, d * (2.0 - d)))
+    if kind == SLOPED:
+        d, other, _ = depths(floats, at, z)
+        return first * first * (segment(d) - segment(other)) / sin(floats[at + THIRD])
+    rows, o, k = int(first), at + NUMBERS, 0
+    while k < rows - 2 and z >= floats[o + k + 1]:
+        k += 1
+    low, high = floats[o + rows + k], floats[o + rows + k + 1]
+    s = (z - floats[o + k]) / (floats[o + k + 1] - floats[o + k])
+    return low + min(s, 1.0) * (high - low)
+
+
+@njit
+def moment_below(floats, at, z):
+    """Integral of z dV from the bottom to level z [m4]."""
+    kind, first = int(floats[at + KIND]), floats[at + FIRST]
+    if kind == PRISM:
+        return 0.5 * first * z * z
+    if kind == LYING:
+        return z * volume_below(floats, at, z) - first * first * first * floats[at + SECOND] * segment_once(z / first)
+    if kind == SLOPED:
+        d, other, rise = depths(floats, at, z)
+        beyond = segment_twice(d) - segment_twice(other)
+        return z * volume_below(floats, at, z) - first**4 * cos(floats[at + THIRD]) / rise * beyond
+    return level_moment(floats, at + NUMBERS, int(first), z)
+
+
+@njit
+def level_at(floats, at, volume):
+    """Level below which it holds a volume, 0 where it holds none [m]; of a cylinder by Newton within bounds."""
+    kind = int(floats[at + KIND])
+    if volume <= 0.0:
+        return 0.0
+    if kind == PRISM:
+        return volume / floats[at + FIRST]
+    if kind == TABLE:
+        return level_of_volume(floats, at + NUMBERS, int(floats[at + FIRST]), volume)
+    low, high = 0.0, floats[at + TOP]
+    whole = pi * floats[at + FIRST] ** 2 * floats[at + SECOND]
+    z, least = high * min(volume / whole, 1.0), NARROW * whole / high
+    for _ in range(100):
+        over = volume_below(floats, at, z) - volume
+        if over > 0.0:
+            high = z
+        else:
+            low = z
+        moved = z - over / max(surface_at(floats, at, z), least)
+        if not low <= moved <= high:
+            moved = 0.5 * (low + high)
+        if abs(moved - z) <= 2e-16 * floats[at + TOP]:
+            return moved
+        z = moved
+    return z

@@ -1,0 +1,69 @@
+"""How high the fluid of a vessel stands at the start, and what its gas has left. Knows its shape; fills no table."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.parts.accumulator import law_shape
+from fvsolve.parts.accumulator.shape import UPRIGHT, height_of, length_of
+
+FLAT = 1e-6  # rise of a cylinder's axis over its length, in radii, below which it lies; likewise, upright
+
+
+class VesselStart:
+    """Gas and fluid of a vessel with a shape at the start.
+
+    gas : its volume [m3]; level : of the fluid [m]; centroid : of the fluid, above the bottom [m]
+    """
+
+    def __init__(self, start, part) -> None:
+        self.law, self.gravity, self.bottom = start.law, start.case.gravity, part.bottom or 0.0
+        shape = np.array(shape_of(part))
+        self.gas = part.gas_volume
+        if self.gas is None:
+            self.gas = part.volume - float(law_shape.volume_below(shape, 0, part.level))
+        self.held = part.volume - self.gas
+        self.level = float(law_shape.level_at(shape, 0, self.held))
+        below = float(law_shape.moment_below(shape, 0, self.level))
+        self.centroid = below / self.held if self.held > 0.0 else 0.0
+
+    def gas_pressure(self, p: float) -> tuple[float, float]:
+        """(pressure of the gas [Pa], mass of the fluid [kg]) where the place has p."""
+        if self.law.linear:
+            rho = self.law.rho
+            return p - rho * self.gravity * (self.bottom + self.level), rho * self.held
+        above = self.gravity * (self.bottom + self.centroid)
+        q = float(self.law.pressure_of_enthalpy(self.law.enthalpy(p) - above))
+        rho = float(self.law.density(q))
+        return q - rho * self.gravity * (self.level - self.centroid), rho * self.held
+
+    def under(self, gas: float) -> float:
+        """Pressure of the place [Pa] where the gas has a pressure."""
+        if self.law.linear:
+            return gas + self.law.rho * self.gravity * (self.bottom + self.level)
+        q = gas
+        for _ in range(20):
+            q = gas + float(self.law.density(q)) * self.gravity * (self.level - self.centroid)
+        return float(self.law.pressure_of_enthalpy(self.law.enthalpy(q) + self.gravity * (self.bottom + self.centroid)))
+
+
+def shape_of(part) -> list[float]:
+    """Numbers of the shape of a vessel, as `law_shape` reads them."""
+    top = height_of(part)
+    if part.diameter is None:
+        if not hasattr(part.area, "level") or len(part.area.level) == 1:
+            area = part.area if not hasattr(part.area, "level") else part.area.area[0]
+            return [law_shape.PRISM, top, float(area), 0.0, 0.0]
+        level, area = part.area.level, part.area.area
+        steps = [
+            0.5 * (a + b) * (high - low) for low, high, a, b in zip(level, level[1:], area, area[1:], strict=False)
+        ]
+        volume = [math.fsum(steps[:k]) for k in range(len(level))]
+        return [law_shape.TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
+    radius, length, slope = 0.5 * part.diameter, length_of(part), UPRIGHT if part.slope is None else part.slope
+    if radius * math.cos(slope) <= FLAT * length * math.sin(slope):
+        return [law_shape.PRISM, top, math.pi * radius**2, 0.0, 0.0]
+    kind = law_shape.LYING if length * math.sin(slope) <= FLAT * radius * math.cos(slope) else law_shape.SLOPED
+    return [kind, top, radius, length, 0.0 if kind == law_shape.LYING else slope]

@@ -1,0 +1,48 @@
+"""What shape a vessel has, and what keeps its level. Knows sizes; knows no fluid and no gas."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from fvsolve.parts.table import Table
+from fvsolve.parts.value import Quantity, Usual, nonnegative, positive
+
+LEVELS = Usual(0.0, 50.0, "pilot vessels to towers")
+UPRIGHT = 0.5 * math.pi
+
+
+class Compressor(Table):
+    """It runs from where the level has risen to `start` until it has fallen to `stop`, and brings `flow`."""
+
+    start: Annotated[float, Quantity("level", nonnegative, "of the fluid at which it starts [m]", LEVELS)]
+    stop: Annotated[float, Quantity("level", nonnegative, "of the fluid, lower, at which it stops [m]", LEVELS)]
+    flow: Annotated[
+        float,
+        Quantity(
+            "flow", positive, "of free air: at ambient pressure and the temperature of the gas at the start [m3/s]",
+            Usual(1e-5, 10.0, "workshops to stations"),
+        ),
+    ]  # fmt: skip
+
+
+def length_of(vessel: Any) -> float:
+    """Length of a cylinder [m]."""
+    return vessel.volume / (math.pi * (0.5 * vessel.diameter) ** 2)
+
+
+def height_of(vessel: Any) -> float:
+    """Level at which a vessel with a shape is full [m]."""
+    if vessel.diameter is not None:
+        slope = UPRIGHT if vessel.slope is None else vessel.slope
+        across = vessel.diameter * math.cos(slope) if slope < UPRIGHT else 0.0
+        return length_of(vessel) * math.sin(slope) + across
+    if not hasattr(vessel.area, "level"):
+        return vessel.volume / vessel.area
+    level, area, left = vessel.area.level, vessel.area.area, vessel.volume
+    for z, end, low, high in zip(level, level[1:], area, area[1:], strict=False):
+        growth, held = (high - low) / (end - z), 0.5 * (low + high) * (end - z)
+        if left <= held:
+            return float(z + 2.0 * left / (low + math.sqrt(max(low * low + 2.0 * growth * left, 0.0))))
+        left -= held
+    return float(level[-1] + left / area[-1])
