@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, ranges, riding_networks, text
+from fvsolve.case import basins, bodies, horizon, ranges, riding_networks, text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.extent import of_profiles
 from fvsolve.case.limits import DesignLimit
@@ -172,8 +172,8 @@ class Case(Shown):
 
     @cached_property
     def notes(self) -> list[Notice]:
-        """What it says beyond what practice knows."""
-        return [*self.told, *ranges.notices(self)]
+        """What it says beyond what practice knows, and beyond the end of the run."""
+        return [*self.told, *ranges.notices(self), *horizon.notices(self)]
 
     @cached_property
     def elevations_stated(self) -> bool:

@@ -36,7 +36,7 @@ def study(
 def _show(found) -> None:
     from fvsolve.cli import terminal
     from fvsolve.cli.report import when, where_and_when
-    from fvsolve.studies.design import name_of, passed
+    from fvsolve.studies.design import name_of
     from fvsolve.units import span
 
     console = terminal.console()
@@ -47,7 +47,7 @@ def _show(found) -> None:
     for row in found.rows:
         verdicts = {one["name"]: one for one in row["verdicts"]}
         cells = [_cell(verdicts.get(name)) for name in limits]
-        rows.append([name_of(row), "holds" if passed(row) else "FAILS", *cells])
+        rows.append([name_of(row), standing(row), *cells])
     terminal.table(["run", "", *(f"margin of {name}" for name in limits.values())], rows, console)
     for row in found.rows:
         if not row["ok"]:
@@ -57,14 +57,28 @@ def _show(found) -> None:
             text = f"{first['text']}: results from {when(row)(first['time'])} on are not to be trusted"
             terminal.line(console, f"{name_of(row)}: {text}", "yellow")
         for one in row["verdicts"]:
-            if not one["ok"]:
+            if not one["ok"] and not is_open(one):
                 value = "-" if one["value"] is None else f"{one['value']:.6g}"
                 text = f"{name_of(row)}: {one['name']}: {value} {one['unit']} ({where_and_when(one, row)})"
                 terminal.line(console, text, "red")
     names = [name or "the case as it is" for name in found.holds]
-    terminal.line(console, f"all limits hold in all events: {', '.join(names) or 'under no protection'}",
-                  "green" if names else "bold red")  # fmt: skip
+    told = f"all limits hold in all events: {', '.join(names)}" if names else "nothing holds all limits in all events"
+    terminal.line(console, told, "green" if names else "bold red")
     terminal.line(console, f"{found.folder}: study.json, study.csv and a run directory for each")
+
+
+def is_open(verdict: dict) -> bool:
+    """Whether a limit is not passed and does not hold either: what the run says of it is not to be trusted."""
+    return not verdict["ok"] and verdict["margin"] is not None and verdict["margin"] >= 0.0
+
+
+def standing(row: dict) -> str:
+    """Of a run in one word."""
+    from fvsolve.studies.design import passed
+
+    if passed(row):
+        return "holds"
+    return "open" if row["ok"] and all(one["ok"] or is_open(one) for one in row["verdicts"]) else "FAILS"
 
 
 def _cell(verdict) -> str:

@@ -337,13 +337,23 @@ def _verdict(one: dict, said: dict) -> str:
     found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where_and_when(one, said)})"
     held = "holds" if one["ok"] else "FAILS"
     if not one["ok"] and one["margin"] is not None and one["margin"] >= 0.0:
-        held = f"OPEN, as the run is not ok ({said['reason']})"
+        held = f"OPEN, as {why_open(said)}"
     margin = "-" if one["margin"] is None else f"{_number(one['margin'])} {span(one['unit'])}"
-    said = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {margin}"
+    text = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {margin}"
+    if one["time"] is not None and one["until"] > 0.0 and one["time"] >= one["until"] * (1.0 - 1e-9):
+        text += ", at the end of the run: a later end may be worse"
     if one["error"] is None or one["margin"] is None:
-        return said
+        return text
     doubt = ", which leaves it open" if abs(one["margin"]) < one["error"] else ""
-    return f"{said} within {one['error']:.2g}{doubt}"
+    return f"{text} within {one['error']:.2g}{doubt}"
+
+
+def why_open(said: dict) -> str:
+    """Why a limit that is not passed does not hold either."""
+    if not said["marks"]:
+        return f"the run is not ok ({said['reason']})"
+    first = min(said["marks"], key=lambda mark: mark["time"])
+    return f"results from {when(said)(first['time'])} on are not to be trusted"
 
 
 def _comparison(one: dict, said: dict) -> str:

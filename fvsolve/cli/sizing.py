@@ -47,11 +47,14 @@ def _show(found) -> None:
     from fvsolve.cli import terminal
 
     console = terminal.console()
-    rows = [[f"{one.value:.6g}", "holds" if one.ok else "FAILS", "-" if one.margin is None else f"{one.margin:.4g}",
+    rows = [[f"{one.value:.6g}", "holds" if one.ok else "open" if one.open else "FAILS",
+             "-" if one.margin is None else f"{one.margin:.4g}",
              one.limit if one.reason == "finished" else one.reason] for one in found.runs]  # fmt: skip
     terminal.table([f"{found.key} [{found.unit or 'SI'}]", "", "least margin over limit", "of"], rows, console)
     for text in found.ties:
         terminal.line(console, f"with {text}")
+    for text in dict.fromkeys(one.open for one in found.runs if one.open):
+        terminal.line(console, f"open: {text}", "yellow")
     if found.value is None:
         near = found.nearest
         text = (f"no value between {found.runs[0].value:.6g} and {found.runs[1].value:.6g} {found.unit} that was tried "

@@ -28,6 +28,7 @@ class Sort(NamedTuple):
 OPENING = Sort("-", "a number from 0, shut, to 1, open", 0.0, 1.0)
 POSITION = Sort("-", "a number from -1 to 1", -1.0, 1.0)
 SPEED = Sort("-", "a relative speed of at least 0", 0.0)
+TURNING = Sort("rad/s", "a finite number [rad/s]")
 PRESSURE = Sort("Pa", "an absolute pressure above 0 [Pa]", small=1e5)
 HEAD = Sort("m", "a head whose pressure is above 0 Pa absolute [m]", small=1e5)  # [Pa]
 SET_PRESSURE = Sort("Pa", "an absolute pressure [Pa]")

@@ -38,7 +38,10 @@ def verdicts(model, summary) -> list[dict[str, Any]]:
 
 
 def verdict(model, summary, limit, chainage: Chainages) -> dict[str, Any]:
-    """Whether a limit holds, and where and when it is nearest, or passed most; see `verdicts`."""
+    """Whether a limit holds, and where and when it is nearest, or passed most; see `verdicts`.
+
+    One that is not passed is open all the same where the run is not ok, or from a mark on not to be trusted.
+    """
     extent = limit.extent
     places = [one for part in met(model, summary, extent) for one in nearest(model, limit, part)]
     places.sort(key=lambda one: one.margin if math.isfinite(one.margin) else -math.inf)
@@ -47,7 +50,7 @@ def verdict(model, summary, limit, chainage: Chainages) -> dict[str, Any]:
     first = places[0]
     slack = ROUNDING * (abs(first.limit) + SIZES.get(extent.quantity, 0.0))
     return {
-        "name": limit.name, "ok": bool(summary.ok and first.margin >= -slack), **rows[0],
+        "name": limit.name, "ok": bool(summary.ok and not summary.marks and first.margin >= -slack), **rows[0],
         "quantity": extent.quantity, "until": float(summary.t), "error": None, "worst": worst(rows),
     }  # fmt: skip
 

@@ -14,6 +14,7 @@ from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
+from fvsolve.run.verdicts import SIZES
 from fvsolve.units import UNITS, show
 
 GOALS = ("least", "greatest")
@@ -25,13 +26,17 @@ _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*"
 
 @dataclass(frozen=True)
 class SizeRun:
-    """One run: the value of the key, whether all limits hold, the least margin over its limit, and of which limit."""
+    """One run: the value of the key, whether all limits hold, the least margin over its limit, and of which limit.
+
+    open : why a run that passes no limit holds none either, as what it schedules goes on after its end; else empty
+    """
 
     value: float
     ok: bool
     margin: float | None
     limit: str
     reason: str
+    open: str = ""
 
 
 @dataclass(frozen=True)
@@ -129,9 +134,12 @@ class Sizing:
         if result.reason.startswith("interrupted"):
             raise KeyboardInterrupt
         worst = min(result.verdicts, key=relative)
-        margin = relative(worst) if result.ok else None
         ok = result.ok and all(one.ok for one in result.verdicts)
-        self.runs.append(SizeRun(value, ok, margin, worst.name, result.reason))
+        late = [one.text for one in result.warnings if one.kind == "end"] if ok else []
+        known = result.ok and not late and (ok or relative(worst) < 0.0)
+        why = late[0] if late else result.marks[0].text if result.ok and not ok and not known else ""
+        margin = relative(worst) if known else None
+        self.runs.append(SizeRun(value, ok and not late, margin, worst.name, result.reason, why))
         return self.runs[-1]
 
     def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
@@ -171,10 +179,13 @@ class Sizing:
 
 
 def relative(verdict: Any) -> float:
-    """The margin of a verdict over its limit; of a limit that is nothing, over the value or one."""
+    """The margin of a verdict over its limit; of a pressure or head, over an atmosphere where its limit is less."""
     if verdict.margin is None:
         return -math.inf
-    return verdict.margin / (abs(verdict.limit) or abs(verdict.value) or 1.0)
+    shown = UNITS.get(verdict.unit)
+    usual = SIZES.get(verdict.quantity, 0.0)
+    least = usual / abs(float(shown.si(1.0) - shown.si(0.0))) if usual and shown is not None else usual
+    return verdict.margin / (max(abs(verdict.limit), least) or abs(verdict.value) or 1.0)
 
 
 def size(

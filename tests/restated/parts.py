@@ -23,6 +23,10 @@ MOVING = st.one_of(
     st.fixed_dictionaries({"natural_frequency": between(1.0, 10.0), "damping_ratio": between(0.3, 1.5)}),
 )
 OPENING = st.one_of(st.just(1.0), between(0.1, 1.0), st.builds(ramp, between(0.1, 0.5), between(0.01, 0.4), ONE, NONE))
+HILL = [
+    {"opening": 0.3, "unit_speed": [30, 70, 110], "unit_flow": [0.32, 0.3, 0.2], "efficiency": [0.6, 0.8, 0.1]},
+    {"opening": 1.0, "unit_speed": [110, 70, 30], "unit_flow": [0.7, 1.0, 1.05], "efficiency": [0.2, 0.9, 0.6]},
+]
 CONDUIT = {"length": between(5.0, 60.0), "diameter": between(0.05, 0.2), "friction": st.sampled_from(FRICTIONS[1:])}
 CONNECTION = {"connection": st.fixed_dictionaries(
     {"diameter": between(0.03, 0.1), "loss_in": between(0.5, 5.0), "loss_out": between(0.5, 5.0)}
@@ -73,6 +77,12 @@ LINKS = {
         {"speed": st.one_of(between(0.5, 1.2), st.builds(ramp, between(0.1, 0.4), between(0.05, 0.4), ONE, NONE)),
          "check_valve": st.booleans()},
         a=st.sampled_from([{}, {"rated_speed": 150.0, "inertia": 0.5}]),
+    ),
+    "turbine": of(
+        "turbine",
+        {"diameter": between(0.03, 0.08), "speed": between(0.0, 150.0), "hill_chart": st.just(HILL)},
+        {"opening": st.one_of(between(0.1, 1.0), st.builds(ramp, between(0.1, 0.5), between(0.01, 0.4), ONE, NONE))},
+        a=st.sampled_from([{}, {"inertia": 0.05, "trip": 0.2}]),
     ),
     "leak": of("leak", {"coefficient": between(1e-7, 1e-5), "opening": OPENING}, {"exponent": between(0.5, 1.5)}),
 }  # fmt: skip

@@ -105,8 +105,10 @@ def test_at_rest_it_stays_at_rest(table, kind, data, settings):
     Under a tolerance a pressure may err by that (of 3 bar), and by its root what a valve at no drop lets through.
     """
     part = data.draw((LINKS if table == "links" else NODES)[kind])
-    still = {"pump": {"speed": 0.0}, "leak": {"opening": 0.0}, "junction": {"demand": 0.0}, "inflow": {"flow": 0.0},
-             "tank": {"level": HEAD}, "reservoir": {"head": HEAD}}.get(kind, {})  # fmt: skip
+    still = {
+        "pump": {"speed": 0.0}, "turbine": {"speed": 0.0}, "leak": {"opening": 0.0}, "junction": {"demand": 0.0},
+        "inflow": {"flow": 0.0}, "tank": {"level": HEAD}, "reservoir": {"head": HEAD},
+    }.get(kind, {})  # fmt: skip
     part |= still
     shown = told(made(*data.draw(joined(table, part, settings)), settings))
     if shown.ended == "refused":

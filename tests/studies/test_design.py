@@ -95,7 +95,7 @@ def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
     assert status == 0 and "all limits hold in all events: vessel" in text and "fast with none" in text
     study.write_text(STUDY[: STUDY.index("[protections.vessel")])
     status, text, _ = fvs("study", str(study), "--out", str(tmp_path / "other"))
-    assert status == 1 and "under no protection" in text
+    assert status == 1 and "nothing holds all limits in all events" in text
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Torques in the tables of a model: on shafts of pumps among the numbers of the pump, on bodies pushes like others."""
+"""Torques in the tables of a model: on shafts among the numbers of what has one, on bodies pushes like others."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from fvsolve.model.lowering import Lowering, lowering_of
 from fvsolve.model.masses import Push, join
 from fvsolve.parts.force.lower import brace_of
 from fvsolve.parts.pump.law import OWN_NUMBERS
-from fvsolve.parts.pump.lower import torques_on
+from fvsolve.parts.pump.lower_turning import torques_on
 
 
 class TorqueRows(Lowering, kind="torque"):
-    """What its pump adds up."""
+    """What its pump or turbine adds up."""
 
     def of(self, part):
         return self if part.axis is None else ON_BODIES
 
     def inputs(self, model, name, part):
-        pump = part.to.removesuffix(".shaft")
-        row = lowering_of(type(model.case.links[pump])).row_of(model, pump)
-        place = [one is part for one in torques_on(model.case, pump)].index(True)
+        turned = part.to.removesuffix(".shaft")
+        row = lowering_of(type(model.case.links[turned])).row_of(model, turned)
+        place = [one is part for one in torques_on(model.case, turned)].index(True)
         return {"torque": Input(TORQUE, int(model.tables.floats[row["data"] + OWN_NUMBERS + 2 * place]))}
 
 

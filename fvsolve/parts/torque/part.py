@@ -26,7 +26,7 @@ class Torque(Link, kind="torque"):
     quantities: ClassVar[dict[str, str]] = {}
 
     from_: Annotated[str | None, Text("the body that it turns back, if any"), Field(alias="from")] = None
-    to: Annotated[str, Text("the shaft it turns, PUMP.shaft, or a body")]
+    to: Annotated[str, Text("the shaft it turns, PUMP.shaft or TURBINE.shaft, or a body")]
     torque: Annotated[Schedule, Scheduled("torque", about="in the direction in which a pump is driven [N m]")]
     axis: Annotated[
         tuple[float, ...] | None, Rows("number", length=3, about="that it turns a body about, in the body's axes")
@@ -40,17 +40,17 @@ class Torque(Link, kind="torque"):
     def faults(self, name: str, around: Around) -> Faults:
         if no_direction(self.axis):
             yield ("axis",), "is all zeros; wanted for example [0, 1, 0]"
-        pump = around.links.get(self.to.removesuffix(".shaft"))
+        turned = around.links.get(self.to.removesuffix(".shaft"))
         if around.spatial(self.to) and self.axis is None:
             yield (), "axis is missing: a body is turned about one, in its own axes, for example [0, 1, 0]"
-        if getattr(pump, "kind", "") != "pump" or around.spatial(self.to):
+        if "shaft" not in getattr(turned, "owns", {}) or around.spatial(self.to):
             return
         for key, given in (("from", self.from_), ("axis", self.axis)):
             if given is not None:
                 yield (key,), f"goes with bodies; {self.to} is a shaft"
-        if pump.inertia is None:
-            yield ("to",), f"{self.to} has no inertia, so no torque can turn it; give the pump inertia"
-        if pump.trip is not None:
+        if turned.inertia is None:
+            yield ("to",), f"{self.to} has no inertia, so no torque can turn it; give the {turned.kind} inertia"
+        if turned.trip is not None:
             text = "is held by its motor until it trips; leave trip out, and let the torque fall to 0 in its place"
             yield ("to",), f"{self.to} {text}"
 

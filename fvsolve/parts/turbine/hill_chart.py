@@ -1,0 +1,166 @@
+"""Hill charts of turbines as a file may say them. Knows points of openings; evaluates none of them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from fvsolve.parts.csv_rows import Misread, read_rows, split
+from fvsolve.parts.series import copy_name, find_file
+from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.turbine.points import EFFICIENCY, FLOW, SPEED, TORQUE, faults_of_curve, faults_of_still
+from fvsolve.parts.value import NEEDED, Misfit, Number, Rows, Setting, Value, between
+from fvsolve.units import show
+
+WITHIN = between(-1e4, 1e4)  # n11 and Q11 of any machine
+UNITS = {SPEED: "rpm m^(1/2)", FLOW: "m^(1/2)/s", TORQUE: "N/m3"}
+EXAMPLE = "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], efficiency = [0.88, 0.85] }"
+
+
+class OpeningCurve(NamedTuple):
+    """Points of one opening in their order: n11 = N D / sqrt(H), Q11 = Q / (D^2 sqrt(H)), and efficiency or T11.
+
+    speed [rpm m^(1/2)]; flow [m^(1/2)/s]; value : efficiency [-], or T11 = T / (D^3 H) [N/m3]; word : which
+    """
+
+    opening: float
+    speed: tuple[float, ...]
+    flow: tuple[float, ...]
+    value: tuple[float, ...]
+    word: str
+
+    def table(self) -> dict[str, Any]:
+        """What the file would say."""
+        return {"opening": self.opening, SPEED: list(self.speed), FLOW: list(self.flow), self.word: list(self.value)}
+
+    def torques(self, weight: float) -> list[float]:
+        """T11 at its points; weight = rho g [N/m3]."""
+        if self.word == TORQUE:
+            return list(self.value)
+        points = zip(self.speed, self.flow, self.value, strict=True)
+        return [eta * weight * q * 30.0 / math.pi / n for n, q, eta in points]
+
+
+class HillChart(NamedTuple):
+    """Curves by rising openings above 0; still : (n11, T11) that brakes the runner behind shut vanes, or none."""
+
+    curves: tuple[OpeningCurve, ...]
+    still: tuple[float, float] | None
+    said: Any
+
+    def table(self) -> Any:
+        """What the file would say."""
+        return self.said
+
+
+class HillChartValue(Value):
+    """Curves of openings, inline or as columns of a CSV file."""
+
+    about = (
+        "n11 = N D / sqrt(H) [rpm m^(1/2)], Q11 = Q / (D^2 sqrt(H)) [m^(1/2)/s] and efficiency, or T11 = T / (D^3 H) "
+        "[N/m3], of each opening"
+    )
+    takes = (
+        "list of `{ opening, unit_speed = [...], unit_flow = [...], efficiency or unit_torque = [...] }`, or `{ file }`"
+    )
+    keys = {
+        "opening": (Number(between(0, 1)), NEEDED),
+        SPEED: (Rows("number", WITHIN), NEEDED), FLOW: (Rows("number", WITHIN), NEEDED),
+        EFFICIENCY: (Rows("number", between(0, 1)), None), TORQUE: (Rows("number", between(-1e8, 1e8)), None),
+    }  # fmt: skip
+
+    def read(self, given: Any, setting: Setting) -> HillChart:
+        if isinstance(given, HillChart):
+            return given
+        if isinstance(given, dict) and "file" in given:
+            return from_file(given, setting)
+        if not isinstance(given, (list, tuple)) or not given:
+            raise ValueError(f"{show(given)} is no list of curves; wanted [{EXAMPLE}, ...] or {{ file }}")
+        curves, faults = {}, []
+        for k, one in enumerate(given):
+            try:
+                curves[k] = self.curve(one, setting)
+            except Misfit as error:
+                faults += [((k, *below), text) for below, text in error.faults]
+            except ValueError as error:
+                faults.append(((k,), str(error)))
+        found = {k: (k,) for k in curves}
+        return chart_of(curves, found, faults, [one.table() for one in curves.values()])
+
+    def curve(self, given: Any, setting: Setting) -> OpeningCurve:
+        """One of the list."""
+        if not isinstance(given, dict):
+            raise ValueError(f"{show(given)} is no table; wanted one such as {EXAMPLE}")
+        found = read_keys(given, self.keys, setting)
+        words = [word for word in (EFFICIENCY, TORQUE) if found[word] is not None]
+        if len(words) != 1:
+            said = f"{EFFICIENCY} and {TORQUE} are given; keep one" if words else f"wanted {EFFICIENCY} or {TORQUE}"
+            raise Misfit([(tuple(words[1:]), said)])
+        return OpeningCurve(found["opening"], found[SPEED], found[FLOW], found[words[0]], words[0])
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [{"type": "array", "items": keys_json(self.keys), "minItems": 1}, {"type": "object"}]}
+
+
+def from_file(given: dict[str, Any], setting: Setting) -> HillChart:
+    """Columns opening, unit_speed, unit_flow and efficiency or unit_torque; points of an opening in their order."""
+    unknown = [((key,), "unknown key; beside file there is none") for key in given if key != "file"]
+    if unknown or not isinstance(given["file"], str):
+        raise Misfit(unknown or [(("file",), f"{show(given['file'])} is no text")])
+    try:
+        path = find_file(given["file"], setting)
+        columns, word = columns_of(read_rows(path))
+    except ValueError as error:
+        raise Misfit([(("file",), str(error))]) from None
+    points: dict[float, list] = {}
+    for opening, *point in zip(*columns, strict=True):
+        points.setdefault(opening, []).append(point)
+    curves, faults = {}, []
+    for opening, rows in points.items():
+        try:
+            given = dict(zip((SPEED, FLOW, word), map(list, zip(*rows, strict=True)), strict=True))
+            curves[opening] = HillChartValue().curve({"opening": opening, **given}, setting)
+        except Misfit as error:
+            faults += [
+                (("file",), f"{path.name}, opening {opening:g}: {below[0]}: {text}") for below, text in error.faults
+            ]
+    said = {"file": copy_name(path, setting)}
+    return chart_of(curves, dict.fromkeys(curves, ("file",)), faults, said, f"{path.name}, ")
+
+
+def columns_of(rows) -> tuple[list, str]:
+    """(opening, n11, Q11 and efficiency or T11 of every row, which of the two), by their headers."""
+    words = [word for word in (EFFICIENCY, TORQUE) if word in rows.names]
+    if len(words) != 1:
+        said = "has both; keep one" if words else "has neither"
+        raise ValueError(f"{rows.file}: wanted a column {EFFICIENCY} or {TORQUE}, and it {said}")
+    found = []
+    for name in ("opening", SPEED, FLOW, words[0]):
+        column = rows.column(name, 0)
+        unit = split(rows.header[column])[1]
+        if name in UNITS and unit not in ("", UNITS[name]):
+            raise Misread(rows.file, f"column {show(rows.header[column])}: wanted {name} in {UNITS[name]}")
+        found.append(rows.plain(column) if name in UNITS else rows.numbers(column, "number").tolist())
+    return found, words[0]
+
+
+def chart_of(curves: dict, places: dict, faults: list, said: Any, file: str = "") -> HillChart:
+    """The chart of curves, each with the keys of its place; Misfit with all that is wrong with them."""
+    seen: dict[float, Any] = {}
+    for k, one in curves.items():
+        if one.opening in seen:
+            first = seen[one.opening] + 1
+            faults.append(
+                ((*places[k], "opening"), f"{one.opening:g} is that of curve {first} already; one curve each")
+            )
+        seen.setdefault(one.opening, k)
+        keys, name = places[k], f"{file}opening {one.opening:g}: "
+        found = faults_of_still(one) if one.opening == 0.0 else faults_of_curve(one)
+        faults += [((*keys, key) if not file and key else keys, (name if file else "") + text) for key, text in found]
+    open_ones = sorted((one for one in curves.values() if one.opening > 0.0), key=lambda one: one.opening)
+    if not open_ones and not faults:
+        faults.append(((), "has no curve of an opening above 0"))
+    if faults:
+        raise Misfit(faults)
+    still = next(((one.speed[0], one.value[0]) for one in curves.values() if one.opening == 0.0), None)
+    return HillChart(tuple(open_ones), still, said)

@@ -1,0 +1,168 @@
+"""A turbine: its vanes, its speed, what its shaft gets. Knows one turbine; knows no network.
+
+While its generator holds the speed, that is a schedule; once it has let go, or where given torques turn the shaft from
+the start, J d(omega)/dt = torque of the water and given ones. Its numbers are those of a pump, at a rated speed of 1.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.devices import PASSING
+from fvsolve.kernels.records import JUNCTION, RATE
+from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.valves import valve_conductance
+from fvsolve.parts.pump.law import (
+    GIVEN,
+    HELD_SPEED,
+    INERTIA,
+    MODE,
+    OFFSET,
+    TORQUE,
+    TRIPPING,
+    TURNED,
+    given_torque,
+    pump_speed,
+    tripped,
+)
+from fvsolve.parts.pump.law import stored as stored
+from fvsolve.parts.turbine.law_chart import chart_at, chart_head, chart_step, chart_torque, is_outside
+
+SHUT = 1e-12  # square of an opening that is none
+
+
+@njit
+def set(t, y, out, tables, device):
+    """Its speed, and how far its vanes are open."""
+    layout, k = tables.layout[0], device["valve"]
+    out[layout["drive"] + k] = pump_speed(t, y, tables, device)
+    g = valve_conductance(tables, k, t)
+    out[layout["conductance"] + k] = g if g >= SHUT * tables.valves[k]["conductance"] else 0.0
+
+
+@njit
+def vanes(tables, k, g):
+    """Opening of turbine k at its conductance."""
+    return sqrt(g / tables.valves[k]["conductance"])
+
+
+@njit
+def point(out, tables, device):
+    """(opening, speed [rad/s], flow [m3/s], density over that of the case) of a turbine whose nodes are closed."""
+    layout, k = tables.layout[0], device["valve"]
+    rho, _ = head_drop(tables, out, k)
+    opening = vanes(tables, k, out[layout["conductance"] + k])
+    return opening, out[layout["drive"] + k], out[layout["valve"] + k] / rho, rho / tables.settings[0]["rho"]
+
+
+@njit
+def torque_now(out, tables, device):
+    """Torque of the water on the shaft [N m]."""
+    opening, omega, q, dense = point(out, tables, device)
+    return dense * chart_torque(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
+
+
+@njit
+def holds(t, tables, device):
+    """Whether the generator holds the speed."""
+    mode = tables.floats[device["data"] + MODE]
+    return mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device))
+
+
+@njit
+def move(t, y, dydt, out, tables, device):
+    """d/dt of the speed of a shaft that runs free, and its rate."""
+    floats, at = tables.floats, device["data"]
+    if floats[at + MODE] == HELD_SPEED:
+        return
+    if holds(t, tables, device):
+        if dydt.size > 0:
+            dydt[device["y"]] = 0.0
+        return
+    out[RATE] = max(out[RATE], shaft_rate(out, tables, device))
+    if dydt.size == 0:
+        return
+    push = torque_now(out, tables, device)
+    if floats[at + MODE] == TURNED:
+        push = floats[at + OFFSET] + (push + floats[at + TORQUE]) + given_torque(t, tables, device, True)
+    dydt[device["y"]] = push / floats[at + INERTIA]
+
+
+@njit
+def shaft_rate(out, tables, device):
+    """Rate at which the water brakes a free shaft [1/s]."""
+    floats = tables.floats
+    opening, omega, q, dense = point(out, tables, device)
+    if opening <= 0.0:
+        return 0.0
+    steep = chart_at(floats, tables.valves[device["valve"]]["data"], opening, omega, q)[4]
+    return dense * abs(steep) / floats[device["data"] + INERTIA]
+
+
+@njit
+def power(t, y, dydt, out, tables, device):
+    """Power given to the shaft, rate of what it stores, what of drop times flow the shaft has got, below 0 [W]."""
+    floats, at = tables.floats, device["data"]
+    omega = out[tables.layout[0]["drive"] + device["valve"]]
+    taken = -torque_now(out, tables, device) * omega
+    if holds(t, tables, device):
+        return taken, 0.0, taken
+    given = given_torque(t, tables, device, False) * omega if floats[at + GIVEN] > 0.0 else 0.0
+    return given, floats[at + INERTIA] * omega * dydt[device["y"]], taken
+
+
+@njit
+def value(t, y, out, tables, device, which):
+    """Its head [m], speed [rad/s], torque [N m], power at the shaft [W], opening."""
+    st, k = tables.settings[0], device["valve"]
+    opening, omega, q, _ = point(out, tables, device)
+    if which == 0:
+        if opening > 0.0:
+            return chart_head(tables.floats, tables.valves[k]["data"], opening, omega, q)[0]
+        rho, drop = head_drop(tables, out, k)
+        return drop / (rho * st["gravity"])
+    if which == 1:
+        return omega
+    if which == 4:
+        return opening
+    torque = torque_now(out, tables, device)
+    return torque if which == 2 else torque * omega
+
+
+@njit
+def outside(out, tables, device):
+    """PASSING where it works at an angle that its chart does not give."""
+    opening, omega, q, _ = point(out, tables, device)
+    beyond = is_outside(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
+    return PASSING if beyond else 0
+
+
+@njit
+def stiffness(tables, k):
+    """What the drop across turbine k falls by as it takes more, by the pipes beside it [Pa s/kg]."""
+    nodes, total = tables.nodes, 0.0
+    for i in (tables.valves[k]["from_node"], tables.valves[k]["to_node"]):
+        if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
+            total += 1.0 / nodes[i]["admittance"]
+    return total
+
+
+@njit
+def step(out, tables, k, g, m, drop, denser, wide):
+    """a, s by its chart, which asks for the drop of heads at the density before it."""
+    rho, fall = head_drop(tables, out, k)
+    return turbine_step(tables, out, k, rho, g, m, fall)
+
+
+@njit
+def slope(out, tables, k, g, drop):
+    """d flow / d drop [kg/s/Pa]; none through shut vanes."""
+    m = out[tables.layout[0]["valve"] + k]
+    return turbine_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
+
+
+@njit
+def turbine_step(tables, out, k, rho, g, m, drop):
+    """`chart_step` of a turbine whose fluid has the density rho [kg/m3], at the speed that it has."""
+    weight, omega = rho * tables.settings[0]["gravity"], out[tables.layout[0]["drive"] + k]
+    opening, stiff = vanes(tables, k, g), stiffness(tables, k)
+    return chart_step(tables.floats, tables.valves[k]["data"], opening, omega, rho, weight, stiff, g, m, drop, m / rho)

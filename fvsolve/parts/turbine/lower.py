@@ -1,0 +1,123 @@
+"""Turbines in the tables of a scene, and how they start. Knows one turbine at a time; computes no chart."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.kernels import records as rec
+from fvsolve.model.device import Device
+from fvsolve.model.inputs import TURNING, Input, opening
+from fvsolve.parts.pump.law import INERTIA, RATED
+from fvsolve.parts.pump.lower_turning import Turning, numbers_of
+from fvsolve.parts.turbine import law
+from fvsolve.parts.turbine import law_chart as charts
+from fvsolve.parts.turbine.lower_chart import chart_numbers
+from fvsolve.steady import Edge
+
+SMALL = 1e-6  # share of a pressure that is none
+
+
+class TurbineRows(Turning, Device, kind="turbine"):
+    """A restriction that follows its hill chart; its flow at the start is that at which pressures and chart agree."""
+
+    law = law
+    quantities = ("head", "speed", "torque", "power", "opening")
+    small = 1.0  # rad/s
+
+    def inputs(self, model, name, part):
+        found = opening(model, name)
+        return found | {"speed": Input(TURNING, int(self.row_of(model, name)["schedule"]))}
+
+    def restriction(self, draft, name, link, row) -> None:
+        density = draft.fluid.density
+        row["data"], row["schedule"] = len(draft.floats), draft.schedules.add(link.opening)
+        draft.floats += chart_numbers(link, density * draft.case.gravity)
+        row["conductance"] = density * draft.floats[row["data"] + charts.FLOW] ** 2 / draft.case.gravity
+
+    def numbers(self, draft, name, part) -> list[float]:
+        found = self.turning(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
+        return numbers_of(found, self.given(draft, name), [])
+
+    def squares(self, model, part, row, y, out) -> list[dict[int, float]]:
+        return [{int(row["y"]): math.sqrt(0.5 * part.inertia)}] if row["y"] >= 0 else []
+
+    def above(self, model, part, row) -> float:
+        speed = float(model.tables.valves[row["valve"]]["drive"])
+        return 0.5 * part.inertia * speed**2 if row["y"] >= 0 else 0.0
+
+    def passing(self, model, name, part, time) -> Notice:
+        text = (f"{name}: it leaves its hill chart at {time:.6g} s; outside of it straight lines go on to its "
+                "flow at rest and its speed without flow; more points would tell")  # fmt: skip
+        return Notice("range", f"links.{name}", text, "hill_chart")
+
+    def edge(self, start, k: int):
+        row = start.valves[k]
+        i, j = int(row["from_node"]), int(row["to_node"])
+        row["drive"] = omega = self.speed_at(start, k)
+        vanes = float(start.given(row["schedule"]))
+        row["open"] = g = row["conductance"] * vanes * vanes if vanes * vanes >= law.SHUT else 0.0
+        if g <= 0.0:
+            return Edge(i, j, None, 0.0, shut=True)
+        if start.rest:
+            row["open"] = 0.0
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        floats, at, rho = start.draft.tables.floats, int(row["data"]), start.density_at(i)
+        weight, ratio = rho * start.case.gravity, rho / start.draft.fluid.density
+
+        def newton(flow, present):
+            present = float(present * ratio)
+            first = charts.greatest(floats, at, vanes, weight, present)  # of several flows the greatest
+            a, s = charts.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present, first)
+            return 1.0 / s, ratio, a / s
+
+        first = rho * floats[at + charts.FLOW] * charts.capacity(floats, at, vanes)
+        return Edge(i, j, newton, float(first), drives=omega != 0.0)
+
+    def follow(self, start, k) -> None:
+        """Nothing: `begin` sees to it."""
+
+    def begin(self, start, part, row) -> list[str]:
+        draft, valve, moving = start.draft, start.valves[int(row["valve"])], []
+        if valve["open"] > 0.0:
+            rho, floats = start.density_at(int(valve["from_node"])), draft.tables.floats
+            vanes = float(start.given(valve["schedule"]))
+            at = floats, int(valve["data"]), vanes, float(valve["drive"])
+            drop = rho * start.case.gravity * charts.chart_head(*at, float(valve["flow"]) / rho)[0]
+            ratio = rho / draft.fluid.density
+            if abs(drop - valve["drop"] * ratio) > SMALL * (abs(drop) + abs(valve["drop"])) + 1e-3:
+                name = draft.valve_names[row["valve"]]
+                moving.append(f"turbine {name}: its flow is not that of its hill chart")
+                valve["open"] = 0.0
+            elif draft.case.law.linear:
+                valve["drop"] = drop
+        draft.warnings += torn(start, draft.valve_names[row["valve"]], part, valve)
+        return moving + self.let_go(start, part, row, valve)
+
+    def asked(self, start, row, valve) -> float:
+        rho = start.density_at(int(valve["from_node"]))
+        vanes, omega = float(start.given(valve["schedule"])), float(valve["drive"])
+        floats, dense = start.draft.tables.floats, rho / start.draft.fluid.density
+        return -dense * charts.chart_torque(floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho)
+
+
+def torn(start, name: str, part, valve) -> list[Notice]:
+    """A note on a turbine whose curves fold, with a pressure given on both sides."""
+    ends = (start.nodes["kind"][int(valve[key])] for key in ("from_node", "to_node"))
+    if rec.JUNCTION in ends or not any(map(folds, part.hill_chart.curves)):
+        return []
+    ways = f"between {part.from_} and {part.to} nothing holds its flow"
+    text = (f"{name}: its hill chart folds, and {ways}: it takes one of several and may jump to and fro; a pipe or "
+            "rigid-column that leads to it would hold it")  # fmt: skip
+    return [Notice("range", f"links.{name}", text, "hill_chart")]
+
+
+def folds(one) -> bool:
+    """Whether n11 of a forward runner rises with the angle of a curve somewhere."""
+    points = list(zip(one.speed, one.flow, strict=True))
+    rising = points[0][0] * points[1][1] > points[0][1] * points[1][0]
+    ahead = points if rising else points[::-1]
+    return any(n < m for (n, _), (m, _) in pairwise(ahead) if n > 0.0 and m > 0.0)
