@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from fvsolve import units
 from fvsolve.case import basins, bodies, horizon, ranges, riding_networks, text
 from fvsolve.case.claims import Compare, Expect
 from fvsolve.case.extent import of_profiles
@@ -201,6 +202,22 @@ class Case(Shown):
     def elevations(self) -> dict[str, float]:
         """Heights of all places of the fluid above datum [m]."""
         return {name: self.elevation(name) for name in self.places}
+
+    def unit_of(self, dimension: str) -> str:
+        """The unit that `[output]` asks for, SI where it is silent."""
+        known, asked = units.DIMENSIONS[dimension], self.output.units
+        return asked.get(dimension) or asked.get(known.base) or known.si
+
+    def amount(self, value: float, dimension: str, digits: int = 4, span: bool = False, silent: str = "") -> str:
+        """A number [SI] with the unit that `[output]` asks for, as messages tell it.
+
+        span : it is a difference, whose zero point does not matter; silent : the unit where `[output]` is
+        """
+        unit = self.unit_of(dimension)
+        unit = silent if silent and unit == units.DIMENSIONS[dimension].si else unit
+        if span:
+            return f"{units.find(units.span(unit), dimension).number(value):.{digits}g} {units.span(unit)}"
+        return f"{units.convert(value, dimension, unit, self.ambient_pressure):.{digits}g} {unit}"
 
     def wave_speed(self, name: str) -> float:
         """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho), 1/K = 1/beta + diameter / (E wall)."""

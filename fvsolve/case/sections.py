@@ -231,7 +231,7 @@ def steps_by_error(method: str | None) -> bool:
 
 
 class OutputUnits(Value):
-    """`[output] units`: a unit per quantity of a probe."""
+    """`[output] units`: a unit per quantity of a probe, and of what is said of parts."""
 
     about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }; SI, absolute if left out'
     takes = "`{ QUANTITY = UNIT }`"
@@ -252,6 +252,10 @@ class OutputUnits(Value):
         "energy",
         "power",
         "time",
+        "length",
+        "area",
+        "volume",
+        "density",
     )
 
     def read(self, given: Any, setting: Setting) -> dict[str, str]:

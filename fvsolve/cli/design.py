@@ -35,12 +35,14 @@ def study(
 
 def _show(found) -> None:
     from fvsolve.cli import terminal
+    from fvsolve.cli.report import when, where_and_when
     from fvsolve.studies.design import name_of
+    from fvsolve.units import span
 
     console = terminal.console()
     if found.design.title:
         terminal.line(console, found.design.title, "bold")
-    limits = {one["name"]: f"{one['name']} [{one['unit']}]" for row in found.rows for one in row["verdicts"]}
+    limits = {one["name"]: f"{one['name']} [{span(one['unit'])}]" for row in found.rows for one in row["verdicts"]}
     rows = []
     for row in found.rows:
         verdicts = {one["name"]: one for one in row["verdicts"]}
@@ -52,14 +54,12 @@ def _show(found) -> None:
             terminal.line(console, f"{name_of(row)}: {row['reason']}", "bold red")
         if row["marks"]:
             first = min(row["marks"], key=lambda mark: mark["time"])
-            text = f"{first['text']}: results from {first['time']:.6g} s on are not to be trusted"
+            text = f"{first['text']}: results from {when(row)(first['time'])} on are not to be trusted"
             terminal.line(console, f"{name_of(row)}: {text}", "yellow")
         for one in row["verdicts"]:
             if not one["ok"] and not is_open(one):
-                at = "" if one["chainage"] is None else f" at {one['chainage']:.6g} m"
-                when = "" if one["time"] is None else f", {one['time']:.6g} s"
                 value = "-" if one["value"] is None else f"{one['value']:.6g}"
-                text = f"{name_of(row)}: {one['name']}: {value} {one['unit']} ({one['place']}{at}{when})"
+                text = f"{name_of(row)}: {one['name']}: {value} {one['unit']} ({where_and_when(one, row)})"
                 terminal.line(console, text, "red")
     names = [name or "the case as it is" for name in found.holds]
     told = f"all limits hold in all events: {', '.join(names)}" if names else "nothing holds all limits in all events"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from fvsolve.cli.terminal import console as _console
 from fvsolve.cli.terminal import line as _line
 from fvsolve.cli.terminal import table as _table
 from fvsolve.errors import listing
 from fvsolve.output.directory import pictures_there
+from fvsolve.units import span
 
 ROWS = 20  # of a table at most; the rest is on disk
 MANY = 40  # rows of a table of `check`: beyond, those that stand out
@@ -14,7 +17,7 @@ FLUID = {
     "density": "density", "bulk_modulus": "modulus", "sound_speed": "velocity", "viscosity": "viscosity",
     "vapor_pressure": "pressure",
 }  # fmt: skip
-NODE = {"elevation": ("elevation", "length"), "pressure": ("pressure", "pressure"), "head": ("head", "head")}
+NODE = {"elevation": ("elevation", "head"), "pressure": ("pressure", "pressure"), "head": ("head", "head")}
 MASS = {
     "position": ("position", "position"), "velocity": ("velocity", "velocity"), "force": ("net force", "force")
 }  # fmt: skip
@@ -34,27 +37,30 @@ PIPE = {
 }
 
 BASIN = {
-    "physics": "physics", "cells": "cells", "path": "kernels over", "area": "area [m2]", "depth": "depth [m]",
-    "wave_speed": "wave speed [m/s]", "memory": "memory [B]",
+    "physics": ("physics", ""), "cells": ("cells", ""), "path": ("kernels over", ""), "area": ("area", "area"),
+    "depth": ("depth", "level"), "wave_speed": ("wave speed", "velocity"), "memory": ("memory [B]", ""),
 }  # fmt: skip
-PATCH = {"faces": "faces", "length": "length [m]", "area": "cells behind [m2]", "reflects": "waves reflected"}
+PATCH = {
+    "faces": ("faces", ""), "length": ("length", "length"), "area": ("cells behind", "area"),
+    "reflects": ("waves reflected", ""),
+}  # fmt: skip
 PLACES_SHOWN = 3
 EVENTS_SHOWN = 12
 
 
 def result(one) -> None:
     """Least and greatest of every probe, marks, ledgers, expectations, comparisons, steps."""
-    said = one.summary
+    said, told = one.summary, when(one.summary)
     console = _console()
     if said["title"]:
         _line(console, said["title"], "bold")
     _extremes(console, one)
-    for text in marks_of(said["marks"]):
+    for text in marks_of(said["marks"], told):
         _line(console, text, "yellow")
     for cavity in said["cavities"]:
         _line(console, cavity["text"])
     for event in said["events"][:EVENTS_SHOWN]:
-        _line(console, f"{event['name']} {event['what']} at t = {event['time']:.6g} s")
+        _line(console, f"{event['name']} {event['what']} at t = {told(event['time'])}")
     if len(said["events"]) > EVENTS_SHOWN:
         _line(console, f"and {len(said['events']) - EVENTS_SHOWN} more events; all stand in summary.json")
     for name, ledger in said["ledgers"].items():
@@ -64,12 +70,20 @@ def result(one) -> None:
     for verdict in said["verdicts"]:
         _line(console, _verdict(verdict, said), "green" if verdict["ok"] else "bold red")
     for measured in said["comparisons"]:
-        _line(console, _comparison(measured))
+        _line(console, _comparison(measured, said))
     _notices(console, said["warnings"])
     if "resolution" in said:
         _line(console, said["resolution"]["words"])
-    when = "" if "at t = " in said["reason"] else f" at t = {said['t']:.6g} s"
-    _line(console, f"{said['reason']}{when}; {_cost(said)}", None if one.ok else "bold red")
+    end = "" if "at t = " in said["reason"] else f" at t = {told(said['t'])}"
+    _line(console, f"{said['reason']}{end}; {_cost(said)}", None if one.ok else "bold red")
+
+
+def when(said: dict) -> Callable[[float], str]:
+    """What tells times [s] in the unit of a run."""
+    from fvsolve.output.column import UnitColumn
+
+    clock = UnitColumn("t", "time", said["time_unit"])
+    return lambda t: f"{_number(float(clock.from_si(t)))} {clock.unit}"
 
 
 def files(one) -> None:
@@ -104,18 +118,10 @@ def checks(case, found: dict, every: bool = False) -> None:
         _states(
             console, case, word, found[group], keys, every, {name for name in found[group] if f"{place}.{name}" in odd}
         )
-    rows = [[name, *(_number(one.get(key)) for key in BASIN)] for name, one in found["basins"].items()]
-    if rows:
-        _table(["basin", *BASIN.values()], rows, console)
-        _line(console, "")
-    rows = [
-        [f"{name}.{patch}", *(_number(faces[key]) for key in PATCH)]
-        for name, one in found["basins"].items()
-        for patch, faces in one["patches"].items()
-    ]
-    if rows:
-        _table(["patch", *PATCH.values()], rows, console)
-        _line(console, "")
+    basins = found["basins"]
+    _rows(console, case, "basin", basins, BASIN)
+    patches = {f"{name}.{patch}": faces for name, one in basins.items() for patch, faces in one["patches"].items()}
+    _rows(console, case, "patch", patches, PATCH)
     said = [f"friction of {name} remembers: {_memory(one['unsteady'])}"
             for name, one in found["pipes"].items() if "unsteady" in one]  # fmt: skip
     said += _walls(case, found["pipes"])
@@ -130,6 +136,19 @@ def checks(case, found: dict, every: bool = False) -> None:
     if found["basins"]:
         _line(console, _threads(found["threads"]))
     _line(console, _step(found))
+
+
+def _rows(console, case, word: str, found: dict, keys: dict) -> None:
+    """A table of basins or patches in the units of `[output]`, none of none."""
+    from fvsolve.output.column import column
+
+    columns = [column(said, dimension, case) if dimension else None for said, dimension in keys.values()]
+    heads = [said if one is None else one.header for (said, _), one in zip(keys.values(), columns, strict=True)]
+    rows = [[name, *(_number(one.get(key) if unit is None else _in(unit, one.get(key)))
+                     for key, unit in zip(keys, columns, strict=True))] for name, one in found.items()]  # fmt: skip
+    if rows:
+        _table([word, *heads], rows, console)
+        _line(console, "")
 
 
 def _walls(case, pipes: dict) -> list[str]:
@@ -149,9 +168,8 @@ def _wall(case, one: dict) -> str:
         unit = column("allowable", "gauge_pressure", case)
         said.append(f"bears {_number(_in(unit, one['allowable_pressure']))} {unit.unit}")
     if "creep" in one:
-        said.append(
-            f"{one['creep']['elements']} elements creep, slow waves run at {one['creep']['slow_speed']:.4g} m/s"
-        )
+        speed = case.amount(one["creep"]["slow_speed"], "velocity")
+        said.append(f"{one['creep']['elements']} elements creep, slow waves run at {speed}")
     if "restraint_factor" in one:
         said.append(f"restraint {one['restraint_factor']:.4g}")
     if "source" in one:
@@ -201,13 +219,12 @@ def _outstanding(found: dict, keys: dict, odd: set[str]) -> list[str]:
 def _fluid(case, found: dict) -> str:
     """The fluid in the units of `[output]`; its modulus in that of pressures."""
     from fvsolve.output.column import column
-    from fvsolve.units import UNITS
 
     said = []
     for key, dimension in FLUID.items():
         one = column(key, dimension, case)
-        if dimension == "modulus" and (UNITS[one.unit].gauge or UNITS[one.unit].absolute):
-            one = column(key, dimension, case, one.unit[:-1])
+        if dimension == "modulus":
+            one = column(key, dimension, case, span(one.unit))
         said.append(f"{key.replace('_', ' ')} {'unknown' if found[key] is None else _number(_in(one, found[key]))}"
                     f"{'' if found[key] is None else ' ' + one.unit}")  # fmt: skip
     name = "" if found["name"] == found["source"] else f" ({found['source']})"
@@ -216,6 +233,8 @@ def _fluid(case, found: dict) -> str:
 
 def _in(column, value):
     """A number in the unit of a column; None where there is none."""
+    if isinstance(value, list):  # a range
+        return [_in(column, one) for one in value]
     return value if value is None or column.plain else float(column.from_si(value))
 
 
@@ -249,7 +268,7 @@ def titles(found: dict[str, str]) -> None:
 def differences(found: dict) -> None:
     """Differences of two runs, per shared probe."""
     rows = [
-        [name, one["unit"], _number(one["greatest"]), _number(one["t_greatest"]), _number(one["rms"])]
+        [name, span(one["unit"]), _number(one["greatest"]), _number(one["t_greatest"]), _number(one["rms"])]
         for name, one in found["probes"].items()
     ]
     _table(["probe", "unit", "greatest difference", "at [s]", "rms"], rows)
@@ -259,10 +278,14 @@ def differences(found: dict) -> None:
 
 
 def _extremes(console, one) -> None:
-    rows = [[name, one.units[name], *map(_number, found)] for name, found in one.extremes.items()]
-    heads = ["probe", "unit", "least", "at [s]", "greatest", "at [s]"]
+    from fvsolve.output.column import UnitColumn
+
+    clock = UnitColumn("at", "time", one.summary["time_unit"])
+    rows = [[name, one.units[name], _number(found.least), _number(_in(clock, found.t_least)), _number(found.greatest),
+             _number(_in(clock, found.t_greatest))] for name, found in one.extremes.items()]  # fmt: skip
+    heads = ["probe", "unit", "least", clock.header, "greatest", clock.header]
     if "peaks" in one.summary:
-        heads = ["probe", "unit", "least", "+-", "at [s]", "greatest", "+-", "at [s]"]
+        heads = ["probe", "unit", "least", "+-", clock.header, "greatest", "+-", clock.header]
         for row, peak in zip(rows, one.summary["peaks"].values(), strict=True):
             row[3:3] = [_off(peak["least"])]
             row[6:6] = [_off(peak["greatest"])]
@@ -291,7 +314,7 @@ def _claim(one: dict) -> str:
     verdict = "holds" if one["ok"] else "FAILS"
     return (
         f"{verdict}: {one['text']} = {_number(one['claimed'])} {one['unit']} within "
-        f"{_number(one['tolerance'])}: found {_number(one['found'])}"
+        f"{_number(one['tolerance'])} {span(one['unit'])}: found {_number(one['found'])}"
         f"{'' if one['error'] is None else f' +- {_off(one)}'}"
     )
 
@@ -301,24 +324,32 @@ def _off(peak: dict) -> str:
     return "?" if peak["error"] is None else f"{peak['error']:.2g}"
 
 
+def where_and_when(one: dict, said: dict) -> str:
+    """Where and when a verdict is nearest to its limit, in the units of a run's summary."""
+    from fvsolve.output.column import UnitColumn
+
+    along = UnitColumn("chainage", "length", said["envelope_units"]["distance"])
+    where = "" if one["chainage"] is None else f" at {_number(_in(along, one['chainage']))} {along.unit}"
+    return one["place"] + where + ("" if one["time"] is None else f", {when(said)(one['time'])}")
+
+
 def _verdict(one: dict, said: dict) -> str:
-    where = one["place"] + ("" if one["chainage"] is None else f" at {_number(one['chainage'])} m")
-    when = "" if one["time"] is None else f", {_number(one['time'])} s"
     beside = "at least" if one["bound"] == "least" else "at most"
-    found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where}{when})"
+    found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where_and_when(one, said)})"
     held = "holds" if one["ok"] else "FAILS"
     if not one["ok"] and one["margin"] is not None and one["margin"] >= 0.0:
         held = f"OPEN, as {why_open(said)}"
-    said = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {_number(one['margin'])}"
+    margin = "-" if one["margin"] is None else f"{_number(one['margin'])} {span(one['unit'])}"
+    text = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {margin}"
     if one["time"] is not None and one["until"] > 0.0 and one["time"] >= one["until"] * (1.0 - 1e-9):
-        said += ", at the end of the run: a later end may be worse"
+        text += ", at the end of the run: a later end may be worse"
     if one["error"] is None or one["margin"] is None:
-        return said
+        return text
     doubt = ", which leaves it open" if abs(one["margin"]) < one["error"] else ""
-    return f"{said} within {one['error']:.2g}{doubt}"
+    return f"{text} within {one['error']:.2g}{doubt}"
 
 
-def marks_of(marks: list[dict]) -> list[str]:
+def marks_of(marks: list[dict], told) -> list[str]:
     """What the model carried on through, each said once with the places that met it, the first one first."""
     alike: dict[str, list[dict]] = {}
     for mark in sorted(marks, key=lambda mark: mark["time"]):
@@ -328,7 +359,7 @@ def marks_of(marks: list[dict]) -> list[str]:
         names = [mark["text"].partition(": ")[0] for mark in those]
         more = f" and {len(names) - PLACES_SHOWN} more" if len(names) > PLACES_SHOWN else ""
         where = ", ".join(names[:PLACES_SHOWN]) + more
-        found.append(f"{where}: {text}: results from {those[0]['time']:.6g} s on are not to be trusted")
+        found.append(f"{where}: {text}: results from {told(those[0]['time'])} on are not to be trusted")
     return found
 
 
@@ -337,18 +368,18 @@ def why_open(said: dict) -> str:
     if not said["marks"]:
         return f"the run is not ok ({said['reason']})"
     first = min(said["marks"], key=lambda mark: mark["time"])
-    return f"results from {first['time']:.6g} s on are not to be trusted"
+    return f"results from {when(said)(first['time'])} on are not to be trusted"
 
 
-def _comparison(one: dict) -> str:
+def _comparison(one: dict, said: dict) -> str:
     if one["rms"] is None:
         return f"{one['probe']} against {one['file']}: no measured time lies within the run"
-    unit = one["unit"]
+    unit, apart, told = one["unit"], span(one["unit"]), when(said)
     return (
-        f"{one['probe']} against {one['file']}: rms {_number(one['rms'])} {unit}, greatest difference "
-        f"{_number(one['greatest_difference'])} {unit} at {_number(one['t_greatest_difference'])} s; peak "
-        f"{_number(one['computed_peak'])} at {_number(one['t_computed_peak'])} s, measured "
-        f"{_number(one['measured_peak'])} at {_number(one['t_measured_peak'])} s"
+        f"{one['probe']} against {one['file']}: rms {_number(one['rms'])} {apart}, greatest difference "
+        f"{_number(one['greatest_difference'])} {apart} at {told(one['t_greatest_difference'])}; peak "
+        f"{_number(one['computed_peak'])} {unit} at {told(one['t_computed_peak'])}, measured "
+        f"{_number(one['measured_peak'])} {unit} at {told(one['t_measured_peak'])}"
     )
 
 

@@ -110,14 +110,14 @@ def redundant(rows: np.ndarray, names: list[str]) -> list[str]:
 
 def moves(draft, accelerations: np.ndarray) -> list[str]:
     """What moves at the start, and what begins to, in words."""
-    found = []
+    found, told = [], draft.case.amount
     for name, row in zip(draft.body_names, draft.body_table, strict=True):
         pose, own = draft.case.poses[name], accelerations[row["freedom"] : row["freedom"] + row["freedoms"]]
         stated = name in draft.case.nodes  # of water in modes only what it begins to do
         if stated and (fast := np.linalg.norm(pose.spin)) > 0.0:
-            found.append(f"body {name} turns at {fast:.4g} rad/s")
+            found.append(f"body {name} turns at {told(fast, 'angular_velocity')}")
         if stated and (fast := np.linalg.norm(pose.velocity)) > 0.0:
-            found.append(f"body {name} moves at {fast:.4g} m/s")
+            found.append(f"body {name} moves at {told(fast, 'velocity')}")
         slides = 0 if row["joint"] in (rec.REVOLUTE, rec.BALL) else 3 if row["joint"] == rec.FREE else 1
         for part, unit in ((own[:slides], "m/s2"), (own[slides:], "rad/s2")):
             if np.any(part):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -39,9 +40,9 @@ class Device(Restriction):
         """As of `Lowering`: what a vessel is said to have at the start."""
         return node.initial_pressure
 
-    def moves(self, name: str, node: Any, row, inflow: float, flow: float) -> str:
+    def moves(self, name: str, node: Any, row, inflow: float, flow: float, told: Callable[..., str]) -> str:
         """As of `Lowering`."""
-        return f"{node.kind} {name}: pressure changes by {row['stiffness'] * inflow:.4g} Pa/s"
+        return f"{node.kind} {name}: pressure changes by {told(row['stiffness'] * inflow, 'pressure', span=True)}/s"
 
     def gate(self, name: str) -> str | None:
         """The link that a vessel opens and shuts beside."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from types import ModuleType
@@ -75,9 +76,12 @@ class Lowering:
         """Pressure [Pa] that a place holds in the steady problem, None where flows decide."""
         return None
 
-    def moves(self, name: str, node: Any, row, inflow: float, flow: float) -> str:
-        """What a net flow [kg/s], [m3/s] into a place does at the start, in words; "" for nothing."""
-        return f"junction {name}: {flow:.4g} m3/s more flow in than out"
+    def moves(self, name: str, node: Any, row, inflow: float, flow: float, told: Callable[..., str]) -> str:
+        """What a net flow [kg/s], [m3/s] into a place does at the start, in words; "" for nothing.
+
+        told : as `Case.amount`, numbers in the units of `[output]`
+        """
+        return f"junction {name}: {told(flow, 'flow')} more flow in than out"
 
     # links ----------------------------------------------------------------------------------------------------
 

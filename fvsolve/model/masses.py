@@ -129,7 +129,8 @@ def start_masses(draft, start) -> list[str]:
     moving = []
     for name, row in zip(draft.mass_names, masses, strict=False):
         if row["velocity"] != 0.0:
-            moving.append(f"mass {name} moves at {row['velocity']:.4g} m/s")
+            moving.append(f"mass {name} moves at {draft.case.amount(row['velocity'], 'velocity')}")
         if row["force"] != 0.0 and row["lightness"] > 0.0:
-            moving.append(f"mass {name} accelerates at {row['force'] * row['lightness']:.4g} m/s2")
+            pull = draft.case.amount(row["force"] * row["lightness"], "acceleration")
+            moving.append(f"mass {name} accelerates at {pull}")
     return moving

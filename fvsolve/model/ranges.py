@@ -34,8 +34,9 @@ def _quick(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -> 
     if not (speed > QUICKEST).any():
         return []
     worst = int(np.argmax(speed))
-    text = (f"{_all(names, speed > QUICKEST)}: {speed[worst]:.4g} m/s at the start in {names[worst]}, above "
-            f"{QUICKEST:g} m/s; a flow or a diameter in other units?")  # fmt: skip
+    found, most = (draft.case.amount(one, "velocity") for one in (speed[worst], QUICKEST))
+    text = (f"{_all(names, speed > QUICKEST)}: {found} at the start in {names[worst]}, above "
+            f"{most}; a flow or a diameter in other units?")  # fmt: skip
     return [Notice("range", f"links.{names[worst]}", text, "flow", float(speed[worst]), QUICKEST)]
 
 
@@ -50,7 +51,7 @@ def _laminar(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -
     if not AT_REST < reynolds[worst] < LAMINAR:
         return []
     text = (f"{names[worst]}: Reynolds number {reynolds[worst]:.4g} at the start, laminar as water hardly is in "
-            f"pipes this wide; are {abs(flow[worst]) / fluid.density:.4g} m3/s and a viscosity of "
+            f"pipes this wide; are {draft.case.amount(abs(flow[worst]) / fluid.density, 'flow')} and a viscosity of "
             f"{fluid.viscosity:.4g} Pa s right?")  # fmt: skip
     return [Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)]
 

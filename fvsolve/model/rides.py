@@ -74,5 +74,7 @@ def driven_at_start(draft, start) -> list[str]:
                 many = int(row["cells" if "cells" in row.dtype.names else "rides"])
                 push = float(drives[row["ride"] : row["ride"] + many].sum())
                 if abs(push) > SMALL:
-                    found.append(f"{kind} {name}: its body drives it with {rho * push:.4g} Pa")
+                    found.append(
+                        f"{kind} {name}: its body drives it with {draft.case.amount(rho * push, 'pressure', span=True)}"
+                    )
     return found

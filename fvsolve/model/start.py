@@ -265,8 +265,8 @@ class Start:
         names = list(self.case.places)
         for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
             drawn = self.demand[i] / self.draft.fluid.density
-            what = f"{drawn:.4g} m3/s are drawn here but every way to it" if drawn > 0.0 else (
-                f"{-drawn:.4g} m3/s come in here but every way out")  # fmt: skip
+            what = f"{self.case.amount(drawn, 'flow')} are drawn here but every way to it" if drawn > 0.0 else (
+                f"{self.case.amount(-drawn, 'flow')} come in here but every way out")  # fmt: skip
             self.draft.fault(
                 f"nodes.{names[i]}",
                 f'no steady state: {what} is shut; open a valve, or use initial = "rest"',
@@ -276,9 +276,10 @@ class Start:
             free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
             if free and not self.rest and abs(held[ends[0]] - held[ends[1]]) > 1e-6 * PRESSURE_SCALE:
                 a, b = ((held[k] - self.case.ambient_pressure) / self.weight for k in ends)
+                a, b = (self.case.amount(one, "head", 6) for one in (a, b))
                 self.draft.fault(
                     f"links.{name}",
-                    f"no steady state: it has no friction, and heads of {a:.6g} m and {b:.6g} m at its ends; "
+                    f"no steady state: it has no friction, and heads of {a} and {b} at its ends; "
                     'give it friction or initial_flow, or use initial = "rest"',
                 )
         if not self.draft.faults and not self.answer.converged:
@@ -431,17 +432,20 @@ class Start:
         for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):
             name = name.removesuffix(".inside")
             if inflow != 0.0:
-                text = lowering_of(type(node)).moves(name, node, row, inflow, inflow / fluid.density)
+                text = lowering_of(type(node)).moves(name, node, row, inflow, inflow / fluid.density, self.case.amount)
                 moving += [text] if text else []
+        told = self.case.amount
         for name, pressure in self.driven.items():
-            moving.append(f"pipe {name}: {pressure:.4g} Pa drive it, unbalanced by friction")
+            moving.append(f"pipe {name}: {told(pressure, 'pressure', span=True)} drive it, unbalanced by friction")
         for name, row in zip(self.draft.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
-                moving.append(f"rigid column {name}: {row['offset']:.4g} Pa drive it unbalanced")
+                moving.append(f"rigid column {name}: {told(row['offset'], 'pressure', span=True)} drive it unbalanced")
         for k, (name, row) in enumerate(zip(self.draft.valve_names, self.valves, strict=True)):
             if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
                 if self.conductance(k) > 0.0:
-                    moving.append(f"valve {name}: open with {row['drop']:.4g} Pa across it and no flow")
+                    moving.append(
+                        f"valve {name}: open with {told(row['drop'], 'pressure', span=True)} across it and no flow"
+                    )
         if self.case.numerics.initial == "equilibrium":
             for text in moving:
                 self.draft.fault("numerics.initial", f'"equilibrium" wants nothing to move, but {text}')

@@ -43,6 +43,11 @@ class UnitColumn:
         return value * unit.denominator / unit.numerator
 
     @property
+    def span_unit(self) -> str:
+        """What a difference of two values is told in: bar where they are in barg."""
+        return units.span(self.unit)
+
+    @property
     def plain(self) -> bool:
         """True where the column is in SI itself, so that not one bit is touched."""
         return self.dimension == "number" or self.unit == units.DIMENSIONS[self.dimension].si
@@ -50,11 +55,7 @@ class UnitColumn:
 
 def column(name: str, dimension: str, case, label: str = "") -> UnitColumn:
     """The column of a quantity in the unit that `case.output.units` asks for, SI where it is silent; or a number's."""
-    known = units.DIMENSIONS[dimension]
-    asked = case.output.units
-    return UnitColumn(
-        name, dimension, label or asked.get(dimension) or asked.get(known.base) or known.si, case.ambient_pressure
-    )
+    return UnitColumn(name, dimension, label or case.unit_of(dimension), case.ambient_pressure)
 
 
 def time_column(case) -> UnitColumn:

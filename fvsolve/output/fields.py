@@ -237,10 +237,20 @@ def read_series(path: Path) -> list[tuple[float, Path]]:
 
 def read_pipes(path: Path, quantity: str) -> np.ndarray:
     """A quantity of all cells of pipes in a frame, SI : float64[cells]; RunError where it cannot be read."""
+    return read_lines(path, quantity)[2]
+
+
+def read_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(points float64[p, 3] [m], lines int[c, 2], a quantity float64[c] in SI, number of the pipe int[c]) of a frame.
+
+    RunError where it cannot be read.
+    """
     from meshio import vtu  # meshio.read prints and exits where it cannot
 
     try:
-        return vtu.read(str(path)).cell_data_dict[quantity]["line"]
+        mesh = vtu.read(str(path))
+        data = mesh.cell_data_dict
+        return mesh.points, mesh.cells_dict["line"], data[quantity]["line"], data["pipe"]["line"]
     except Exception as error:  # whatever it and its parsers make of a damaged file
         said = f"{type(error).__name__}: {error}"
         raise RunError(f"{path} cannot be read ({said}); run again with --force") from None

@@ -16,6 +16,7 @@ from fvsolve.report.page import WARNINGS, rendered
 from fvsolve.report.section import section
 from fvsolve.report.tables import ERROR, ReportTable
 from fvsolve.report.trust import OPEN, Word, state
+from fvsolve.units import span
 
 POINTS = 400  # of a series
 PROBES, SECTIONS = 6, 2  # of an event at most, those of the first run
@@ -87,17 +88,18 @@ def matrix(runs: list) -> ReportTable:
         rows.append([row["event"] or "", row["protection"] or "", "holds" if holds else "FAILS", *margins])
     heads = ["event", "protection", "verdict"]
     heads += [word for name in names for word in (f"margin of {name}", *[ERROR] * asked)]
-    units = ["", "", ""] + [unit for unit in names.values() for _ in range(1 + asked)]
+    units = ["", "", ""] + [span(unit) for unit in names.values() for _ in range(1 + asked)]
     return ReportTable("Margins", heads, rows, units, frozenset(bad))
 
 
 def failing(runs: list) -> ReportTable | None:
     """Every limit that fails, where and when."""
-    rows = [[name_of(row), one.name, one.value, one.limit, one.margin, one.unit, one.place, one.chainage, one.time]
+    rows = [[name_of(row), one.name, one.value, one.limit, one.unit, one.margin, span(one.unit), one.place,
+             one.chainage, one.time]
             for row, result in runs for one in result.verdicts if not one.ok]  # fmt: skip
-    heads = ("run", "limit", "value", "allowed", "margin", "unit", "worst at", "chainage", "time")
-    units = ("", "", "", "", "", "", "", "m", "s")
-    return ReportTable("", heads, rows, units, loose=frozenset({2, 3, 4}), most=FAILED) if rows else None
+    heads = ("run", "limit", "value", "allowed", "unit", "margin", "unit", "worst at", "chainage", "time")
+    units = ("", "", "", "", "", "", "", "", "m", "s")
+    return ReportTable("", heads, rows, units, loose=frozenset({2, 3, 5}), most=FAILED) if rows else None
 
 
 def changed(said: dict[str, Any]) -> list[ReportTable]:

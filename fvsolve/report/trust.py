@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from fvsolve.output.column import column
 from fvsolve.report.tables import ERROR, ReportTable, worded
+from fvsolve.units import span
 
 HOLDS, FAILS, OPEN = "holds", "FAILS", "open"
 BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
@@ -93,7 +94,9 @@ def verdicts(result) -> ReportTable | None:
     rows = []
     for one in found:
         asks = f"{one.quantity.replace('_', ' ')} {BOUNDS[one.bound]} {worded(one.limit)} {one.unit}"
-        rows.append([one.name, asks, state(one), one.value, *[one.error] * asked, one.margin, one.unit, one.place,
+        apart = span(one.unit)
+        said = one.unit if apart == one.unit else f"{one.unit}, margin {apart}"
+        rows.append([one.name, asks, state(one), one.value, *[one.error] * asked, one.margin, said, one.place,
                      _in(length, one.chainage), _in(height, one.elevation), _in(time, one.time)])  # fmt: skip
     heads = ("limit", "asks for", "verdict", "value", *[ERROR] * asked, "margin", "unit", "worst at")
     heads += ("chainage", "elevation", "time")
@@ -110,7 +113,7 @@ def worst(result) -> list[ReportTable]:
         rows = [[row["place"], _in(length, row["chainage"]), _in(height, row["elevation"]), _in(time, row["time"]),
                  row["value"], row["limit"], row["margin"]] for row in one.worst]  # fmt: skip
         bad = frozenset(k for k, row in enumerate(rows) if row[-1] is None or row[-1] < 0.0)
-        units = ("", length.unit, height.unit, time.unit, one.unit, one.unit, one.unit)
+        units = ("", length.unit, height.unit, time.unit, one.unit, one.unit, span(one.unit))
         heads = ("place", "chainage", "elevation", "time", one.quantity.replace("_", " "), BOUNDS[one.bound], "margin")
         made += [ReportTable(f"Limit {one.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
     return made

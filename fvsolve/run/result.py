@@ -266,9 +266,12 @@ class Result(Shown):
     def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:
         """Draw `field` at the frame nearest to `time` [s] (the last by default) with PyVista; its path.
 
-        Left out, `field` is pressure, or where there are no pipes the first of the first basin; `contours` are lines of
-        equal values. RunError where there are no frames, FvsolveError where nothing can be drawn.
+        Left out, `field` is pressure, or where there are no pipes the first of the first basin, and of a case without
+        pipes, basins and bodies its parts alone; `contours` are lines of equal values. RunError where there are no
+        frames, FvsolveError where nothing can be drawn.
         """
+        if field is None and self._lumped:
+            return self._draw([], "parts", path, ".png", 0)
         times = [t for t, _ in self._frames()]
         t = times[-1] if time is None else min(times, key=lambda one: abs(one - time))
         return self._draw([t], field, path, ".png", contours)
@@ -277,6 +280,12 @@ class Result(Shown):
     def animate(self, path=None, field: str | None = None, contours: int = 0) -> Path:
         """Draw all frames as `view` does, as a .gif or .mp4; its path."""
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
+
+    @property
+    def _lumped(self) -> bool:
+        """Whether there is nothing that has fields."""
+        kinds = {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
+        return self.directory is not None and not kinds & {"pipe", "basin", "body"}
 
     def _frames(self) -> list[tuple[float, Path]]:
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
@@ -291,6 +300,7 @@ class Result(Shown):
 
     def _draw(self, times: list[float], field: str | None, path, suffix: str, contours: int) -> Path:
         from fvsolve.draw.view import view
+        from fvsolve.run.drawn import scene_of
 
         if field is None:
             pipes = any(link.kind == "pipe" for link in self.case.links.values())
@@ -299,13 +309,9 @@ class Result(Shown):
             field = "pressure" if pipes or not basins else next(iter(basins[0].own.fields), "pressure")
             field = "speed" if bodies and not pipes and not basins else field
         out = Path(path) if path else self.directory / f"{field}{suffix}"
-        frames, what = self._frames(), f"{self.summary['title']}\n{field.replace('_', ' ')}"
-        view(
-            [(f"{what} at t = {t:.6g} s", [file for at, file in frames if at == t]) for t in times],
-            field,
-            out,
-            contours,
-        )
+        frames = self._frames() if times else []
+        found = [(t, [file for at, file in frames if at == t]) for t in times]
+        view(scene_of(self.case, self.summary["title"], field, found, contours), out)
         return out
 
     def _measured(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:

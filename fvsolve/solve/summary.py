@@ -155,8 +155,10 @@ def find_cavities(slate: Slate) -> list[Cavity]:
         share, volume, t_volume = (float(x) for x in marks[marks.size - 3 * (len(model.pipes) - k) :][:3])
         if np.isfinite(share):
             time, distance = float(marks[k]), share * pipe.length
-            text = (f"{pipe.name}: a cavity opened {distance:.4g} m from {pipe.from_} at {time:.6g} s; "
-                    f"at most {1e3 * volume:.4g} l at {t_volume:.6g} s")  # fmt: skip
+            told = model.case.amount
+            text = (f"{pipe.name}: a cavity opened {told(distance, 'length')} from {pipe.from_} at "
+                    f"{told(time, 'time', 6)}; at most {told(volume, 'volume', silent='l')} at "
+                    f"{told(t_volume, 'time', 6)}")  # fmt: skip
             found.append(Cavity(f"links.{pipe.name}", time, distance, volume, t_volume, text))
     return found
 

@@ -15,8 +15,8 @@ from fvsolve.units.outside import ask_pint
 from fvsolve.units.spellings import DIMENSIONS, LIKELY, MEANT, UNITS, Dimension, Unit
 
 __all__ = [
-    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "likely", "parse", "show", "vacuum",
-    "wanted",
+    "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "likely", "parse", "show", "span",
+    "vacuum", "wanted",
 ]  # fmt: skip
 
 LONGEST = 100  # letters of a unit
@@ -102,6 +102,12 @@ def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0)
     if found.gauge and dimension == "pressure":
         value_si = value_si - ambient
     return found.number(value_si)
+
+
+def span(unit: str) -> str:
+    """The unit of differences of what is told in a unit: "bar" of "barg" and of "bara"."""
+    found = UNITS.get(unit)
+    return unit[:-1] if found is not None and (found.gauge or found.absolute) else unit
 
 
 def likely(given: Any, dimension: str, least: float, greatest: float) -> str:

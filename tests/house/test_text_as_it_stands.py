@@ -18,7 +18,6 @@ from truth.scenes import scene, still
 
 import fvsolve
 from fvsolve.draw.plot import history_figure
-from fvsolve.draw.view import unmarked
 from fvsolve.output.fields import read_series
 
 TITLE = r"a $\nothing_{$ b, $5 and $6 [bold] [/red] <image> & 100 % \o/"
@@ -44,7 +43,6 @@ def test_dollars_are_drawn_as_dollars():
     sizes = [one.get_suptitle() and one._suptitle.get_window_extent().width for one in made]
     dollar = history_figure(t, t[:, None], [("a.level", "m")], title="$")._suptitle.get_window_extent().width
     assert sizes[1] == pytest.approx(sizes[0] + 2.0 * dollar, rel=0.1)
-    assert unmarked("$x$") == r"\$x\$"
 
 
 def test_powers_of_ten_stay_powers():

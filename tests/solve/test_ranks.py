@@ -15,7 +15,8 @@ import pytest
 from solve.test_threads import SCENES, water
 
 import fvsolve
-from fvsolve.draw.view import read, unit_of
+from fvsolve.draw.frames import read
+from fvsolve.draw.scene import DrawnScene, DrawnUnit
 from fvsolve.output.fields import read_series
 
 pytest.importorskip("mpi4py", reason="the extra mpi is not there")
@@ -83,8 +84,9 @@ def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_
     assert names == [f"sheet{part}-00000{k}.{kind}" for part, kind in (("", "pvtu"), (".0", "vtu"), (".1", "vtu"))
                      for k in range(2)]  # fmt: skip
     runs = [tmp_path / name / "fields" / f"sheet-000001.{kind}" for name, kind in (("one", "vtu"), ("a dye", "pvtu"))]
-    one, two = (read(path, "dye") for path in runs)
-    assert two.n_cells == one.n_cells == 132 and two.n_points == one.n_points and unit_of(two, "dye") == "mg/l"
+    asked = DrawnScene("", DrawnUnit("dye", ""), *[DrawnUnit("length", "m")] * 2, [])
+    one, two = (read(path, asked) for path in runs)
+    assert two.n_cells == one.n_cells == 132 and two.n_points == one.n_points and asked.quantity.unit == "mg/l"
     assert np.array_equal(two.cell_centers().points, one.cell_centers().points)
     assert np.array_equal(two["dye"], one["dye"])
 

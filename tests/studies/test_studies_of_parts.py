@@ -9,7 +9,6 @@ from truth.folders import CASES
 
 import fvsolve
 from fvsolve.cli.order import unit
-from fvsolve.draw.view import FLAT, lower
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.accuracy import afford, models
 from fvsolve.studies.accuracy.afford import affordable
@@ -182,18 +181,6 @@ def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
 
 
 # pictures -------------------------------------------------------------------------------------------------------
-
-
-def test_a_network_whose_plan_has_not_the_scale_of_its_heights_is_pressed_flat_to_be_seen_from_above():
-    def lowered(*points):
-        points = np.array(points, float)
-        lower(points)
-        return np.ptp(points, axis=0)
-
-    town = [(0, 0, 0), (30, 5, 70), (10, 25, 20)]
-    assert lowered(*town)[2] == pytest.approx(0.5 * FLAT * 30) and lowered(*town)[0] == 30
-    assert lowered((0, 0, 0), (0, 0, 70))[2] == 70  # one upright pipe
-    assert lowered((0, 0, 0), (300, 50, 70))[2] == 70
 
 
 # map ------------------------------------------------------------------------------------------------------------

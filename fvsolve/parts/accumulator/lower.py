@@ -65,8 +65,8 @@ class AccumulatorRows(Device, kind="accumulator"):
         node["stiffness"] = stiff if shed > 0.0 and neck else part.exponent * p / (fluid.density * gas)
         if neck and shed >= 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
-            text = (f"{name}: empty at the start, where its precharge, {first:.6g} Pa, is not below the pressure, "
-                    f"{p:.6g} Pa")  # fmt: skip
+            charge, pressure = (draft.case.amount(one, "pressure", 6) for one in (first, p))
+            text = f"{name}: empty at the start, where its precharge, {charge}, is not below the pressure, {pressure}"
             draft.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(first), float(p)))
         return []
 
@@ -128,8 +128,9 @@ class ShapedRows(AccumulatorRows, kind=""):
         if not p > 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
             high = stands.level + stands.bottom
-            text = (f"no steady state: {node['pressure']:.6g} Pa at its place are less than the weight of the fluid, "
-                    f"{high:.4g} m high, and leave its gas none; set bottom or level lower")  # fmt: skip
+            has, deep = draft.case.amount(node["pressure"], "pressure", 6), draft.case.amount(high, "head", span=True)
+            text = (f"no steady state: {has} at its place are less than the weight of the fluid, "
+                    f"{deep} high, and leave its gas none; set bottom or level lower")  # fmt: skip
             draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
             return []
         floats = draft.tables.floats

@@ -62,9 +62,10 @@ class AirValveRows(Device, kind="air-valve"):
         name = list(start.case.places)[row["node"]].removesuffix(".inside")
         if short <= law.RELUCTANCE:
             return []
-        text = f"{name}: the air valve is open at the start, {short:.4g} Pa below ambient"
+        below = start.case.amount(short, "pressure", span=True)
+        text = f"{name}: the air valve is open at the start, {below} below ambient"
         start.draft.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(short), 0.0))
-        return [f"air valve {name}: {short:.4g} Pa below ambient, so it opens"]
+        return [f"air valve {name}: {below} below ambient, so it opens"]
 
     def squares(self, model, part, row, y, out):
         """R T / (2 m) (dm + m / (V rho) dy)^2 : what changes its pressure, in air or in fluid."""

@@ -19,8 +19,8 @@ class PatchRows(Lowering, kind="patch"):
             return node.pressure
         return start.law.pressure_under(node.depth) if node.depth else start.case.ambient_pressure
 
-    def moves(self, name, node, row, inflow, flow) -> str:
-        return f"basin {name}: {flow:.4g} m3/s flow in"
+    def moves(self, name, node, row, inflow, flow, told) -> str:
+        return f"basin {name}: {told(flow, 'flow')} flow in"
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity in ("force", "power", "travel"):

@@ -29,5 +29,5 @@ class ChamberRows(Lowering, kind="chamber"):
             return node.initial_pressure
         return start.case.ambient_pressure if row["kind"] == rec.MOVING and not start.touched(i) else None
 
-    def moves(self, name, node, row, inflow, flow) -> str:
-        return f"chamber {name}: pressure changes by {row['stiffness'] * inflow:.4g} Pa/s"
+    def moves(self, name, node, row, inflow, flow, told) -> str:
+        return f"chamber {name}: pressure changes by {told(row['stiffness'] * inflow, 'pressure', span=True)}/s"

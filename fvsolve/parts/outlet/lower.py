@@ -23,7 +23,7 @@ class OutsideRows(Lowering, kind="outside"):
     def pressure_at_start(self, start, i, node, row) -> float:
         return start.given(row["schedule"])
 
-    def moves(self, name, node, row, inflow, flow) -> str:
+    def moves(self, name, node, row, inflow, flow, told) -> str:
         return ""
 
 

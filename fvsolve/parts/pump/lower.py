@@ -64,14 +64,15 @@ class PumpRows(Turning, Device, kind="pump"):
 
     def passing(self, model, name, part, time) -> Notice:
         """What is to be known of a pump that left its curve, and may have."""
+        when = model.case.amount(time, "time", 6)
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
-            text = (f"{name}: it runs down, from {time:.6g} s on beyond its curve's last flow, where its head is "
+            text = (f"{name}: it runs down, from {when} on beyond its curve's last flow, where its head is "
                     "that of a parabola; with rated_speed a Suter table would tell it")  # fmt: skip
             return Notice("range", f"links.{name}", text, "curve")
         speed = specific_speed(part, *rated)
         near = table.words if FEW <= speed <= MANY else f"{table.words}, the nearest"
-        text = (f"{name}: it leaves its curve at {time:.6g} s; outside of it head and torque are those of the Suter "
+        text = (f"{name}: it leaves its curve at {when}; outside of it head and torque are those of the Suter "
                 f"table {near}, joined to it, by its specific speed of {speed:.4g} (rpm, m3/s, m); "
                 "of a pump of several stages or inlets suter says it better")  # fmt: skip
         return Notice("range", f"links.{name}", text, "outside", speed)

@@ -24,7 +24,9 @@ def drawn_backwards(start, name: str, part, valve) -> list[Notice]:
     lowest = still[j] and not still[i] and heads[j] < heads[still].max() - NEAR and heads[j] == heads[still].min()
     if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + NEAR or lowest):
         return []
-    what = "the lowest water there is" if lowest else f"{heads[i] - heads[j]:.4g} m lower"
+    what = (
+        "the lowest water there is" if lowest else f"{start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
+    )
     text = f"{name}: it pumps from {part.from_} to {part.to}, {what}; is it drawn backwards? `from` is its suction side"
     return [Notice("range", f"links.{name}", text, "from", float(heads[i] - heads[j]), 0.0)]
 
@@ -51,6 +53,7 @@ def quick(draft, name: str, part) -> list[Notice]:
     if speed <= QUICKEST:
         return []
     meant = next((f'; was "{flow:.4g} {unit}" meant?' for unit, size in UNITS if speed * size <= QUICKEST), "")
-    text = f"{name}: its rated flow of {flow:.4g} m3/s is {speed:.4g} m/s in the widest pipe beside it{meant}"
+    rated, quick = draft.case.amount(flow, "flow"), draft.case.amount(speed, "velocity")
+    text = f"{name}: its rated flow of {rated} is {quick} in the widest pipe beside it{meant}"
     key = "suter" if part.suter is not None else "curve"
     return [Notice("range", f"links.{name}", text, key, speed, QUICKEST)]

@@ -64,7 +64,9 @@ class Regulator(Device, kind=""):
         least = float(np.min(part.set_pressure.value))
         head = (least - case.ambient_pressure) / weight + (case.elevation(place) or 0.0)
         if head > best:
-            what = f"{least:.6g} Pa at {place} is a head of {head:.4g} m, above every source: {source} has {best:.4g} m"
+            told = case.amount
+            what = (f"{told(least, 'pressure', 6)} at {place} is a head of {told(head, 'head')}, above every source: "
+                    f"{source} has {told(best, 'head')}")  # fmt: skip
             draft.fault(f"links.{name}.set_pressure", f"{what}; it would never {self.verb}, set it lower")
 
     def inputs(self, model, name, part):

@@ -23,7 +23,7 @@ class ReservoirRows(Lowering, kind="reservoir"):
         value = start.given(row["schedule"])
         return start.law.pressure_under(value - row["elevation"]) if row["head_given"] else value
 
-    def moves(self, name, node, row, inflow, flow) -> str:
+    def moves(self, name, node, row, inflow, flow, told) -> str:
         return ""
 
     def inputs(self, model, name, part):

@@ -24,7 +24,8 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
         k = int(row["valve"])
         drop, name = start.drive_of(k)[0], start.draft.valve_names[k]
         if drop >= part.burst_pressure:
-            what = f"{drop:.6g} Pa across it at the start; it would have burst, set it higher or leave the disc out"
+            across = start.case.amount(drop, "pressure", 6, span=True)
+            what = f"{across} across it at the start; it would have burst, set it higher or leave the disc out"
             start.draft.fault(f"links.{name}.burst_pressure", what)
         return []
 

@@ -44,11 +44,16 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
     def begin(self, start, part, row) -> list[str]:
         name, place = start.draft.valve_names[row["valve"]], start.nodes[start.draft.node_index[part.sensed]]
         p, high = float(place["pressure"]), part.high_set is not None and float(place["pressure"]) >= part.high_set
+        told = start.case.amount
         if part.low_set is not None and p < part.low_set:
-            text = (f"{name}: {part.sensed} has {p:.6g} Pa at the start, below low_set, {part.low_set:.6g} Pa: it "
-                    "waits until that has been exceeded")  # fmt: skip
+            text = (f"{name}: {part.sensed} has {told(p, 'pressure', 6)} at the start, below low_set, "
+                    f"{told(part.low_set, 'pressure', 6)}: it waits until that has been exceeded")  # fmt: skip
             start.draft.warnings.append(Notice("start", f"links.{name}", text, "low_set", p, part.low_set))
-        return [f"{name}: opens at once, at {p:.6g} Pa where {part.high_set:.6g} Pa are set"] if high else []
+        if not high:
+            return []
+        return [
+            f"{name}: opens at once, at {told(p, 'pressure', 6)} where {told(part.high_set, 'pressure', 6)} are set"
+        ]
 
 
 class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):

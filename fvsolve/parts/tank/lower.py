@@ -41,9 +41,9 @@ class TankRows(Lowering, kind="tank"):
         upright = 1.0 if node.on is None else start.case.poses[node.on].attitude[2, 2]
         return start.law.pressure_under(row["level"] * upright)
 
-    def moves(self, name, node, row, inflow, flow) -> str:
+    def moves(self, name, node, row, inflow, flow, told) -> str:
         what = "rises" if flow > 0 else "falls"
-        return f"tank {name} {what} at {abs(flow) / row['area'] * 1e3:.4g} mm/s"
+        return f"tank {name} {what} at {told(abs(flow) / row['area'], 'velocity', silent='mm/s')}"
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity != "level":

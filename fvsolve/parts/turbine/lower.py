@@ -50,7 +50,8 @@ class TurbineRows(Turning, Device, kind="turbine"):
         return 0.5 * part.inertia * speed**2 if row["y"] >= 0 else 0.0
 
     def passing(self, model, name, part, time) -> Notice:
-        text = (f"{name}: it leaves its hill chart at {time:.6g} s; outside of it straight lines go on to its "
+        when = model.case.amount(time, "time", 6)
+        text = (f"{name}: it leaves its hill chart at {when}; outside of it straight lines go on to its "
                 "flow at rest and its speed without flow; more points would tell")  # fmt: skip
         return Notice("range", f"links.{name}", text, "hill_chart")
 

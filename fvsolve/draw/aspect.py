@@ -1,0 +1,130 @@
+"""How a scene in space is seen on a sheet, and its axes there. Knows points and matplotlib; knows no part."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.draw import style
+
+ASLANT = (0.6, -1.0, 0.75)  # from where one looks at water, x to the right and y away
+STEEP = (0.35, -1.0, 1.1)  # at a network
+STEEPER = (0.2, -1.0, 2.0)  # at a large one
+HIGH = 0.4  # heights of a network are drawn as this part of its width
+STRAIGHT = 1e-6  # of its length: a network that is no wider is followed in profile
+BETWEEN = 40.0  # ticks at least [points]
+TICK, LABEL, TITLE = 5.0, 9.0, 42.0  # from an edge outwards [points]
+LIKELY = (0.3, 1.02)  # drawn length of pipes over their length where a plan has their scale
+
+
+class Aspect:
+    """From points float64[n, 3] to a sheet float64[n, 2]: a plan, a profile, or aslant with heights drawn `rise` times.
+
+    right, up, back : float64[3], of the sheet and towards who looks; begin : where a profile counts from
+    """
+
+    def __init__(self, kind: str, rise: float = 1.0, along=(1.0, 0.0), seen=STEEP) -> None:
+        self.kind, self.rise, self.begin = kind, rise, 0.0
+        if kind == "plan":
+            self.right, self.up = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+        elif kind == "profile":
+            self.right, self.up = np.array([*along, 0.0]), np.array([0.0, 0.0, 1.0])
+        else:
+            self.right = np.cross((0.0, 0.0, 1.0), seen)
+            self.right /= np.linalg.norm(self.right)
+            self.up = np.cross(np.array(seen) / np.linalg.norm(seen), self.right)
+        self.back = np.cross(self.right, self.up)
+
+    def on_sheet(self, points) -> np.ndarray:
+        """Where points are drawn."""
+        scaled = np.asarray(points, float).reshape(-1, 3) * (1.0, 1.0, self.rise)
+        return np.column_stack([scaled @ self.right - self.begin, scaled @ self.up])
+
+
+def aspect_of(points: np.ndarray, many: bool = False, slant: float = 1.0) -> Aspect:
+    """How to see a network: in profile where it runs straight, as a plan where it is level, else aslant.
+
+    many : parts, to be seen more from above; slant : a height times it is as long as a length
+    """
+    spans = np.ptp(points, axis=0)
+    plan = points[:, :2] - points[0, :2]
+    _, widths, axes = np.linalg.svd(plan, full_matrices=False)
+    if len(widths) < 2 or widths[1] <= STRAIGHT * widths[0]:
+        along = axes[0] * (1.0 if axes[0] @ (plan[-1] if plan[-1].any() else plan.sum(axis=0)) >= 0.0 else -1.0)
+        return Aspect("profile", along=np.where(np.abs(along) < STRAIGHT, 0.0, along))
+    if spans[2] <= 1e-9 * max(spans):
+        return Aspect("plan")
+    return Aspect(
+        "aslant", slant * rounded(HIGH * max(spans[:2]) / (slant * spans[2])), seen=STEEPER if many else STEEP
+    )
+
+
+def rounded(value: float) -> float:
+    """1, 2 or 5 times a power of ten, the greatest up to a value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(step * power for step in (5.0, 2.0, 1.0) if step * power <= value * (1.0 + 1e-9))
+
+
+def corners(low, high) -> np.ndarray:
+    """Corners of a box : float64[8, 3]."""
+    return np.array([(x, y, z) for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+
+
+def fit(axes, seen: np.ndarray, margins: tuple[float, float, float, float]) -> None:
+    """Limits that show points float64[n, 2] of the sheet with margins [points]: left, low, right, high."""
+    point = axes.figure.dpi / 72.0
+    left, low, right, high = (point * one for one in margins)
+    least, most = seen.min(axis=0), seen.max(axis=0)
+    wide, tall = axes.bbox.width - left - right, axes.bbox.height - low - high
+    scale = max((most[0] - least[0]) / wide, (most[1] - least[1]) / tall) or 1.0  # of a pixel
+    spare = 0.5 * (np.array([wide, tall]) - (most - least) / scale)
+    start = least - scale * (spare + (left, low))
+    axes.set_xlim(start[0], start[0] + scale * axes.bbox.width)
+    axes.set_ylim(start[1], start[1] + scale * axes.bbox.height)
+
+
+def frame(axes, aspect: Aspect, low, high, names: tuple[str, str, str]) -> list:
+    """Edges of a box seen aslant with ticks and what they count, the floor drawn lightly; its texts.
+
+    low, high : float64[3], corners of the box; an edge without extent has no ticks
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    floor = aspect.on_sheet([(x0, y0, z0), (x1, y0, z0), (x1, y1, z0), (x0, y1, z0), (x0, y0, z0)])
+    axes.plot(*floor.T, color=style.HAIR, linewidth=0.8, zorder=0)
+    sides = [((x0, y0, z0), (x1, y0, z0)), ((x1, y0, z0), (x1, y1, z0)), ((x0, y0, z0), (x0, y0, z1))]
+    middle, texts = floor[:4].mean(axis=0), []
+    for axis, (start, end) in enumerate(sides):
+        a, b = start[axis], end[axis]
+        if b - a <= 0.0:
+            continue
+        ends = aspect.on_sheet([start, end])
+        axes.plot(*ends.T, color=style.MUTED, linewidth=0.8, zorder=0)
+        along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+        out = np.array([along[1], -along[0]])
+        out *= 1.0 if out @ (ends.mean(axis=0) - middle) > 0.0 else -1.0
+        pixels = np.linalg.norm(np.diff(axes.transData.transform(ends), axis=0))
+        many = max(1, min(6, int(pixels / (axes.figure.dpi / 72.0 * (BETWEEN if axis < 2 else 0.6 * BETWEEN)))))
+        ticks = [
+            t
+            for t in MaxNLocator(many, steps=[1, 2, 2.5, 5, 10]).tick_values(a, b)
+            if a - 1e-9 * (b - a) <= t <= b + 1e-9 * (b - a)
+        ]
+        for tick in ticks:
+            at = ends[0] + (tick - a) / (b - a) * (ends[1] - ends[0])
+            texts.append(_write(axes, at, out, f"{tick:.6g}", LABEL, style.INK, 7.5))
+            axes.annotate("", at, xytext=tuple(TICK * out), textcoords="offset points", annotation_clip=False,
+                          arrowprops={"arrowstyle": "-", "color": style.MUTED, "linewidth": 0.8, "shrinkA": 0,
+                                      "shrinkB": 0})  # fmt: skip
+        gap = TITLE if axis == 2 else 0.72 * TITLE
+        texts.append(_write(axes, ends.mean(axis=0), out, names[axis], gap, style.INK, 8.5))
+    return texts
+
+
+def _write(axes, at, out, text: str, gap: float, colour: str, size: float):
+    across = "center" if abs(out[0]) < 0.2 else "left" if out[0] > 0.0 else "right"
+    upright = "center" if abs(out[1]) < 0.35 else "bottom" if out[1] > 0.0 else "top"
+    return axes.annotate(text, at, xytext=tuple(gap * out), textcoords="offset points", fontsize=size, color=colour,
+                         ha=across, va=upright, annotation_clip=False, zorder=8)  # fmt: skip

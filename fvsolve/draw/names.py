@@ -1,0 +1,58 @@
+"""Names beside points of a picture, none over another. Knows boxes in pixels; draws nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+
+AROUND = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)]  # places of a name, the best first
+COST = 0.5  # of a place of lower rank, in points of lines that it would cover
+STEP, PAD = 4.0, 3.0  # between points of lines, and about them [pixels]
+
+
+def beside(at, sizes, gaps, blocks, lines, within) -> list[tuple[float, float] | None]:
+    """Left lower corner of each name [pixels], None of one that finds no room; the first names choose first.
+
+    at, sizes : float64[n, 2]; gaps : float64[n], from a point to its name; blocks : boxes float64[b, 4] (left, low,
+    right, high) that no name covers; lines : float64[l, 2], points that names had better not cover; within : a box
+    """
+    taken = [np.asarray(block, float) for block in blocks]
+    found: list[tuple[float, float] | None] = []
+    for (x, y), (wide, high), gap in zip(at, sizes, gaps, strict=True):
+        best, least = None, np.inf
+        for rank, (dx, dy) in enumerate(AROUND):
+            reach = gap if 0 in (dx, dy) else 0.75 * gap
+            left = x + dx * reach - (0.5 - 0.5 * dx) * wide
+            low = y + dy * reach - (0.5 - 0.5 * dy) * high
+            box = np.array([left, low, left + wide, low + high])
+            wider = box + (-PAD, 0.0, PAD, 0.0)
+            if _out(box, within) or any(_over(wider, other) for other in taken):
+                continue
+            cost = COST * rank + (_inside(box, lines) if len(lines) else 0)
+            if cost < least:
+                best, least = box, cost
+        found.append(None if best is None else (float(best[0]), float(best[1])))
+        if best is not None:
+            taken.append(best)
+    return found
+
+
+def _over(a, b) -> bool:
+    return bool(a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3])
+
+
+def _out(box, within) -> bool:
+    return bool(box[0] < within[0] or box[1] < within[1] or box[2] > within[2] or box[3] > within[3])
+
+
+def _inside(box, points) -> int:
+    x, y = points[:, 0], points[:, 1]
+    return int(((x > box[0] - PAD) & (x < box[2] + PAD) & (y > box[1] - PAD) & (y < box[3] + PAD)).sum())
+
+
+def dotted(segments: np.ndarray) -> np.ndarray:
+    """Points along lines float64[c, 2, 2], STEP apart : float64[k, 2]."""
+    if not len(segments):
+        return np.zeros((0, 2))
+    lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    parts = [np.linspace(a, b, max(2, int(length / STEP))) for (a, b), length in zip(segments, lengths, strict=True)]
+    return np.concatenate(parts)

@@ -1,0 +1,126 @@
+"""A network on a sheet: pipes in the colours of a field, symbols and names of parts, axes. Knows matplotlib."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.draw import style
+from fvsolve.draw.aspect import aspect_of, corners, fit, frame
+from fvsolve.draw.parts import CROWD, MANY, draw_parts
+from fvsolve.draw.scene import DrawnScene
+from fvsolve.draw.sheet import COLOURS, HALF, SIZE, PictureSheet, span
+
+PIPE, CASE = 3.6, 4.8  # widths of a pipe and of its edge [points]
+LOW = 3.2  # height of a sheet whose network is one level line [inch]
+ASIDE, ABOVE = 0.11, 0.12  # about a profile, of its size
+BESIDE = 0.03  # about a plan with a box, of its size
+ROOM = (46.0, 24.0, 46.0, 24.0)  # about a network [points]
+FRAMED = (60.0, 40.0, 46.0, 16.0)  # about one with a box
+
+
+class Network:
+    """The sheet of a scene of pipes; `show` puts one of its frames on it."""
+
+    def __init__(self, scene: DrawnScene, film: bool) -> None:
+        self.scene, lines = scene, scene.pipes[0][1]
+        points = scene.shown(scene.pipes[0][0])
+        self.nodes = scene.shown([part.at for part in scene.parts if not part.link])
+        self.all = np.vstack([points, self.nodes])
+        self.aspect = aspect_of(self.all, len(scene.parts) > MANY, scene.slant)
+        if self.aspect.kind == "profile" and scene.plan == "laid out":  # the first pipe begins at 0
+            self.aspect.begin = float(self.aspect.on_sheet(points if len(points) else self.all)[:, 0].min())
+        line = self.aspect.kind == "profile"
+        self.level = line and not np.ptp(self.all[:, 2]) > 0.0
+        self.sheet = PictureSheet(film, ruled=self.aspect.kind != "aslant", high=LOW if self.level else SIZE[1])
+        self.axes, self.half = self.sheet.axes, HALF if len(scene.parts) <= MANY else 0.7 * HALF
+        segments = self.aspect.on_sheet(points)[lines]
+        self.lines = self._pipes(segments)
+        self._axes()
+        self.sheet.figure.canvas.draw()  # limits stand from here on
+        self.named, self.wanted = draw_parts(self, scene, segments)
+        if len(lines):
+            values = np.concatenate([self._shown(one[2]) for one in scene.pipes])
+            self.limits = span(float(values.min()), float(values.max()))
+            self.lines.set_clim(self.limits)
+            self.sheet.bar(self.limits, scene.quantity.label)
+        self.sheet.legend(scene.parts)
+
+    def _pipes(self, segments: np.ndarray):
+        """Pipes with their edges; the lines that take colours."""
+        from matplotlib.collections import LineCollection
+
+        many = len(self.scene.names)
+        thin = 1.0 if many <= MANY else 0.6 if many <= CROWD else 0.3
+        round_ends = {"capstyle": "round"}
+        edge = LineCollection(segments, colors=style.INK, linewidths=thin * CASE, zorder=2, **round_ends)
+        inner = LineCollection(segments, cmap=COLOURS, linewidths=thin * PIPE, zorder=3, **round_ends)
+        for one in (edge, inner):
+            self.axes.add_collection(one)
+        return inner
+
+    def show(self, k: int) -> None:
+        """Put frame `k` on the sheet."""
+        self.lines.set_array(self._shown(self.scene.pipes[k][2]))
+        notes = [self.scene.frames[k][0], *self._notes()]
+        self.sheet.caption(self.scene.title, "; ".join(notes))
+
+    def _shown(self, values: np.ndarray) -> np.ndarray:
+        return values * self.scene.quantity.factor + self.scene.quantity.shift
+
+    def _notes(self) -> list[str]:
+        found = []
+        if self.aspect.kind == "aslant":
+            own, times = self.scene.plan == "own scale", self.aspect.rise / self.scene.slant
+            found.append("heights on a scale of their own" if own else f"heights drawn {times:g} times")
+        if self.scene.plan == "laid out":
+            found.append("laid out by lengths")
+        if self.scene.plan == "own scale":
+            found.append("the plan is not to scale")
+        if self.named < self.wanted:
+            found.append(f"{self.named} of {self.wanted} names")
+        return found
+
+    def _axes(self) -> None:
+        """Limits and axes with units."""
+        unit = "" if self.scene.plan == "own scale" else f" [{self.scene.length.unit}]"
+        axes, seen, high = self.axes, self.aspect.on_sheet(self.all), self.scene.height.unit
+        self.texts, self.cover, self.labels = [], np.zeros((0, 2)), []
+        if self.aspect.kind == "aslant":
+            axes.set_axis_off()
+            box = self.all.min(axis=0), self.all.max(axis=0)
+            beside = BESIDE * np.ptp(self.all, axis=0).max() * np.array([1.0, 1.0, 0.0])
+            box = box[0] - beside, box[1] + beside
+            fit(axes, self.aspect.on_sheet(np.vstack([corners(*box)[::2], corners(*box)[1:2], self.all])), FRAMED)
+            self.texts = frame(axes, self.aspect, *box, (f"x{unit}", f"y{unit}", f"z [{high}]"))
+            return self._posts()
+        style.dress(axes)
+        axes.ticklabel_format(axis="both", style="plain", useOffset=False)
+        if self.aspect.kind == "plan":
+            fit(axes, seen, ROOM)
+            names = f"x{unit}", f"y{unit}"
+        else:
+            low, most = seen.min(axis=0), seen.max(axis=0)
+            room = (ASIDE, ABOVE) * (most - low)
+            axes.set_xlim(low[0] - room[0], most[0] + room[0])
+            axes.set_ylim(low[1] - (room[1] or 1.0), most[1] + (room[1] or 1.0))
+            along = "x" if tuple(self.aspect.right) == (1.0, 0.0, 0.0) and self.scene.plan != "laid out" else "distance"
+            names = f"{along}{unit}", f"elevation [{high}]"
+        axes.set_xlabel(names[0], fontsize=8.5, color=style.INK)
+        axes.set_ylabel("" if self.level else names[1], fontsize=8.5, color=style.INK)
+        if self.scene.plan == "schematic":  # distances mean nothing
+            axes.set_axis_off()
+        if self.level:
+            axes.set_yticks([])
+            axes.spines["left"].set_visible(False)
+
+    def _posts(self) -> None:
+        """Thin lines from nodes down to the floor, and pipes on it: by these heights are seen."""
+        from matplotlib.collections import LineCollection
+
+        floor, points, lines = self.all[:, 2].min(), self.scene.shown(self.scene.pipes[0][0]), self.scene.pipes[0][1]
+        below = points * (1.0, 1.0, 0.0) + (0.0, 0.0, floor)
+        shade = self.aspect.on_sheet(below)[lines]
+        self.axes.add_collection(LineCollection(shade, colors=style.HAIR, linewidths=2.0, zorder=0.5))
+        foot = self.nodes * (1.0, 1.0, 0.0) + (0.0, 0.0, floor)
+        posts = np.stack([self.aspect.on_sheet(self.nodes), self.aspect.on_sheet(foot)], axis=1)
+        self.axes.add_collection(LineCollection(posts, colors=style.MUTED, linewidths=0.5, zorder=0.6))

@@ -1,0 +1,133 @@
+"""Symbols and names of parts on a sheet. Knows where parts stand and matplotlib; knows no field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fvsolve.draw import names as naming
+from fvsolve.draw import style
+from fvsolve.draw.aspect import Aspect
+from fvsolve.draw.scene import DrawnScene
+from fvsolve.draw.sheet import stamp
+from fvsolve.draw.symbols import symbol_of
+from fvsolve.errors import visible
+
+APART = 4.8  # halves of a symbol between two
+MANY, FEW = 40, 14  # parts from which symbols are small, pipes up to which they are named
+CROWD = 400  # parts up to which joints have symbols and names
+HALO = 2.2  # white about a name [points]
+EDGE = 5.0  # of the sheet that stays free [pixels]
+
+
+def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int]:
+    """Symbols and names of a scene's parts over what is drawn; how many names are there, and how many there could be.
+
+    stage : its `sheet`, `axes`, `aspect`, `half` of a symbol [points], `texts` that no name covers, `cover`,
+    float64[k, 2], points of the sheet that names had better not cover, `labels`, other names with their points
+    segments : float64[c, 2, 2], pipes on the sheet
+    """
+    if not (scene.parts or scene.pipes or stage.labels):
+        return 0, 0
+    axes, half, aspect = stage.axes, stage.half, stage.aspect
+    point = stage.sheet.figure.dpi / 72.0  # [pixels]
+    at = positions(scene, aspect, axes, APART * half * point)
+    blocks, ties = [], []
+    for part in [part for part in scene.parts if not (part.joint and len(scene.parts) > CROWD)]:
+        ends = [at[name] for name in part.between if name in at]
+        ties += [(at[part.key], end) for end in ends]
+        along = ends[-1] - ends[0] if len(ends) > 1 else np.array([1.0, 0.0])
+        place = axes.transData.inverted().transform(at[part.key])
+        size = half * (0.5 if part.joint and len(scene.parts) > MANY else 1.0)
+        stamp(axes, symbol_of(part.kinds, part.link), place, along, size)
+        reach = (0.4 if part.joint else 1.0) * size * point
+        blocks.append([*(at[part.key] - reach), *(at[part.key] + reach)])
+    back = axes.transData.inverted().transform
+    for a, b in ties:
+        axes.plot(*back(np.array([a, b])).T, color=style.INK, linewidth=1.1, zorder=5)
+    return _names(stage, scene, segments, at, np.array(blocks).reshape(-1, 4), np.reshape(ties, (-1, 2, 2)))
+
+
+def positions(scene: DrawnScene, aspect: Aspect, axes, apart: float) -> dict[str, np.ndarray]:
+    """Where symbols stand [pixels]: parts that no pipe holds in its place go as far aside as their links want."""
+    nodes = [part for part in scene.parts if not part.link]
+    seen = axes.transData.transform(aspect.on_sheet(scene.shown([one.at for one in scene.parts])))
+    at = {part.key: place for part, place in zip(scene.parts, seen, strict=True)}
+    at |= dict(zip(scene.anchors, axes.transData.transform(aspect.on_sheet(
+        scene.shown(list(scene.anchors.values())))), strict=True))  # fmt: skip
+    held = {part.key for part in nodes if part.held} | set(scene.anchors)
+    middle = seen.mean(axis=0) if len(seen) else np.zeros(2)
+    for part in scene.parts:
+        ends = [name for name in part.between if name in at]
+        if len(ends) == 2 and ends[0] != ends[1]:
+            first, last = ends if ends[1] not in held else ends[::-1]
+            way = at[last] - at[first]
+            if np.linalg.norm(way) < apart and last not in held:
+                far = way if np.linalg.norm(way) > 1.0 else at[first] - middle
+                far = far if np.linalg.norm(far) > 1.0 else np.array([1.0, 0.0])
+                if aspect.kind == "profile":  # its height stays
+                    at[last] = np.array([at[first][0] + np.copysign(apart, far[0]), at[last][1]])
+                else:
+                    at[last] = at[first] + apart * far / np.linalg.norm(far)
+                held.add(last)
+        if ends and not part.own_place:
+            at[part.key] = np.mean([at[name] for name in ends], axis=0)
+            if len(ends) == 1:
+                at[part.key] = at[part.key] + (0.0, 0.7 * apart)
+    return at
+
+
+@dataclass
+class DrawnName:
+    """A name and the point that it stands beside [pixels]; `gap` between them [points]."""
+
+    text: str
+    at: np.ndarray
+    gap: float
+    look: dict[str, Any]
+
+
+def _names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[int, int]:
+    """Write the names that find room; how many do, and of how many."""
+    from matplotlib.patheffects import withStroke
+
+    axes, figure = stage.axes, stage.sheet.figure
+    pixels = axes.transData.transform(segments.reshape(-1, 2)).reshape(-1, 2, 2)
+    wanted, renderer = _wanted(scene, at, pixels, stage.half), figure.canvas.get_renderer()
+    look = {"color": style.INK, "fontsize": 8}
+    wanted += [DrawnName(name, axes.transData.transform(place), 6.0, look) for name, place in stage.labels]
+    halo = [withStroke(linewidth=HALO, foreground="white")]
+    always = {"zorder": 7, "parse_math": False, "va": "bottom", "path_effects": halo}
+    texts = [axes.text(0.0, 0.0, visible(one.text), **always, **one.look) for one in wanted]
+    sizes = [text.get_window_extent(renderer).size for text in texts]
+    ticks = [text.get_window_extent(renderer).extents for text in stage.texts]
+    point = figure.dpi / 72.0
+    found = naming.beside(
+        [one.at for one in wanted], sizes, [point * one.gap for one in wanted],
+        np.vstack([blocks, np.reshape(ticks, (-1, 4))]),
+        np.vstack([naming.dotted(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]),
+        (EDGE + axes.bbox.x0 * axes.axison, axes.bbox.y0 - EDGE, figure.bbox.x1 - EDGE, axes.bbox.y1 + EDGE),
+    )  # fmt: skip
+    for text, corner in zip(texts, found, strict=True):
+        if corner is None:
+            text.remove()
+        else:
+            text.set_position(axes.transData.inverted().transform(corner))
+    without = sum(one.joint for one in scene.parts) if len(scene.parts) > CROWD else 0
+    return sum(one is not None for one in found), len(wanted) + without
+
+
+def _wanted(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
+    """Names of parts, then of pipes where these are few, then of joints."""
+    plain, small = {"color": style.INK, "fontsize": 8}, {"color": style.INK, "fontsize": 7.5}
+    parts = [DrawnName(one.name, at[one.key], half + 3.0, plain) for one in scene.parts if not one.joint]
+    joints = [DrawnName(one.name, at[one.key], 5.0, small) for one in scene.parts if one.joint]
+    joints = joints if len(scene.parts) <= CROWD else []
+    if len(scene.names) > FEW or not scene.pipes or not scene.names:
+        return parts + joints
+    look = {"color": style.MUTED, "fontsize": 7.5, "fontstyle": "italic"}
+    middles = {name: pixels[scene.pipes[0][3] == k].reshape(-1, 2) for k, name in enumerate(scene.names)}
+    pipes = [DrawnName(name, one[len(one) // 2], 4.0, look) for name, one in middles.items() if len(one)]
+    return parts + pipes + joints

@@ -1,0 +1,110 @@
+"""The sheet that a field is drawn on: title, axes, bar of colours, symbols and what they mean. Knows matplotlib."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.draw import style
+from fvsolve.draw.symbols import WATER, strokes, symbol_of
+from fvsolve.errors import visible
+
+SIZE = (10.0, 6.0)  # [inch]
+DPI, SMALL = 150, 100  # of a picture, of an animation
+COLOURS = "viridis"
+FOOT = 0.95  # of the sheet, for the bar and the legend [inch]
+HEAD = 0.62
+MARGIN = 0.62  # about a plan
+HALF = 8.0  # of a symbol [points]
+LEAST = 0.05  # of the value about which an even field is shown
+EVEN, NONE = 1e-9, 1e-3
+ROWS = 4  # of the legend
+
+
+class PictureSheet:
+    """A figure with its main axes, `ruled` where ticks stand outside of them."""
+
+    def __init__(self, film: bool, ruled: bool = False, high: float = SIZE[1]) -> None:
+        self.figure = style.figure(high, SIZE[0])
+        self.figure.set_layout_engine("none")
+        self.figure.set_dpi(SMALL if film else DPI)
+        self.high = high
+        low, top = FOOT + (0.5 if ruled else 0.1), HEAD + 0.08
+        wide = MARGIN if ruled else 0.1
+        self.axes = self.figure.add_axes(
+            (wide / SIZE[0], low / high, 1.0 - (wide + 0.25) / SIZE[0], 1.0 - (low + top) / high)
+        )
+        self._texts = [
+            self.figure.text(0.18 / SIZE[0], 1.0 - 0.14 / high, "", fontsize=11, color=style.INK, va="top"),
+            self.figure.text(0.18 / SIZE[0], 1.0 - 0.38 / high, "", fontsize=8.5, color=style.MUTED, va="top"),
+        ]
+        for text in self._texts:
+            text.set_parse_math(False)
+
+    def caption(self, title: str, below: str) -> None:
+        """The title and what stands below it."""
+        for text, said in zip(self._texts, (title, below), strict=True):
+            text.set_text(visible(said if len(said) <= style.LONGEST else said[: style.LONGEST - 3] + "..."))
+
+    def bar(self, limits: tuple[float, float], label: str) -> list[str]:
+        """The bar of colours with the quantity and its unit; what stands at its ticks."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+        from matplotlib.ticker import MaxNLocator
+
+        place = self.figure.add_axes((0.3 / SIZE[0], 0.42 / self.high, 0.4, 0.14 / self.high))
+        bar = self.figure.colorbar(ScalarMappable(Normalize(*limits), COLOURS), cax=place, orientation="horizontal")
+        bar.outline.set_visible(False)
+        bar.set_ticks(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(*limits))
+        bar.ax.set_xlim(*limits)
+        bar.ax.tick_params(labelsize=8, colors=style.MUTED, labelcolor=style.INK, width=0.6, length=3)
+        bar.ax.xaxis.get_offset_text().set(fontsize=8, color=style.MUTED)
+        bar.ax.set_title(label, fontsize=8.5, color=style.INK, loc="left", pad=4, parse_math=False)
+        self.figure.draw_without_rendering()
+        low, high = limits
+        shown = zip(bar.ax.get_xticks(), bar.ax.get_xticklabels(), strict=True)
+        return [text.get_text() for tick, text in shown if low <= tick <= high]
+
+    def legend(self, parts) -> None:
+        """The symbols of the kinds that are drawn, each with its word."""
+        kinds = {part.kinds[0]: part for part in parts}
+        place = self.figure.add_axes((0.5, 0.08 / self.high, 0.49, 0.8 / self.high))
+        place.set_axis_off()
+        place.set_xlim(0.0, 1.0)
+        place.set_ylim(0.0, 1.0)
+        across = max(3, -(-len(kinds) // ROWS))
+        for k, (kind, part) in enumerate(kinds.items()):
+            x, y = (k % across) / across + 0.03, 0.9 - (k // across) * 0.26
+            stamp(place, symbol_of(part.kinds, part.link), (x, y), half=6.0)
+            place.text(x + 0.03, y, kind.replace("-", " "), fontsize=8, color=style.INK, va="center", parse_math=False)
+
+    def picture(self) -> np.ndarray:
+        """The sheet as pixels : uint8[h, w, 3]."""
+        self.figure.canvas.draw()
+        return np.asarray(self.figure.canvas.buffer_rgba())[:, :, :3].copy()
+
+
+def stamp(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF, shift=(0.0, 0.0)) -> None:
+    """A symbol at a point of the axes, along a direction, moved by `shift` [points]."""
+    from matplotlib.patches import Polygon
+    from matplotlib.transforms import Affine2D, ScaledTranslation
+
+    inch = half / 72.0
+    turned = Affine2D().scale(inch).rotate(float(np.arctan2(along[1], along[0])))
+    moved = turned.translate(shift[0] / 72.0, shift[1] / 72.0) + axes.figure.dpi_scale_trans
+    transform = moved + ScaledTranslation(at[0], at[1], axes.transData)
+    fills = {"white": "white", "ink": style.INK, "water": WATER}
+    for fill, points, closed in strokes(symbol):
+        axes.add_patch(Polygon(points, closed=closed, fill=closed, facecolor=fills[fill], edgecolor=style.INK,
+                               linewidth=1.0, joinstyle="round", capstyle="round", transform=transform, zorder=6,
+                               clip_on=False))  # fmt: skip
+
+
+def span(low: float, high: float) -> tuple[float, float]:
+    """Ends of the colours of a field: its own, or some way about an even one."""
+    most = max(abs(low), abs(high))
+    if most == 0.0:
+        return 0.0, 1.0
+    if high - low > EVEN * most:
+        return tuple(0.0 if abs(end) < NONE * (high - low) else end for end in (low, high))
+    middle, half = 0.5 * (low + high), LEAST * most or 0.5
+    return middle - half, middle + half

@@ -1,0 +1,200 @@
+"""Frames of basins and bodies on a sheet, their surfaces drawn by PyVista. Knows .vtu files; knows no run."""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fvsolve.draw import style, water
+from fvsolve.draw.aspect import ASLANT, Aspect, corners, fit, frame, rounded
+from fvsolve.draw.film import write
+from fvsolve.draw.frames import measured, read, tubes
+from fvsolve.draw.parts import draw_parts
+from fvsolve.draw.scene import DrawnScene
+from fvsolve.draw.sheet import COLOURS, HALF, PictureSheet
+from fvsolve.draw.symbols import WATER
+
+FLAT = 0.08  # bodies lower than this part of their width are looked at from above
+LOW = 0.05  # basins lower than this part of their width are drawn higher than they are,
+HIGH = 0.12  # as high as this part
+OVER = 2e-3  # of its diagonal that lines are drawn above a surface
+BESIDE = 0.04  # of parts about a basin, of its size
+ABOVE = 0.25  # of a house, over the highest water, of the height of all
+BED, DEEP, HOUSE, LIMB = "#c9b99a", "#5b87a6", "#a8705a", "#4b5563"
+SHADE = 0.35  # light that reaches all sides
+MARGINS = (62.0, 44.0, 50.0, 14.0)  # about a box [points]
+
+
+class Stage:
+    """What frames have in common: the range of their field, how far they reach and how they are seen."""
+
+    def __init__(self, scene: DrawnScene, film: bool) -> None:
+        import pyvista
+
+        self.scene, self.half, self.texts = scene, HALF, []
+        self._measure()
+        self.sheet = PictureSheet(film, ruled=self.aspect.kind != "aslant")
+        self.axes = axes = self.sheet.axes
+        self._widen()
+        low, high = self.box[::2], self.box[1::2]
+        others = scene.shown([part.at for part in scene.parts]) * (1.0, 1.0, 0.0) + (0.0, 0.0, low[2])
+        fit(axes, self.aspect.on_sheet(np.vstack([corners(low, high), others])), MARGINS)
+        unit, rises = scene.length.unit, scene.height.unit
+        if self.aspect.kind == "aslant":
+            axes.set_axis_off()
+            self.texts = frame(axes, self.aspect, low, high, (f"x [{unit}]", f"y [{unit}]", f"z [{rises}]"))
+        else:
+            style.dress(axes)
+            axes.ticklabel_format(axis="both", style="plain", useOffset=False)
+            axes.set_xlabel(f"x [{unit}]", fontsize=8.5, color=style.INK)
+            axes.set_ylabel(
+                f"y [{unit}]" if self.aspect.kind == "plan" else f"z [{rises}]", fontsize=8.5, color=style.INK
+            )
+        self.sheet.figure.canvas.draw()
+        size = (round(axes.bbox.width), round(axes.bbox.height))
+        self.plotter = pyvista.Plotter(off_screen=True, window_size=size)
+        self.plotter.enable_anti_aliasing("ssaa")
+        self.plotter.enable_parallel_projection()
+        self._camera()
+        self.image = axes.imshow(np.zeros((2, 2, 4)), extent=(*axes.get_xlim(), *axes.get_ylim()), aspect="auto",
+                                 zorder=1, interpolation="antialiased")  # fmt: skip
+        draw_parts(self, scene, self._lines())
+        self.sheet.bar(self.limits, scene.quantity.label)
+        self.sheet.legend(scene.parts)
+
+    def show(self, k: int) -> None:
+        """Put frame `k` on the sheet."""
+        said, files = self.scene.frames[k]
+        self.plotter.clear_actors()
+        for file in files:
+            self._add(read(file, self.scene))
+        self.image.set_data(self.plotter.screenshot(transparent_background=True, return_img=True))
+        rise = self.aspect.rise / self.scene.slant
+        notes = [] if abs(rise - 1.0) < 1e-9 else [f"heights drawn {rise:.3g} times"]
+        self.sheet.caption(self.scene.title, "; ".join([said, *notes]))
+
+    def _measure(self) -> None:
+        """Range of the field, box, and how it is seen."""
+        self.limits, self.box, self.wet = measured(self.scene)
+        x, y, z = (self.box[1::2] - self.box[::2]).tolist()
+        if self.wet:
+            slant, wide = self.scene.slant, max(x, y)
+            rise = rounded(HIGH * wide / (slant * z)) if 0.0 < slant * z < LOW * wide else 1.0
+            self.aspect = Aspect("aslant", rise * slant, seen=ASLANT)
+        elif z <= FLAT * max(x, y):
+            self.aspect = Aspect("plan")
+        elif y <= FLAT * max(x, z):
+            self.aspect = Aspect("profile")
+        else:
+            self.aspect = Aspect("aslant", seen=ASLANT)
+
+    def _widen(self) -> None:
+        """Room in the box for parts that stand beside basins."""
+        for axis in (0, 1) if self.wet else ():
+            at = self.scene.shown([part.at for part in self.scene.parts])[:, axis]
+            low, high = self.box[2 * axis : 2 * axis + 2]
+            room = BESIDE * float(np.ptp(self.box[:4].reshape(2, 2), axis=1).max())
+            self.box[2 * axis] = min([low, *(one - room for one in at if one <= low)])
+            self.box[2 * axis + 1] = max([high, *(one + room for one in at if one >= high)])
+
+    def _camera(self) -> None:
+        (left, right), (low, high) = self.axes.get_xlim(), self.axes.get_ylim()
+        middle = 0.5 * (left + right) * self.aspect.right + 0.5 * (low + high) * self.aspect.up
+        far = 2.0 * (right - left + high - low) + float(np.abs(self.box).max() * self.aspect.rise)
+        camera = self.plotter.camera
+        camera.focal_point, camera.up = middle, self.aspect.up
+        camera.position = middle + far * self.aspect.back
+        camera.parallel_scale = 0.5 * (high - low)
+        camera.clipping_range = (0.1 * far, 2.5 * far)
+
+    def _lines(self) -> np.ndarray:
+        """Pipes and bodies of the first frame on the sheet : float64[c, 2, 2]; what names stand beside and over."""
+        self.cover, self.labels, found = np.zeros((0, 2)), [], [np.zeros((0, 2, 2))]
+        for file in self.scene.frames[0][1]:
+            mesh = read(file, self.scene)
+            points = self.aspect.on_sheet(mesh.points)
+            if 3 not in mesh.celltypes:
+                self.cover = np.vstack([self.cover, self.aspect.on_sheet(mesh.cell_centers().points)])
+                continue
+            lines = mesh.cells_dict[3]
+            found.append(points[lines])
+            if "pipe" in mesh.cell_data:
+                self.scene.pipes = [(np.asarray(mesh.points), lines, np.zeros(0), np.asarray(mesh["pipe"]))]
+            elif len(self.scene.frames) == 1:  # bodies move
+                self.labels = self._bodies(found[-1], np.asarray(mesh["body"]))
+        return np.concatenate(found)
+
+    def _bodies(self, lines: np.ndarray, whose: np.ndarray) -> list[tuple[str, np.ndarray]]:
+        """Names of bodies with the middles of their longest lines."""
+        long, found = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), []
+        for k, name in enumerate(self.scene.bodies):
+            own = np.flatnonzero(whose == k)
+            if len(own) and long[own].max() > 0.0:
+                found.append((name, lines[own[long[own].argmax()]].mean(axis=0)))
+        return found
+
+    def _add(self, mesh: Any) -> None:
+        field = self.scene.quantity.name
+        if "depth" in mesh.cell_data:
+            return self._basin(mesh)
+        mesh.points[:, 2] *= self.aspect.rise
+        if "body" in mesh.cell_data and (field != "speed" or self.wet):
+            shape = tubes(mesh, self.box)
+            if shape.n_points:  # there are bodies without extent
+                self.plotter.add_mesh(shape, color=LIMB, ambient=SHADE)
+        elif field in mesh.cell_data:
+            plane = 3 not in mesh.celltypes
+            self._coloured(mesh.cell_data_to_point_data() if plane else tubes(mesh, self.box), plane)
+            if plane:
+                rim = water.edges(mesh)
+                self.plotter.add_mesh(rim, color=style.INK, line_width=2)
+
+    def _basin(self, mesh: Any) -> None:
+        """The bed of a basin, its houses and the water."""
+        rise, field = self.aspect.rise, self.scene.quantity.name
+        surface = water.water(mesh, rise, (field,), water.WET * self.scene.height.factor) if field != "bed" else None
+        block = water.blocks(mesh)
+        top = self.box[5] + ABOVE * (self.box[5] - self.box[4])
+        mesh.points[:, 2] *= rise
+        for house in water.houses(mesh, rise * top):
+            self.plotter.add_mesh(house, color=HOUSE, ambient=SHADE)
+        if field == "bed":
+            return self._coloured(mesh.cell_data_to_point_data(), True)
+        self.plotter.add_mesh(mesh.extract_cells(~block) if block.any() else mesh, color=BED, smooth_shading=False)
+        if block.any():
+            self.plotter.add_mesh(mesh.extract_cells(block), color=HOUSE, ambient=SHADE)
+        if not surface.n_cells:
+            return None
+        self.plotter.add_mesh(water.sides(surface, water.upright(mesh) * (1.0, 1.0, rise)), color=DEEP, lighting=False)
+        if field in surface.point_data:
+            self._coloured(surface, True)
+        else:
+            self.plotter.add_mesh(surface, color=WATER, smooth_shading=True)
+        return None
+
+    def _coloured(self, shape: Any, plane: bool) -> None:
+        """A shape in the colours of its field, with lines of equal values where it is plane."""
+        (low, high), field, many = self.limits, self.scene.quantity.name, self.scene.contours
+        self.plotter.add_mesh(shape, scalars=field, cmap=COLOURS, clim=self.limits, smooth_shading=True,
+                              show_scalar_bar=False, lighting=not plane or self.wet,
+                              ambient=0.0 if plane else SHADE)  # fmt: skip
+        if plane and many and field in shape.point_data:
+            levels = [low + (high - low) * (k + 1) / (many + 1) for k in range(many)]
+            lines = shape.contour(levels, scalars=field)
+            lines.points[:] += OVER * shape.length * self.aspect.back  # or they sink into it here and there
+            if lines.n_points:
+                self.plotter.add_mesh(lines, color="white", line_width=2)
+
+
+def main() -> None:
+    """Draw what stands on standard input."""
+    scene, out = pickle.load(sys.stdin.buffer)
+    write(Stage(scene, len(scene.frames) > 1), len(scene.frames), Path(out))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""A symbol for each kind of part, as pipework and fluid power draw them. Knows names of kinds; knows no part.
+
+A symbol is strokes in a square from -1 to 1, the way of the flow along x: `M` and `L` go to points, `Z` closes,
+`O x y r` is a circle. What closes is white; after `*` it is ink, after `~` water. A kind that is not here has the
+symbol of the kind that it is made of (an orifice is a valve), else OTHER_NODE or OTHER_LINK: a new part needs no entry,
+and one line gives it its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+BOW = "M -1 -.6 L 1 .6 L 1 -.6 L -1 .6 Z"
+STEM = "M 0 0 L 0 .7"
+CAPSULE = "M -.7 -.9 L .7 -.9 L .7 .4 L .55 .75 L .3 .93 L 0 1 L -.3 .93 L -.55 .75 L -.7 .4 Z"
+BOX = "M -.8 -.8 L -.8 .8 L .8 .8 L .8 -.8 Z"
+SYMBOLS = {
+    "junction": "* O 0 0 .32",
+    "reservoir": "M -.9 .7 L .9 .7 L 0 -.5 Z M -.6 -.75 L .6 -.75 M -.3 -1 L .3 -1",  # a free surface
+    "tank": "M -.75 .9 L -.75 -.9 L .75 -.9 L .75 .9 Z ~ M -.75 .2 L -.75 -.9 L .75 -.9 L .75 .2 Z",
+    "basin": "M -1 .5 L -1 -.6 L 1 -.6 L 1 .5 Z ~ M -1 .1 L -.5 .25 L 0 .1 L .5 .25 L 1 .1 L 1 -.6 L -1 -.6 Z",
+    "accumulator": f"{CAPSULE} ~ M -.7 0 L -.7 -.9 L .7 -.9 L .7 0 Z",
+    "chamber": "O 0 0 .8",
+    "inflow": "* M -.2 -.5 L -.2 .5 L .9 0 Z M -1 0 L -.2 0",
+    "air-valve": "O 0 -.2 .65 M 0 .45 L 0 1 M -.3 .7 L 0 1 L .3 .7",
+    "valve": BOW,
+    "orifice": "M 0 1 L 0 .3 M 0 -1 L 0 -.3 M -.25 1 L .25 1 M -.25 -1 L .25 -1",
+    "leak": "M 0 .9 L .55 -.2 L .4 -.7 L 0 -.9 L -.4 -.7 L -.55 -.2 Z",
+    "check-valve": "* M -.8 -.7 L -.8 .7 L .7 0 Z M .75 -.8 L .75 .8",
+    "relief-valve": f"{BOW} M 0 0 L -.25 .25 L .25 .45 L -.25 .65 L .25 .85 L 0 1",  # its spring
+    "surge-anticipating": f"{BOW} {STEM} * O 0 .75 .25",  # its pilot
+    "rupture-disc": "M -.8 -.7 L -.8 .7 L .8 .7 L .8 -.7 Z M -.2 -.7 L .1 -.35 L .2 0 L .1 .35 L -.2 .7",
+    "pressure-reducing": f"{BOW} {STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z * M 0 0 L 1 .6 L 1 -.6 Z",  # a diaphragm
+    "pressure-sustaining": f"{BOW} {STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z * M 0 0 L -1 .6 L -1 -.6 Z",
+    "flow-control": f"{BOW} {STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z",
+    "pump": "O 0 0 .9 * M -.4 .7 L -.4 -.7 L .85 0 Z",
+    "turbine": "O 0 0 .9 * M .4 .7 L .4 -.7 L -.85 0 Z",
+    "spool-valve": "M -1 -.4 L -1 .4 L 1 .4 L 1 -.4 Z M -.35 -.4 L -.35 .4 M .35 -.4 L .35 .4 M -.8 -.3 L -.5 .3",
+    "cylinder": "M -1 -.5 L -1 .5 L .6 .5 L .6 -.5 Z * M -.25 -.5 L -.25 .5 L -.05 .5 L -.05 -.5 Z M 0 0 L 1 0",
+    "rigid-column": "* M -1 -.2 L -1 .2 L 1 .2 L 1 -.2 Z",
+    "bushing": "M -.8 -.4 L .8 -.4 M -.8 .4 L .8 .4 * M -.6 -.15 L -.6 .15 L .6 .15 L .6 -.15 Z",
+    "pin": "O 0 0 .6 * O 0 0 .2",
+    "mass": f"* {BOX}",
+    "body": "* M -.9 -.3 L -.9 .3 L .9 .3 L .9 -.3 Z",
+    "frame": "M -1 .3 L 1 .3 M -.8 -.3 L -.4 .3 M -.2 -.3 L .2 .3 M .4 -.3 L .8 .3",
+    "spring": "M -1 0 L -.7 0 L -.5 .5 L -.1 -.5 L .3 .5 L .7 -.5 L .8 0 L 1 0",
+    "damper": "M -1 0 L -.1 0 M -.1 -.35 L -.1 .35 M .5 -.5 L -.5 -.5 M .5 .5 L -.5 .5 M .5 -.5 L .5 .5 M .5 0 L 1 0",
+    "end-stop": "M -1 0 L .2 0 M .2 -.5 L .2 .5 * M .5 -.8 L .5 .8 L .8 .8 L .8 -.8 Z",
+    "force": "M -1 0 L .3 0 * M .3 -.4 L .3 .4 L 1 0 Z",
+    "torque": "M .5 -.6 L -.2 -.75 L -.75 -.2 L -.7 .4 L -.1 .75 L .4 .6 * M .3 .95 L .8 .3 L 0 .25 Z",
+}  # fmt: skip
+OTHER_NODE, OTHER_LINK = BOX, "M -1 0 L 0 .7 L 1 0 L 0 -.7 Z"
+
+WATER = "#8ab6d6"
+
+
+def symbol_of(kinds: Sequence[str], link: bool) -> str:
+    """The symbol of a part: `kinds` are its own and those it is made of, nearest first."""
+    return next((SYMBOLS[kind] for kind in kinds if kind in SYMBOLS), OTHER_LINK if link else OTHER_NODE)
+
+
+@cache
+def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], bool]]:
+    """(fill, points, whether closed) of each stroke, in the order in which they are drawn."""
+    found: list[tuple[str, list, bool]] = []
+    words, at, fill = symbol.split(), 0, "white"
+    while at < len(words):
+        word = words[at]
+        if word in "*~":
+            fill, at = {"*": "ink", "~": "water"}[word], at + 1
+        elif word == "Z":
+            found[-1] = (*found[-1][:2], True)
+            fill, at = "white", at + 1
+        elif word == "O":
+            x, y, r = map(float, words[at + 1 : at + 4])
+            found.append((fill, _circle(x, y, r), True))
+            fill, at = "white", at + 4
+        else:
+            if word == "M":
+                found.append((fill, [], False))
+            found[-1][1].append((float(words[at + 1]), float(words[at + 2])))
+            at += 3
+    return [(fill, tuple(points), closed) for fill, points, closed in found]
+
+
+def _circle(x: float, y: float, r: float) -> list[tuple[float, float]]:
+    from math import cos, pi, sin
+
+    return [(x + r * cos(k * pi / 16), y + r * sin(k * pi / 16)) for k in range(32)]
