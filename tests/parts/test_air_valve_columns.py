@@ -395,3 +395,13 @@ def test_a_valve_from_it_to_where_columns_alone_lead_on_is_refused_by_name():
     links = {"one": column("high", "v"), "k": gate("v", "j", 0.05), "two": column("j", "low")}
     with pytest.raises(fvsolve.CaseError, match="nodes.v: a valve joins this air valve to j"):
         fvsolve.build(fvsolve.load(summit(nodes={"j": junction(elevation=HEIGHT)}, links=links)))
+
+
+def test_a_valve_or_pump_between_columns_that_nothing_holds_is_refused_by_name():
+    """It took no part: the columns ran on through a valve all but shut, and every ledger closed."""
+    lifts = {"type": "pump", "from": "v", "to": "j", "curve": {"flow": [0.1], "head": [10.0]}}
+    for part in (gate("v", "j", 0.05), lifts):
+        links = {"one": column("high", "v"), "k": part, "two": column("j", "low")}
+        nodes = {name: junction(elevation=HEIGHT) for name in ("v", "j")}
+        with pytest.raises(fvsolve.CaseError, match="nodes.[vj]: k joins it to [jv], and only rigid columns lead on"):
+            fvsolve.build(fvsolve.load(summit(probes=(), nodes=nodes, links=links)))
