@@ -23,8 +23,8 @@ LEVELS = (0.5, 1.0, 2.0)
 SAFETY = 1.25  # Roache's, of three grids
 HALF = math.sqrt(2.0) / (math.sqrt(2.0) - 1.0)  # of order one half, to what twice the resolution leaves and all beyond
 MOST = 2.0  # order that is believed at most
-LEAST = 2e-6  # of a value: what iterations, and rows between steps, leave
-ROUNDING = 1e-12  # of the greatest value in that unit
+LEAST = 5e-6  # of a value: what iterations, rows between steps, and swings that have all but died leave
+ROUNDING = 1e-12  # of the greatest value in that unit, of angles of a radian at least
 SIDES = ("least", "greatest")
 
 
@@ -50,7 +50,7 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     apart = parted(runs)
     if apart:
         shared = dict.fromkeys(shared, 0.0)
-    smooth, largest = not said["cells"], {}
+    smooth, largest = not said["cells"], {"rad": 1.0}
     for one in said["extremes"].values():
         largest[one["unit"]] = max([largest.get(one["unit"], 0.0), *(abs(one[side] or 0.0) for side in SIDES)])
     said["peaks"] = {}
