@@ -12,6 +12,7 @@ from fvsolve.parts.table import Table
 from fvsolve.parts.value import Quantity, Usual
 from fvsolve.units import DIMENSIONS
 
+SHARES = 3.0  # of a class that a limit may plausibly allow
 MOST_LOOKED = 10_000  # parts that are remembered
 LOOKED: dict[int, tuple[Table, Any, list]] = {}  # id -> part, what its file says, what is odd in it
 TOP = {  # keys that stand in no table: fields of a case
@@ -28,6 +29,9 @@ def notices(case: Any) -> list[Notice]:
              if (odd := _beyond(value, getattr(case, key), case.raw.get(key)))]  # fmt: skip
     found += [_notice(place, *odd[:1], case, *odd[1:]) for place, part in parts.items()
               for odd in _of_part(part, _said(case.raw, place))]  # fmt: skip
+    found += [_notice(("limits", name), ("share_of_class",), case, limit.share_of_class, SHARES,
+                      f"{limit.share_of_class:g} of what the class bears; a share of 1 is all of it")
+              for name, limit in case.limits.items() if (limit.share_of_class or 0.0) > SHARES]  # fmt: skip
     return list({(one.place, one.text): one for one in found}.values())
 
 

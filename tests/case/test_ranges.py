@@ -27,6 +27,10 @@ EXAMPLES = {  # what the docs print of cases
 }
 
 SLIPS = {  # settings -> (place, key, value, limit, what the text says)
+    "per cent of a class": (
+        {"links.main.allowable_pressure": 1e6, "limits.top": {"on": "main", "share_of_class": 100}},
+        "limits.top", "share_of_class", 100.0, 3.0, "a share of 1 is all of it",
+    ),
     "diameter in mm": ({"links.main.diameter": 304.8}, "links.main", "diameter", 304.8, 14.0, '"304.8 mm"'),
     "diameter with its unit": ({"links.main.diameter": "300 m"}, "links.main", "diameter", 300.0, 14.0, '"300 mm"'),
     "wider than long": ({"links.main.length": 0.2}, "links.main", "diameter", 0.3048, 0.2, "its length of 0.2 m"),
