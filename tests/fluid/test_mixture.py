@@ -201,10 +201,12 @@ def test_two_chambers_with_air_agree_with_scipy(keys):
 
 BAD = {
     "air under another law": ({"law": "log", "air_fraction": 0.01}, "air_fraction", 'use law = "mixture"'),
-    "a cavity under another law": ({"cavitation": True}, "cavitation", 'use law = "mixture"'),
+    "a cavity under another law": ({"law": "linear", "cavitation": True}, "cavitation", 'use law = "mixture"'),
     "nothing but air": ({"law": "mixture", "air_fraction": 1.0}, "air_fraction", "below 1"),
     "less than no air": ({"law": "mixture", "air_fraction": -0.1}, "air_fraction", "between 0 and 1"),
-    "cavities from nothing": ({"law": "mixture", "cavitation": True, "vapor_pressure": 2e3}, "cavitation", "free gas"),
+    "cavities from nothing": (
+        {"cavitation": True, "air_fraction": 0.0, "vapor_pressure": 2e3}, "cavitation", "free gas",
+    ),
     "cavities of what never boils": (
         {"law": "mixture", "cavitation": True, "air_fraction": 1e-6}, "cavitation", "vapour pressure",
     ),

@@ -153,7 +153,7 @@ def _dense(a) -> np.ndarray:
     if a.shape[0] > LARGEST:
         share = math.floor(100 * LARGEST / a.shape[0])
         raise FvsolveError(f"the case has {a.shape[0]} states, a verdict is found up to {LARGEST}: give its pipes "
-                           f"{share} % of their cells, --set links.NAME.cells=...")  # fmt: skip
+                           f"fewer cells, {share} % of what they have, --set links.NAME.cells=...")  # fmt: skip
     return a if isinstance(a, np.ndarray) else a.toarray()
 
 
