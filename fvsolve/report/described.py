@@ -23,6 +23,11 @@ FLUID = (
 SILENT = ("position", "elevation", "type", "from", "to", "ports", "scalars")  # keys that stand elsewhere, or draw
 
 
+def model(result) -> list[ReportTable | None]:
+    """All tables of this page, in order; None of what a case has not."""
+    return [fluid(result), pipes(result), walls(result), parts(result)]
+
+
 def fluid(result) -> ReportTable:
     """The liquid at its reference state, and where its numbers are from."""
     case, said = result.case, result.summary["fluid"]
@@ -61,6 +66,24 @@ def pipes(result) -> ReportTable | None:
     heads = ("pipe", "from", "to", "length", "diameter", "wave speed", *heads, "friction", "cells")
     units = ("", "", "", length.unit, length.unit, speed.unit, *[height.unit] * (2 * stated))
     return ReportTable("Pipes", heads, rows, units, more=ELSEWHERE)
+
+
+def walls(result) -> ReportTable | None:
+    """What pipes bear, the wall they have, and whose figures these are; None where no pipe says any of it."""
+    case, rows = result.case, []
+    thick, bears = column("", "length", case), column("", "pressure", case)
+    modulus = _pressed(column("", "modulus", case), case)
+    for name, link in case.links.items():
+        made, allowed = getattr(link, "wall", None), getattr(link, "allowable_pressure", None)
+        made = None if made == "stiff" else made
+        if made is None and allowed is None:
+            continue
+        row = [name, None if allowed is None else float(bears.span_from_si(allowed)), None, None, link.source or ""]
+        if made is not None:
+            row[2:4] = float(thick.from_si(made.thickness)), float(modulus.from_si(made.youngs_modulus))
+        rows.append(row)
+    heads, units = ("pipe", "bears", "wall", "modulus", "source"), ("", bears.span_unit, thick.unit, modulus.unit)
+    return ReportTable("Walls", heads, rows, units, more=ELSEWHERE) if rows else None
 
 
 def _friction(link, case) -> str:

@@ -36,7 +36,7 @@ def page(result, ways: list[SectionWay]) -> str:
         "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(chosen(result)),
         "places": _there([*trust.worst(result), *worst.by_pipe(result), probes if result.envelope else None]),
-        "model": _there([described.fluid(result), described.pipes(result), described.parts(result)]),
+        "model": _there(described.model(result)),
         "numbers": _there([numerics.settings(result), numerics.ledgers(result), trust.claims(result),
                            numerics.comparisons(result)]),
         "told": _cut([one.text for one in result.warnings if one.ok]), "happened": _there([numerics.cavities(result),

@@ -36,7 +36,7 @@ def study_page(said: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> 
         "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
         "words": words(said, runs), "matrix": [matrix(runs)] if first.verdicts else [], "events": events,
         "failing": failing(runs), "changes": changed(said), "first": name_of(runs[0][0]),
-        "model": [one for one in (described.fluid(first), described.pipes(first), described.parts(first)) if one],
+        "model": [one for one in described.model(first) if one],
         "told": told(runs), "versions": numerics.versions(first), "ink": INK,
     }  # fmt: skip
     return rendered("study", filled, figures)

@@ -52,7 +52,7 @@ def tables(result, ways: list[SectionWay]) -> list[ReportTable]:
         words, trust.verdicts(result), *trust.worst(result),
         worst.of_all(result, ways), *worst.by_pipe(result), worst.of_probes(result),
         *(_along(result, section(result, way)) for way in ways), numerics.cavities(result), numerics.events(result),
-        described.fluid(result), described.pipes(result), described.parts(result), numerics.settings(result),
+        *described.model(result), numerics.settings(result),
         numerics.ledgers(result), trust.claims(result), numerics.comparisons(result), notes,
         ReportTable("Versions", versions.headers, versions.rows),
     ]  # fmt: skip

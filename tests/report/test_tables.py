@@ -8,6 +8,7 @@ import pytest
 from truth.scenes import junction, lake, pipe, scene
 
 import fvsolve
+from fvsolve.report.described import walls
 from fvsolve.report.legs import ways
 from fvsolve.report.report import write_report
 from fvsolve.report.section import section
@@ -52,6 +53,15 @@ def test_numbers_of_a_column_are_aligned_on_their_points():
     assert worded(12345.678) == "12\u202f346" and worded(-0.0) == "0" and worded(1e-12) == "1e\u221212"
     assert worded(float("nan")) == worded(None) == "\u2013" and worded(True) == "yes"
     assert ReportTable("", ("name", "length"), [["a", 1.0], ["b", None]]).numeric == [False, True]
+
+
+def test_what_pipes_bear_and_whose_figures_these_are_stands_in_a_table_of_its_own(tmp_path):
+    units = {"output.units": {"pressure": "barg", "length": "mm"}, "numerics.end": 0.1, "expect": {}}
+    found = walls(fvsolve.run("plastic-main", set=units, out=tmp_path / "run", pictures=False))
+    assert found.units[:3] == ("", "bar", "mm") and [row[0] for row in found.rows] == ["upper", "lower"]
+    assert [row[1] for row in found.rows] == pytest.approx([16.0, 16.0])  # PE100, SDR 11, C = 1.25
+    assert [row[2] for row in found.rows] == pytest.approx([200.0 / 11.0, 160.0 / 11.0])
+    assert "ISO 4427" in found.rows[0][4]
 
 
 def test_the_workbook_holds_every_row_and_no_formula(fork, tmp_path):
