@@ -56,6 +56,9 @@ def _show(found) -> None:
             first = min(row["marks"], key=lambda mark: mark["time"])
             text = f"{first['text']}: results from {when(row)(first['time'])} on are not to be trusted"
             terminal.line(console, f"{name_of(row)}: {text}", "yellow")
+        for note in row["warnings"]:
+            if note["kind"] == "end":
+                terminal.line(console, f"{name_of(row)}: {note['text']}", "yellow")
         for one in row["verdicts"]:
             if not one["ok"] and not is_open(one):
                 value = "-" if one["value"] is None else f"{one['value']:.6g}"

@@ -365,8 +365,9 @@ def marks_of(marks: list[dict], told) -> list[str]:
 
 def why_open(said: dict) -> str:
     """Why a limit that is not passed does not hold either."""
+    late = [one["text"] for one in said["warnings"] if one["kind"] == "end"]
     if not said["marks"]:
-        return f"the run is not ok ({said['reason']})"
+        return late[0] if said["ok"] and late else f"the run is not ok ({said['reason']})"
     first = min(said["marks"], key=lambda mark: mark["time"])
     return f"results from {when(said)(first['time'])} on are not to be trusted"
 

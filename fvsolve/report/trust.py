@@ -69,6 +69,8 @@ def verdict(result) -> Word:
         why = "their margins are smaller than the error of the numbers"
         if not result.ok or result.marks:
             why = "the run is not sound" if not result.ok else "from a time on the numbers are not to be trusted"
+        elif any(one.kind == "end" for one in result.warnings):
+            why = "what is scheduled goes on after the end of the run"
         return Word("doubt", f"Whether {'limits hold' if len(unsure) > 1 else 'a limit holds'} is open.",
                     f"{', '.join(unsure)}: {why}.")  # fmt: skip
     every = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"

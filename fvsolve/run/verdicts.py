@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fvsolve.case import horizon
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.case.limits import VACUUM
 from fvsolve.case.routes import legs
@@ -33,14 +34,15 @@ class Nearest(NamedTuple):
 
 def verdicts(model, summary) -> list[dict[str, Any]]:
     """One verdict of every limit of the case, in units of `[output]`, with the worst place of each part."""
-    chainage = Chainages(model.case)
-    return [verdict(model, summary, limit, chainage) for limit in model.case.limits.values()]
+    chainage, whole = Chainages(model.case), not summary.marks and not horizon.notices(model.case)
+    return [verdict(model, summary, limit, chainage, whole) for limit in model.case.limits.values()]
 
 
-def verdict(model, summary, limit, chainage: Chainages) -> dict[str, Any]:
+def verdict(model, summary, limit, chainage: Chainages, whole: bool) -> dict[str, Any]:
     """Whether a limit holds, and where and when it is nearest, or passed most; see `verdicts`.
 
-    One that is not passed is open all the same where the run is not ok, or from a mark on not to be trusted.
+    One that is not passed is open all the same where the run is not ok, and where it is not `whole`: from a mark on not
+    to be trusted, or at its end while a schedule goes on.
     """
     extent = limit.extent
     places = [one for part in met(model, summary, extent) for one in nearest(model, limit, part)]
@@ -50,7 +52,7 @@ def verdict(model, summary, limit, chainage: Chainages) -> dict[str, Any]:
     first = places[0]
     slack = ROUNDING * (abs(first.limit) + SIZES.get(extent.quantity, 0.0))
     return {
-        "name": limit.name, "ok": bool(summary.ok and not summary.marks and first.margin >= -slack), **rows[0],
+        "name": limit.name, "ok": bool(summary.ok and whole and first.margin >= -slack), **rows[0],
         "quantity": extent.quantity, "until": float(summary.t), "error": None, "worst": worst(rows),
     }  # fmt: skip
 

@@ -224,7 +224,7 @@ class DesignRun:
             write_summary(place / "summary.json", result.summary)
         said = result.summary
         kept = ("ok", "reason", "t", "verdicts", "extremes", "peaks", "marks", "events", "expectations", "time_unit",
-                "envelope_units")  # fmt: skip
+                "envelope_units", "warnings")  # fmt: skip
         return {key: task[key] for key in ("event", "protection", "directory")} | {
             key: plain(said[key]) for key in kept if key in said
         }

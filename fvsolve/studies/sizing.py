@@ -28,7 +28,8 @@ _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*"
 class SizeRun:
     """One run: the value of the key, whether all limits hold, the least margin over its limit, and of which limit.
 
-    open : why a run that passes no limit holds none either, as what it schedules goes on after its end; else empty
+    open : why a run that passes no limit holds none either, as what it schedules goes on after its end, or its numbers
+    are not to be trusted; else empty
     """
 
     value: float
@@ -135,11 +136,10 @@ class Sizing:
             raise KeyboardInterrupt
         worst = min(result.verdicts, key=relative)
         ok = result.ok and all(one.ok for one in result.verdicts)
-        late = [one.text for one in result.warnings if one.kind == "end"] if ok else []
-        known = result.ok and not late and (ok or relative(worst) < 0.0)
-        why = late[0] if late else result.marks[0].text if result.ok and not ok and not known else ""
-        margin = relative(worst) if known else None
-        self.runs.append(SizeRun(value, ok and not late, margin, worst.name, result.reason, why))
+        known = result.ok and (ok or relative(worst) < 0.0)
+        doubts = [one.text for one in result.marks] + [one.text for one in result.warnings if one.kind == "end"]
+        why = doubts[0] if result.ok and not known and doubts else ""
+        self.runs.append(SizeRun(value, ok, relative(worst) if known else None, worst.name, result.reason, why))
         return self.runs[-1]
 
     def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
