@@ -18,7 +18,7 @@ from fvsolve.case.cells import means, samples
 from fvsolve.case.riding_patches import on_body
 from fvsolve.case.sections import Output
 from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
-from fvsolve.errors import MeshError, listing
+from fvsolve.errors import MeshError, did_you_mean, listing
 from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
 from fvsolve.parts.basin.part import MovingWall, Place, StartOfFields
@@ -113,8 +113,9 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
         if line.basin in nodes and pool is None:
             continue  # at fault itself
         if not isinstance(pool, Pool):
-            pools = [one for one, kind in nodes.items() if isinstance(kind, Pool)]
-            yield (*key, "basin"), f"no basin named {show(line.basin)}; basins are {listing(pools) or 'none'}"
+            pools = [one for one, kind in nodes.items() if kind is None or isinstance(kind, Pool)]
+            near = did_you_mean(line.basin, pools) or f"; basins are {listing(pools) or 'none'}"
+            yield (*key, "basin"), f"no basin named {show(line.basin)}{near}"
             continue
         for end, point in (("from", line.from_), ("to", line.to)):
             try:

@@ -27,7 +27,7 @@ def network(table: dict[str, Any]) -> Found:
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
     places = _places(nodes, links)
     ends: dict[str, list[str]] = {}
-    complete = True
+    unjoined = 0  # ports that join no place that is known
     for name, link in links.items():
         found, fits = _ports(_dict(link)), True
         for keys, place, domain in found:
@@ -45,7 +45,7 @@ def network(table: dict[str, Any]) -> Found:
         for k, (keys, place, _) in enumerate(found):
             if isinstance(place, str) and place in [other for _, other, _ in found[:k]]:
                 yield ("links", name, *keys), f"joins {show(place)} to itself"
-        complete = complete and len(set(joined)) == len(found) and all(place in places for place in joined)
+        unjoined += len(found) - len({*joined} & places.keys())
         ends[name] = [place for place in [*joined, *_owned(name, link)] if place in places]
     for group in ("nodes", "links"):
         kinds = [_dict(node).get("type") for node in nodes.values()]
@@ -55,10 +55,11 @@ def network(table: dict[str, Any]) -> Found:
     tied = {name: _tied(name, node, places) for name, node in nodes.items()}
     hanging = _hanging(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
-    for name, node in nodes.items():
-        if own_places(name, node) is None and not touched & {name, *points_of(name, node)}:
-            yield ("nodes", name), "no link touches it"
-    if not complete:
+    loose = [name for name, node in nodes.items()
+             if own_places(name, node) is None and not touched & {name, *points_of(name, node)}]  # fmt: skip
+    if len(loose) > unjoined:  # else they may be what ports at fault should join
+        yield from ((("nodes", name), "no link touches it") for name in loose)
+    if unjoined:
         return  # what hangs together is not known
     own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
     own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := points_of(name, node))}
@@ -184,6 +185,17 @@ def own_places(name: str, node: Any) -> list[str] | None:
     kind = _kind("nodes", node)
     own = kind.own_places(_dict(node)) if kind else None
     return None if own is None else [f"{name}.{one}" for one in own]
+
+
+def has_mesh(node: Any) -> bool:
+    """Whether a node of a file is a basin whose patches are those of a mesh in a file of its own."""
+    return _dict(node).get("type") == "basin" and "mesh" in node
+
+
+def named_of(name: str, links: dict[str, Any]) -> list[str]:
+    """Places of a part that links of the file name."""
+    places = [place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)]
+    return [place.partition(".")[2] for place in places if place.startswith(f"{name}.")]
 
 
 def _tied(name: str, node: Any, places: dict[str, Any]) -> list[str]:

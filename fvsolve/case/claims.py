@@ -15,7 +15,7 @@ from fvsolve.case.probe import Kinds, Probe, read_probe
 from fvsolve.errors import did_you_mean
 from fvsolve.parts.series import copy_name, find_file, read_columns
 from fvsolve.parts.table import read_keys
-from fvsolve.parts.value import NEEDED, VALUE, Misfit, Number, Quantity, Setting, Text, nonnegative
+from fvsolve.parts.value import NEEDED, VALUE, Anything, Misfit, Number, Quantity, Setting, Text, nonnegative
 from fvsolve.units import show
 
 FUNCTIONS = ("max", "min", "mean", "final", "at", "greatest", "least")
@@ -65,7 +65,34 @@ class Compare:
 
 
 def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: Setting) -> Expect | None:
-    """One line of `[expect]`; None where the part of its probe is at fault itself. Raises ValueError."""
+    """One line of `[expect]`; None where the part of its probe is at fault itself. Raises Misfit."""
+    faults, named = [], (None, None, None, None)
+    try:
+        named = read_claim(claim, kinds, routes, setting)
+    except ValueError as error:
+        faults.append(((), str(error)))
+    function, probe, extent, time = named
+    read = probe or extent
+    keys = expect_keys("number" if read is None else read.dimension)
+    if read is None:
+        keys |= {"value": (Anything(), NEEDED), "atol": (Anything(), 0.0)}
+    try:
+        if not isinstance(given, dict):
+            raise ValueError(f"{show(given)} is no table; wanted one such as {{ value = 1.0, rtol = 1e-2 }}")
+        if "rtol" not in given and "atol" not in given:
+            faults.append(((), "no tolerance; wanted rtol, atol or both"))
+        found = read_keys(given, keys, setting)
+    except ValueError as error:
+        raise Misfit(faults + getattr(error, "faults", [((), str(error))])) from None
+    if faults:
+        raise Misfit(faults)
+    return None if read is None else Expect(claim, function, probe, extent, time, **found)
+
+
+def read_claim(
+    claim: str, kinds: Kinds, routes: Mapping[str, Any], setting: Setting
+) -> tuple[str, Probe | None, Extent | None, float | None]:
+    """(function, probe, extent, time [s]) that a claim names; neither where the part is at fault itself."""
     match = _CLAIM.fullmatch(claim)
     if match is None or match[1] not in FUNCTIONS:
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
@@ -83,26 +110,12 @@ def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any],
     if when is not None:
         given_time = float(when) if _BARE.fullmatch(when) else when.strip("\"'")
         time = Quantity("time").read(given_time, setting)
-    probe, extent = None, None
     if function in WHOLE and "@" not in probe_text:
         on, dot, quantity = probe_text.rpartition(".")
         if not dot:
             raise ValueError(f"wanted {function}(PART.QUANTITY)")
-        try:
-            extent = read_extent(on, quantity, kinds, routes)
-        except Misfit as error:
-            raise ValueError(str(error)) from None
-    else:
-        probe = read_probe(probe_text, kinds)
-    if probe is None and extent is None:
-        return None
-    dimension = (probe or extent).dimension
-    if not isinstance(given, dict):
-        raise ValueError(f"{show(given)} is no table; wanted one such as {{ value = 1.0, rtol = 1e-2 }}")
-    found = read_keys(given, expect_keys(dimension), setting)
-    if "rtol" not in given and "atol" not in given:
-        raise Misfit([((), "no tolerance; wanted rtol, atol or both")])
-    return Expect(claim, function, probe, extent, time, **found)
+        return function, None, read_extent(on, quantity, kinds, routes), time
+    return function, read_probe(probe_text, kinds), None, time
 
 
 def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:

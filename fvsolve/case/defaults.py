@@ -33,8 +33,9 @@ def filled(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     found = defaults_of(table, given.get("type"))
     if not found:
         return given
+    known = KINDS[given["type"]].keys()  # others are faults of the defaults alone
     stated = {key for group in KINDS[given["type"]].alternatives if any(one in given for one in group) for key in group}
-    return {**{key: value for key, value in found.items() if key not in stated}, **given}
+    return {**{key: value for key, value in found.items() if key in known and key not in stated}, **given}
 
 
 def link_said(table: Mapping[str, Any], name: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from fvsolve.case.probe import Kinds, Probe
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import Pipe
+from fvsolve.parts import KINDS, Pipe
 from fvsolve.parts.value import Misfit
 from fvsolve.units import show
 
@@ -62,11 +62,19 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
     if not isinstance(names, (list, tuple)) or not names or not all(isinstance(one, str) for one in names):
         raise ValueError(f'{show(given)} names nothing; wanted a part, a route, "pipes" or "nodes", or a list of such')
     parts: dict[tuple[str, str], None] = {}
+    problems, known = [], True
     for one in names:
-        found = parts_of(one, quantity, kinds, routes)
-        if found is None:
-            return None
-        parts |= dict.fromkeys(found)
+        try:
+            found = parts_of(one, quantity, kinds, routes)
+        except Misfit:
+            raise
+        except ValueError as error:
+            problems.append(str(error))
+        else:
+            known = known and found is not None
+            parts |= dict.fromkeys(found or ())
+    if problems:
+        raise ValueError("; ".join(problems))
     dimensions, lacking = set(), []
     for group, name in parts:
         known = quantities_of(kinds[group][name])
@@ -80,6 +88,8 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
         has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "it has none"
         text = f"{name}{more} without {show(quantity)}: a {kinds[group][name].kind}; {has}"
         raise Misfit([(("quantity",), text)])
+    if not known:
+        return None
     return Extent(tuple(names), tuple(parts), quantity, dimensions.pop())
 
 
@@ -94,6 +104,9 @@ def parts_of(one: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -
     if groups:
         return None if kinds[groups[0]][one] is None else [(groups[0], one)]
     if one in routes:
+        if quantity not in (known := quantities_of(Pipe)):
+            has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
+            raise Misfit([(("quantity",), f"{one} without {show(quantity)}: a route; {has}")])
         return None if routes[one] is None else [("links", pipe) for pipe in routes[one].pipes]
     if one in ALL:
         wanted = (lambda kind: kind is Pipe) if one == "pipes" else (lambda kind: quantity in quantities_of(kind))
@@ -111,3 +124,10 @@ def quantities_of(kind: Any) -> dict[str, str]:
     """Quantities of a kind of part that can be watched -> dimension."""
     found = {**getattr(kind, "quantities", {}), **getattr(kind, "along", {})}
     return found | ({"pressure_head": "head"} if "pressure" in found else {})
+
+
+def only_dimension(quantity: str) -> str | None:
+    """The dimension of a quantity, whatever has it; None where none has, or not all the same."""
+    kinds = [kind for group in KINDS.values() for kind in group.values()]
+    found = {quantities_of(kind).get(quantity) for kind in kinds} - {None}
+    return found.pop() if len(found) == 1 else None

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fvsolve.case.extent import OF_PRESSURE, Extent, read_extent
+from fvsolve.case.extent import OF_PRESSURE, Extent, only_dimension, read_extent
 from fvsolve.case.probe import Kinds
 from fvsolve.errors import did_you_mean
 from fvsolve.parts.table import read_keys
-from fvsolve.parts.value import NEEDED, VALUE, Misfit, Number, Quantity, Setting, Text, Value, positive
+from fvsolve.parts.value import NEEDED, VALUE, Anything, Misfit, Number, Quantity, Setting, Text, Value, positive
 from fvsolve.units import show
 
 VACUUM, VAPOR = "vacuum", "vapor"
@@ -102,9 +102,9 @@ def read_limit(
         except ValueError as error:
             key = "quantity" if isinstance(error, Misfit) and "quantity" in given else "on"
             faults.append(((key,), str(error)))
-    dimension = extent.dimension if extent is not None else "number"
-    keys = limit_keys(asked if isinstance(asked, str) else "", dimension)
-    if extent is None:
+    dimension = extent.dimension if extent is not None else only_dimension(asked) if isinstance(asked, str) else None
+    keys = limit_keys(asked if isinstance(asked, str) else "", dimension or "number")
+    if dimension is None:
         keys |= dict.fromkeys(("least", "greatest"), (Anything(), None))
     try:
         found = read_keys(given, keys, setting)
@@ -116,7 +116,7 @@ def read_limit(
     if bounds["greatest"] is not None and bounds["share_of_class"] is not None:
         faults.append((("share_of_class",), "greatest and share_of_class are given; keep one"))
     least, greatest = bounds["least"], bounds["greatest"]
-    if extent is not None and isinstance(least, float) and isinstance(greatest, float) and not least < greatest:
+    if dimension is not None and isinstance(least, float) and isinstance(greatest, float) and not least < greatest:
         faults.append((("least",), f"{show(given['least'])} is not below greatest, {show(given['greatest'])}"))
     if extent is not None and bounds["share_of_class"] is not None:
         faults += list(unclassed(extent, links))
@@ -137,13 +137,6 @@ def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Itera
     for key in ("least", "greatest"):
         if getattr(limit, key) == VAPOR and fluid is not None and not fluid.vapor_pressure:
             yield (key,), 'the fluid has no vapour pressure; wanted vapor_pressure above 0 under [fluid], or "vacuum"'
-
-
-class Anything(Value):
-    """Whatever stands there: what it means is not known, as what it belongs to is at fault."""
-
-    def read(self, given: Any, setting: Setting) -> Any:
-        return given
 
 
 def unclassed(extent: Extent, links: Mapping[str, Any]):

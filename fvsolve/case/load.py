@@ -6,6 +6,7 @@ import functools
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from fvsolve.case.limits import DesignLimit, limit_faults, read_limit
 from fvsolve.case.moved import moved
 from fvsolve.case.probe import Probe, default_probes, read_probe
 from fvsolve.case.raw import Raw, dotted, opened, override, read_raw
-from fvsolve.case.routes import Route, legs, spread
+from fvsolve.case.routes import Route, broken, legs, spread
 from fvsolve.case.routes import misfits as route_misfits
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.doors import TABLE, door
@@ -119,6 +120,9 @@ class _Reader:
         self.origin: dict[tuple, tuple] = {}  # (group, name) of what a cut pipe came to -> of what the file has
         self.pieces: dict[str, list[str]] = {}  # of cut pipes
         self.said = raw.table  # before pipes are cut
+        self.lost: set[tuple[str, str]] = set()  # (group, name) of what cannot be read, as what it hangs on is at fault
+        self.uncut: dict[str, Pipe] = {}  # pipes that cannot be cut, as what is placed on them is at fault
+        self.joined = True  # whether it is known what joins what
         self.lumped: dict[str, Any] = {}  # meshes of basins whose water is but masses on a body
 
     def case(self) -> Case:
@@ -170,16 +174,19 @@ class _Reader:
         output = self.output(numerics, kinds)
         expect, compare = self.expect(kinds, routes), self.compare(kinds)
         limits = self.limits(kinds, routes, parts["links"], properties, top["gravity"])
-        self.add(check.network(self.with_patches(meshes)))
+        if self.joined:
+            self.add(check.network(self.drawn(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
         start = numerics.start if numerics is not None else 0.0
-        self.add(check.parts(*parts.values(), *about, start, meshes, self.lumped))
+        self.add(check.parts(parts["nodes"], parts["links"] | self.uncut, *about, start, meshes, self.lumped))
+        timed = numerics or self.timed()
+        if timed is not None:
+            self.add(check.cavities(timed, has_cells, fluid))
+            self.add(basins.misfits(*parts.values(), meshes, properties, (timed.start, timed.end),
+                                     self.group("nodes")))  # fmt: skip
+            self.add(check.claims(expect, timed))
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
-            self.add(check.cavities(numerics, has_cells, fluid))
-            self.add(basins.misfits(*parts.values(), meshes, properties, (numerics.start, numerics.end),
-                                     self.group("nodes")))  # fmt: skip
-            self.add(check.claims(expect, numerics))
             carries = bool(carried) and any(parts["nodes"][name].own.carries for name in meshes)
             numerics = numerics.filled(has_cells, carries, check.follows_cavities(fluid, has_cells))
         self.add(scalars.misfits(carried, *parts.values(), properties))
@@ -242,21 +249,26 @@ class _Reader:
         self.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
                        for name, one in table["links"].items() if placing.is_pipe(one)
                        for k in range(len(one["bends"]) if isinstance(one.get("bends"), list) else 0)}  # fmt: skip
-        self.add(placing.faults(table))
-        self.stop()
+        odd = list(placing.faults(table))
+        self.add(odd)
+        astray = {keys[:2] for keys, _ in odd}
         pipes, table = {}, defaults.spread(table)
         for name, given in table["links"].items():
-            if placing.is_pipe(given):
+            if placing.is_pipe(given) and ("links", name) not in astray:
                 try:
                     pipes[name] = self.part(Pipe, {key: one for key, one in given.items() if key != "pieces"})
                 except ValueError as error:
                     self.misfit(("links", name), error)
-        self.stop()
-        counts = default_cells(pipes, properties, numerics.cell_time)
-        exact = {name for name, pipe in pipes.items() if (pipe.line or numerics.line) == "delay"}
-        made = placing.cut(table, pipes, counts, exact, self.fault)
-        self.stop()
+        line = (numerics or self.in_order("numerics", Numerics)).line
+        exact = {name for name, pipe in pipes.items() if (pipe.line or line) == "delay"}
+        if None in (properties, numerics):
+            counts = {name: pipe.cells or 1 for name, pipe in pipes.items()}
+            exact |= {name for name, pipe in pipes.items() if pipe.cells is None}
+        else:
+            counts = default_cells(pipes, properties, numerics.cell_time)
+        made = placing.cut(table, pipes, counts, exact, astray, self.fault)
         self.raw, self.pieces = replace(self.raw, table=made.table), made.pieces
+        self.lost, self.uncut, self.joined = made.lost, made.wholes, made.known
         self.origin |= made.origin
         return made.told
 
@@ -283,9 +295,11 @@ class _Reader:
     def fault(self, keys: tuple, message: str) -> None:
         if ROOT in keys:
             keys = keys[len(keys) - keys[::-1].index(ROOT) :]
-        keys = (*self.origin.get(keys[:2], keys[:2]), *keys[2:])
-        keys = defaults.place(self.said, keys)
+        own = (*self.origin.get(keys[:2], keys[:2]), *keys[2:])
+        keys = defaults.place(self.said, own)
         place = text.path(keys)
+        if keys != own and any(one.place == place for one in self.faults):
+            return  # a default that no part may have
         if self.raw.is_override(keys):
             self.faults.append(Fault(place, message, override=True))
         else:
@@ -322,6 +336,21 @@ class _Reader:
         except ValueError as error:
             self.misfit((name,), error)
             return None
+
+    def in_order(self, name: str, model: Any) -> Any:
+        """What the keys of a table say that have no fault, for what hangs on them; all may be left out."""
+        found = {}
+        for key, value in model.values().items():
+            with suppress(KeyError, TypeError, ValueError):
+                found[key] = value.read(self.raw.table[name][key], self.setting)
+        return model.model_construct(**found)
+
+    def timed(self) -> Numerics | None:
+        """The keys of `[numerics]` that are in order, if start and end are among them."""
+        said = self.raw.table.get("numerics")
+        asked = self.in_order("numerics", Numerics) if isinstance(said, dict) else None
+        times = {key for key in ("start", "end") if asked is not None and key in said}
+        return asked if "end" in times and times <= asked.model_fields_set else None
 
     def top(self) -> dict[str, Any]:
         for key in self.raw.table:
@@ -397,7 +426,7 @@ class _Reader:
                 self.fault((group, name), f"{show(part)} is no table; wanted one with a type")
                 continue
             kind = self.kind(group, name, part)
-            if kind is None:
+            if kind is None or (group, name) in self.lost:
                 continue
             try:
                 made[name] = self.kept((group, name), part, functools.partial(self.part, kind, part))
@@ -412,25 +441,35 @@ class _Reader:
         return kind.model_validate(rest, context=self.setting)
 
     def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:
-        """Meshes of basins by name; without one it is not known what may be joined, and reading ends."""
+        """Meshes of basins by name; basins without one leave the nodes, as at fault themselves."""
         made = {}
-        for name, node in nodes.items():
+        for name, node in [*nodes.items()]:
             try:
                 if isinstance(node, Basin):
                     mesh = self.kept(("meshes", name), node, functools.partial(basins.mesh_of, node, self.setting))
                     (self.lumped if node.lumped else made)[name] = mesh
             except Misfit as error:
                 self.misfit(("nodes", name), error)
-        if len(made) + len(self.lumped) < sum(isinstance(node, Basin) for node in nodes.values()):
-            self.stop()
+                del nodes[name]
         return made
 
-    def with_patches(self, meshes: dict[str, Any]) -> dict[str, Any]:
-        """The table as the file has it, basins with all the patches of their meshes."""
-        nodes = self.raw.table.get("nodes")
-        own = {name: {**nodes[name], "patches": dict.fromkeys(basins.patch_names(mesh), {})
-                      | (nodes[name].get("patches") or {})} for name, mesh in meshes.items()}  # fmt: skip
-        return {**self.raw.table, "nodes": {**nodes, **own}} if meshes else self.raw.table
+    def drawn(self, meshes: dict[str, Any]) -> dict[str, Any]:
+        """The table as the file has it, basins with all the patches of their meshes, what is lost as a junction.
+
+        A basin whose mesh is lost has the patches that are named of it.
+        """
+        nodes, links = self.group("nodes"), self.group("links")
+        patches = {name: basins.patch_names(mesh) for name, mesh in meshes.items()}
+        lost = [name for name, one in nodes.items() if check.has_mesh(one) and name not in (*meshes, *self.lumped)]
+        patches |= {name: check.named_of(name, links) for name in lost}
+        if not patches and not self.lost:
+            return self.raw.table
+        own = {name: {**nodes[name], "patches": dict.fromkeys(found, {}) | (nodes[name].get("patches") or {})}
+               for name, found in patches.items()}  # fmt: skip
+        own |= {name: {"type": "junction"} for group, name in self.lost if group == "nodes"}
+        unfit = [name for group, name in self.lost if group == "links" and not placing.is_pipe(links[name])]
+        links = {name: one for name, one in links.items() if name not in unfit}
+        return {**self.raw.table, "nodes": {**nodes, **own}, "links": links}
 
     def kind(self, group: str, name: str, part: dict[str, Any]) -> Any:
         known = KINDS[group]
@@ -498,14 +537,15 @@ class _Reader:
 
     def output(self, numerics: Numerics | None, kinds: dict) -> Output | None:
         output = self.table("output", Output)
-        if output is None:
-            return None
-        if output.probes is None:
+        asked = output if output is not None else self.in_order("output", Output)
+        if asked.probes is None:
             probes = default_probes(kinds)
         else:
-            named = [self.probe(one, ("output", "probes", n), kinds) for n, one in enumerate(output.probes)]
+            named = [self.probe(one, ("output", "probes", n), kinds) for n, one in enumerate(asked.probes)]
             probes = list({probe.text: probe for probe in named if probe is not None}.values())
-        self.add(basins.line_faults(output, kinds["nodes"]))
+        self.add(basins.line_faults(asked, kinds["nodes"]))
+        if output is None:
+            return None
         changes: dict[str, Any] = {"probes": probes}
         if output.every is None and numerics is not None:
             changes["every"] = (numerics.end - numerics.start) / DEFAULT_ROWS
@@ -514,7 +554,7 @@ class _Reader:
     def routes(self, links: dict[str, Any]) -> dict[str, Route | None]:
         """Routes by name; None in the place of what is at fault itself."""
         made: dict[str, Route | None] = {}
-        named = self.group("links")
+        named, odd = self.group("links"), set()
         for name, given in self.group("routes").items():
             made[name] = None
             if name in self.group("nodes") or name in named or name in ALL:
@@ -524,11 +564,16 @@ class _Reader:
                 made[name] = spread(Route.model_validate(given, context=self.setting), self.pieces, links)
             except ValueError as error:
                 self.misfit(("routes", name), error)
-        faulty = list(route_misfits(made, links, named))
+                with suppress(KeyError, TypeError, ValueError):
+                    pipes = Route.values()["pipes"].read(given["pipes"], self.setting)
+                    made[name] = spread(Route.model_construct(pipes=pipes), self.pieces, links)
+                    odd.add(name)
+        faulty = list(route_misfits(made, links, named, self.pieces)) if self.joined else []
         self.add(faulty)
-        lost = {keys[1] for keys, _ in faulty}
+        lost = odd | {keys[1] for keys, _ in faulty}
         pipes = {name for name, link in links.items() if isinstance(link, Pipe)}
-        lost |= {name for name, one in made.items() if one and not pipes.issuperset(one.pipes)}
+        lost |= {name for name, one in made.items()
+                 if one and (not pipes.issuperset(one.pipes) or broken(one, links) is not None)}  # fmt: skip
         return {name: None if name in lost else one for name, one in made.items()}
 
     def limits(self, kinds: dict, routes: dict, links: dict[str, Any], *about: Any) -> dict[str, DesignLimit | None]:

@@ -35,10 +35,15 @@ class Placed:
     distance: float = 0.0
 
     @property
+    def fits(self) -> bool:
+        """Whether its kind may stand in a pipe."""
+        return kind_of(self.group, self.said) is not None and unfit(self.group, self.said) is None
+
+    @property
     def inline(self) -> bool:
         """Whether it is a link that lies in the pipe."""
-        kind = KINDS[self.group][self.said["type"]]
-        return self.group == "links" and "to" in kind.joins and "to" not in (*self.said, *kind.may_lack)
+        kind = kind_of(self.group, self.said)
+        return self.fits and self.group == "links" and "to" in kind.joins and "to" not in (*self.said, *kind.may_lack)
 
     @property
     def joins(self) -> tuple[str, str]:
@@ -50,13 +55,20 @@ class Placed:
 
 @dataclass
 class Cutting:
-    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made, notices."""
+    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made, notices.
+
+    lost : (group, name) of what cannot be read, as it, its pipe or what stands on that is at fault; wholes : pipes
+    that are not cut for that; known : whether it is known what joins what
+    """
 
     table: dict[str, Any]
     named: frozenset[str]  # links of the file
     pieces: dict[str, list[str]] = field(default_factory=dict)
     origin: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
     told: list[Notice] = field(default_factory=list)
+    lost: set[tuple[str, str]] = field(default_factory=set)
+    wholes: dict[str, Pipe] = field(default_factory=dict)
+    known: bool = True
 
 
 def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
@@ -78,6 +90,21 @@ def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
 
 def is_pipe(part: Any) -> bool:
     return isinstance(part, dict) and part.get("type") == "pipe"
+
+
+def kind_of(group: str, part: dict[str, Any]) -> Any:
+    """The class of a part of the file; None where its type is at fault."""
+    return KINDS[group].get(str(part.get("type")))
+
+
+def unfit(group: str, part: dict[str, Any]) -> str | None:
+    """Why a part of a known kind cannot stand in a pipe."""
+    kind = kind_of(group, part)
+    if group == "nodes" and (kind.domain != "hydraulic" or kind.own_places(part) is not None):
+        return f"a {kind.kind} does not stand in a pipe; wanted a place of the fluid"
+    if group == "links" and not set(kind.joins) <= {"from", "to"}:
+        return f"a {kind.kind} has other ports than from and to; place a junction, and join that"
+    return "a pipe has length; place a junction, and join that" if kind is Pipe else None
 
 
 def bent(table: dict[str, Any]) -> dict[str, Any]:
@@ -120,7 +147,6 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
     pipes = [name for name, one in links.items() if is_pipe(one)]
     for group, name, part in placed(table):
         on, key = part.get("on"), (group, name)
-        kind = KINDS[group].get(str(part.get("type")))
         if "on" not in part:
             yield key, f"at says {show(part['at'])}; on is missing, the pipe that it counts along"
         elif on not in pipes:
@@ -128,31 +154,38 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
             yield (*key, "on"), f"no pipe named {show(on)}{near}"
         elif "at" not in part:
             yield key, f"at is missing, where along {on} it stands"
-        if kind is None:
+        if kind_of(group, part) is None:
             continue
-        if group == "nodes" and (kind.domain != "hydraulic" or kind.own_places(part) is not None):
-            yield (*key, "on"), f"a {kind.kind} does not stand in a pipe; wanted a place of the fluid"
-        if group == "links" and not set(kind.joins) <= {"from", "to"}:
-            yield (*key, "on"), f"a {kind.kind} has other ports than from and to; place a junction, and join that"
-        elif group == "links" and kind is Pipe:
-            yield (*key, "on"), "a pipe has length; place a junction, and join that"
+        if (why := unfit(group, part)) is not None:
+            yield (*key, "on"), why
         elif "from" in part:
             yield (*key, "from"), "it is on a pipe, which is where it starts from; leave from, or on and at, out"
 
 
-def cut(table: dict[str, Any], wholes: dict[str, Pipe], cells: dict[str, int], exact: set[str], say: Say) -> Cutting:
+def cut(
+    table: dict[str, Any], wholes: dict[str, Pipe], cells: dict[str, int], exact: set[str], odd: set, say: Say
+) -> Cutting:
     """The table with pipes cut at what is placed on them.
 
-    wholes : pipes as they are read; cells : of each; exact : those that are cut where it is said, between no cells;
-    say : takes the keys and the text of a fault
+    wholes : pipes as they are read, those without faults; cells : of each; exact : those that are cut where it is said,
+    between no cells; odd : (group, name) of what says wrongly where it stands; say : takes the keys and the text of a
+    fault
     """
     made = Cutting({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
                    frozenset(table["links"]))  # fmt: skip
+    pipes = [name for name, one in table["links"].items() if is_pipe(one)]
     by_pipe: dict[str, list[Placed]] = {}
+    lost: set[str] = set()  # pipes whose pieces cannot be told
     for group, name, part in placed(table):
         one = Placed(group, name, part)
-        if read_distance(one, wholes[part["on"]], say):
-            by_pipe.setdefault(part["on"], []).append(one)
+        on = part["on"] if part.get("on") in pipes else next(iter(pipes), None)
+        made.known = made.known and on is not None
+        stands = "at" in part and read_distance(one, on, wholes.get(on), say)
+        if (group, name) in odd or not one.fits or on not in wholes or not stands:
+            lost.add(on)
+        if not one.fits:
+            made.lost.add((group, name))
+        by_pipe.setdefault(on, []).append(one)
         rest = {key: value for key, value in part.items() if key not in WHERE}
         if group == "nodes":
             made.table["nodes"][name] = rest
@@ -162,21 +195,47 @@ def cut(table: dict[str, Any], wholes: dict[str, Pipe], cells: dict[str, int], e
     links = made.table["links"]
     made.table["links"] = {}
     for name, part in table["links"].items():
-        if name in by_pipe:
-            cut_one(made, name, part, wholes[name], by_pipe[name], cells[name], name in exact, say)
-        else:
+        if name not in by_pipe:
             made.table["links"][name] = links.get(name, part)
+            continue
+        on_it, whole = by_pipe[name], wholes.get(name)
+        fits = whole is not None and has_room(name, on_it, cells[name], name in exact, say)
+        if fits and name not in lost and are_apart(on_it, say):
+            cut_one(made, name, part, whole, on_it, cells[name], name in exact, say)
+        else:
+            made.wholes |= {} if whole is None else {name: whole}
+            lose(made, name, part, on_it, say)
     return made
 
 
-def read_distance(one: Placed, pipe: Pipe, say: Say) -> bool:
-    """Fill in how far along its pipe a part stands; False where that is at fault."""
-    key, given, on = (one.group, one.name, "at"), one.said["at"], one.said["on"]
+def lose(made: Cutting, name: str, given: dict[str, Any], parts: list[Placed], say: Say) -> None:
+    """Put pieces of a pipe into the table of which nothing is known but what they join."""
+    names = made.pieces[name] = [f"{name}-{k + 1}" for k in range(len(parts) + 1)]
+    taken(made, name, given, parts, names, say)
+    starts = [given.get("from"), *(one.joins[1] for one in parts)]
+    ends = [*(one.joins[0] for one in parts), given.get("to")]
+    for own, first, last in zip(names, starts, ends, strict=True):
+        # a profile, for what would lend elevations
+        made.table["links"][own] = {"type": "pipe", "from": first, "to": last, "profile": None}
+        made.origin["links", own] = ("links", name)
+        made.lost.add(("links", own))
+    for one in parts if made.known else ():
+        for place in one.joins if one.group == "links" else ():
+            made.table["nodes"][place] = {"type": "junction"}
+            made.origin["nodes", place] = ("links", one.name)
+    made.table["routes"].setdefault(name, {"pipes": names})
+
+
+def read_distance(one: Placed, on: str | None, pipe: Pipe | None, say: Say) -> bool:
+    """Fill in how far along its pipe a part stands, where that is in order; False where what it says is at fault."""
+    key, given = (one.group, one.name, "at"), one.said["at"]
     try:
         chainage = units.parse(given, "length")
     except ValueError as error:
         say(key, str(error))
         return False
+    if pipe is None or on != one.said.get("on"):
+        return True
     begin = 0.0 if pipe.profile is None else float(pipe.profile.chainage[0])
     one.distance = chainage - begin
     if not 0.0 < one.distance < pipe.length:
@@ -187,21 +246,31 @@ def read_distance(one: Placed, pipe: Pipe, say: Say) -> bool:
     return True
 
 
-def cut_one(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, exact: bool, say: Say):
-    """Put the pieces of one pipe and what they need into the table."""
+def has_room(name: str, parts: list[Placed], cells: int, exact: bool, say: Say) -> bool:
+    """Whether a pipe has cells enough for what stands on it."""
+    if exact or cells > len(parts):
+        return True
+    say(("links", name, "cells"), f"{cells} cells for {len(parts)} parts on it; wanted {len(parts) + 1} at least")
+    return False
+
+
+def are_apart(parts: list[Placed], say: Say) -> bool:
+    """Put parts into the order in which they stand; False where two stand at the same place."""
     parts.sort(key=lambda one: one.distance)
-    for one, other in zip(parts, parts[1:], strict=False):
-        if one.distance == other.distance:
-            say((other.group, other.name, "at"), f"{one.name} stands there; join it to that, or place it elsewhere")
+    alike = [(one, other) for one, other in zip(parts, parts[1:], strict=False) if one.distance == other.distance]
+    for one, other in alike:
+        say((other.group, other.name, "at"), f"{one.name} stands there; join it to that, or place it elsewhere")
+    return not alike
+
+
+def cut_one(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, exact: bool, say: Say):
+    """Put the pieces of one pipe and what they need into the table; parts : in their order along it."""
     asked = np.array([one.distance for one in parts])
     if exact:
         cuts = asked
         edges = np.concatenate([[0.0], cuts, [whole.length]])
         counts = np.maximum(1, np.round(np.diff(edges) / whole.length * cells)).astype(int)
     else:
-        if cells <= len(parts):
-            text = f"{cells} cells for {len(parts)} parts on it; wanted {len(parts) + 1} at least"
-            return say(("links", name, "cells"), text)
         faces = between(asked / whole.length * cells, cells)
         cuts = faces / cells * whole.length
         edges, counts = np.concatenate([[0.0], cuts, [whole.length]]), np.diff(np.concatenate([[0], faces, [cells]]))
@@ -221,12 +290,14 @@ def taken(made: Cutting, name: str, given: dict, parts: list[Placed], names: lis
     """Faults of names that cutting a pipe would give twice, and of keys for pieces that it has not."""
     for one in names:
         if one in made.named:
+            made.known = False
             say(("links", one), f"{name} is cut, and {show(one)} is the name of a piece of it; rename one")
     if name in made.table["routes"]:
         say(("routes", name), f"{name} is cut, and so a route by itself; rename this one")
     for one in parts:
         for place in dict.fromkeys(one.joins) if one.group == "links" else ():
             if place in made.table["nodes"]:
+                made.known = False
                 say(("nodes", place), f"{one.name} joins {one.said['on']} at a place of that name; rename one")
     own = given.get("pieces", {})
     if not isinstance(own, dict) or not all(isinstance(one, dict) for one in own.values()):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from fvsolve import units
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import Link, Node, Scalar
+from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -78,14 +78,14 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
 
 def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
     """A place along a route, by a share of its length or a chainage; None where the route is at fault itself."""
+    along = Pipe.along | _carried(Pipe, kinds, "along")
+    if quantity not in along:
+        near = did_you_mean(quantity, along)
+        raise ValueError(f"{name} is a route, without {show(quantity)}; it has {', '.join(along)}{near}")
     if kinds["routes"][name] is None:
         return None
-    legs, links = kinds["routes"][name]
-    kind = type(links[legs[0].pipe])
-    along = kind.along | _carried(kind, kinds, "along")
-    if quantity not in along:
-        raise ValueError(f"{name} is a route, without {show(quantity)}; it has {', '.join(along)}")
-    if place is None and quantity not in kind.quantities:
+    legs, _ = kinds["routes"][name]
+    if place is None and quantity not in Pipe.quantities:
         raise ValueError(f'{name} is a route: say where, for example "{name}.{quantity}@0.5"')
     begin, end = legs[0].begin, legs[-1].end
     at = begin + share_of(place or "0", end - begin, begin) * (end - begin)

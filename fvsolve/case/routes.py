@@ -76,36 +76,50 @@ def is_pipe(given: Any) -> bool:
     return isinstance(given, dict) and given.get("type") == "pipe"
 
 
-def misfits(routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any]) -> Iterator[tuple]:
-    """Faults of routes: what is no pipe, and pipes that do not follow each other; named : links, those at fault too."""
+def misfits(
+    routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any], pieces: dict[str, list[str]]
+) -> Iterator[tuple]:
+    """Faults of routes: what is no pipe, and pipes that do not follow each other.
+
+    named : links as the file has them, those at fault too; pieces : of pipes that are cut
+    """
+    pipes = [one for one, given in named.items() if one not in links and is_pipe(given)]
+    pipes += [one for one, link in links.items() if link.kind == "pipe"]
     for name, route in routes.items():
         if route is None:
             continue
         unknown = False
-        pipes = [one for one, given in named.items() if one not in links and is_pipe(given)]
-        pipes += [one for one, link in links.items() if link.kind == "pipe"]
         for k, pipe in enumerate(route.pipes):
+            place = ("routes", name, "pipes", as_said(route, pieces, k))
             if pipe in pipes:
                 unknown = unknown or pipe not in links
                 continue
             unknown = True
             if pipe in links:
-                yield ("routes", name, "pipes", k), f"{show(pipe)} is no pipe but a {links[pipe].kind}; leave it out"
+                yield place, f"{show(pipe)} is no pipe but a {links[pipe].kind}; leave it out"
             else:
-                near = did_you_mean(pipe, pipes) or f"; pipes are {listing(pipes)}"
-                yield ("routes", name, "pipes", k), f"no pipe named {show(pipe)}{near}"
+                known = [*pipes, *pieces]
+                near = did_you_mean(pipe, known) or f"; pipes are {listing(known)}"
+                yield place, f"no pipe named {show(pipe)}{near}"
         if unknown:
             continue
-        k = broken(route, links)
+        k = broken(route, links, named)
         if k is not None:
             pairs = [(pipe, links[pipe]) for pipe in route.pipes[k - 1 : k + 1]]
             ends = " and ".join(f"{pipe} joins {one.from_} and {one.to}" for pipe, one in pairs)
             text = f"{route.pipes[k]} does not follow: {ends}, and no link without length lies between"
-            yield ("routes", name, "pipes", k), text
+            yield ("routes", name, "pipes", as_said(route, pieces, k)), text
 
 
-def joined(links: dict[str, Any]) -> dict[str, str]:
-    """Place -> one that stands for all that links without length join it to."""
+def as_said(route: Route, pieces: dict[str, list[str]], k: int) -> int:
+    """Which name of the file pipe k of a route came from, pieces of one pipe from the same."""
+    whole = {piece: name for name, own in pieces.items() for piece in own}
+    names = [whole.get(pipe, pipe) for pipe in route.pipes[: k + 1]]
+    return sum(one != before for one, before in itertools.pairwise(names))
+
+
+def joined(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:  # noqa: B006
+    """Place -> one that stands for all that links without length join it to, those at fault too."""
     root: dict[str, str] = {}
 
     def find(name: str) -> str:
@@ -113,16 +127,19 @@ def joined(links: dict[str, Any]) -> dict[str, str]:
             name = root[name]
         return name
 
-    for link in links.values():
-        if link.kind != "pipe" and set(link.ports) == {"from", "to"}:
-            first, second = find(link.ports["from"]), find(link.ports["to"])
-            root[first] = second
+    pairs = [(link.ports["from"], link.ports["to"]) for link in links.values()
+             if link.kind != "pipe" and set(link.ports) == {"from", "to"}]  # fmt: skip
+    pairs += [(given.get("from"), given.get("to")) for name, given in named.items()
+              if name not in links and isinstance(given, dict) and not is_pipe(given)]  # fmt: skip
+    for first, second in pairs:
+        if isinstance(first, str) and isinstance(second, str):
+            root[find(first)] = find(second)
     return {name: find(name) for name in list(root)}
 
 
-def ways(route: Route, links: dict[str, Any]) -> list[list[tuple[int, bool]]]:
+def ways(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
     """Of every pipe of a route: how it can be run, each with the way before it that leads there."""
-    one = joined(links)
+    one = joined(links, named)
     ends = [[one.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]
     found: list[list[tuple[int, bool]]] = [[(-1, False), (-1, True)]]
     for k in range(1, len(ends)):
@@ -137,9 +154,9 @@ def ways(route: Route, links: dict[str, Any]) -> list[list[tuple[int, bool]]]:
     return found
 
 
-def broken(route: Route, links: dict[str, Any]) -> int | None:
+def broken(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> int | None:  # noqa: B006
     """Number of the first pipe of a route that does not follow the one before it."""
-    found = ways(route, links)
+    found = ways(route, links, named)
     return None if found[-1] else len(found) - 1
 
 

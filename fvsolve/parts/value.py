@@ -128,6 +128,13 @@ class Value:
         return {**self.json(), **({"description": self.about} if self.about else {})}
 
 
+class Anything(Value):
+    """Whatever stands there: what it means is not known, as what it belongs to is at fault."""
+
+    def read(self, given: Any, setting: Setting) -> Any:
+        return given
+
+
 @dataclass(frozen=True)
 class Quantity(Value):
     """A number in SI or text with a unit, in a range; a pressure comes out absolute."""
