@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 # Control characters, marks of direction, ends of lines that are no "\n", halves of letters.
@@ -68,6 +69,17 @@ class CaseError(FvsolveError):
         count = len(self.faults)
         head = f"{self.file}: {count} fault{'' if count == 1 else 's'}"
         return "\n".join([head, *(f"  {fault}" for fault in self.faults)])
+
+
+@contextmanager
+def gathered(faults: list[Fault], place: str = "") -> Iterator[None]:
+    """Adds what goes wrong within to the faults, an error of values at the place, all of a case; then goes on."""
+    try:
+        yield
+    except CaseError as error:
+        faults += error.faults
+    except (ValueError, FvsolveError) as error:
+        faults.append(Fault(place, str(error)))
 
 
 class MeshError(CaseError):

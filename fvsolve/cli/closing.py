@@ -8,6 +8,7 @@ import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.studying import told
+from fvsolve.errors import CaseError, gathered
 
 
 @app.command()
@@ -23,7 +24,12 @@ def optimise(
     """The law of a valve that makes a peak least, by a few knots, beside the linear one."""
     from fvsolve.studies import closing
 
-    made = load_case(case, set)
+    faults, made = [], None
+    with gathered(faults):
+        made = load_case(case, set)
+    faults += closing.asked(made, law, minimise, knots, runs)
+    if faults:
+        raise CaseError(faults, case)
     with told(kept=False) as progress:
         found = closing.optimise(made, law, minimise, knots, runs, None, lambda done, what: progress(done, runs, what))
     if as_json:

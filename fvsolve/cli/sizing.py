@@ -10,7 +10,7 @@ import typer
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.studying import told
 from fvsolve.cli.sweep import RANGE, values_of
-from fvsolve.errors import FvsolveError
+from fvsolve.errors import CaseError, FvsolveError, gathered
 
 
 @app.command()
@@ -28,11 +28,19 @@ def size(
     """The value of a key at which all limits of a case hold, by bracketing."""
     from fvsolve.studies import sizing
 
-    key, listed = values_of(vary, "--vary", RANGE)
-    if len(listed) != 2:
-        raise FvsolveError(f"--vary {vary}: wanted {RANGE}")
-    ties = sizing.tied(tie)
-    made = load_case(case, set)
+    faults, key, listed, ties, made = [], "", [], {}, None
+    with gathered(faults):
+        key, listed = values_of(vary, "--vary", RANGE)
+        if len(listed) != 2:
+            listed = []
+            raise FvsolveError(f"--vary {vary}: wanted {RANGE}")
+    with gathered(faults):
+        ties = sizing.tied(tie)
+    with gathered(faults):
+        made = load_case(case, set)
+    faults += sizing.asked(made, key, listed, goal, ties, rtol)
+    if faults:
+        raise CaseError(faults, case)
     with told(kept=False) as progress:
         found = sizing.size(made, key, *listed, goal, ties, None, rtol,
                             lambda done, what: progress(done, sizing.MOST_RUNS, what))  # fmt: skip

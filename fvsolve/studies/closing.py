@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from fvsolve.case import Case, load
-from fvsolve.case.raw import dotted
-from fvsolve.errors import FvsolveError
+from fvsolve.case.text import path
+from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean, gathered, listing
 from fvsolve.parts.schedule import Schedule
 from fvsolve.run import run
 from fvsolve.units import show
 
 STARTS = (0.0, 1.0, -1.0)  # how much quicker, in logarithms, the first piece is than the last, of laws that begin
+MOST_KNOTS = 12
 REACH = 1.0  # of the first simplex about a start
 
 
@@ -72,8 +73,7 @@ class Search:
     def __call__(self, z: np.ndarray) -> float:
         """The peak of a law; infinite where its run does not come to its end."""
         time, value = self.law(z)
-        claim = {self.minimise: {"value": 1.0, "atol": 1.0}}
-        quiet = {"output.fields": 0, "output.lines": {}, "expect": claim}
+        quiet = {"output.fields": 0, "output.lines": {}, "expect": claim(self.minimise)}
         result = run(load(self.case, {self.key: {"time": time, "value": value}, **quiet}))
         if result.reason.startswith("interrupted"):
             raise KeyboardInterrupt
@@ -98,11 +98,13 @@ def optimise(
     """
     from scipy.optimize import minimize
 
-    if not 1 <= knots <= 12:
-        raise FvsolveError(f"knots = {knots}; wanted 1 to 12")
-    if runs < len(STARTS) * (knots + 2):
-        raise FvsolveError(f"runs = {runs}; wanted {len(STARTS) * (knots + 2)} or more for {knots} knots")
-    made = load(case, dict(set or {}))
+    faults: list[Fault] = []
+    made = None
+    with gathered(faults):
+        made = load(case, dict(set or {}))
+    faults += asked(made, key, minimise, knots, runs)
+    if faults:
+        raise CaseError(faults, "case" if made is None else made.name)
     search = Search(made, key, minimise, span_of(made, key), knots, progress)
     search(np.zeros(knots))
     for k, start in enumerate(STARTS):
@@ -116,17 +118,49 @@ def optimise(
     return Optimum(key, minimise, search.unit, linear, best, len(search.laws), search.laws)
 
 
+def asked(case: Case | None, key: str, minimise: str, knots: int, runs: int) -> list[Fault]:
+    """All that is wrong of a search before it runs; case : None where it is at fault itself."""
+    faults: list[Fault] = []
+    least = len(STARTS) * (min(max(knots, 1), MOST_KNOTS) + 2)
+    if not 1 <= knots <= MOST_KNOTS:
+        faults.append(Fault("knots", f"{knots} is out of range; wanted 1 to {MOST_KNOTS}"))
+    if runs < least:
+        faults.append(Fault("runs", f"{runs} are too few; wanted {least} or more for {least // len(STARTS) - 2} knots"))
+    if case is not None:
+        with gathered(faults, f"--law {key}"):
+            span_of(case, key)
+        claimed: list[Fault] = []
+        with gathered(claimed):
+            load(case, {"expect": claim(minimise)})
+        faults += [Fault(f"--minimise {minimise}", one.message) for one in claimed]
+    return faults
+
+
+def claim(minimise: str) -> dict[str, Any]:
+    """`[expect]` that asks for a peak alone."""
+    return {minimise: {"value": 1.0, "atol": 1.0}}
+
+
 def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
     """(begin, end [s], first, last value [SI]) of the schedule under a key; FvsolveError where none moves there."""
-    keys = dotted(key)
-    part = getattr(case, keys[0], {}).get(keys[1]) if len(keys) == 3 and keys[0] in ("nodes", "links") else None
-    schedule = getattr(part, keys[2], None) if part is not None else None
-    if not isinstance(schedule, Schedule):
-        raise FvsolveError(f"{key} is no schedule of this case; wanted one such as links.gate.opening")
+    laws = dict(schedules(case))
+    schedule = laws.get(key)
+    if schedule is None:
+        near = did_you_mean(key, laws)
+        moving = [name for name, one in laws.items() if not one.constant] or ["none"]
+        raise FvsolveError(f"is no schedule of this case{near or f'; those that move are {listing(moving)}'}")
     if schedule.constant or schedule.kind not in ("linear", "smooth", "ramp") or len(schedule.time) < 2:
         example = '{ start = "1 s", duration = "10 s", value = [1, 0] }'
-        raise FvsolveError(f"{key} does not go from one value to another; wanted a ramp or a table, such as {example}")
+        raise FvsolveError(f"does not go from one value to another; wanted a ramp or a table, such as {example}")
     ends = float(schedule.time[0]), float(schedule.time[-1]), float(schedule.value[0]), float(schedule.value[-1])
     if ends[2] == ends[3]:
-        raise FvsolveError(f"{key} begins and ends at {show(ends[2])}; wanted a law from one value to another")
+        raise FvsolveError(f"begins and ends at {show(ends[2])}; wanted a law from one value to another")
     return ends
+
+
+def schedules(case: Case) -> Iterator[tuple[str, Schedule]]:
+    """Schedules of parts, by their keys."""
+    for group in ("nodes", "links"):
+        for name, part in getattr(case, group).items():
+            said = {info.alias or field: getattr(part, field) for field, info in type(part).model_fields.items()}
+            yield from ((path((group, name, key)), one) for key, one in said.items() if isinstance(one, Schedule))

@@ -5,131 +5,19 @@ from __future__ import annotations
 import csv
 import json
 import os
-import tomllib
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fvsolve.case import Case, load, shipped
-from fvsolve.case.lines import key_lines
-from fvsolve.case.raw import dotted
-from fvsolve.errors import CaseError, Fault, FvsolveError, RunError, did_you_mean
+from fvsolve.case import Case, load
+from fvsolve.errors import FvsolveError, RunError
 from fvsolve.output.summary import plain, write_summary
 from fvsolve.run import run
+from fvsolve.studies.design_file import Design, read_design
 from fvsolve.studies.many import many
 from fvsolve.studies.sent import Sent
-from fvsolve.units import show
 
-KEYS = ("case", "title", "error", "events", "protections")
-DEEP = ("nodes", "links", "limits", "routes", "scalars", "defaults")  # of named tables whose keys are set one by one
 STUDY = "study.json"
-
-
-@dataclass(frozen=True)
-class Design:
-    """What a study file says: sets of overrides, dotted key -> value, by the names of events and protections."""
-
-    name: str
-    path: Path
-    title: str
-    case: Path
-    error: bool
-    events: dict[str, dict[str, Any]]
-    protections: dict[str, dict[str, Any]]
-
-    def runs(self) -> Iterator[tuple[str | None, str | None, dict[str, Any]]]:
-        """(event, protection, keys) of every run; None where the file has none of a kind."""
-        for event, of_event in (self.events or {None: {}}).items():
-            for protection, of_protection in (self.protections or {None: {}}).items():
-                yield event, protection, {**of_protection, **of_event}
-
-
-def read_design(path: str | Path) -> Design:
-    """The study of a TOML file; CaseError with all that is wrong in it, by line."""
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig").replace("\r\n", "\n")
-        said = tomllib.loads(text)
-    except OSError as error:
-        raise CaseError([Fault("", f"cannot be read: {error.strerror or error}")], path.name) from None
-    except ValueError as error:
-        raise CaseError([Fault("", f"TOML: {error}")], path.name) from None
-    lines, faults = key_lines(text), []
-
-    def fault(keys: tuple, message: str) -> None:
-        at = next((lines[keys[:n]] for n in range(len(keys), 0, -1) if keys[:n] in lines), None)
-        faults.append(Fault(".".join(keys), message, at))
-
-    for key in said:
-        if key not in KEYS:
-            fault((key,), f"unknown key{did_you_mean(key, KEYS) or '; keys are ' + ', '.join(KEYS)}")
-    for key, kind, what in (("title", str, "text"), ("error", bool, "true or false")):
-        if not isinstance(said.get(key, kind()), kind):
-            fault((key,), f"{show(said[key])} is not {what}")
-    case = said.get("case")
-    if not isinstance(case, str):
-        fault(("case",) if "case" in said else (), "case is missing, the file that is studied" if case is None
-              else f"{show(case)} is no text")  # fmt: skip
-    sets = {group: read_sets(said.get(group, {}), group, fault) for group in ("events", "protections")}
-    if not faults and not any(sets.values()):
-        fault((), "nothing is studied; wanted [events.NAME], [protections.NAME] or both")
-    for event, of_event in sets["events"].items():
-        for protection, of_protection in sets["protections"].items():
-            for one, other in clashes(of_event, of_protection):
-                text = f"{one} is set here and {other} by protections.{protection}; a run cannot have both"
-                fault(("events", event), text)
-    place = None if not isinstance(case, str) else path.parent / case
-    if place is not None and not place.is_file() and case in shipped.names():
-        place = shipped.find(case)
-    if place is not None and not place.is_file():
-        fault(("case",), f"{show(case)}: there is no such file; a path is relative to the study")
-    if faults:
-        raise CaseError(faults, path.name)
-    return Design(path.stem, path, said.get("title", ""), place, said.get("error", False), **sets)
-
-
-def read_sets(given: Any, group: str, fault) -> dict[str, dict[str, Any]]:
-    """Sets of overrides by name, as dotted keys."""
-    if not isinstance(given, dict):
-        fault((group,), f"{show(given)} is no table of tables by name")
-        return {}
-    found = {}
-    for name, one in given.items():
-        if not isinstance(one, dict):
-            fault((group, name), f'{show(one)} is no table; wanted keys of the case, such as links.pump.trip = "2 s"')
-        elif not name.replace("-", "").replace("_", "").isalnum():
-            fault((group, name), f"{show(name)} is no name; a name has letters, digits, _ and -")
-        else:
-            found[name] = dict(keys_of(one))
-    return found
-
-
-def keys_of(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Dotted keys of nested tables: those of parts one by one, whatever stands under them whole."""
-    for first, inner in table.items():
-        if "." in first or not isinstance(inner, dict):
-            yield first, inner
-            continue
-        for second, below in inner.items():
-            if first in DEEP and isinstance(below, dict):
-                yield from ((path(first, second, third), value) for third, value in below.items())
-            else:
-                yield path(first, second), below
-
-
-def path(*keys: str) -> str:
-    """Keys as TOML writes them, in quotes where they are not bare."""
-    return ".".join(key if key.replace("-", "").replace("_", "").isalnum() else json.dumps(key) for key in keys)
-
-
-def clashes(one: dict[str, Any], other: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Keys of both of which one is, or lies within, the other, unless both say the same."""
-    for key in one:
-        for beside in other:
-            a, b = dotted(key), dotted(beside)
-            if a[: len(b)] == b[: len(a)] and not (a == b and one[key] == other[beside]):
-                yield key, beside
 
 
 @dataclass(frozen=True)
@@ -169,11 +57,10 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
           progress=None) -> Studied:  # fmt: skip
     """Run all events with all protections of a study file, `jobs` at a time, each into a run directory of its own.
 
-    What is there of the same study goes on or stays; `force` begins anew. Raises CaseError with the faults of all
-    runs, RunError where a directory holds another run.
+    What is there of the same study goes on or stays; `force` begins anew. Raises CaseError with the faults of the file
+    and of all runs, RunError where a directory holds another run.
     """
     design = source if isinstance(source, Design) else read_design(source)
-    check_runs(design)
     folder = Path(out) if out is not None else Path("runs") / design.name
     tasks = []
     for event, protection, keys in design.runs():
@@ -188,22 +75,6 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
     found = Studied(design, folder, rows)
     write_study(found)
     return found
-
-
-def check_runs(design: Design) -> None:
-    """Raises CaseError with the faults of all runs that could not start, each by its event and protection."""
-    base = load(design.case)
-    faults: dict[tuple, Fault] = {}
-    for event, protection, keys in design.runs():
-        try:
-            load(base, keys)
-        except CaseError as error:
-            where = [f"{group}.{name}" for group, name in (("events", event), ("protections", protection)) if name]
-            for one in error.faults:
-                text = f"{one.place}: {one.message}" if one.place else one.message
-                faults.setdefault((one.place, one.message), Fault(" with ".join(where), text))
-    if faults:
-        raise CaseError(list(faults.values()), design.path.name)
 
 
 class DesignRun:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import Case, load
-from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
+from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean, gathered
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.verdicts import SIZES
@@ -99,12 +99,7 @@ class Sizing:
     def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None) -> None:
         self.case, self.key, self.unit, self.progress = case, key, unit, progress
         self.runs: list[SizeRun] = []
-        self.rules = {}
-        for tied, text in ties.items():
-            try:
-                self.rules[tied] = Arithmetic(text)
-            except ValueError as error:
-                raise FvsolveError(f"--tie {tied}: {error}") from None
+        self.rules = {tied: Arithmetic(text) for tied, text in ties.items()}
 
     def keys(self, value: float) -> dict[str, Any]:
         """What is set for a value of the key; formulas take its SI value as x."""
@@ -115,7 +110,7 @@ class Sizing:
             try:
                 found[tied] = float(np.asarray(rule(np.array([x]), np.array([0.0])))[0])
             except ValueError as error:
-                raise FvsolveError(f"--tie {tied}: {error}") from None
+                raise CaseError([Fault(f"--tie {tied}", str(error))], self.case.name) from None
         return found
 
     def __call__(self, value: float) -> SizeRun:
@@ -198,28 +193,63 @@ def size(
     ties : other keys as formulas of x, the value in SI. Raises FvsolveError where the case has no limits, CaseError for
     what is no case.
     """
-    if goal not in GOALS:
-        raise FvsolveError(f"goal = {show(goal)}{did_you_mean(str(goal), GOALS)}; wanted {listing(list(GOALS))}")
-    if not 0.0 < rtol < 1.0:
-        raise FvsolveError(f"rtol = {rtol}; wanted a number between 0 and 1")
+    faults: list[Fault] = []
+    made = None
+    with gathered(faults):
+        made = load(case, dict(set or {}))
+    faults += asked(made, key, (low, high), goal, ties or {}, rtol)
+    if faults:
+        raise CaseError(faults, "case" if made is None else made.name)
     first, last, unit = ends(low, high)
-    made = load(case, dict(set or {}))
-    if not made.limits:
-        raise FvsolveError(f"{made.name} states no [limits]; a size is what holds them")
     search = Sizing(made, key, unit, ties or {}, progress)
     value, bracket = search.search(first, last, goal, rtol)
     said = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
     return Size(key, unit, goal, value, bracket, search.runs, said)
 
 
+def asked(
+    case: Case | None, key: str, span: Sequence[Any], goal: str, ties: Mapping[str, str], rtol: float
+) -> list[Fault]:
+    """All that is wrong of a search before it runs; case : None where it is at fault itself, and so span, if empty."""
+    faults: list[Fault] = []
+    if goal not in GOALS:
+        near = did_you_mean(str(goal), GOALS)
+        faults.append(Fault("goal", f"{show(goal)} is none{near}; wanted {' or '.join(GOALS)}"))
+    if not 0.0 < rtol < 1.0:
+        faults.append(Fault("rtol", f"{rtol} is out of range; wanted a number between 0 and 1"))
+    found = len(faults)
+    with gathered(faults, f"--vary {key}"):
+        low, high, unit = ends(*span) if span else (0.0, 1.0, "")
+    for name, text in ties.items():
+        with gathered(faults, f"--tie {name}"):
+            Arithmetic(text)
+            if name == key:
+                raise ValueError("is what is varied; wanted another key")
+    if case is not None and not case.limits:
+        text = 'states no [limits], which a size would hold; wanted for example { on = "pipes", greatest = "10 barg" }'
+        faults.append(Fault("", f"{case.name} {text}"))
+    if case is not None and span and len(faults) == found + (not case.limits):
+        wrong: list[Fault] = []
+        with gathered(wrong):
+            load(case, Sizing(case, key, unit, ties, None).keys(high if goal == "greatest" else low))
+        options = {key: "--vary", **dict.fromkeys(ties, "--tie")}
+        faults += [Fault(f"{options[one.place]} {one.place}", one.message) if one.place in options else one
+                   for one in wrong]  # fmt: skip
+    return faults
+
+
 def tied(texts: Sequence[str]) -> dict[str, str]:
-    """`KEY = formula` of each as pairs."""
-    found = {}
+    """`KEY = formula` of each as pairs; CaseError with all that are none."""
+    found: dict[str, str] = {}
+    faults = []
     for text in texts:
-        key, equals, rule = text.partition("=")
-        if not (equals and key.strip() and rule.strip()):
-            raise FvsolveError(
-                f'--tie {text}: wanted "KEY = formula of x", for example "nodes.vessel.gas_volume = x / 2"'
-            )
-        found[key.strip()] = rule.strip()
+        key, equals, rule = (one.strip() for one in text.partition("="))
+        if not (equals and key and rule):
+            example = '"nodes.vessel.gas_volume = x / 2"'
+            faults.append(Fault(f"--tie {text}", f'wanted "KEY = formula of x", for example {example}'))
+        elif key in found:
+            faults.append(Fault(f"--tie {text}", f"{key} is {found[key]} before; keep one"))
+        found.setdefault(key, rule)
+    if faults:
+        raise CaseError(faults)
     return found

@@ -121,6 +121,19 @@ def test_what_is_wrong_is_named(study, change, told: str) -> None:
     assert not (study.parent / "out").exists()
 
 
+def test_all_that_is_wrong_of_a_study_comes_at_once_by_line(study) -> None:
+    text = STUDY.replace('title = "Two taps"', "title = 3").replace('duration = "3 s"', 'duration = "3 kg"')
+    text = text.replace("[protections.none]", "[protections.none]\nlinks.tap.aera = 2").replace('"main"', '"mian"')
+    study.write_text(text + "[events.cut]\nlinks.main.cells = 20\n[protections.fine]\nlinks.main.cells = 10\n")
+    with pytest.raises(CaseError) as error:
+        design.study(study, study.parent / "out")
+    assert [str(one).partition(": ")[0] for one in error.value.faults] == [f"line {n}" for n in (2, 9, 12, 18, 21)]
+    assert [one.place for one in error.value.faults] == [
+        "title", "events.slow.links.tap.opening.duration", "protections.none.links.tap.aera",
+        "protections.vessel.nodes.vessel.on", "events.cut.links.main.cells",
+    ]  # fmt: skip
+
+
 @pytest.mark.slow
 def test_the_commands_of_the_page_say_what_it_says(fvs, tmp_path, monkeypatch) -> None:
     """Each command of docs/designs.md, and of what it prints the words that the page has."""
@@ -201,3 +214,18 @@ def test_what_cannot_be_sized_is_said() -> None:
     with pytest.raises(CaseError, match='did you mean "lake"'):
         size(still(least=3e5), "nodes.lkae.head", 20.0, 80.0)
     assert np.isclose(ends("1 km", "2000 m")[0], 1000.0) and AMBIENT > 0.0
+
+
+def test_all_that_is_wrong_of_a_search_comes_at_once(fvs, tmp_path) -> None:
+    (tmp_path / "still.toml").write_text(write(still(least=3e5)))
+    case = str(tmp_path / "still.toml")
+    status, _, told = fvs("size", case, "--vary", "nodes.lake.head=80,20", "--goal", "lest", "--rtol", "3",
+                          "--tie", "links.main.length", "--set", "links.mian.cells=3")  # fmt: skip
+    assert status == 2 and "5 faults" in told and 'did you mean "least"' in told and 'did you mean "main"' in told
+    status, _, told = fvs("size", case, "--vary", "nodes.lake.haed=20,80", "--tie", "links.main.lenght=x")
+    assert status == 2 and "2 faults" in told
+    assert '--vary nodes.lake.haed: unknown key; did you mean "head"' in told and "--tie links.main.lenght" in told
+    status, _, told = fvs(
+        "optimise", case, "--law", "links.tap.openning", "--minimise", "max(gaet.head)", "--knots", "0"
+    )
+    assert status == 2 and "3 faults" in told and 'did you mean "links.tap.opening"' in told

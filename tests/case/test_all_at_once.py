@@ -1,0 +1,111 @@
+"""Faults of all sections come at once: of a file with several, just those of files with one each."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import pytest
+from case.test_placing import placed
+
+import fvsolve
+
+POINT = {"basin": "pool", "from": [0, 0], "to": [1, 1]}
+ODD: dict[tuple, Any] = {  # path of a key -> what cannot stand there
+    ("schema",): 3,
+    ("titel",): "x",
+    ("gravity",): "9 kg",
+    ("fluid", "densty"): 3,
+    ("nodes", "end", "area"): "3 kg",
+    ("nodes", "top", "at"): "9 km",
+    ("links", "main", "cells"): 3,
+    ("links", "hole", "coefficent"): 1,
+    ("links", "half", "on"): "mian",
+    ("links", "pump", "efficiency"): 80,
+    ("signals", "tide", "value"): [1.2e5],
+    ("scalars", "dye", "unitt"): "g",
+    ("defaults", "pipe", "colour"): "red",
+    ("routes", "way", "pipes"): ["main", "tial"],
+    ("limits", "high", "on"): "wya",
+    ("limits", "quick", "greatest"): "9 bar",
+    ("numerics", "method"): "rk44",
+    ("output", "every"): "3 m",
+    ("output", "units", "pressure"): "m3/h",
+    ("output", "probes", 0): "gat.pressure",
+    ("output", "lines"): {"across": POINT},
+    ("expect", "max(gate.presure)"): {"value": 1.0, "rtol": 1.0},
+    ("expect", "max(gate.pressure)", "value"): "3 m3/h",
+    ("expect", "at(gate.pressure, 99 s)"): {"value": 1.0, "rtol": 1.0},
+    ("compare", "gate.head"): {"file": "lost.csv"},
+    ("exact",): {"name": "rayz"},
+}
+
+
+def whole() -> dict:
+    """A case with something in every section."""
+    case = placed()
+    case["nodes"] |= {"top": {"type": "junction", "on": "main", "at": "2.2 km"},
+                      "end": {"type": "tank", "area": 10.0, "level": 5.0, "elevation": 20.0}}  # fmt: skip
+    case["nodes"]["sea"]["pressure"] = {"signal": "tide"}
+    case["links"] |= {
+        "tail": {"type": "pipe", "from": "gate", "to": "end", "length": 100.0, "diameter": 0.3, "wave_speed": 1e3},
+        "pump": {"type": "pump", "from": "end", "to": "sea", "curve": {"flow": [0.1], "head": [20.0]}},
+    }
+    probes = ["gate.pressure", "main.head@2 km", "main-2.flow@0", "hole.flow", "way.pressure@0.2"]
+    case["output"] |= {"units": {"pressure": "barg"}, "probes": probes}
+    return case | {
+        "signals": {"tide": {"time": [0, 1], "value": [1.2e5, 1.3e5]}},
+        "scalars": {"dye": {"unit": "g"}},
+        "defaults": {"pipe": {"minor_loss": 1.0}},
+        "routes": {"way": {"pipes": ["main", "tail"]}},
+        "limits": {"high": {"on": "way", "greatest": "30 bar"},
+                   "quick": {"on": ["main", "tail"], "quantity": "velocity", "greatest": "9 m/s"}},
+        "expect": {"max(gate.pressure)": {"value": 1e6, "rtol": 10.0}},
+    }  # fmt: skip
+
+
+def faults(*paths: tuple) -> set[tuple[str, str]]:
+    """(place, message) of all faults of the case with what cannot stand at some places."""
+    case = copy.deepcopy(whole())
+    for path in paths:
+        table: Any = case
+        for key in path[:-1]:
+            table = table[key] if isinstance(table, list) else table.setdefault(key, {})
+        table[path[-1]] = ODD[path]
+    try:
+        fvsolve.load(case)
+    except fvsolve.CaseError as error:
+        return {(one.place, one.message) for one in error.faults}
+    return set()
+
+
+def test_one_fault_in_each_section_is_one_fault_each_and_all_come_at_once() -> None:
+    alone = [faults(path) for path in ODD]
+    assert [len(one) for one in alone] == [1] * len(ODD)
+    assert faults(*ODD) == set().union(*alone)
+
+
+@pytest.mark.parametrize("first", [path for path in ODD if path[0] in ("nodes", "links", "numerics", "routes")])
+def test_no_fault_hides_or_makes_another(first: tuple) -> None:
+    for other in ODD:
+        assert faults(first, other) == faults(first) | faults(other), other
+
+
+def test_faults_that_follow_from_another_are_not_told() -> None:
+    case = whole()
+    case["nodes"]["gate"]["type"] = "juncton"  # links, probes, claims and limits name it
+    case["links"]["main"]["diameter"] = "3 kg"  # so do pieces, routes, a limit and elevations
+    case["links"]["tap"]["to"] = "see"  # and nothing else joins the sea
+    del case["links"]["pump"], case["links"]["safe"]
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load(case)
+    assert [one.place for one in error.value.faults] == ["links.main.diameter", "nodes.gate.type", "links.tap.to"]
+
+
+@pytest.mark.parametrize("cells", [[10**7, 10**7], "many"])
+def test_a_basin_without_a_mesh_hides_nothing(cells: Any) -> None:
+    with pytest.raises(fvsolve.CaseError) as error:
+        fvsolve.load("basin-draining", {"nodes.pool.cells": cells, "output.units": {"pressure": "m3/h"},
+                                        "limits.high": {"on": "outsied", "greatest": 1.0}})  # fmt: skip
+    assert sorted(one.place for one in error.value.faults) == [
+        "limits.high.on", "nodes.pool.cells", "output.units.pressure"]  # fmt: skip
