@@ -40,8 +40,12 @@ def filled(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
 
 def link_said(table: Mapping[str, Any], name: str) -> dict[str, Any]:
     """What a case says of a link, its defaults among it; of a piece of a cut pipe what is said of the whole."""
-    links = table["links"]
-    return filled(table, links[name] if name in links else links[name.rpartition("-")[0]])
+    return filled(table, table["links"][whole(table, name)])
+
+
+def whole(table: Mapping[str, Any], name: str) -> str:
+    """The link of a file that a link came from: itself, or a pipe that is cut."""
+    return name if name in table.get("links", ()) else name.rpartition("-")[0]
 
 
 def spread(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import defaults
+from fvsolve.case import defaults, waves
 from fvsolve.errors import Notice
+from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import Quantity, Usual
 from fvsolve.units import DIMENSIONS
@@ -15,6 +16,10 @@ from fvsolve.units import DIMENSIONS
 SHARES = 3.0  # of a class that a limit may plausibly allow
 MOST_LOOKED = 10_000  # parts that are remembered
 LOOKED: dict[int, tuple[Table, Any, list]] = {}  # id -> part, what its file says, what is odd in it
+TWO = (
+    "smooth through two entries is a straight line; one more of the same value before the first, and behind the last, "
+    "makes it level at both ends"
+)
 TOP = {  # keys that stand in no table: fields of a case
     "ambient_pressure": Quantity("pressure", usual=Usual(3e4, 2e6, "mountains to deep caissons")),
     "gravity": Quantity("acceleration", usual=Usual(1.0, 30.0, "the Moon to Jupiter")),
@@ -32,6 +37,8 @@ def notices(case: Any) -> list[Notice]:
     found += [_notice(("limits", name), ("share_of_class",), case, limit.share_of_class, SHARES,
                       f"{limit.share_of_class:g} of what the class bears; a share of 1 is all of it")
               for name, limit in case.limits.items() if (limit.share_of_class or 0.0) > SHARES]  # fmt: skip
+    found += [_notice(("links", defaults.whole(case.raw, name)), ("wave_speed",), case, *odd) for name in case.links
+              if (odd := waves.at_odds(case, name))]  # fmt: skip
     return list({(one.place, one.text): one for one in found}.values())
 
 
@@ -56,6 +63,8 @@ def _of_table(table: Table, said: Any) -> Iterator[tuple[tuple[Any, ...], float,
             odd = None if value is None else _beyond(one, value, given)
             if odd:
                 yield (key,), *odd
+        if isinstance(value, Schedule) and value.kind == "smooth" and len(value.time) == 2:
+            yield (key,), 2.0, 3.0, TWO
     yield from table.unusual()
 
 

@@ -258,6 +258,8 @@ LIKELY = {
         "viscosity": ("mPa s",),
         "temperature": ("degC",),
         "mass": ("kg", "g", "t"),
+        "power": ("kW", "W", "MW"),
+        "inertia": ("kg cm2", "g m2", "kg m2", "t m2"),
         "frequency": ("Hz", "kHz"),
         "angular_velocity": ("rpm",),
         "angle": ("deg",),

@@ -60,6 +60,16 @@ SLIPS = {  # settings -> (place, key, value, limit, what the text says)
     ),
     "wave speed": ({"links.main.wave_speed": 12}, "links.main", "wave_speed", 12.0, 30.0, "soft hoses"),
     "wave speed in km/s": ({"links.main.wave_speed": 1.2}, "links.main", "wave_speed", 1.2, 30.0, '"1.2 km/s"'),
+    "wave speed of another wall": (
+        {"links.main": {"type": "pipe", "from": "lake", "to": "gate", "length": 900, "nominal": "DN300",
+                        "class": "SDR11", "material": "PE100", "wave_speed": 1200, "friction": {"model": "none"}}},
+        "links.main", "wave_speed", 1200.0, (998.0 * (1 / 2.2e9 + 9 / 1.3e9)) ** -0.5,
+        "the wall of PE100 SDR11 DN300",
+    ),
+    "smooth through two": (
+        {"links.valve.opening": {"time": [1, 2], "value": [1, 0], "kind": "smooth"}},
+        "links.valve", "opening", 2.0, 3.0, "a straight line",
+    ),
     "Darcy factor": (
         {"links.main.friction": {"model": "steady", "factor": 2}},
         "links.main", "friction.factor", 2.0, 0.5, "Moody",

@@ -117,3 +117,27 @@ def test_a_rated_flow_too_quick_for_the_pipes_beside_it_is_asked_about(flow, uni
     said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
     assert [key for key, _ in said] == ["curve"] and f'was "{flow:.4g} {unit}" meant?' in said[0][1]
     assert notes(WATERS, "sump", "out", curve={"flow": [1.0], "head": [50.0]}) == []
+
+
+@pytest.mark.parametrize("flow, asked", [("0.03 l/s", True), ("0.1 m3/h", True), ("2 l/s", False)])
+def test_a_rated_flow_that_hardly_moves_in_the_pipes_beside_it_is_asked_about(flow, asked):
+    said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
+    assert [key for key, _ in said] == ["curve"] * asked and all("another unit meant?" in text for _, text in said)
+
+
+@pytest.mark.parametrize(
+    ("keys", "says"),
+    [
+        ({"inertia": 1.5e4}, '"15000 kg cm2"'),  # 1.5 kg m2, which power and speed let expect to a factor of 2
+        ({"inertia": 0.0015}, "1.84 kg m2 is usual of 6.538e+04 W at 1480 rpm"),
+        ({"inertia": 1.5}, None),
+        ({"inertia": 15.0}, None),  # a flywheel
+        ({"shaft_power": {"flow": [0.1], "power": [65]}}, '"65 kW"'),
+        ({"shaft_power": {"flow": [0.1], "power": ["65 MW"]}}, "shaft_power says 6.5e+07 W"),
+        ({"shaft_power": {"flow": [0.1], "power": ["65 kW"]}}, None),
+    ],
+)
+def test_an_inertia_or_a_power_far_from_what_the_rated_point_says_is_noted_once(keys, says):
+    said = notes(WATERS, "sump", "out", curve=ONE, rated_speed="1480 rpm", **keys)
+    assert [key for key, _ in said] == ([] if says is None else [*keys][:1])
+    assert says is None or says in said[0][1]

@@ -295,3 +295,10 @@ def test_the_shipped_plant_has_the_points_of_its_formula():
     assert (Path(__file__).parents[2] / "cases/hydropower.csv").read_text() == chart()
     case = fvsolve.load("hydropower", {"numerics.end": 0.1, "expect": {}, "limits": {}})
     assert fvsolve.run(case)["unit.flow"][0] == approx(steady()[0], rel=5e-4)
+
+
+@pytest.mark.parametrize(("inertia", "far"), [(INERTIA, False), (60.0, True), (60e6, True)])
+def test_an_inertia_far_from_that_of_machines_of_its_power_is_noted(inertia: float, far: bool) -> None:
+    for opening in (0.0, 0.8):
+        made = fvsolve.build(fvsolve.load(plant(TIGHT, inertia=inertia, trip=1.0, opening=opening)))
+        assert [one.key for one in made.warnings if one.kind == "range"] == ["inertia"] * far

@@ -13,7 +13,7 @@ from fvsolve.parts.pump import law
 from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.lower_curve import curve_numbers, rated_point
 from fvsolve.parts.pump.lower_join import joined_table, specific_speed
-from fvsolve.parts.pump.lower_notes import drawn_backwards, estimated, quick
+from fvsolve.parts.pump.lower_notes import at_odds, drawn_backwards, estimated, off_scale
 from fvsolve.parts.pump.lower_shaft import inertia, shaft_points
 from fvsolve.parts.pump.lower_turning import Turning, numbers_of
 from fvsolve.steady import Edge
@@ -134,7 +134,8 @@ class PumpRows(Turning, Device, kind="pump"):
         if valve["open"] == 0.0 and k not in start.shut:
             moving.append(f"pump {name}: turns at {valve['drive']:.4g} of its speed without the flow for it")
         draft.warnings += [
-            *drawn_backwards(start, name, part, valve), *quick(draft, name, part), *estimated(draft, name, part),
+            *drawn_backwards(start, name, part, valve), *off_scale(draft, name, part), *estimated(draft, name, part),
+            *at_odds(draft, name, part),
         ]  # fmt: skip
         return moving + self.let_go(start, part, row, valve)
 

@@ -81,18 +81,27 @@ def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
 
 
 def inertia(part, weight: float) -> float | None:
-    """Of all that turns with the shaft [kg m2]; where a pump that trips has none, impeller with its water, and motor.
+    """Of all that turns with the shaft [kg m2]: as given; where a pump that trips has none, as power and speed say."""
+    if part.inertia is not None or part.trip is None:
+        return part.inertia
+    return usual_inertia(rated_power(part, weight), part.rated_speed)
+
+
+def rated_power(part, weight: float) -> float:
+    """At the shaft, at the rated point [W]."""
+    flow, head = rated_point(part, weight)
+    if part.shaft_power is not None:
+        return float(np.interp(flow, *shaft_power(part, weight, flow, 0.0)))
+    return weight * flow * head / rated_efficiency(part)
+
+
+def usual_inertia(power: float, speed: float) -> float:
+    """Of impeller, its water and motor, by power at the shaft [W] and speed [rad/s] : [kg m2].
 
     0.03768 (P / N^3)^0.9556 + 0.0043 (P / N)^1.48, P the power at the shaft at the rated point [kW], N its speed in
     1000 rpm. Regressions that go back to Thorley (Fluid Transients in Pipeline Systems, 1991), read as an open program
     has both (`calculate_inertia`) and as Neutrium prints the former ("Estimation of pump moment of inertia":
     1.5e7 (P / N^3)^0.9556 with N in rpm, 0.1 % less).
     """
-    if part.inertia is not None or part.trip is None:
-        return part.inertia
-    flow, head = rated_point(part, weight)
-    power = weight * flow * head / rated_efficiency(part) / 1000.0
-    if part.shaft_power is not None:
-        power = float(np.interp(flow, *shaft_power(part, weight, flow, 0.0))) / 1000.0
-    speed = part.rated_speed * 30.0 / math.pi / 1000.0
+    power, speed = power / 1000.0, speed * 30.0 / math.pi / 1000.0
     return 0.03768 * (power / speed**3) ** 0.9556 + 0.0043 * (power / speed) ** 1.48

@@ -12,6 +12,7 @@ from fvsolve.kernels import records as rec
 from fvsolve.model.device import Device
 from fvsolve.model.inputs import TURNING, Input, opening
 from fvsolve.parts.pump.law import INERTIA, RATED
+from fvsolve.parts.pump.lower_notes import odd_inertia
 from fvsolve.parts.pump.lower_turning import Turning, numbers_of
 from fvsolve.parts.turbine import law
 from fvsolve.parts.turbine import law_chart as charts
@@ -83,6 +84,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
 
     def begin(self, start, part, row) -> list[str]:
         draft, valve, moving = start.draft, start.valves[int(row["valve"])], []
+        name = draft.valve_names[row["valve"]]
         if valve["open"] > 0.0:
             rho, floats = start.density_at(int(valve["from_node"])), draft.tables.floats
             vanes = float(start.given(valve["schedule"]))
@@ -90,12 +92,11 @@ class TurbineRows(Turning, Device, kind="turbine"):
             drop = rho * start.case.gravity * charts.chart_head(*at, float(valve["flow"]) / rho)[0]
             ratio = rho / draft.fluid.density
             if abs(drop - valve["drop"] * ratio) > SMALL * (abs(drop) + abs(valve["drop"])) + 1e-3:
-                name = draft.valve_names[row["valve"]]
                 moving.append(f"turbine {name}: its flow is not that of its hill chart")
                 valve["open"] = 0.0
             elif draft.case.law.linear:
                 valve["drop"] = drop
-        draft.warnings += torn(start, draft.valve_names[row["valve"]], part, valve)
+        draft.warnings += [*torn(start, name, part, valve), *heavy(start, name, part, valve)]
         return moving + self.let_go(start, part, row, valve)
 
     def asked(self, start, row, valve) -> float:
@@ -114,6 +115,18 @@ def torn(start, name: str, part, valve) -> list[Notice]:
     text = (f"{name}: its hill chart folds, and {ways}: it takes one of several and may jump to and fro; a pipe or "
             "rigid-column that leads to it would hold it")  # fmt: skip
     return [Notice("range", f"links.{name}", text, "hill_chart")]
+
+
+def heavy(start, name: str, part, valve) -> list[Notice]:
+    """A note on an inertia far from that of machines of the greatest power of its chart at the head of the start."""
+    speed, ends = float(np.max(np.abs(part.speed.value))), [int(valve["from_node"]), int(valve["to_node"])]
+    if part.inertia is None or speed == 0.0 or start.weight == 0.0:
+        return []
+    high, low = start.nodes["pressure"][ends] / start.weight + start.nodes["elevation"][ends]
+    unit = max(n * torque for one in part.hill_chart.curves
+               for n, torque in zip(one.speed, one.torques(start.weight), strict=True))  # fmt: skip
+    power = math.pi / 30.0 * unit * part.diameter**2 * max(high - low, 0.0) ** 1.5
+    return odd_inertia(start.case, name, part.inertia, power, speed) if power > 0.0 else []
 
 
 def folds(one) -> bool:
