@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,12 +107,15 @@ def read_limit(
     keys = limit_keys(asked if isinstance(asked, str) else "", dimension or "number")
     if dimension is None:
         keys |= dict.fromkeys(("least", "greatest"), (Anything(), None))
+    bounds = dict.fromkeys(BOUNDS)
     try:
-        found = read_keys(given, keys, setting)
+        read_keys(given, keys, setting)
     except Misfit as error:
-        raise Misfit(faults + error.faults) from None
-    bounds = {key: found[key] for key in BOUNDS}
-    if all(one is None for one in bounds.values()):
+        faults += error.faults
+    for key in BOUNDS:
+        with suppress(KeyError, ValueError):
+            bounds[key] = keys[key][0].read(given[key], setting)
+    if not any(key in given for key in BOUNDS):
         faults.append(((), f"nothing is limited; wanted one of {', '.join(BOUNDS)}"))
     if bounds["greatest"] is not None and bounds["share_of_class"] is not None:
         faults.append((("share_of_class",), "greatest and share_of_class are given; keep one"))

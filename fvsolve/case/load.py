@@ -54,6 +54,7 @@ GROUPS = {
     "numerics": "how it is solved",
 }
 ALONE = ("basin", "body")  # nodes that need no link
+OF_STUDIES = {"events", "protections"}
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
     "signals", "scalars", "defaults", "numerics", "output", "expect", "compare", "routes", "limits", "exact",
@@ -353,6 +354,9 @@ class _Reader:
         return asked if "end" in times and times <= asked.model_fields_set else None
 
     def top(self) -> dict[str, Any]:
+        if OF_STUDIES & self.raw.table.keys() and not {"nodes", "links"} & self.raw.table.keys():
+            self.fault((), f"is a study of a case; fvsolve study {self.raw.file} runs it")
+            self.stop()
         for key in self.raw.table:
             if key not in KEYS:
                 self.fault((key,), f"unknown key{did_you_mean(key, KEYS) or '; keys are ' + ', '.join(KEYS)}")

@@ -80,7 +80,7 @@ def read_raw(source: Any) -> Raw:
         if re.search(r"^\s*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", text, re.MULTILINE | re.IGNORECASE):
             what = f"an EPANET network, no case; fvsolve new {path.stem} --from {path} makes one of it"
             raise CaseError([Fault("", what)], path.name) from None
-        raise CaseError([_syntax_fault(error, text)], path.name) from None
+        raise CaseError([syntax_fault(error, text)], path.name) from None
     return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)
 
 
@@ -164,7 +164,8 @@ def _read_text(path: Path) -> str:
         raise CaseError([Fault("", f"cannot be read: {message}")], str(path)) from None
 
 
-def _syntax_fault(error: ValueError, text: str) -> Fault:
+def syntax_fault(error: ValueError, text: str) -> Fault:
+    """What is wrong with a text that is no TOML, and the line."""
     message = str(error)
     match = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
     line = int(match[1]) if match else text.count("\n") + 1

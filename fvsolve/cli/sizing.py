@@ -64,12 +64,21 @@ def _show(found) -> None:
     for text in dict.fromkeys(one.open for one in found.runs if one.open):
         terminal.line(console, f"open: {text}", "yellow")
     if found.value is None:
-        near = found.nearest
-        text = (f"no value between {found.runs[0].value:.6g} and {found.runs[1].value:.6g} {found.unit} that was tried "
-                f"holds all limits; {near.value:.6g} comes nearest, by {near.limit}")  # fmt: skip
-        terminal.line(console, text, "bold red")
+        terminal.line(console, _unmet(found), "bold red")
         return
     where = "at the end of the range" if found.bracket is None else (
         f"{min(found.bracket):.6g} to {max(found.bracket):.6g} {found.unit} bracket it")  # fmt: skip
     said = f"{found.goal} value that holds all limits: {found.value:.6g} {found.unit}; {where}; {len(found.runs)} runs"
     terminal.line(console, said, "green")
+
+
+def _unmet(found) -> str:
+    """What came nearest, by how much it fell short, and where it might be met."""
+    near, tried = found.nearest, sorted(one.value for one in found.runs)
+    text = (f"no value between {tried[0]:.6g} and {tried[-1]:.6g} {found.unit} that was tried holds all limits; "
+            f"{near.value:.6g} comes nearest")  # fmt: skip
+    if near.margin is None:
+        return f"{text}; of none is a margin known"
+    text += f", with a margin of {near.margin:.3g} of the limit {near.limit}"
+    beyond = {tried[0]: "below", tried[-1]: "above"}.get(near.value)
+    return f"{text}; margins grow to that end: look {beyond} it, or change something else" if beyond else text

@@ -74,8 +74,9 @@ def read_table(path: Path) -> np.ndarray:
         file.readline()
         try:
             table = np.loadtxt(file, delimiter=",", ndmin=2)
-        except ValueError as error:
-            raise RunError(f"{path} cannot be read: {error}") from None
+        except ValueError:
+            text = f"a row has not {names} numbers; was it cut off or edited? run again with --force"
+            raise RunError(f"{path} cannot be read: {text}") from None
     if table.size and table.shape[1] != names:
         raise RunError(f"{path} cannot be read: {table.shape[1]} numbers in a row under {names} headers")
     return table if table.size else np.empty((0, names))

@@ -11,7 +11,7 @@ from typing import Any
 
 from fvsolve.case import load, shipped
 from fvsolve.case.lines import key_lines
-from fvsolve.case.raw import dotted
+from fvsolve.case.raw import dotted, syntax_fault
 from fvsolve.errors import CaseError, Fault, did_you_mean
 from fvsolve.units import show
 
@@ -50,6 +50,9 @@ def read_design(path: str | Path) -> Design:
         at = next((lines[one] for one in spellings(keys) if one in lines), None)
         faults.setdefault((place, message), Fault(place, message, at))
 
+    if {"nodes", "fluid"} & said.keys():
+        text = f'is a case, no study; a study names it, case = "{path.name}", beside [events.NAME], [protections.NAME]'
+        raise CaseError([Fault("", text)], path.name)
     for key in said:
         if key not in KEYS:
             fault((key,), f"unknown key{did_you_mean(key, KEYS) or '; keys are ' + ', '.join(KEYS)}")
@@ -82,6 +85,7 @@ def spellings(keys: tuple) -> Iterator[tuple]:
 
 def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
     """What a TOML file says, and the lines of its keys; CaseError where it says nothing."""
+    text = ""
     try:
         text = path.read_text(encoding="utf-8-sig").replace("\r\n", "\n")
         return tomllib.loads(text), key_lines(text)
@@ -91,7 +95,7 @@ def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
     except OSError as error:
         raise CaseError([Fault("", f"cannot be read: {error.strerror or error}")], path.name) from None
     except ValueError as error:
-        raise CaseError([Fault("", f"TOML: {error}")], path.name) from None
+        raise CaseError([syntax_fault(error, text)], path.name) from None
 
 
 def studied(case: Any, folder: Path, fault: Say) -> Path | None:

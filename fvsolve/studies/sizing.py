@@ -15,6 +15,7 @@ from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean, gathere
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.verdicts import SIZES
+from fvsolve.studies.plans import is_known, quantity_of
 from fvsolve.units import UNITS, show
 
 GOALS = ("least", "greatest")
@@ -220,6 +221,8 @@ def asked(
     found = len(faults)
     with gathered(faults, f"--vary {key}"):
         low, high, unit = ends(*span) if span else (0.0, 1.0, "")
+        if case is not None and is_known(case.raw, key) and quantity_of(case.raw, key) is None:
+            raise ValueError("takes words or whole numbers, of which there are none between two; wanted a sweep of it")
     for name, text in ties.items():
         with gathered(faults, f"--tie {name}"):
             Arithmetic(text)

@@ -815,6 +815,20 @@ def test_a_dict_that_cannot_start_has_faults_without_lines():
         run(tomllib.loads(SHUT))
 
 
+def test_a_study_is_no_case_and_says_what_runs_it(tmp_path):
+    (tmp_path / "plan.toml").write_text('case = "main.toml"\n[events.trip.links.pump]\ntrip = 1\n')
+    with pytest.raises(CaseError, match="1 fault\n  is a study of a case; fvsolve study plan.toml runs it"):
+        load(tmp_path / "plan.toml")
+
+
+def test_a_material_that_is_none_hides_no_class_that_is_none():
+    pipe = {"links.main": {"type": "pipe", "from": "lake", "to": "gate", "length": 900, "nominal": "DN300",
+                           "material": "ductil-iron", "class": "Q9", "friction": {"model": "none"}}}  # fmt: skip
+    with pytest.raises(CaseError) as error:
+        load(tomllib.loads(SCENE), pipe)
+    assert [one.place for one in error.value.faults] == ["links.main.class", "links.main.material"]
+
+
 def test_a_list_of_parts_names_each_once():
     table = tomllib.loads(SCENE.replace("[links.main]", "[links.gate]"))
     table["output"]["probes"] = ["door.pressure"]

@@ -111,6 +111,8 @@ def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
         (("[events.slow]", "[event.slow]"), 'unknown key; did you mean "events"?'),
         (('title = "Two taps"', "title = 3"), "3 is not text"),
         (("[protections.none]", "[protections]\nnone = 3\n[protections.x]"), "3 is no table"),
+        (("[events.slow]", "[nodes.slow]"), "is a case, no study"),
+        (("[events.slow]", "[events.slow"), "line 8: TOML"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named(study, change, told: str) -> None:
@@ -197,12 +199,16 @@ def test_the_command_shows_its_runs(fvs, tmp_path) -> None:
     status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30", "--json")
     said = json.loads(text)
     assert status == 1 and said["value"] is None and said["nearest"]["value"] == 30.0
+    status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30")
+    assert status == 1 and "30 comes nearest" in text and "look above it" in text
     assert {"value", "bracket", "runs"} <= set(said)
 
 
 def test_what_cannot_be_sized_is_said() -> None:
     with pytest.raises(FvsolveError, match="states no"):
         size(throttled() | {"limits": {}}, "nodes.lake.head", 20.0, 80.0)
+    with pytest.raises(FvsolveError, match="words or whole numbers"):
+        size(still(least=3e5), "links.main.cells", 10, 20)
     with pytest.raises(FvsolveError, match="is not below"):
         ends("80 m", "20 m")
     with pytest.raises(FvsolveError, match="have not one unit"):

@@ -5,12 +5,11 @@ What the file says itself stands; `source` gathers whose figures the others are.
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 from fvsolve.parts.conduit import sized
 from fvsolve.parts.friction import DARCY, KEYS
-from fvsolve.parts.pipe.classes import NoSize, rated
+from fvsolve.parts.pipe.classes import SCHEDULE, NoSize, no_class, rated
 from fvsolve.parts.pipe.materials import Material, materials
 from fvsolve.parts.value import Misfit
 from fvsolve.units import parse, show
@@ -27,6 +26,8 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
         return given
     found, said = {**given}, []
     if name is not None and material is None:  # blamed where it is read; nothing follows from it
+        if isinstance(found.get("class"), str) and (text := no_class(found["class"])) is not None:
+            raise Misfit([(("class",), text)])
         sized_by = {"class", "nominal"} & set(found)
         return {key: one for key, one in found.items() if key not in sized_by} | ({"diameter": 1.0} if sized_by else {})
     if isinstance(found.get("class"), str):
@@ -44,7 +45,7 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
 def _add_class(found: dict[str, Any], said: list[str], material: str | None) -> None:
     """Bore, wall and allowable pressure of a class; a schedule stays one."""
     name, nominal = found["class"], found.get("nominal")
-    if (schedule := re.fullmatch(r"(?:schedule|sch\.?)\s*(\w+)", name.strip(), re.IGNORECASE)) is not None:
+    if (schedule := SCHEDULE.fullmatch(name.strip())) is not None:
         del found["class"]
         found["schedule"] = schedule[1]
         return

@@ -69,17 +69,29 @@ def ductile() -> dict[int, tuple[float, dict[int, float]]]:
     return found
 
 
+IRON, PLASTIC = re.compile(r"(K|C|CLASS)(\d+)"), re.compile(r"(SDR|PN)(\d+(?:\.\d+)?)")
+SCHEDULE = re.compile(r"(?:schedule|sch\.?)\s*(\w+)", re.IGNORECASE)
+
+
 def rated(name: str, nominal: str, material: str | None) -> Rated:
     """What a class is at a nominal size; ValueError for what is not made or was not read."""
     text = name.strip().upper().replace(" ", "")
-    if found := re.fullmatch(r"(K|C|CLASS)(\d+)", text):
+    if found := IRON.fullmatch(text):
         if material != "ductile-iron":
             raise ValueError(f'{name} is a class of ductile iron; wanted material = "ductile-iron"')
         return _ductile(found[1][0], int(found[2]), name, _size(nominal))
-    if found := re.fullmatch(r"(SDR|PN)(\d+(?:\.\d+)?)", text):
+    if found := PLASTIC.fullmatch(text):
         return _plastic(found[1], float(found[2]), name, _size(nominal), material)
+    raise ValueError(no_class(name))
+
+
+def no_class(name: str) -> str | None:
+    """What is said of a name that is that of no class, whatever the material; None of others."""
+    text = name.strip().upper().replace(" ", "")
+    if IRON.fullmatch(text) or PLASTIC.fullmatch(text) or SCHEDULE.fullmatch(name.strip()):
+        return None
     known = ("K9", "C40", "SDR11", "PN16", "schedule 40")
-    raise ValueError(f"no class named {show(name)}{did_you_mean(name, known)}; wanted one such as {listing(known)}")
+    return f"no class named {show(name)}{did_you_mean(name, known)}; wanted one such as {listing(known)}"
 
 
 def _size(nominal: str) -> float:

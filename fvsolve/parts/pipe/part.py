@@ -108,6 +108,11 @@ class Pipe(Conduit, kind="pipe"):
         return yielding(self)
 
     @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        sized = "class" in given and "diameter" not in given  # it asks for nominal itself
+        return super().key_faults({"nominal": "", **given} if sized else given)
+
+    @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
         """Names of the catalogue and of sizes turned into numbers; Misfit where one means nothing."""
         faults, found = [], given
@@ -145,7 +150,8 @@ class Pipe(Conduit, kind="pipe"):
                 yield ("profile",), f"{end} rides on {node.on}, and a pipe on a body is straight"
             stated = getattr(node, "elevation", None)
             if stated is not None and abs(stated - z) > MET:
-                yield ("profile",), f"{end} lies at {stated:.10g} m, and it {ENDS[place]} at {z:.10g} m"
+                text = f"{end} lies at {stated:.10g} m, and it {ENDS[place]} at {z:.10g} m; wanted the same"
+                yield ("profile",), f"{text}, or no elevation of {end}, which then has that of the profile"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from super().unusual()

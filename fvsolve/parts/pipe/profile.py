@@ -76,7 +76,7 @@ class ProfileValue(Value):
         if isinstance(given, Profile):
             return given
         if not isinstance(given, dict):
-            wanted = "{ chainage = [0, 900], elevation = [12, 31] }"
+            wanted = '{ chainage = [0, 900], elevation = [12, 31] }, or { file = "profile.csv" }'
             raise ValueError(f"{show(given)} is no table; wanted one such as {wanted}")
         columns, said = from_file(given, setting) if "file" in given else from_lists(given, setting)
         if len(columns) == 3:
@@ -143,7 +143,8 @@ def from_file(given: dict[str, Any], setting: Setting) -> tuple[dict[str, np.nda
         if len(found[keys[0]]) < 2:
             raise ValueError(f"{path.name} has one point; wanted two at least")
         if "chainage" in found:
-            check_rising(found["chainage"].tolist(), [f"{one:g}" for one in found["chainage"]], "chainages")
+            check_rising(found["chainage"].tolist(), [f"{one:g}" for one in found["chainage"]],
+                         f"{path.name}: chainages")  # fmt: skip
     except ValueError as error:
         raise Misfit([(("file",), str(error))]) from None
     return found, {"file": copy_name(path, setting)}
