@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import defaults, waves
+from fvsolve.case import defaults
 from fvsolve.errors import Notice
 from fvsolve.parts.schedule import Schedule
 from fvsolve.parts.table import Table
@@ -37,9 +37,18 @@ def notices(case: Any) -> list[Notice]:
     found += [_notice(("limits", name), ("share_of_class",), case, limit.share_of_class, SHARES,
                       f"{limit.share_of_class:g} of what the class bears; a share of 1 is all of it")
               for name, limit in case.limits.items() if (limit.share_of_class or 0.0) > SHARES]  # fmt: skip
-    found += [_notice(("links", defaults.whole(case.raw, name)), ("wave_speed",), case, *odd) for name in case.links
-              if (odd := waves.at_odds(case, name))]  # fmt: skip
+    found += [_notice(("links", defaults.whole(case.raw, name)), ("wave_speed",), case, *odd)
+              for name, link in case.links.items() if (odd := _wave_speed(case, name, link))]  # fmt: skip
     return list({(one.place, one.text): one for one in found}.values())
+
+
+def _wave_speed(case: Any, name: str, link: Any) -> tuple[float, float, str] | None:
+    """(value, limit, text) of a wave speed beside a material that says another."""
+    if getattr(link, "wave_speed", None) is None or link.material is None:
+        return None
+    from fvsolve.case.waves import at_odds  # most pipes say one of them
+
+    return at_odds(case, name)
 
 
 def _of_part(part: Table, said: Any) -> list[tuple[tuple[Any, ...], float, float, str]]:

@@ -15,10 +15,7 @@ NAMED = ("diameter", "nominal", "schedule", "class", "material", "lining")  # ke
 
 def at_odds(case: Any, name: str) -> tuple[float, float, str] | None:
     """(value, limit, text) of a wave speed that is stated and far from that of the wall that is named beside it."""
-    pipe = case.links[name]
-    if pipe.kind != "pipe" or pipe.wave_speed is None or pipe.material is None:
-        return None
-    said = defaults.link_said(case.raw, name)
+    pipe, said = case.links[name], defaults.link_said(case.raw, name)
     try:
         named = Pipe.model_validate({"from": "a", "to": "b", "length": 1.0, **{k: said[k] for k in NAMED if k in said}})
     except ValueError:  # a material alone, whose thickness is not known
