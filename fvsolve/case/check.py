@@ -55,11 +55,11 @@ def network(table: dict[str, Any]) -> Found:
     tied = {name: _tied(name, node, places) for name, node in nodes.items()}
     hanging = _hanging(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
-    loose = [name for name, node in nodes.items()
-             if own_places(name, node) is None and not touched & {name, *points_of(name, node)}]  # fmt: skip
+    loose = [name for name, node in nodes.items() if not lost(name, nodes, links)
+             and own_places(name, node) is None and not touched & {name, *points_of(name, node)}]  # fmt: skip
     if len(loose) > unjoined:  # else they may be what ports at fault should join
         yield from ((("nodes", name), "no link touches it") for name in loose)
-    if unjoined:
+    if unjoined or any(lost(name, nodes, links) for name in nodes):
         return  # what hangs together is not known
     own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
     own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := points_of(name, node))}
@@ -90,9 +90,11 @@ def parts(
 ) -> Found:
     """Faults of elevations, and what each part finds wrong beside the others."""
     poses = bodies.poses(nodes, start)
+    named = nodes if raw is None else _dict(raw.table.get("nodes"))
     high = {name: node for name, node in nodes.items() if riding_networks.has_height(node, poses)}
     said = {} if raw is None else _dict(raw.table.get("links"))
-    lends = any("profile" in _dict(link) for name, link in said.items() if name not in links)  # and is at fault itself
+    lends = any("profile" in _dict(link) or kind_name(link, "links") is None or not {*_ends(link)} <= named.keys()
+                for name, link in said.items() if name not in links or "profile" in _dict(link))  # fmt: skip
     yield from _elevations({name: riding_networks.standing(node, poses) for name, node in high.items()}, links, lends)
 
     def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Found:
@@ -101,7 +103,6 @@ def parts(
                 yield (ROOT, *keys), text
 
     if meshes or lumped or gravity == 0.0 or any(map(in_space, (*nodes.values(), *links.values()))):
-        named = nodes if raw is None else _dict(raw.table.get("nodes"))
         yield from bodies.misfits(nodes, named)
         yield from riding_networks.misfits(nodes, links, basins.riding_places(nodes, meshes), named)
         yield from bodies.one_place(nodes, links, poses)
@@ -187,6 +188,12 @@ def own_places(name: str, node: Any) -> list[str] | None:
     return None if own is None else [f"{name}.{one}" for one in own]
 
 
+def kind_name(part: Any, group: str = "nodes") -> str | None:
+    """The type of a part of the file; None where it is at fault."""
+    kind = _kind(group, part)
+    return None if kind is None else kind.kind
+
+
 def has_mesh(node: Any) -> bool:
     """Whether a node of a file is a basin whose patches are those of a mesh in a file of its own."""
     return _dict(node).get("type") == "basin" and "mesh" in node
@@ -196,6 +203,11 @@ def named_of(name: str, links: dict[str, Any]) -> list[str]:
     """Places of a part that links of the file name."""
     places = [place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)]
     return [place.partition(".")[2] for place in places if place.startswith(f"{name}.")]
+
+
+def _ends(link: Any) -> list[str]:
+    """Places that a link of the file goes from and to, those that are names."""
+    return [str(_dict(link).get(key)) for key in ("from", "to")]
 
 
 def _tied(name: str, node: Any, places: dict[str, Any]) -> list[str]:
@@ -234,7 +246,18 @@ def _places(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, str | Non
         kind, own = _kind("nodes", node), own_places(name, node)
         found |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
         found |= dict.fromkeys(points_of(name, node), "spatial")
-    return found | {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
+    found |= {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
+    named = {place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)}
+    return dict.fromkeys((one for one in named if lost(one.partition(".")[0], nodes, links)), None) | found
+
+
+def lost(name: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
+    """Whether places of a part cannot be told, as it is at fault itself."""
+    for group, parts in (("nodes", nodes), ("links", links)):
+        if name in parts and _kind(group, parts[name]) is None:
+            return True
+    node = _dict(nodes.get(name))
+    return any(not isinstance(node.get(key, {}), dict) for key in ("points", "patches"))
 
 
 def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fvsolve.case.probe import Kinds, Probe
+from fvsolve.case.probe import Kinds, Probe, of_uncut
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.parts.value import Misfit
@@ -108,6 +108,8 @@ def parts_of(one: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -
             has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
             raise Misfit([(("quantity",), f"{one} without {show(quantity)}: a route; {has}")])
         return None if routes[one] is None else [("links", pipe) for pipe in routes[one].pipes]
+    if of_uncut(one, kinds) or (one in ALL and None in kinds[ALL[one]].values()):
+        return None
     if one in ALL:
         wanted = (lambda kind: kind is Pipe) if one == "pipes" else (lambda kind: quantity in quantities_of(kind))
         found = [(ALL[one], name) for name, kind in kinds[ALL[one]].items() if kind is not None and wanted(kind)]

@@ -54,6 +54,7 @@ GROUPS = {
     "numerics": "how it is solved",
 }
 ALONE = ("basin", "body")  # nodes that need no link
+NAMING = ("nodes", "links", "signals", "scalars", "routes", "defaults")  # tables that others name things of
 OF_STUDIES = {"events", "protections"}
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
@@ -139,6 +140,12 @@ class _Reader:
         numerics = self.table("numerics", Numerics)
         self.setting.signals = self.group("signals")
         self.add(defaults.misfits(self.raw.table, self.setting))
+        tables = [self.raw.table.get(name, {}) for name in NAMING]
+        tables += tables[-1].values() if isinstance(tables[-1], dict) else []  # of defaults
+        if not all(isinstance(one, dict) for one in tables):
+            for name in NAMING[:-1]:
+                self.group(name)
+            self.stop()  # what is named there is not known
         whole, told = self.raw.table, self.cut(properties, numerics)
         carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
@@ -147,6 +154,8 @@ class _Reader:
         self.unused_signals()
         kinds = {group: self.kinds(group) for group in parts} | {"scalars": carried}
         has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
+        has_cells = has_cells or None in (*kinds["links"].values(), *kinds["nodes"].values())  # it may be one
+        kinds["uncut"] = dict.fromkeys(self.uncounted())
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         for name, node in parts["nodes"].items():
@@ -417,7 +426,8 @@ class _Reader:
         return found
 
     def parts(self, group: str) -> dict[str, Any]:
-        basin = any(isinstance(one, dict) and one.get("type") in ALONE for one in self.group("nodes").values())
+        alone = (*ALONE, None)  # what is at fault may be one
+        basin = any(check.kind_name(one) in alone for one in self.group("nodes").values())
         if group not in self.raw.table and not (group == "links" and basin):
             self.fault((), f"[{group}] is missing: {GROUPS[group]}")
         made = {}
@@ -437,6 +447,13 @@ class _Reader:
             except ValueError as error:
                 self.misfit((group, name), error)
         return made
+
+    def uncounted(self) -> list[str]:
+        """Parts at fault whose places cannot be told, and pipes of whose pieces the number is not known."""
+        nodes, links = self.group("nodes"), self.group("links")
+        bent = [name for name, one in links.items()
+                if placing.is_pipe(one) and not isinstance(one.get("bends", []), list)]  # fmt: skip
+        return bent + [name for name in (*nodes, *links) if check.lost(name, nodes, links)]
 
     def part(self, kind: Any, given: dict[str, Any]) -> Any:
         """A part of a kind, as its table has it."""

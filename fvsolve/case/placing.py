@@ -75,6 +75,7 @@ def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
     """(group, name, part) of what says a chainage, or that it is on a pipe."""
     links = table.get("links")
     pipes = [name for name, one in links.items() if is_pipe(one)] if isinstance(links, dict) else []
+    bodies = list(table["nodes"]) if isinstance(table.get("nodes"), dict) else []
     found = []
     for group in ("nodes", "links"):
         parts = table.get(group)
@@ -83,6 +84,7 @@ def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
                 continue
             kind = KINDS[group].get(str(part.get("type")))
             own = group == "links" and kind is not None and "at" in kind.keys()
+            own = own or (part.get("on") in bodies and part.get("on") not in pipes)
             if not own and ("at" in part or part.get("on") in pipes):
                 found.append((group, name, part))
     return found

@@ -57,6 +57,8 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
         return of_route(given.strip(), name, quantity, place, kinds)
     if not parts and kinds["nodes"].get(name.partition(".")[0], name) is None:
         return None  # a patch of a basin that is at fault
+    if not parts and of_uncut(name, kinds):
+        return None
     if not parts:
         names = [*kinds["nodes"], *kinds["links"]] if part is None else list(kinds[part])
         what = {"nodes": "node", "links": "link"}.get(part or "", "part")
@@ -74,6 +76,11 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     if len(found) > 1:
         raise ValueError(f"a node and a link are named {show(name)}; write nodes.{given} or links.{given}")
     return found[0]
+
+
+def of_uncut(name: str, kinds: Kinds) -> bool:
+    """Whether a name may be that of a piece, bend or place of a part of which it is not known what it has."""
+    return any(name.startswith((f"{whole}-", f"{whole}.")) for whole in kinds.get("uncut", ()))
 
 
 def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:

@@ -94,6 +94,8 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
     """Faults of a link between places of which one or more ride."""
     stand = [whose(place, nodes) for place in ends]
     on = [getattr(node, "on", None) for node in stand]
+    if None in stand or any(body is not None and body not in nodes for body in on):
+        return  # at fault itself
     if not any(on):
         if getattr(link, "route", None):
             yield ("route",), "is a way on a body, and its ends ride on none; give both on and at"

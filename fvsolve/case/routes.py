@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fvsolve.errors import did_you_mean, listing
+from fvsolve.parts import KINDS
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import VALUE, Misfit, Quantity, Setting, Value
 from fvsolve.units import show
@@ -76,6 +77,11 @@ def is_pipe(given: Any) -> bool:
     return isinstance(given, dict) and given.get("type") == "pipe"
 
 
+def is_known(given: Any) -> bool:
+    """Whether a table of a file says a type of link that there is."""
+    return isinstance(given, dict) and str(given.get("type")) in KINDS["links"]
+
+
 def misfits(
     routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any], pieces: dict[str, list[str]]
 ) -> Iterator[tuple]:
@@ -83,7 +89,7 @@ def misfits(
 
     named : links as the file has them, those at fault too; pieces : of pipes that are cut
     """
-    pipes = [one for one, given in named.items() if one not in links and is_pipe(given)]
+    pipes = [one for one, given in named.items() if one not in links and (is_pipe(given) or not is_known(given))]
     pipes += [one for one, link in links.items() if link.kind == "pipe"]
     for name, route in routes.items():
         if route is None:

@@ -46,6 +46,8 @@ def misfits(case):
         if law.model != "unsteady" or law.weighting == "vardy-brown" or law.roughness is None or pipe.minor_loss:
             message = f'the exact solution "{name}" wants "unsteady" friction by roughness, laminar, and no minor loss'
             yield ("links", link, "friction"), message
+        elif case.properties.viscosity is None:
+            yield ("fluid",), f'viscosity is missing, which the exact solution "{name}" hangs on'
         elif reynolds(case, pipe) >= LAMINAR:
             message = f'the exact solution "{name}" is laminar; the demand asks for Reynolds {reynolds(case, pipe):.0f}'
             yield ("links", link, "friction"), message

@@ -81,6 +81,7 @@ class Table(BaseModel):
             given = cls.in_numbers(given, setting_of(info))
         except Misfit as error:
             faults += error.faults
+            given = given if error.instead is None else error.instead
         try:
             made = handler(given)
         except ValidationError as error:

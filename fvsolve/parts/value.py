@@ -26,10 +26,10 @@ SHAPE = "shape"  # another model: cells, parts, methods
 
 
 class Misfit(ValueError):
-    """What does not fit in a value: pairs of the keys below it and a message."""
+    """What does not fit in a value: pairs of the keys below it and a message; what may stand in for the value."""
 
-    def __init__(self, faults: list[tuple[tuple[Any, ...], str]]):
-        self.faults = faults
+    def __init__(self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None):
+        self.faults, self.instead = faults, instead
         super().__init__("; ".join(message for _, message in faults))
 
 

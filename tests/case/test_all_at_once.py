@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import copy
+import re
+import tomllib
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from case.test_placing import placed
+from truth.folders import DOCS
 
 import fvsolve
 
@@ -109,3 +113,34 @@ def test_a_basin_without_a_mesh_hides_nothing(cells: Any) -> None:
                                         "limits.high": {"on": "outsied", "greatest": 1.0}})  # fmt: skip
     assert sorted(one.place for one in error.value.faults) == [
         "limits.high.on", "nodes.pool.cells", "output.units.pressure"]  # fmt: skip
+
+
+def keys_of(table: Any, above: tuple = ()) -> Iterator[tuple]:
+    for key, value in table.items() if isinstance(table, dict) else enumerate(table if isinstance(table, list) else ()):
+        yield (*above, key)
+        yield from keys_of(value, (*above, key))
+
+
+@pytest.mark.parametrize("name", ["pumping-main", "plastic-main", "bend-force", "basin-draining", "closed-cylinder"])
+def test_whatever_is_no_value_is_told_where_it_stands_and_nowhere_else(name: str) -> None:
+    base = tomllib.loads((DOCS.parent / "cases" / f"{name}.toml").read_text(encoding="utf-8"))
+    for path in keys_of(base):
+        case = copy.deepcopy(base)
+        table: Any = case
+        for key in path[:-1]:
+            table = table[key]
+        table[path[-1]] = "3 zz"
+        try:
+            fvsolve.load(case)
+        except fvsolve.CaseError as error:
+            places = [re.sub(r'["\]]', "", one.place.replace("[", ".")) for one in error.faults]
+            own = ".".join(map(str, path))
+            assert all(one.startswith(own) or own.startswith(f"{one}.") for one in places), (own, str(error))
+
+
+def test_an_exact_solution_without_a_viscosity_says_so() -> None:
+    case = tomllib.loads((DOCS.parent / "cases" / "laminar-line.toml").read_text(encoding="utf-8"))
+    del case["fluid"]["viscosity"]
+    case["nodes"]["valve"]["demand"] = {"time": [0.0, 1.0, 2.0], "value": [1e-5, 1e-5, 0.0], "kind": "smooth"}
+    with pytest.raises(fvsolve.CaseError, match="viscosity is missing"):
+        fvsolve.load(case)

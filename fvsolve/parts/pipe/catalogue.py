@@ -28,8 +28,9 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
     if name is not None and material is None:  # blamed where it is read; nothing follows from it
         if isinstance(found.get("class"), str) and (text := no_class(found["class"])) is not None:
             raise Misfit([(("class",), text)])
-        sized_by = {"class", "nominal"} & set(found)
-        return {key: one for key, one in found.items() if key not in sized_by} | ({"diameter": 1.0} if sized_by else {})
+        return {key: one for key, one in stood_in(found).items() if key not in ("class", "nominal")}
+    if not all(isinstance(found.get(key, ""), str) for key in ("class", "nominal")):
+        return stood_in(found)  # likewise
     if isinstance(found.get("class"), str):
         _add_class(found, said, name if isinstance(name, str) else None)
     if isinstance(found.get("nominal"), str) and "diameter" not in found:
@@ -39,6 +40,19 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
         _add_roughness(found, said, material)
     if said:
         found.setdefault("source", "; ".join(said))
+    return found
+
+
+def stood_in(given: dict[str, Any]) -> dict[str, Any]:
+    """A table with a bore, wall and roughness in place of those that a name at fault would stand for."""
+    found = {**given}
+    if not {"class", "nominal"}.isdisjoint(given):
+        found["diameter"] = 1.0
+    if isinstance(given.get("wall"), dict):
+        found["wall"] = {OF_WALL[0]: 1e11, "thickness": 0.01, **given["wall"]}
+    friction = given.get("friction")
+    if isinstance(friction, dict) and DARCY[0] in KEYS.get(str(friction.get("model")), ()):
+        found["friction"] = friction if any(key in friction for key in DARCY) else {**friction, DARCY[0]: 1e-4}
     return found
 
 

@@ -116,21 +116,21 @@ class Pipe(Conduit, kind="pipe"):
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
         """Names of the catalogue and of sizes turned into numbers; Misfit where one means nothing."""
         faults, found = [], given
-        try:
-            if not CATALOGUE.isdisjoint(given):
-                from fvsolve.parts.pipe.catalogue import from_catalogue
+        if not CATALOGUE.isdisjoint(given):
+            from fvsolve.parts.pipe.catalogue import from_catalogue, stood_in
 
+            try:
                 found = from_catalogue(given)
-        except Misfit as error:
-            faults = error.faults
-            found = {key: one for key, one in given.items() if key not in ("nominal", "schedule", "class")}
+            except Misfit as error:
+                faults, found = error.faults, stood_in(given)
+                found = {key: one for key, one in found.items() if key not in ("nominal", "schedule", "class")}
         for read in (super().in_numbers, along_profile):
             try:
                 found = read(found, setting)
             except Misfit as error:
                 faults = faults + error.faults
         if faults:
-            raise Misfit(faults)
+            raise Misfit(faults, found)
         return found
 
     def faults(self, name: str, around: Around) -> Faults:
