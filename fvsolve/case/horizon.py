@@ -26,10 +26,13 @@ def notices(case: Any) -> list[Notice]:
 
 
 def later(part: Any, end: float) -> Iterator[tuple[str, float]]:
-    """(key, time [s]) of what a part does after a time."""
+    """(key, time [s]) of what a part does after a time; of a wave, which has no end, of its first period."""
     for name, info in type(part).model_fields.items():
         value = getattr(part, name)
-        if isinstance(value, Schedule):
+        if isinstance(value, Schedule) and value.wave:
+            if (period := value.wave[2]) > end:
+                yield info.alias or name, float(period)
+        elif isinstance(value, Schedule):
             changes = len(value.time) and len(value.time) <= MOST and value.time[-1] > end
             if changes and np.ptp(value.value[max(np.searchsorted(value.time, end, "right") - 1, 0) :]) > 0.0:
                 yield info.alias or name, float(value.time[-1])

@@ -334,19 +334,24 @@ def where_and_when(one: dict, said: dict) -> str:
 
 
 def _verdict(one: dict, said: dict) -> str:
+    from fvsolve.run.result import OPEN, LimitVerdict
+
+    this = LimitVerdict(**one)
     beside = "at least" if one["bound"] == "least" else "at most"
     found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where_and_when(one, said)})"
-    held = "holds" if one["ok"] else "FAILS"
-    if not one["ok"] and one["margin"] is not None and one["margin"] >= 0.0:
-        held = f"OPEN, as {why_open(said)}"
+    held = this.state if this.state != OPEN else f"OPEN, as {open_as(this, said)}"
     margin = "-" if one["margin"] is None else f"{_number(one['margin'])} {span(one['unit'])}"
     text = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {margin}"
+    if one["error"] is not None and one["margin"] is not None:
+        text += f" within {one['error']:.2g}"
     if one["time"] is not None and one["until"] > 0.0 and one["time"] >= one["until"] * (1.0 - 1e-9):
         text += ", at the end of the run: a later end may be worse"
-    if one["error"] is None or one["margin"] is None:
-        return text
-    doubt = ", which leaves it open" if abs(one["margin"]) < one["error"] else ""
-    return f"{text} within {one['error']:.2g}{doubt}"
+    return text
+
+
+def open_as(verdict, said: dict) -> str:
+    """Why a limit that may be passed, or is not, does not hold either."""
+    return "its margin is smaller than its error" if verdict.doubtful else why_open(said)
 
 
 def marks_of(marks: list[dict], told) -> list[str]:
@@ -364,7 +369,7 @@ def marks_of(marks: list[dict], told) -> list[str]:
 
 
 def why_open(said: dict) -> str:
-    """Why a limit that is not passed does not hold either."""
+    """Why a run cannot tell whether a limit holds that it does not pass."""
     late = [one["text"] for one in said["warnings"] if one["kind"] == "end"]
     if not said["marks"]:
         return late[0] if said["ok"] and late else f"the run is not ok ({said['reason']})"

@@ -191,9 +191,8 @@ class Run:
 
     def widen(self, rows: np.ndarray) -> None:
         """Extremes by rows as well, for what lies between steps is as accurate: no row is beyond what is printed."""
-        few = len(self.model.probes)
-        least, t_least, greatest, t_greatest = self.slate.extremes[:, :few]
-        t, values = rows[:, 0], rows[:, 1 : 1 + few]
+        least, t_least, greatest, t_greatest = self.slate.extremes
+        t, values = rows[:, 0], rows[:, 1:]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
         lower = (found := values[at, each]) < least
         if lower.any():
