@@ -174,8 +174,11 @@ def _in_unit(one: Column, case) -> Column:
     if not one.head.endswith(" [J]"):
         return one
     own = column(one.head.removesuffix(" [J]"), "energy", case)
-    return replace(one, head=own.header,
-                   words=lambda row: text(None if row[one.key] is None else own.from_si(row[one.key]), one.words))  # fmt: skip
+
+    def words(row: Mapping) -> str:
+        return text(None if row[one.key] is None else own.from_si(row[one.key]), one.words)
+
+    return replace(one, head=own.header, words=words)
 
 
 def _outcome(case, rows, where) -> list[dict]:

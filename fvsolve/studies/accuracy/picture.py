@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 SHOWN = 3  # variables with a table of their own on the terminal; all are in order.csv
 NORMS = ("L1", "L2", "max")
@@ -14,12 +15,13 @@ def order_picture(one):
     from fvsolve.draw.order import order_figure
 
     sizes = [row.level.size for row in one.rows]
-    curves = {
-        f"{variable} [{unit(variable, one.units)}]": {
-            norm: ([row.errors.get(variable, {}).get(norm, math.nan) for row in one.rows], fits[norm]) for norm in NORMS
-        }
-        for variable, fits in list(one.fits.items())[: 2 * SHOWN]
-    }
+    curves = {}
+    for variable, fits in list(one.fits.items())[: 2 * SHOWN]:
+        size, own = one.told(variable)
+        curves[f"{variable} [{own}]"] = {
+            norm: ([size * row.errors.get(variable, {}).get(norm, math.nan) for row in one.rows],
+                   replace(fits[norm], constant=size * fits[norm].constant)) for norm in NORMS
+        }  # fmt: skip
     return order_figure(sizes, curves, one.plan.measure, f"{one.case}: {title(one)}; {one.words}")
 
 
@@ -31,12 +33,24 @@ def title(one) -> str:
 
 def unit(variable: str, known: Mapping[str, str] = {}) -> str:  # noqa: B006
     """SI unit of a variable, as `known` of a study or its part has it; of a scalar, a label of the case's, none."""
-    from fvsolve.parts import KINDS
     from fvsolve.units import DIMENSIONS
 
-    if variable in known:
-        return known[variable]
+    return known[variable] if variable in known else DIMENSIONS[dimension_of(variable)].si
+
+
+def dimension_of(variable: str) -> str:
+    """What a variable of pipes, nodes and links is; a number if it is none of theirs."""
+    from fvsolve.parts import KINDS
+
     quantity = variable.split("@")[0].rsplit(".", 1)[-1].rsplit(" ", 1)[-1]
     kinds = [kind for group in KINDS.values() for kind in group.values()]
-    return next((DIMENSIONS[own[quantity]].si for kind in kinds
-                 for own in (kind.quantities, getattr(kind, "along", {})) if quantity in own), "-")  # fmt: skip
+    return next((own[quantity] for kind in kinds
+                 for own in (kind.quantities, getattr(kind, "along", {})) if quantity in own), "number")  # fmt: skip
+
+
+def differences_in(case, variable: str) -> tuple[float, str]:
+    """(size of 1 SI, unit) of differences of a variable as `[output]` has them."""
+    from fvsolve.output.column import column
+
+    own = column("", dimension_of(variable), case)
+    return own.span_from_si(1.0), own.span_unit
