@@ -72,9 +72,11 @@ def places(case) -> dict[str, tuple[float, float]]:
 @style.as_it_stands
 def model_figure(model):
     """Heads at the nodes of a model at its start."""
-    names = model.node_names
-    heads = [one["head"] for one in model.checks["nodes"].values()]
-    return bars(names, heads, "head at the start [m]", model.case.title or model.case.name)
+    from fvsolve.output.column import column
+
+    names, own = model.node_names, column("head at the start", "head", model.case)
+    heads = [own.from_si(one["head"]) for one in model.checks["nodes"].values()]
+    return bars(names, heads, own.header, model.case.title or model.case.name)
 
 
 @style.as_it_stands

@@ -15,7 +15,8 @@ from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.verdicts import SIZES
-from fvsolve.units import UNITS, show
+from fvsolve.studies.plans import quantity_of
+from fvsolve.units import DIMENSIONS, UNITS, show
 
 GOALS = ("least", "greatest")
 LOOKS = 8  # places between two ends of which neither holds, where it is looked for
@@ -42,7 +43,9 @@ class SizeRun:
 
 @dataclass(frozen=True)
 class Size:
-    """What was found: the value that holds, in `unit`, the bracket (what fails, what holds), the runs as they came.
+    """What was found: the value that holds, the bracket (what fails, what holds), the runs as they came.
+
+    unit : that of the ends; of bare numbers that of the key, SI, "" where it has none
 
     value is None where the limits cannot be met between the ends; nearest is then the run that came nearest.
     """
@@ -209,7 +212,13 @@ def size(
     search = Sizing(made, key, unit, ties or {}, progress)
     value, bracket = search.search(first, last, goal, rtol)
     said = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
-    return Size(key, unit, goal, value, bracket, search.runs, said)
+    return Size(key, unit or unit_of(made, key), goal, value, bracket, search.runs, said)
+
+
+def unit_of(case: Case, key: str) -> str:
+    """SI unit of bare numbers under a key; "" where they have none."""
+    quantity = quantity_of(case.raw, key)
+    return "" if quantity is None or quantity.dimension == "number" else DIMENSIONS[quantity.dimension].si
 
 
 def tied(texts: Sequence[str]) -> dict[str, str]:
