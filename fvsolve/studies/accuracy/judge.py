@@ -173,9 +173,9 @@ class Judge:
         notes += [*self.expected(exact), *self.way_out(fits)]
         numerics = self.case.numerics
         known = {name: unit for name in fits if (unit := unit_of(self.case, name)) is not None}
+        shown = {name: differences_in(self.case, name) for name in [*fits, "length"] if name not in known}
         return Order(self.case.name, numerics.scheme, numerics.method, self.plan, kind, words, tuple(rows), fits, own,
-                     tuple(notes), known, {name: differences_in(self.case, name) for name in fits if name not in known}
-                     )  # fmt: skip
+                     tuple(notes), known, shown)  # fmt: skip
 
     def refuse(self, rows, fits, words: str) -> None:
         """FvsolveError where the reference can judge no row in any variable."""

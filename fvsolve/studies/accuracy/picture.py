@@ -8,21 +8,24 @@ from dataclasses import replace
 
 SHOWN = 3  # variables with a table of their own on the terminal; all are in order.csv
 NORMS = ("L1", "L2", "max")
+CELLS = "cell size [m]"  # a measure; others, steps and tolerances, are told as they are
 
 
 def order_picture(one):
     """Errors over the size of cells or steps, a panel a variable, a line a norm: a matplotlib Figure."""
     from fvsolve.draw.order import order_figure
 
-    sizes = [row.level.size for row in one.rows]
+    longer, length = one.shown.get("length", (1.0, "m")) if one.plan.measure == CELLS else (1.0, "")
+    measure = CELLS.replace("[m]", f"[{length}]") if length else one.plan.measure
     curves = {}
     for variable, fits in list(one.fits.items())[: 2 * SHOWN]:
         size, own = one.told(variable)
         curves[f"{variable} [{own}]"] = {
             norm: ([size * row.errors.get(variable, {}).get(norm, math.nan) for row in one.rows],
-                   replace(fits[norm], constant=size * fits[norm].constant)) for norm in NORMS
+                   replace(fit, constant=size * fit.constant / longer**fit.order)) for norm, fit in fits.items()
         }  # fmt: skip
-    return order_figure(sizes, curves, one.plan.measure, f"{one.case}: {title(one)}; {one.words}")
+    sizes = [longer * row.level.size for row in one.rows]
+    return order_figure(sizes, curves, measure, f"{one.case}: {title(one)}; {one.words}")
 
 
 def title(one) -> str:
@@ -49,8 +52,8 @@ def dimension_of(variable: str) -> str:
 
 
 def differences_in(case, variable: str) -> tuple[float, str]:
-    """(size of 1 SI, unit) of differences of a variable as `[output]` has them."""
+    """(size of 1 SI, unit) of differences of a variable, or of lengths, as `[output]` has them."""
     from fvsolve.output.column import column
 
-    own = column("", dimension_of(variable), case)
+    own = column("", variable if variable == "length" else dimension_of(variable), case)
     return own.span_from_si(1.0), own.span_unit

@@ -34,8 +34,8 @@ class Order(Shown):
     """An order study of one scheme and method.
 
     fits : variable -> {"L1" | "L2" | "max": Fit}; own : variable -> norm -> the reference's own error
-    units : of variables that are no probe's; shown : variable -> (size of 1 SI, unit) of its errors as a person reads
-    them, SI if it is not there
+    units : of variables that are no probe's; shown : variable, or "length" -> (size of 1 SI, unit) of its errors as a
+    person reads them, SI if it is not there
     kind : of the reference, "exact" | "finer" | "richardson" | "function"; notes : what must be said of the numbers
     """
 
