@@ -135,7 +135,7 @@ def checks(case, found: dict, every: bool = False) -> None:
     _notices(console, found["warnings"], every)
     if found["basins"]:
         _line(console, _threads(found["threads"]))
-    _line(console, _step(found))
+    _line(console, _step(case, found))
 
 
 def _rows(console, case, word: str, found: dict, keys: dict) -> None:
@@ -296,12 +296,12 @@ def _extremes(console, one) -> None:
         _line(console, f"... {len(rows) - ROWS} more {where}")
 
 
-def _step(found: dict) -> str:
+def _step(case, found: dict) -> str:
     if found["step"] is None:
         return f"step: {found['step_set_by']}"
     expected = found["expected_seconds"]
     cost = "" if expected is None else f", about {expected:.2g} s"
-    step = f"step at the start {_number(found['step'])} s, set by {found['step_set_by']}"
+    step = f"step at the start {case.step_amount(found['step'])}, set by {found['step_set_by']}"
     return f"{step}; {found['steps']} such steps{cost}"
 
 
