@@ -206,7 +206,7 @@ def test_points_of_other_sources_are_not_taken_up(tmp_path, monkeypatch):
         monkeypatch.setattr(jit, "PACKAGE", package)
         package_hash.cache_clear()
         with Points(tmp_path) as points:
-            points.get(load(closing()), {}, lambda: made.append(words) or {"value": 1.0})
+            points.get(load(closing()), {}, lambda said=words: made.append(said) or {"value": 1.0})
     package_hash.cache_clear()
     assert made == ["", "# another"]
 
