@@ -78,11 +78,16 @@ def result(one) -> None:
     _line(console, f"{said['reason']}{end}; {_cost(said)}", None if one.ok else "bold red")
 
 
-def when(said: dict) -> Callable[[float], str]:
-    """What tells times [s] in the unit of a run."""
+def clock_of(said: dict):
+    """The column of times of a run."""
     from fvsolve.output.column import UnitColumn
 
-    clock = UnitColumn("t", "time", said["time_unit"])
+    return UnitColumn("t", "time", said["time_unit"])
+
+
+def when(said: dict) -> Callable[[float], str]:
+    """What tells times [s] in the unit of a run."""
+    clock = clock_of(said)
     return lambda t: f"{_number(float(clock.from_si(t)))} {clock.unit}"
 
 
@@ -265,13 +270,20 @@ def titles(found: dict[str, str]) -> None:
     _table(["case", "title"], [[name, title] for name, title in found.items()])
 
 
-def differences(found: dict) -> None:
-    """Differences of two runs, per shared probe."""
+def differences(found: dict, said: dict) -> None:
+    """Differences of two runs, per shared probe, times in the unit of the first, whose summary is `said`."""
+    clock = clock_of(said)
     rows = [
-        [name, span(one["unit"]), _number(one["greatest"]), _number(one["t_greatest"]), _number(one["rms"])]
+        [
+            name,
+            span(one["unit"]),
+            _number(one["greatest"]),
+            _number(clock.from_si(one["t_greatest"])),
+            _number(one["rms"]),
+        ]
         for name, one in found["probes"].items()
     ]
-    _table(["probe", "unit", "greatest difference", "at [s]", "rms"], rows)
+    _table(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
     for key in ("only_a", "only_b"):
         if found[key]:
             _line(_console(), f"only in {found[key[-1]]}: {', '.join(found[key])}")

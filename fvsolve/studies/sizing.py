@@ -15,8 +15,8 @@ from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.verdicts import SIZES
-from fvsolve.studies.plans import quantity_of
-from fvsolve.units import DIMENSIONS, UNITS, show
+from fvsolve.studies.plans import bare_unit
+from fvsolve.units import UNITS, show
 
 GOALS = ("least", "greatest")
 LOOKS = 8  # places between two ends of which neither holds, where it is looked for
@@ -212,13 +212,7 @@ def size(
     search = Sizing(made, key, unit, ties or {}, progress)
     value, bracket = search.search(first, last, goal, rtol)
     said = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
-    return Size(key, unit or unit_of(made, key), goal, value, bracket, search.runs, said)
-
-
-def unit_of(case: Case, key: str) -> str:
-    """SI unit of bare numbers under a key; "" where they have none."""
-    quantity = quantity_of(case.raw, key)
-    return "" if quantity is None or quantity.dimension == "number" else DIMENSIONS[quantity.dimension].si
+    return Size(key, unit or bare_unit(made.raw, key), goal, value, bracket, search.runs, said)
 
 
 def tied(texts: Sequence[str]) -> dict[str, str]:
