@@ -272,17 +272,10 @@ def titles(found: dict[str, str]) -> None:
 
 def differences(found: dict, said: dict) -> None:
     """Differences of two runs, per shared probe, times in the unit of the first, whose summary is `said`."""
-    clock = clock_of(said)
-    rows = [
-        [
-            name,
-            span(one["unit"]),
-            _number(one["greatest"]),
-            _number(clock.from_si(one["t_greatest"])),
-            _number(one["rms"]),
-        ]
-        for name, one in found["probes"].items()
-    ]
+    clock, rows = clock_of(said), []
+    for name, one in found["probes"].items():
+        when = None if one["t_greatest"] is None else clock.from_si(one["t_greatest"])
+        rows.append([name, span(one["unit"]), *map(_number, (one["greatest"], when, one["rms"]))])
     _table(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
     for key in ("only_a", "only_b"):
         if found[key]:
