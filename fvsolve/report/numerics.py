@@ -22,7 +22,8 @@ def settings(result) -> ReportTable:
     if said["cells"]:
         rows += [["scheme", _scheme(numerics)], ["cells", said["cells"]]]
     rows += [["method", "; ".join(_method(one, result.case) for one in said["methods"])],
-             ["step", "; ".join(given) or "by default"], ["steps", said["steps"]], ["steps taken again", said["rejections"]], ["calls of rates", said["rhs"]],
+             ["step", "; ".join(given) or "by default"],
+             ["steps", said["steps"]], ["steps taken again", said["rejections"]], ["calls of rates", said["rhs"]],
              ["seconds of stepping", said["seconds"]]]  # fmt: skip
     if "resolution" in said:
         rows.append(["errors of peaks (\u00b1)", said["resolution"]["words"]])
