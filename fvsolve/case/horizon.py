@@ -20,7 +20,8 @@ def notices(case: Any) -> list[Notice]:
         for name, part in getattr(case, group).items():
             for key, time in later(part, end):
                 place = f"{group}.{name}"
-                text = f"{place}.{key}: goes on to {time:g} s, after the end of the run at {end:g} s"
+                late, last = (case.amount(one, "time", 6) for one in (time, end))
+                text = f"{place}.{key}: goes on to {late}, after the end of the run at {last}"
                 found.append(Notice("end", place, text, key, time, end))
     return found
 

@@ -50,18 +50,21 @@ def _show(found) -> None:
     rows = [[f"{one.value:.6g}", "holds" if one.ok else "open" if one.open else "FAILS",
              "-" if one.margin is None else f"{one.margin:.4g}",
              one.limit if one.reason == "finished" else one.reason] for one in found.runs]  # fmt: skip
-    terminal.table([f"{found.key} [{found.unit or 'SI'}]", "", "least margin over limit", "of"], rows, console)
+    unit = f" {found.unit}" if found.unit else ""
+    key = f"{found.key} [{found.unit}]" if unit else found.key
+    terminal.table([key, "", "least margin over limit", "of"], rows, console)
     for text in found.ties:
         terminal.line(console, f"with {text}")
     for text in dict.fromkeys(one.open for one in found.runs if one.open):
         terminal.line(console, f"open: {text}", "yellow")
     if found.value is None:
         near = found.nearest
-        text = (f"no value between {found.runs[0].value:.6g} and {found.runs[1].value:.6g} {found.unit} that was tried "
+        low, high = sorted(one.value for one in found.runs[:2])
+        text = (f"no value between {low:.6g} and {high:.6g}{unit} that was tried "
                 f"holds all limits; {near.value:.6g} comes nearest, by {near.limit}")  # fmt: skip
         terminal.line(console, text, "bold red")
         return
     where = "at the end of the range" if found.bracket is None else (
-        f"{min(found.bracket):.6g} to {max(found.bracket):.6g} {found.unit} bracket it")  # fmt: skip
-    said = f"{found.goal} value that holds all limits: {found.value:.6g} {found.unit}; {where}; {len(found.runs)} runs"
+        f"{min(found.bracket):.6g} to {max(found.bracket):.6g}{unit} bracket it")  # fmt: skip
+    said = f"{found.goal} value that holds all limits: {found.value:.6g}{unit}; {where}; {len(found.runs)} runs"
     terminal.line(console, said, "green")

@@ -26,7 +26,8 @@ def words(result) -> list[Word]:
     said = result.summary
     found = []
     if result.reason != "finished":
-        reached = f"It reached t = {said['t']:.6g} s of {result.case.numerics.end:.6g} s"
+        reached, end = (result.case.amount(one, "time", 6) for one in (said["t"], result.case.numerics.end))
+        reached = f"It reached t = {reached} of {end}"
         found.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; the rest is not known."))
     found += [Word("bad", "Not to be trusted.", one.text) for one in result.warnings if not one.ok]
     found += [*_doubt(result), verdict(result)]
@@ -42,10 +43,12 @@ def _doubt(result) -> list[Word]:
     marks = sorted(result.marks, key=lambda one: one.time)
     if not marks:
         return []
-    later = ", ".join(f"{one.place.partition('.')[2]} at {one.time:.6g} s" for one in marks[1 : 1 + LATER])
+    when = [result.case.amount(one.time, "time", 6) for one in marks]
+    places = [f"{one.place.partition('.')[2]} at {t}" for one, t in zip(marks, when, strict=True)]
+    later = ", ".join(places[1 : 1 + LATER])
     more = f", and {len(marks) - 1 - LATER} more places" if len(marks) > 1 + LATER else ""
     text = marks[0].text + (f". Later also {later}{more}" if later else "")
-    return [Word("doubt", f"Results from {marks[0].time:.6g} s on are not to be trusted.", text)]
+    return [Word("doubt", f"Results from {when[0]} on are not to be trusted.", text)]
 
 
 def sound(result) -> bool:

@@ -346,7 +346,7 @@ class Run:
             place = f" at {model.state_names[bad[0]]}" if bad.size else ""
         elif code == slots.BAD_STATUS and loop.out[rec.WHERE] >= 0 and loop.out[rec.STATUS] != rec.NO_WEIGHT:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
-        when = f"t = {loop.t:.6g} s"
+        when = f"t = {model.case.amount(loop.t, 'time', 6)}"
         if code == slots.CHATTERS:
             first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at one time, or crowded over a span
             names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})
