@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from fvsolve.steppers.tableau import METHODS
 
 os.environ.setdefault("MPLBACKEND", "Agg")
+signal.signal(signal.SIGINT, signal.default_int_handler)  # which jobs in the background of a shell do not heed
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: its threads only get in each other's way
 
 

@@ -63,7 +63,7 @@ class Case(Shown):
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
     lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # of those whose water is masses on its body
     read: dict[tuple, tuple] = field(default_factory=dict, repr=False)  # place -> (what stands there, the same read)
-    told: list[Notice] = field(default_factory=list, repr=False)  # of what was placed
+    told: list[Any] = field(default_factory=list, repr=False)  # of what was placed, as `placing` has it
     found: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses where their forces balance
 
     picture = "fvsolve.draw.objects:case_figure"
@@ -173,7 +173,7 @@ class Case(Shown):
     @cached_property
     def notes(self) -> list[Notice]:
         """What it says beyond what practice knows, and beyond the end of the run."""
-        return [*self.told, *ranges.notices(self), *horizon.notices(self)]
+        return [*(one.notice(self) for one in self.told), *ranges.notices(self), *horizon.notices(self)]
 
     @cached_property
     def elevations_stated(self) -> bool:
@@ -218,6 +218,11 @@ class Case(Shown):
         if span:
             return f"{units.find(units.span(unit), dimension).number(value):.{digits}g} {units.span(unit)}"
         return f"{units.convert(value, dimension, unit, self.ambient_pressure):.{digits}g} {unit}"
+
+    def step_amount(self, step: float, digits: int = 6) -> str:
+        """A step [s] as messages tell it: in the unit of times, in s where that is longer."""
+        longer = units.find(self.unit_of("time"), "time").si(1.0) > 1.0
+        return f"{step:.{digits}g} s" if longer else self.amount(step, "time", digits)
 
     def wave_speed(self, name: str) -> float:
         """Wave speed of a pipe [m/s]: as stated, or sqrt(K / rho), 1/K = 1/beta + diameter / (E wall)."""

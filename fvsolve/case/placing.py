@@ -53,9 +53,26 @@ class Placed:
         return (f"{self.name}-in", f"{self.name}-out") if self.inline else (f"{self.name}-at", f"{self.name}-at")
 
 
+@dataclass(frozen=True)
+class Moved:
+    """A part that stands elsewhere than asked, by so much, at a chainage of a pipe [m]."""
+
+    group: str
+    name: str
+    by: float
+    chainage: float
+    pipe: str
+
+    def notice(self, case: Any) -> Notice:
+        """What is to be known of it."""
+        by, at = case.amount(abs(self.by), "length"), case.amount(self.chainage, "length", 10)
+        text = f"{self.name}: moved by {by} to chainage {at} of {self.pipe}, where two of its cells meet"
+        return Notice("cells", f"{self.group}.{self.name}", text, "at", self.by)
+
+
 @dataclass
 class Cutting:
-    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made, notices.
+    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made, who moved.
 
     lost : (group, name) of what cannot be read, as it, its pipe or what stands on that is at fault; wholes : pipes
     that are not cut for that; known : whether it is known what joins what
@@ -65,7 +82,7 @@ class Cutting:
     named: frozenset[str]  # links of the file
     pieces: dict[str, list[str]] = field(default_factory=dict)
     origin: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
-    told: list[Notice] = field(default_factory=list)
+    told: list[Moved] = field(default_factory=list)
     lost: set[tuple[str, str]] = field(default_factory=set)
     wholes: dict[str, Pipe] = field(default_factory=dict)
     known: bool = True
@@ -280,9 +297,7 @@ def cut_one(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Plac
     begin = 0.0 if whole.profile is None else float(whole.profile.chainage[0])
     for one, at in zip(parts, cuts.tolist(), strict=True):
         if abs(at - one.distance) > 1e-9 * whole.length:
-            text = (f"{one.name}: moved by {abs(at - one.distance):.4g} m to chainage {begin + at:.10g} m of {name}, "
-                    "where two of its cells meet")  # fmt: skip
-            made.told.append(Notice("cells", f"{one.group}.{one.name}", text, "at", at - one.distance))
+            made.told.append(Moved(one.group, one.name, at - one.distance, begin + at, name))
     taken(made, name, given, parts, names, say)
     lay(made, name, given, whole, parts, edges, counts.tolist())
     made.table["routes"][name] = {"pipes": names, "start": begin}

@@ -35,16 +35,22 @@ def optimise(
     if as_json:
         print_json(found.plain())
     else:
-        _show(found)
+        _show(found, made)
 
 
-def _show(found) -> None:
+def _show(found, case) -> None:
     from fvsolve.cli import terminal
+    from fvsolve.output.column import column, time_column
+    from fvsolve.studies.plans import quantity_of
 
-    console = terminal.console()
-    rows = [[f"{t:.6g}", f"{a:.4f}", f"{b:.4f}"]
-            for t, a, b in zip(found.best.time, found.linear.value, found.best.value, strict=True)]  # fmt: skip
-    terminal.table(["t [s]", "linear", "best"], rows, console)
+    console, clock = terminal.console(), time_column(case)
+    quantity = quantity_of(case.raw, found.key)
+    own = column("", "number" if quantity is None else quantity.dimension, case)
+    bare, spec = own.dimension == "number", ".4f" if own.dimension == "number" else ".6g"
+    rows = [[f"{clock.from_si(t):.6g}", *(format(own.from_si(one), spec) for one in pair)]
+            for t, *pair in zip(found.best.time, found.linear.value, found.best.value, strict=True)]  # fmt: skip
+    heads = [name if bare else f"{name} [{own.unit}]" for name in ("linear", "best")]
+    terminal.table([clock.header, *heads], rows, console)
     peaks = ["-" if one.peak is None else f"{one.peak:.6g} {found.unit}" for one in (found.linear, found.best)]
     terminal.line(console, f"{found.minimise}: linear {peaks[0]}, best {peaks[1]}; {found.runs} runs", "green")
     terminal.line(console, found.schedule)

@@ -184,11 +184,12 @@ def compare(
     from fvsolve.run import open_run
     from fvsolve.run.comparison import differences
 
-    found = differences(open_run(run_a), open_run(run_b))
+    one = open_run(run_a)
+    found = differences(one, open_run(run_b))
     if as_json:
         print_json(found)
     else:
-        report.differences(found)
+        report.differences(found, one.summary)
 
 
 @app.command()

@@ -36,6 +36,7 @@ def study(
 def _show(found) -> None:
     from fvsolve.cli import terminal
     from fvsolve.cli.report import when, where_and_when
+    from fvsolve.run.result import FAILS
     from fvsolve.studies.design import name_of
     from fvsolve.units import span
 
@@ -59,29 +60,31 @@ def _show(found) -> None:
         for note in row["warnings"]:
             if note["kind"] == "end":
                 terminal.line(console, f"{name_of(row)}: {note['text']}", "yellow")
-        for one in row["verdicts"]:
-            if not one["ok"] and not is_open(one):
-                value = "-" if one["value"] is None else f"{one['value']:.6g}"
-                text = f"{name_of(row)}: {one['name']}: {value} {one['unit']} ({where_and_when(one, row)})"
-                terminal.line(console, text, "red")
+        for one in verdicts_of(row):
+            if one.state == FAILS or one.doubtful:
+                value = "-" if one.value is None else f"{one.value:.6g}"
+                text = f"{name_of(row)}: {one.name}: {value} {one.unit} ({where_and_when(one._asdict(), row)})"
+                why = "" if one.state == FAILS else ": open, as its margin is smaller than its error"
+                terminal.line(console, text + why, "red" if one.state == FAILS else "yellow")
     names = [name or "the case as it is" for name in found.holds]
     told = f"all limits hold in all events: {', '.join(names)}" if names else "nothing holds all limits in all events"
     terminal.line(console, told, "green" if names else "bold red")
     terminal.line(console, f"{found.folder}: study.json, study.csv and a run directory for each")
 
 
-def is_open(verdict: dict) -> bool:
-    """Whether a limit is not passed and does not hold either: what the run says of it is not to be trusted."""
-    return not verdict["ok"] and verdict["margin"] is not None and verdict["margin"] >= 0.0
+def verdicts_of(row: dict) -> list:
+    """Of a run."""
+    from fvsolve.run.result import LimitVerdict
+
+    return [LimitVerdict(**one) for one in row["verdicts"]]
 
 
 def standing(row: dict) -> str:
     """Of a run in one word."""
-    from fvsolve.studies.design import passed
+    from fvsolve.run.result import FAILS, HOLDS, OPEN
 
-    if passed(row):
-        return "holds"
-    return "open" if row["ok"] and all(one["ok"] or is_open(one) for one in row["verdicts"]) else "FAILS"
+    states = [FAILS] * (not row["ok"]) + [one.state for one in verdicts_of(row)]
+    return next((one for one in (FAILS, OPEN) if one in states), HOLDS)
 
 
 def _cell(verdict) -> str:

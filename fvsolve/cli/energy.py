@@ -6,6 +6,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Annotated
 
 import typer
@@ -13,7 +14,7 @@ import typer
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
 from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.sheet import Column, Sheet
+from fvsolve.studies.sheet import Column, Sheet, text
 
 Asked = Annotated[str | None, typer.Argument(metavar="[CASE]", help="a case; without one, schemes and methods alone")]
 Port = Annotated[str | None, typer.Option(metavar="NODE", help="ask whether the network is passive at this port")]
@@ -84,6 +85,7 @@ def ledger(case, port, out, as_json: bool) -> None:
     """One run of a case: its ledger, its picture, the verdict at a port."""
     from fvsolve.cli.progress import watched
     from fvsolve.draw.energy import energy_figure
+    from fvsolve.output.column import column, time_column
     from fvsolve.studies.energy.energy import energy as study
     from fvsolve.studies.energy.energy import write_table
 
@@ -93,49 +95,53 @@ def ledger(case, port, out, as_json: bool) -> None:
             one = study(case, port=port, progress=progress)
         write_table(one, folder / FILES[0])
         at_port = None if one.port is None else (one.port.node, one.port.course, one.port.bound)
-        figure = energy_figure(
-            one.t, one.supplied, one.stored, one.dissipated, one.numerical(), case.title or case.name, at_port
-        )
+        clock, own = time_column(case), column("", "energy", case)
+        units = clock.unit, None if own.plain else (own.to_si(1.0), own.unit)
+        figure = energy_figure(clock.from_si(one.t), one.supplied, one.stored, one.dissipated, one.numerical(),
+                               case.title or case.name, at_port, units)  # fmt: skip
         for name in FILES[1:]:
             figure.savefig(folder / name)
     if as_json:
         print_json(one.plain() | {"directory": str(folder), "files": list(FILES)})
     else:
-        _ledger(one, folder)
+        _ledger(one, case, folder)
     sys.exit(130 if one.reason == "interrupted" else 0 if one.ok else 1)
 
 
-def _ledger(one, folder) -> None:
+def _ledger(one, case, folder) -> None:
     from fvsolve.cli.terminal import console, line, table
+    from fvsolve.output.column import column
 
-    where, rows = console(), []
+    where, rows, joules = console(), [], column("energy", "energy", case)
+
+    def amount(value: float) -> list[str]:
+        share = f"{100.0 * value / one.through:.4g}" if one.through > 0.0 else "-"
+        return [f"{joules.from_si(value):.6g}", share]
+
     for what in ("supplied", "stored", "dissipated"):
         lines = getattr(one, what)
         order = sorted(lines, key=lambda name: -abs(lines[name][-1]))
-        rows += [[what, name, *_amount(lines[name][-1], one)] for name in order[:LINES]]
+        rows += [[what, name, *amount(lines[name][-1])] for name in order[:LINES]]
         if len(order) > LINES:
             rest = sum(lines[name][-1] for name in order[LINES:])
-            rows.append([what, f"{len(order) - LINES} others", *_amount(rest, one)])
-    rows += [["numerical", name, *_amount(values[-1], one)] for name, values in one.numerical().items()]
-    table(["what", "part", "energy [J]", "share [%]"], rows, where)
+            rows.append([what, f"{len(order) - LINES} others", *amount(rest)])
+    rows += [["numerical", name, *amount(values[-1])] for name, values in one.numerical().items()]
+    table(["what", "part", joules.header, "share [%]"], rows, where)
     line(where, "")
-    said, left = f"remainder {one.remainder[-1]:.4g} J", one.newton_counts
+    said, left = f"remainder {case.amount(one.remainder[-1], 'energy')}", one.newton_counts
     if left:
-        said += f", what Newton leaves: {one.newton[-1]:.4g} J, the rest"
-    line(where, f"{said}{'' if left else ','} {one.relative:.3g} of the {one.through:.6g} J that passed: {one.verdict}")
+        said += f", what Newton leaves: {case.amount(one.newton[-1], 'energy')}, the rest"
+    passed = case.amount(one.through, "energy", 6)
+    line(where, f"{said}{'' if left else ','} {one.relative:.3g} of the {passed} that passed: {one.verdict}")
     if one.port is not None:
         line(where, one.port.text, None if one.port.passive else "bold red")
     for mark in one.marks:
         line(where, mark, "yellow")
     cut = one.reason == "interrupted"
-    ended = f"{one.reason} at t = {one.t[-1]:.6g} s" if one.ok or cut else one.reason
+    ended = f"{one.reason} at t = {case.amount(one.t[-1], 'time', 6)}" if one.ok or cut else one.reason
     line(where, f"{ended}; {one.steps} steps{f': the ledger is up to there, {AGAIN}' if cut else ''}",
          None if one.ok else "bold red")  # fmt: skip
     line(where, f"{folder}: {', '.join(FILES)}")
-
-
-def _amount(value: float, one) -> list[str]:
-    return [f"{value:.6g}", f"{100.0 * value / one.through:.4g}" if one.through > 0.0 else "-"]
 
 
 def pairs(case, schemes, methods, port, out, as_json: bool) -> None:
@@ -153,11 +159,26 @@ def pairs(case, schemes, methods, port, out, as_json: bool) -> None:
         print_json({"pairs": rows, "directory": str(folder), "files": ["pairs.csv"]})
         sys.exit(2 if all(row["creates"] is None for row in rows) else 0)
     where = console()
-    sheet(Sheet([one for one in PAIR if port or one.key not in ("relative", "margin")], rows), where)
+    heads = [_in_unit(one, case) for one in PAIR if port or one.key not in ("relative", "margin")]
+    sheet(Sheet(heads, rows), where)
     refused = _outcome(case, rows, where)
     line(where, f"{folder}: pairs.csv, points.jsonl")
     if len(refused) == len(rows):
         sys.exit(2)
+
+
+def _in_unit(one: Column, case) -> Column:
+    """A column of energies as the reader wants them; others as they are."""
+    from fvsolve.output.column import column
+
+    if not one.head.endswith(" [J]"):
+        return one
+    own = column(one.head.removesuffix(" [J]"), "energy", case)
+
+    def words(row: Mapping) -> str:
+        return text(None if row[one.key] is None else own.from_si(row[one.key]), one.words)
+
+    return replace(one, head=own.header, words=words)
 
 
 def _outcome(case, rows, where) -> list[dict]:

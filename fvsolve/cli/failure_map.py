@@ -31,6 +31,7 @@ def map_(
 ) -> None:
     """Failure map: methods against steps or a key, each square run for real: stable, ringing, wrong, blown up ..."""
     from fvsolve.studies.failure.failure_map import failures
+    from fvsolve.studies.plans import headed
     from fvsolve.studies.points import Points
 
     read_case = load_case(case, set, scheme, method)
@@ -40,11 +41,12 @@ def map_(
             read_case, listed(scheme, "--scheme"), methods_of(method), _numbers("--courant", courant),
             _steps(step), _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
         )  # fmt: skip
-    files = _written(found, folder)
+    head = found.key if found.key == "step" else headed(read_case.raw, found.key, found.values)
+    files = _written(found, folder, head)
     if as_json:
         print_json(found.plain() | {"files": [str(file) for file in files]})
     else:
-        _show(found, files)
+        _show(found, files, head)
 
 
 def _numbers(option: str, text: str | None) -> list[float] | None:
@@ -72,26 +74,26 @@ def _key(text: str | None) -> tuple[str, list] | None:
     return name.strip(), [value_of(word) for word in listed(values)]
 
 
-def _written(found, folder: Path) -> list[Path]:
+def _written(found, folder: Path, head: str) -> list[Path]:
     from fvsolve.draw.failure_map import failure_map_figure
 
     rows = [{"value": found.values[row["column"]]} | row for row in found.plain()["squares"]]
     table = Sheet([Column(key) for key in rows[0]], rows).write(folder / "map.csv")
-    figure = failure_map_figure(found, f"{found.case}: where methods fail")
+    figure = failure_map_figure(found, f"{found.case}: where methods fail", head)
     pictures = [folder / f"map.{kind}" for kind in ("png", "svg")]
     for picture in pictures:
         figure.savefig(picture)
     return [table, *pictures]
 
 
-def _show(found, files: list[Path]) -> None:
+def _show(found, files: list[Path], head: str) -> None:
     from fvsolve.cli import terminal
     from fvsolve.draw.failure_map import column_labels
     from fvsolve.studies.failure.verdict import VERDICTS
 
     console = terminal.console()
     for scheme in found.schemes:
-        what = "steps" if found.key == "step" else found.key
+        what = "steps" if found.key == "step" else head
         terminal.line(console, f"{scheme}, {what}:" if found.wave_rate else f"{what}:", "bold")
         heads = [
             "method",

@@ -98,7 +98,7 @@ def say(one) -> None:
     for variable in one.variables[:SHOWN]:
         terminal.line(console, "")
         where = " at the end, all pipes" if variable in ("pressure", "flow") else ""
-        terminal.line(console, f"{variable} [{unit(variable, one.units)}]{where}")
+        terminal.line(console, f"{variable} [{one.told(variable)[1]}]{where}")
         terminal.sheet(rows_of(one, variable), console)
     terminal.line(console, "")
     terminal.table(["fitted order of", "L1", "L2", "max"], fitted(one), console)
@@ -109,11 +109,11 @@ def say(one) -> None:
 
 def rows_of(one, variable: str) -> Sheet:
     """A variable's table."""
-    fits, found = one.fits[variable], []
+    fits, found, size = one.fits[variable], [], one.told(variable)[0]
     for k, row in enumerate(one.rows):
         step = f"rtol {row.level.size:g}" if one.plan.measure == "rtol" else row.level.step
         cells = {"cells": row.level.cells or None, "step": step, "rhs": row.rhs, "seconds": row.seconds}
-        cells |= {norm: row.errors.get(variable, {}).get(norm) for norm in NORMS}
+        cells |= {norm: size * error for norm, error in row.errors.get(variable, {}).items()}
         cells |= {f"order {norm}": fits[norm].pairwise[k - 1] if k else None for norm in NORMS}
         marks = {norm: fits[norm].marks[k] for norm in NORMS}
         same = len(set(marks.values())) == 1

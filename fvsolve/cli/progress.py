@@ -88,7 +88,7 @@ class Bar:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-        self.start, self.end = case.numerics.start, case.numerics.end
+        self.start, self.end, self.told = case.numerics.start, case.numerics.end, case.amount
         self.first: tuple[float, float] | None = None
         self.shown = Progress(
             TextColumn("{task.description}", markup=False),
@@ -104,4 +104,8 @@ class Bar:
         self.first = self.first or (t, seconds)
         spent = seconds - self.first[1]
         speed = f", {(t - self.first[0]) / spent:.3g} s per s" if spent > 0.0 else ""
-        self.shown.update(self.task, completed=t - self.start, now=f"{t:.6g} of {self.end:.6g} s{speed}")
+        self.shown.update(
+            self.task,
+            completed=t - self.start,
+            now=f"{self.told(t, 'time', 6)} of {self.told(self.end, 'time', 6)}{speed}",
+        )

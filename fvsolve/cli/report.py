@@ -78,11 +78,16 @@ def result(one) -> None:
     _line(console, f"{said['reason']}{end}; {_cost(said)}", None if one.ok else "bold red")
 
 
-def when(said: dict) -> Callable[[float], str]:
-    """What tells times [s] in the unit of a run."""
+def clock_of(said: dict):
+    """The column of times of a run."""
     from fvsolve.output.column import UnitColumn
 
-    clock = UnitColumn("t", "time", said["time_unit"])
+    return UnitColumn("t", "time", said["time_unit"])
+
+
+def when(said: dict) -> Callable[[float], str]:
+    """What tells times [s] in the unit of a run."""
+    clock = clock_of(said)
     return lambda t: f"{_number(float(clock.from_si(t)))} {clock.unit}"
 
 
@@ -135,7 +140,7 @@ def checks(case, found: dict, every: bool = False) -> None:
     _notices(console, found["warnings"], every)
     if found["basins"]:
         _line(console, _threads(found["threads"]))
-    _line(console, _step(found))
+    _line(console, _step(case, found))
 
 
 def _rows(console, case, word: str, found: dict, keys: dict) -> None:
@@ -265,13 +270,13 @@ def titles(found: dict[str, str]) -> None:
     _table(["case", "title"], [[name, title] for name, title in found.items()])
 
 
-def differences(found: dict) -> None:
-    """Differences of two runs, per shared probe."""
-    rows = [
-        [name, span(one["unit"]), _number(one["greatest"]), _number(one["t_greatest"]), _number(one["rms"])]
-        for name, one in found["probes"].items()
-    ]
-    _table(["probe", "unit", "greatest difference", "at [s]", "rms"], rows)
+def differences(found: dict, said: dict) -> None:
+    """Differences of two runs, per shared probe, times in the unit of the first, whose summary is `said`."""
+    clock, rows = clock_of(said), []
+    for name, one in found["probes"].items():
+        when = None if one["t_greatest"] is None else clock.from_si(one["t_greatest"])
+        rows.append([name, span(one["unit"]), *map(_number, (one["greatest"], when, one["rms"]))])
+    _table(["probe", "unit", "greatest difference", f"at [{clock.unit}]", "rms"], rows)
     for key in ("only_a", "only_b"):
         if found[key]:
             _line(_console(), f"only in {found[key[-1]]}: {', '.join(found[key])}")
@@ -296,12 +301,12 @@ def _extremes(console, one) -> None:
         _line(console, f"... {len(rows) - ROWS} more {where}")
 
 
-def _step(found: dict) -> str:
+def _step(case, found: dict) -> str:
     if found["step"] is None:
         return f"step: {found['step_set_by']}"
     expected = found["expected_seconds"]
     cost = "" if expected is None else f", about {expected:.2g} s"
-    step = f"step at the start {_number(found['step'])} s, set by {found['step_set_by']}"
+    step = f"step at the start {case.step_amount(found['step'])}, set by {found['step_set_by']}"
     return f"{step}; {found['steps']} such steps{cost}"
 
 
@@ -334,19 +339,24 @@ def where_and_when(one: dict, said: dict) -> str:
 
 
 def _verdict(one: dict, said: dict) -> str:
+    from fvsolve.run.result import OPEN, LimitVerdict
+
+    this = LimitVerdict(**one)
     beside = "at least" if one["bound"] == "least" else "at most"
     found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where_and_when(one, said)})"
-    held = "holds" if one["ok"] else "FAILS"
-    if not one["ok"] and one["margin"] is not None and one["margin"] >= 0.0:
-        held = f"OPEN, as {why_open(said)}"
+    held = this.state if this.state != OPEN else f"OPEN, as {open_as(this, said)}"
     margin = "-" if one["margin"] is None else f"{_number(one['margin'])} {span(one['unit'])}"
     text = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {margin}"
+    if one["error"] is not None and one["margin"] is not None:
+        text += f" within {one['error']:.2g}"
     if one["time"] is not None and one["until"] > 0.0 and one["time"] >= one["until"] * (1.0 - 1e-9):
         text += ", at the end of the run: a later end may be worse"
-    if one["error"] is None or one["margin"] is None:
-        return text
-    doubt = ", which leaves it open" if abs(one["margin"]) < one["error"] else ""
-    return f"{text} within {one['error']:.2g}{doubt}"
+    return text
+
+
+def open_as(verdict, said: dict) -> str:
+    """Why a limit that may be passed, or is not, does not hold either."""
+    return "its margin is smaller than its error" if verdict.doubtful else why_open(said)
 
 
 def marks_of(marks: list[dict], told) -> list[str]:
@@ -364,7 +374,7 @@ def marks_of(marks: list[dict], told) -> list[str]:
 
 
 def why_open(said: dict) -> str:
-    """Why a limit that is not passed does not hold either."""
+    """Why a run cannot tell whether a limit holds that it does not pass."""
     late = [one["text"] for one in said["warnings"] if one["kind"] == "end"]
     if not said["marks"]:
         return late[0] if said["ok"] and late else f"the run is not ok ({said['reason']})"

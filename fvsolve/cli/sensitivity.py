@@ -60,17 +60,30 @@ def fit(
     if as_json:
         print_json(made.plain())
         return
-    show(made, ", ".join(f"rms of {probe} {rms:.6g}" for probe, rms in made.rms.items()) + f", {made.runs} runs")
     from fvsolve.cli import terminal
+    from fvsolve.studies.plans import bare_unit
+
+    probes = {one.probe.text: one.probe for one in found.compare.values() if one.probe is not None}
+    left = [f"rms of {name} {difference(found, probes[name], rms)}" for name, rms in made.rms.items()]
+    units = {key: f"{key} [{unit}]" if (unit := bare_unit(found.raw, key)) else key for key in made.values}
+    show(made, ", ".join([*left, f"{made.runs} runs"]), units)
 
     for doubt in made.doubts:
         terminal.line(terminal.console(), doubt, "yellow")
 
 
-def show(made, last: str) -> None:
-    """A table of keys, and a line below."""
+def difference(case, probe, value: float) -> str:
+    """A difference of a probe [SI] with the unit that it is recorded in."""
+    from fvsolve.output.column import column
+
+    own = column(probe.text, probe.dimension, case, probe.unit)
+    return f"{own.span_from_si(value):.6g} {own.span_unit}"
+
+
+def show(made, last: str, units: dict[str, str] = {}) -> None:  # noqa: B006
+    """A table of keys, those in `units` as these say them, and a line below."""
     from fvsolve.cli import terminal
 
-    console = terminal.console()
-    terminal.table(*made.sheet.words(), console)
+    console, (heads, rows) = terminal.console(), made.sheet.words()
+    terminal.table(heads, [[units.get(key, key), *row] for key, *row in rows], console)
     terminal.line(console, last)

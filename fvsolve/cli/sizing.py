@@ -58,7 +58,9 @@ def _show(found) -> None:
     rows = [[f"{one.value:.6g}", "holds" if one.ok else "open" if one.open else "FAILS",
              "-" if one.margin is None else f"{one.margin:.4g}",
              one.limit if one.reason == "finished" else one.reason] for one in found.runs]  # fmt: skip
-    terminal.table([f"{found.key} [{found.unit or 'SI'}]", "", "least margin over limit", "of"], rows, console)
+    unit = f" {found.unit}" if found.unit else ""
+    key = f"{found.key} [{found.unit}]" if unit else found.key
+    terminal.table([key, "", "least margin over limit", "of"], rows, console)
     for text in found.ties:
         terminal.line(console, f"with {text}")
     for text in dict.fromkeys(one.open for one in found.runs if one.open):
@@ -67,15 +69,16 @@ def _show(found) -> None:
         terminal.line(console, _unmet(found), "bold red")
         return
     where = "at the end of the range" if found.bracket is None else (
-        f"{min(found.bracket):.6g} to {max(found.bracket):.6g} {found.unit} bracket it")  # fmt: skip
-    said = f"{found.goal} value that holds all limits: {found.value:.6g} {found.unit}; {where}; {len(found.runs)} runs"
+        f"{min(found.bracket):.6g} to {max(found.bracket):.6g}{unit} bracket it")  # fmt: skip
+    said = f"{found.goal} value that holds all limits: {found.value:.6g}{unit}; {where}; {len(found.runs)} runs"
     terminal.line(console, said, "green")
 
 
 def _unmet(found) -> str:
     """What came nearest, by how much it fell short, and where it might be met."""
     near, tried = found.nearest, sorted(one.value for one in found.runs)
-    text = (f"no value between {tried[0]:.6g} and {tried[-1]:.6g} {found.unit} that was tried holds all limits; "
+    unit = f" {found.unit}" if found.unit else ""
+    text = (f"no value between {tried[0]:.6g} and {tried[-1]:.6g}{unit} that was tried holds all limits; "
             f"{near.value:.6g} comes nearest")  # fmt: skip
     if near.margin is None:
         return f"{text}; of none is a margin known"

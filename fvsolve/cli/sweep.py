@@ -46,6 +46,7 @@ def sweep(
 ) -> None:
     """One run for every combination of values: a table with a row for each, failed ones with their reason."""
     from fvsolve import studies
+    from fvsolve.studies.plans import headed
 
     given = dict(values_of(text) for text in set)
     fixed = {key: values[0] for key, values in given.items() if len(values) == 1}
@@ -56,11 +57,12 @@ def sweep(
     folder = folder_of(found, "sweep", out)
     with told() as progress:
         made = studies.sweep(found, moved, fixed, jobs, folder, progress, points, sample, seed, dask)
-    charts = write_charts(made, outcome, folder)
+    heads = {key: headed(found.raw, key, [row[key] for row in made.rows]) for key in made.keys}
+    charts = write_charts(made, outcome, folder, heads)
     if as_json:
         print_json(made.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]})
     else:
-        _show(made, folder)
+        _show(made, folder, heads)
     sys.exit(0 if all(row["ok"] for row in made.rows) else 1)
 
 
@@ -73,8 +75,8 @@ def ranges(texts: list[str], option: str) -> dict[str, list]:
     return dict(found)
 
 
-def write_charts(made, outcomes: list[str], folder: Path) -> list[Path]:
-    """A picture for each outcome in `charts`, all extremes if none is named; returns their paths."""
+def write_charts(made, outcomes: list[str], folder: Path, heads: dict[str, str]) -> list[Path]:
+    """A picture for each outcome in `charts`, all extremes if none is named, keys under their heads; their paths."""
     from fvsolve.draw.sweep import outcome_figure
 
     known = made.outcomes
@@ -83,7 +85,7 @@ def write_charts(made, outcomes: list[str], folder: Path) -> list[Path]:
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
         path = writable(folder / "charts") / f"{plain}.png"
-        outcome_figure(made, name).savefig(path)
+        outcome_figure(made, name, heads).savefig(path)
         paths.append(path)
     return paths
 
@@ -112,7 +114,7 @@ def split(text: str) -> list[str]:
     return [part.strip() for part in parts if part.strip()]
 
 
-def _show(made, folder: Path) -> None:
+def _show(made, folder: Path, heads: dict[str, str]) -> None:
     from fvsolve.cli import terminal
     from fvsolve.studies.sweep import pasted
 
@@ -121,7 +123,7 @@ def _show(made, folder: Path) -> None:
     shown = columns[len(made.keys) : len(made.keys) + 1 + SHOWN]
     first = made.rows[:MOST]
     rows = [[*(pasted(row[key]) for key in made.keys), *(_text(row.get(name)) for name in shown)] for row in first]
-    terminal.table([*made.keys, *shown], rows, console)
+    terminal.table([*heads.values(), *shown], rows, console)
     for row in first:
         where = ", ".join(f"{key} = {pasted(row[key])}" for key in made.keys)
         if not row["ok"]:

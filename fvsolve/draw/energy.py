@@ -13,13 +13,14 @@ KINDS = {"stored": "Blues", "dissipated": "Oranges", "supplied": "Greens"}
 
 
 @style.as_it_stands
-def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=None):
-    """Three panels over time [s]: energy supplied by port, stored and dissipated by part, and lost to the numbers.
+def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=None, units=("s", None)):
+    """Three panels over time: energy supplied by port, stored and dissipated by part, and lost to the numbers.
 
     supplied, stored, dissipated, numerical : {name: float64[k]} [J], cumulative. Positive ones are stacked upwards,
     negative ones downwards. What is stored is drawn above its least during the run; the gap between the areas and the
     line over them is the remainder.
-    port : (name, integral of p q, its bound) for one panel more.
+    port : (name, integral of p q, its bound) for one panel more. units : of t, and (size [J], name) of energies; those
+    that fit if None.
     """
     figure = style.figure(8.2 if port is None else 9.8)
     heights = (2, 3, 2, 2)[: 3 if port is None else 4]
@@ -28,12 +29,13 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
     least = {name: np.min(one, initial=0.0) for name, one in stored.items()}
     stored, start = {name: one - least[name] for name, one in stored.items()}, -sum(least.values())
     shown = [whole + start, *supplied.values(), *stored.values(), *dissipated.values()]
-    size, unit = unit_of(max(np.max(np.abs(one), initial=0.0) for one in shown))
+    clock, given = units
+    size, unit = given or unit_of(max(np.max(np.abs(one), initial=0.0) for one in shown))
     _stack(top, t, {"supplied": supplied}, size)
     top.plot(t, whole / size, color=style.INK, linewidth=1.2, label="supplied by all")
     _stack(middle, t, {"dissipated": dissipated, "stored": stored}, size)
     middle.plot(t, (whole + start) / size, color=style.INK, linewidth=1.2, label="supplied and\nstored at the start")
-    small, own = unit_of(max((np.max(np.abs(one), initial=0.0) for one in numerical.values()), default=0.0))
+    small, own = given or unit_of(max((np.max(np.abs(one), initial=0.0) for one in numerical.values()), default=0.0))
     for (name, values), colour in zip(numerical.items(), style.COLOURS, strict=False):
         look = {"color": style.INK, "linestyle": (0, (4, 2))} if name == "remainder" else {"color": colour}
         low.plot(t, values / small, linewidth=1.2, label=name, **look)
@@ -44,21 +46,21 @@ def energy_figure(t, supplied, stored, dissipated, numerical, title="", port=Non
         axes.set_ylabel(name, fontsize=8.5, color=style.INK)
         style.legend(axes)
     for axes in more:
-        _port(axes, t, *port)
-    (more or [low])[-1].set_xlabel("time [s]", fontsize=8.5, color=style.INK)
+        _port(axes, t, *port, given)
+    (more or [low])[-1].set_xlabel(f"time [{clock}]", fontsize=8.5, color=style.INK)
     style.title(figure, title)
     return figure
 
 
-def _port(axes, t, name, work, bound) -> None:
+def _port(axes, t, name, work, bound, given) -> None:
     """The running integral of p q at a port over its bound; a bound far below is told, not drawn."""
     span = max(np.ptp(work), np.max(np.abs(work)))
     far = span > 0.0 and np.max(bound) < -FAR * span
-    size, unit = unit_of(max(np.max(np.abs(work)), 0.0 if far else np.max(np.abs(bound))))
+    size, unit = given or unit_of(max(np.max(np.abs(work)), 0.0 if far else np.max(np.abs(bound))))
     axes.plot(t, work / size, color=style.COLOURS[0], linewidth=1.2, label="integral of p q")
     look = {"color": style.DOUBT, "linestyle": (0, (4, 2)), "linewidth": 1.2}
     if far:
-        own, its = unit_of(np.max(np.abs(bound)))
+        own, its = given or unit_of(np.max(np.abs(bound)))
         axes.plot([], [], label=f"its bound, {np.max(bound) / own:.4g} {its}", **look)
     else:
         axes.plot(t, bound / size, label="its lower bound", **look)

@@ -16,7 +16,7 @@ DARK = ("stable", "wrong", "blown up", "refused")  # which white letters stand o
 
 
 @style.as_it_stands
-def failure_map_figure(found, title: str = ""):
+def failure_map_figure(found, title: str = "", head: str = ""):
     """Methods down, steps or values across, one panel a scheme; a bar where eigenvalues predict the limit."""
     tall = 0.30 * len(found.methods)
     figure = style.figure(1.5 + len(found.schemes) * (tall + 0.75), width=max(7.0, 2.3 + 0.68 * len(found.values)))
@@ -24,7 +24,7 @@ def failure_map_figure(found, title: str = ""):
     for axes, scheme in zip(panels, found.schemes, strict=True):
         _panel(axes, found, scheme)
     what = "step, and Courant number" if found.wave_rate else "step"
-    panels[-1].set_xlabel(what if found.key == "step" else found.key, fontsize=8.5, color=style.INK)
+    panels[-1].set_xlabel(what if found.key == "step" else head or found.key, fontsize=8.5, color=style.INK)
     _legend(figure, found)
     style.title(figure, title)
     return figure

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from fvsolve.draw import style
+from fvsolve.units import convert
 
 NAMED = 40  # nodes up to which names are written
 PANELS = 4  # columns of a sweep that are drawn
@@ -72,9 +73,9 @@ def places(case) -> dict[str, tuple[float, float]]:
 @style.as_it_stands
 def model_figure(model):
     """Heads at the nodes of a model at its start."""
-    names = model.node_names
-    heads = [one["head"] for one in model.checks["nodes"].values()]
-    return bars(names, heads, "head at the start [m]", model.case.title or model.case.name)
+    names, unit = model.node_names, model.case.unit_of("head")
+    heads = [convert(one["head"], "head", unit) for one in model.checks["nodes"].values()]
+    return bars(names, heads, f"head at the start [{unit}]", model.case.title or model.case.name)
 
 
 @style.as_it_stands

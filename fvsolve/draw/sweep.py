@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from fvsolve.draw import style
 
@@ -11,8 +12,8 @@ WORDS = 12  # values that are none of numbers, up to which each is named
 
 
 @style.as_it_stands
-def outcome_figure(sweep, name: str):
-    """One column of a `Sweep` over each key that varied, a point a run; runs without it, and not ok, apart."""
+def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
+    """One column of a `Sweep` over each key that varied, under its head; runs without it, and not ok, apart."""
     keys = list(sweep.keys)[:PANELS]
     across = min(len(keys), 3)
     figure = style.figure(0.8 + 2.4 * -(-len(keys) // across))
@@ -31,7 +32,7 @@ def outcome_figure(sweep, name: str):
         axes.margins(x=0.04)
         if words:
             axes.set_xticks(range(len(words)), words, fontsize=7, rotation=30, ha="right")
-        axes.set_xlabel(key, fontsize=8.5, color=style.INK)
+        axes.set_xlabel(heads[key], fontsize=8.5, color=style.INK)
         if k % across == 0:
             axes.set_ylabel(name, fontsize=8.5, color=style.INK)
     style.legend(panels[len(keys) - 1])

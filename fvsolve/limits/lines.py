@@ -50,7 +50,7 @@ def line_growth(model, method: Method, h: float, span: float) -> list[Notice]:
         return []
     wrong, other = grows >= GROWS**2, '"rk4" or "trapezoid"' if a < EASY else '"trapezoid"'
     text = (f"{name}: waves that delay lines bring back to it grow {grows:.3g} times in the run with {method.name} and "
-            f"steps of {h:.6g} s, {a:.3g} of the time in which they fill it (an estimate); "
+            f"steps of {model.case.step_amount(h)}, {a:.3g} of the time in which they fill it (an estimate); "
             f"{'the numbers are not to be trusted' if wrong else 'it may be wrong'}; give method = {other}, "
             "or shorter steps")  # fmt: skip
     return [Notice("step-limit", name, text, "method", a, None, not wrong)]

@@ -72,7 +72,7 @@ def step_limits(
     found = [notice(model, room, method.name) for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
     jumps = any(jump for _, jump in model.breaks)
     modes = [mode for mode in modes if mode.own or not found]  # of cells those that waves bring with them are known
-    return found + [of_mode(numerics, h, mode, method.name, astray, jumps) for mode in modes] + growing + lines
+    return found + [of_mode(model.case, h, mode, method.name, astray, jumps) for mode in modes] + growing + lines
 
 
 def first_step(model, slate: Slate | None = None) -> float:
@@ -94,8 +94,9 @@ def given_step(model) -> float:
     return numerics.step if numerics.step is not None else numerics.courant / model.wave_rate
 
 
-def of_mode(numerics, h: float, mode: Mode, method: str, astray: float | None, jumps: bool) -> Notice:
+def of_mode(case, h: float, mode: Mode, method: str, astray: float | None, jumps: bool) -> Notice:
     """What is to be said of what is no wave alone: before a run that it grows, after it whether that was seen."""
+    numerics = case.numerics
     seen = astray is None or not mode.own or astray >= WRONG or (mode.followed and astray > STILL)
     enough = (GROWS if mode.followed else GROWS**2) if mode.own else GROWS**2 if jumps else SMOOTH
     wrong = seen and mode.grows >= enough
@@ -103,9 +104,9 @@ def of_mode(numerics, h: float, mode: Mode, method: str, astray: float | None, j
     ends = "the numbers are not to be trusted" if wrong else doubt
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
     size = rounded_down(getattr(numerics, key) * mode.limit / h)
-    text = (f"{mode.place}: deviations grow {mode.grows:.3g} times in the run with {method} and steps of {h:.6g} s, "
-            f"as the start has it; {mode.limit:.6g} s is the limit (an estimate); {ends}; "
-            f"give numerics.{key} = {size:.4g}{unit} or less")  # fmt: skip
+    text = (f"{mode.place}: deviations grow {mode.grows:.3g} times in the run with {method} and steps of "
+            f"{case.step_amount(h)}, as the start has it; {case.step_amount(mode.limit)} is the limit (an estimate); "
+            f"{ends}; give numerics.{key} = {size:.4g}{unit} or less")  # fmt: skip
     return Notice("step-limit", mode.place, text, key, h, mode.limit, not wrong)
 
 

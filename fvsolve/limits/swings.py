@@ -33,9 +33,9 @@ def swings(model, method: str, step: float, span: float) -> list[Notice]:
     grows = f"by {100.0 * (mode.grows - 1.0):.3g} %" if mode.grows < 2.0 else f"{mode.grows:.3g} times"
     size = f"{numerics.courant * mode.limit / step:.3g}"
     text = (f"{mode.place}: a swing at {mode.frequency:.4g} Hz with hardly any damping grows {grows} in the run, at "
-            f"{math.log(mode.grows) / span:.3g} 1/s, with {method} and steps of {step:.4g} s, as the start has it: of "
-            'the imaginary axis its region has nothing; give numerics.method = "ssp-rk3", or numerics.courant = '
-            f"{size}, by which it grows by 1 %")  # fmt: skip
+            f"{math.log(mode.grows) / span:.3g} 1/s, with {method} and steps of {model.case.step_amount(step, 4)}, as "
+            'the start has it: of the imaginary axis its region has nothing; give numerics.method = "ssp-rk3", or '
+            f"numerics.courant = {size}, by which it grows by 1 %")  # fmt: skip
     return [Notice("swing", mode.place, text, "courant", mode.grows, SWELLS, mode.grows < GROWS)]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve import attitude
+from fvsolve import attitude, units
 from fvsolve.case.bodies import coordinate
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
@@ -57,29 +57,31 @@ def told(case) -> Iterator[Notice]:
     for name, node in case.found.items():
         before = case.nodes[name]
         if node.kind == "mass":
-            yield moved(name, "initial_position", before.initial_position, node.initial_position, "m")
+            yield moved(case, name, "initial_position", before.initial_position, node.initial_position, "position")
         elif node.joint.kind in ("revolute", "prismatic"):
-            key, unit = ("angle", "rad") if node.joint.kind == "revolute" else ("travel", "m")
-            yield moved(name, f"joint.{key}", *(coordinate(one.joint, 0.0) for one in (before, node)), unit)
+            key, what = ("angle", "angle") if node.joint.kind == "revolute" else ("travel", "position")
+            yield moved(case, name, f"joint.{key}", *(coordinate(one.joint, 0.0) for one in (before, node)), what)
         else:
-            yield from stands(name, node.joint.kind == "free", case.poses[name], case.stated.poses[name])
+            yield from stands(case, name, node.joint.kind == "free", case.poses[name], case.stated.poses[name])
 
 
-def stands(name: str, free: bool, pose, before) -> Iterator[Notice]:
+def stands(case, name: str, free: bool, pose, before) -> Iterator[Notice]:
     """Where a ball joint's body, or a free one, stands, and how far from where it is stated to."""
     turn = attitude.axis_angle(attitude.deviation(pose.attitude, before.attitude))[1]
     roll, pitch, yaw = np.degrees(attitude.roll_pitch_yaw(pose.attitude))
     text = f"roll {roll:.6g}, pitch {pitch:.6g}, yaw {yaw:.6g} deg, turned by {math.degrees(turn):.4g} deg"
     yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.attitude", turn, 0.0)
     if free:
-        (x, y, z), far = pose.place, float(np.linalg.norm(pose.place - before.place))
-        text = f"[{x:.6g}, {y:.6g}, {z:.6g}] m, {far:.4g} m from what is stated"
+        own, far = case.unit_of("position"), float(np.linalg.norm(pose.place - before.place))
+        x, y, z = units.convert(pose.place, "position", own)
+        text = f"[{x:.6g}, {y:.6g}, {z:.6g}] {own}, {case.amount(far, 'position')} from what is stated"
         yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.at", far, 0.0)
 
 
-def moved(name: str, key: str, before: float, now: float, unit: str) -> Notice:
+def moved(case, name: str, key: str, before: float, now: float, dimension: str) -> Notice:
     """That one number is another than stated."""
-    text = f"{name}: forces balance at {key.removeprefix('joint.')} {now:.6g} {unit}, stated {before:.6g} {unit}"
+    found, stated = (case.amount(one, dimension, 6) for one in (now, before))
+    text = f"{name}: forces balance at {key.removeprefix('joint.')} {found}, stated {stated}"
     return Notice("start", f"nodes.{name}", text, key, now, before)
 
 

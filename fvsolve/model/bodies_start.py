@@ -85,7 +85,8 @@ def start_pins(draft, at: Statics) -> np.ndarray:
     slips = dict(zip(names, rows @ at.rates(), strict=True))
     for name, slip in slips.items():
         if abs(slip) > LOOSE:
-            draft.fault(f"links.{name}", f"the rates of the start open it at {abs(slip):.4g} m/s; let them agree")
+            quick = draft.case.amount(abs(slip), "velocity")
+            draft.fault(f"links.{name}", f"the rates of the start open it at {quick}; let them agree")
     draft.check()
     forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)
     for row, force in zip(draft.pin_table, forces, strict=True):

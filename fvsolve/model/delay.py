@@ -69,7 +69,7 @@ def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
     for name in lines:
         why = "waves travel along it unchanged but for friction"
         if travel[name] < longest:
-            why += f", and faster than a step of {longest:.4g} s"
+            why += f", and faster than a step of {case.step_amount(longest, 4)}"
         found[name] = Followed("delay", why, rate, longest)
     return {name: found[name] for name in pipes}
 
@@ -164,8 +164,9 @@ def cut_lines(draft) -> list[str]:
         if asked == "auto" and off > case.numerics.accuracy:
             unfit.append(name)
         elif off == math.inf:
+            longest = draft.case.step_amount(chosen.longest, 4)
             draft.fault(f"links.{name}.line", f'"delay" does not fit: friction takes {takes:.3g} of a wave in a line '
-                        f'shorter than a step of {chosen.longest:.4g} s; wanted shorter steps, or "cells"')  # fmt: skip
+                        f'shorter than a step of {longest}; wanted shorter steps, or "cells"')  # fmt: skip
     shape_past(draft)
     return unfit
 

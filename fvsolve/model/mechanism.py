@@ -90,7 +90,8 @@ def drive(draft, name: str, schedule, row) -> None:
     kinks = [time for time, _ in sorted(rate_jumps(schedule)) if start < time <= end]
     if kinks:
         what = "it jumps" if schedule.kind == "step" else "its rate jumps"
-        text = f"drives the joint, and at t = {kinks[0]:g} s {what}, which asks for a force without end"
+        when = draft.case.amount(kinks[0], "time", 6)
+        text = f"drives the joint, and at t = {when} {what}, which asks for a force without end"
         draft.fault(f"nodes.{name}.joint.{key}", f'{text}; wanted kind = "smooth", level at both ends, or a wave')
     for time in schedule.time if np.all(np.isfinite(schedule.time)) else ():  # its acceleration jumps
         draft.schedules.breaks.setdefault(float(time), False)

@@ -156,6 +156,7 @@ def unstable(at: Displaced, found: Found) -> list[Notice]:
     if not len(values) or values[0] >= -LEAST * np.max(np.abs(values)):
         return []
     name, rate = owner(at, int(np.argmax(np.abs(free @ modes[:, 0])))), float(np.sqrt(-values[0]))
-    text = (f"{name}: its forces balance, but not stably: what moves it a little grows by e in {1.0 / rate:.3g} s; "
+    takes = at.draft.case.amount(1.0 / rate, "time", 3)
+    text = (f"{name}: its forces balance, but not stably: what moves it a little grows by e in {takes}; "
             "state another place, or hold it")  # fmt: skip
     return [Notice("start", f"nodes.{name}", text, "stability", rate, 0.0)]

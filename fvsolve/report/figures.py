@@ -55,7 +55,7 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str, b
     names = _names(one)
     above = 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
     layout |= {"shapes": shapes, "annotations": names, "margin": {"l": 62, "r": 14, "t": above, "b": 50}}
-    layout["xaxis"]["range"] = [one.way.begin, one.way.end]
+    layout["xaxis"]["range"] = list(one.ends)
     made: dict[str, Any] = {"data": data, "layout": layout}
     if moving is not None:
         made["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
@@ -82,7 +82,7 @@ def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> 
     layout = _layout(f"head [{unit}]", f"chainage [{along}]", 440)
     layout |= {"annotations": names, "shapes": [_post(device.chainage) for device in first.devices],
                "margin": {"l": 62, "r": 14, "t": above, "b": 50}}  # fmt: skip
-    layout["xaxis"]["range"] = [first.way.begin, first.way.end]
+    layout["xaxis"]["range"] = list(first.ends)
     return {"data": data, "layout": layout}
 
 
@@ -157,7 +157,7 @@ def _post(x: float) -> dict[str, Any]:
 
 def _names(one: Section) -> list[dict[str, Any]]:
     """What stands over the chainages of a section."""
-    late = one.way.begin + 0.9 * one.way.length
+    late = one.ends[0] + 0.9 * (one.ends[1] - one.ends[0])
     return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
              "xanchor": "right" if x > late else "left", "yanchor": "bottom",
              "text": as_it_stands(_cut(names)), "hovertext": as_it_stands(names),

@@ -71,7 +71,12 @@ def _in_line(link, case) -> bool:
 
 
 def _chained(chain: list[tuple[str, bool, float]], result) -> SectionWay:
-    """A chain with its chainages, turned so that the head falls along it at the start."""
+    """A chain with its chainages, turned so that the head falls along it at the start; one pipe as it was drawn."""
+    if len(chain) == 1:
+        pipe, _, length = chain[0]
+        profile = result.case.links[pipe].profile
+        begin = 0.0 if profile is None else float(profile.chainage[0])
+        return _way(pipe, [Leg(pipe, begin, begin + length, False)], result.case.links)
     first, last = chain[0], chain[-1]
     begins = _start_head(result, first[0], last=first[1])
     ends = _start_head(result, last[0], last=not last[1])

@@ -21,7 +21,8 @@ def settings(result) -> ReportTable:
     rows = [["time", f"{span[0]} to {span[1]} {time.unit}"]]
     if said["cells"]:
         rows += [["scheme", _scheme(numerics)], ["cells", said["cells"]]]
-    rows += [["method", "; ".join(_method(one) for one in said["methods"])], ["step", "; ".join(given) or "by default"],
+    rows += [["method", "; ".join(_method(one, result.case) for one in said["methods"])],
+             ["step", "; ".join(given) or "by default"],
              ["steps", said["steps"]], ["steps taken again", said["rejections"]], ["calls of rates", said["rhs"]],
              ["seconds of stepping", said["seconds"]]]  # fmt: skip
     if "resolution" in said:
@@ -77,5 +78,5 @@ def _scheme(numerics) -> str:
     return f"{numerics.scheme}, limiter {limiter}" if limiter and numerics.scheme == "muscl" else numerics.scheme
 
 
-def _method(one: dict) -> str:
-    return one["method"] if not one["time"] else f"{one['method']} from {one['time']:.6g} s on"
+def _method(one: dict, case) -> str:
+    return one["method"] if not one["time"] else f"{one['method']} from {case.amount(one['time'], 'time', 6)} on"

@@ -32,8 +32,9 @@ class Section:
     """One way with what was met along it.
 
     chainage : float64[n]; pipe : str[n]; along : quantity -> float64[n]; lines : name -> float64[n], heads at which
-    liquid boils, that a class allows, that limits state, nan where there is none; parted : spans of chainage where the
-    vapour pressure was reached; beyond : (chainage, head, name) of what passes a limit
+    liquid boils, that a class allows, that limits state, nan where there is none; ends : chainages of both ends;
+    parted : spans of chainage where the vapour pressure was reached; beyond : (chainage, head, name) of what passes a
+    limit
     """
 
     way: SectionWay
@@ -41,6 +42,7 @@ class Section:
     pipe: np.ndarray
     along: dict[str, np.ndarray]
     lines: dict[str, np.ndarray]
+    ends: tuple[float, float]
     parted: list[tuple[float, float]]
     beyond: list[tuple[float, float, str]]
     devices: list[Standing]
@@ -66,8 +68,8 @@ class Section:
 
         Devices and ends go before joints; devices that are near share a label.
         """
-        length, ends = self.way.length, (self.way.begin, self.way.end)
-        order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in ends))
+        length = self.ends[1] - self.ends[0]
+        order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in self.ends))
         shown: list[tuple[float, list[str], bool]] = []
         for device in order:
             names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
@@ -89,9 +91,15 @@ def section(result, way: SectionWay) -> Section:
     if boils is not None:
         lines["vapour line"] = head_of(result, boils, along["elevation"])
     lines |= limit_lines(result, pipe, along["elevation"])
-    return Section(way, strung_up["chainage"], pipe, along, lines,
-                   _parted(result, along["least_pressure"], chainage, way), _beyond(result, way, chainage, along),
-                   _devices(result, way))  # fmt: skip
+    parted = _parted(result, along["least_pressure"], chainage, way)
+    beyond = _beyond(result, way, chainage, along)
+    told = distances.from_si
+    return Section(
+        way, strung_up["chainage"], pipe, along, lines, (float(told(way.begin)), float(told(way.end))),
+        [(float(told(a)), float(told(b))) for a, b in parted],
+        [(float(told(at)), head, name) for at, head, name in beyond],
+        [one._replace(chainage=float(told(one.chainage))) for one in _devices(result, way)],
+    )  # fmt: skip
 
 
 def boiling(result) -> float | None:
@@ -130,7 +138,7 @@ def _beyond(result, way: SectionWay, chainage: np.ndarray, along: dict) -> list[
 
 
 def _devices(result, way: SectionWay) -> list[Standing]:
-    """What stands at the places of a way: nodes that are more than joints, and links that are no pipes."""
+    """What stands at the places of a way, chainages in m: nodes that are more than joints, and links but pipes."""
     case, found = result.case, []
     for place, chainage in way.places:
         owner = place.partition(".")[0]

@@ -7,6 +7,7 @@ from typing import Any
 from fvsolve.draw.plot import quantity, thinned
 from fvsolve.draw.style import INK
 from fvsolve.errors import visible
+from fvsolve.output.column import column
 from fvsolve.report import described, numerics
 from fvsolve.report.figures import history_figure, study_section
 from fvsolve.report.heads import in_units
@@ -14,8 +15,9 @@ from fvsolve.report.histories import HistoryPanel, Series
 from fvsolve.report.legs import ways
 from fvsolve.report.page import WARNINGS, rendered
 from fvsolve.report.section import section
-from fvsolve.report.tables import ERROR, ReportTable
-from fvsolve.report.trust import OPEN, Word, state
+from fvsolve.report.tables import ERROR, ReportTable, in_unit
+from fvsolve.report.trust import Word
+from fvsolve.run.result import FAILS, HOLDS, OPEN
 from fvsolve.units import span
 
 POINTS = 400  # of a series
@@ -63,7 +65,7 @@ def words(said: dict[str, Any], runs: list) -> list[Word]:
             Word("none", "No limits were stated.", "The study says what happens, not whether it is allowed."),
         ]
     names = [visible(name) or "the case as it is" for name in said["holds"]]
-    unsure = [name_of(row) for row, result in runs for one in result.verdicts if state(one) == OPEN]
+    unsure = [name_of(row) for row, result in runs for one in result.verdicts if one.state == OPEN]
     if names:
         found.append(Word("good", f"All limits hold in all events with {', '.join(names)}.", ""))
     else:
@@ -81,11 +83,12 @@ def matrix(runs: list) -> ReportTable:
     rows, bad = [], set()
     for k, (row, result) in enumerate(runs):
         found = {one.name: one for one in result.verdicts}
-        holds = result.ok and all(one.ok for one in result.verdicts)
-        if not holds:
+        states = [FAILS] * (not result.ok) + [one.state for one in result.verdicts]
+        state = next((one for one in (FAILS, OPEN) if one in states), HOLDS)
+        if state == FAILS:
             bad.add(k)
         margins = [getattr(found.get(name), key, None) for name in names for key in ("margin", *["error"] * asked)]
-        rows.append([row["event"] or "", row["protection"] or "", "holds" if holds else "FAILS", *margins])
+        rows.append([row["event"] or "", row["protection"] or "", state, *margins])
     heads = ["event", "protection", "verdict"]
     heads += [word for name in names for word in (f"margin of {name}", *[ERROR] * asked)]
     units = ["", "", ""] + [span(unit) for unit in names.values() for _ in range(1 + asked)]
@@ -93,13 +96,14 @@ def matrix(runs: list) -> ReportTable:
 
 
 def failing(runs: list) -> ReportTable | None:
-    """Every limit that fails, where and when."""
-    rows = [[name_of(row), one.name, one.value, one.limit, one.unit, one.margin, span(one.unit), one.place,
-             one.chainage, one.time]
+    """Every limit that fails or is open, where and when."""
+    length, time = (column("", what, runs[0][1].case) for what in ("length", "time"))
+    rows = [[name_of(row), one.name, one.state, one.value, one.limit, one.unit, one.margin, span(one.unit), one.place,
+             in_unit(length, one.chainage), in_unit(time, one.time)]
             for row, result in runs for one in result.verdicts if not one.ok]  # fmt: skip
-    heads = ("run", "limit", "value", "allowed", "unit", "margin", "unit", "worst at", "chainage", "time")
-    units = ("", "", "", "", "", "", "", "", "m", "s")
-    return ReportTable("", heads, rows, units, loose=frozenset({2, 3, 5}), most=FAILED) if rows else None
+    heads = ("run", "limit", "verdict", "value", "allowed", "unit", "margin", "unit", "worst at", "chainage", "time")
+    units = ("",) * 9 + (length.unit, time.unit)
+    return ReportTable("", heads, rows, units, loose=frozenset({3, 4, 6}), most=FAILED) if rows else None
 
 
 def changed(said: dict[str, Any]) -> list[ReportTable]:

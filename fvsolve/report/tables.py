@@ -17,6 +17,11 @@ ERROR = "\u00b1"  # the header of what is known to two digits
 NARROW, FIGURE, POINT = "\u202f", "\u2007", "\u2008"  # spaces between thousands, as wide as a digit, as a point
 
 
+def in_unit(shown, value: float | None) -> float | None:
+    """A number [SI] in the unit of a column; None stays."""
+    return None if value is None else float(shown.from_si(value))
+
+
 @dataclass(frozen=True)
 class ReportTable:
     """Rows of words, numbers, truths and None under headers.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fvsolve.output.column import column
-from fvsolve.report.tables import ERROR, ReportTable, worded
+from fvsolve.report.tables import ERROR, ReportTable, in_unit, worded
+from fvsolve.run.result import FAILS, HOLDS, OPEN
 from fvsolve.units import span
 
-HOLDS, FAILS, OPEN = "holds", "FAILS", "open"
 BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
 LATER = 6  # marks named behind the first
 
@@ -26,7 +26,8 @@ def words(result) -> list[Word]:
     said = result.summary
     found = []
     if result.reason != "finished":
-        reached = f"It reached t = {said['t']:.6g} s of {result.case.numerics.end:.6g} s"
+        reached, end = (result.case.amount(one, "time", 6) for one in (said["t"], result.case.numerics.end))
+        reached = f"It reached t = {reached} of {end}"
         found.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; the rest is not known."))
     found += [Word("bad", "Not to be trusted.", one.text) for one in result.warnings if not one.ok]
     found += [*_doubt(result), verdict(result)]
@@ -42,10 +43,12 @@ def _doubt(result) -> list[Word]:
     marks = sorted(result.marks, key=lambda one: one.time)
     if not marks:
         return []
-    later = ", ".join(f"{one.place.partition('.')[2]} at {one.time:.6g} s" for one in marks[1 : 1 + LATER])
+    when = [result.case.amount(one.time, "time", 6) for one in marks]
+    places = [f"{one.place.partition('.')[2]} at {t}" for one, t in zip(marks, when, strict=True)]
+    later = ", ".join(places[1 : 1 + LATER])
     more = f", and {len(marks) - 1 - LATER} more places" if len(marks) > 1 + LATER else ""
     text = marks[0].text + (f". Later also {later}{more}" if later else "")
-    return [Word("doubt", f"Results from {marks[0].time:.6g} s on are not to be trusted.", text)]
+    return [Word("doubt", f"Results from {when[0]} on are not to be trusted.", text)]
 
 
 def sound(result) -> bool:
@@ -59,7 +62,7 @@ def verdict(result) -> Word:
     if not verdicts:
         return Word("none", "No limits were stated.", "The case does not say what its parts may bear: this report says "
                     "what happens, not whether it is allowed.")  # fmt: skip
-    states = [state(one) for one in verdicts]
+    states = [one.state for one in verdicts]
     failed = [one.name for one, how in zip(verdicts, states, strict=True) if how == FAILS]
     if failed:
         many = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
@@ -77,20 +80,10 @@ def verdict(result) -> Word:
     return Word("good", f"{every}.", "") if sound(result) else Word("doubt", f"{every}, as far as to be trusted.", "")
 
 
-def state(one) -> str:
-    """What is to be said of a verdict: open where the margin is smaller than the error of the value, and where no place
-    is beyond the limit in a run that is not ok."""
-    if one.margin is None:
-        return FAILS
-    if one.error is not None and abs(one.margin) < one.error:
-        return OPEN
-    return HOLDS if one.ok else FAILS if one.margin < 0.0 else OPEN
-
-
 def verdicts(result) -> ReportTable | None:
     """The table of verdicts, those that fail first; None where no limits were stated."""
     order = (FAILS, OPEN, HOLDS)
-    found = sorted(result.verdicts, key=lambda one: order.index(state(one)))
+    found = sorted(result.verdicts, key=lambda one: order.index(one.state))
     length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
     asked = any(one.error is not None for one in found)
     rows = []
@@ -98,11 +91,11 @@ def verdicts(result) -> ReportTable | None:
         asks = f"{one.quantity.replace('_', ' ')} {BOUNDS[one.bound]} {worded(one.limit)} {one.unit}"
         apart = span(one.unit)
         said = one.unit if apart == one.unit else f"{one.unit}, margin {apart}"
-        rows.append([one.name, asks, state(one), one.value, *[one.error] * asked, one.margin, said, one.place,
-                     _in(length, one.chainage), _in(height, one.elevation), _in(time, one.time)])  # fmt: skip
+        where = in_unit(length, one.chainage), in_unit(height, one.elevation), in_unit(time, one.time)
+        rows.append([one.name, asks, one.state, one.value, *[one.error] * asked, one.margin, said, one.place, *where])
     heads = ("limit", "asks for", "verdict", "value", *[ERROR] * asked, "margin", "unit", "worst at")
     heads += ("chainage", "elevation", "time")
-    bad = frozenset(k for k, one in enumerate(found) if state(one) == FAILS)
+    bad = frozenset(k for k, one in enumerate(found) if one.state == FAILS)
     units = ("",) * (7 + asked) + (length.unit, height.unit, time.unit)
     return ReportTable("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * asked})) if rows else None
 
@@ -112,7 +105,8 @@ def worst(result) -> list[ReportTable]:
     length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
     made = []
     for one in result.verdicts:
-        rows = [[row["place"], _in(length, row["chainage"]), _in(height, row["elevation"]), _in(time, row["time"]),
+        told = ((length, "chainage"), (height, "elevation"), (time, "time"))
+        rows = [[row["place"], *(in_unit(shown, row[key]) for shown, key in told),
                  row["value"], row["limit"], row["margin"]] for row in one.worst]  # fmt: skip
         bad = frozenset(k for k, row in enumerate(rows) if row[-1] is None or row[-1] < 0.0)
         units = ("", length.unit, height.unit, time.unit, one.unit, one.unit, span(one.unit))
@@ -133,7 +127,3 @@ def claims(result) -> ReportTable | None:
 def claim(one) -> str:
     """A claim in words."""
     return f"{one.text}: claimed {one.claimed:.6g}, found {one.found:.6g} {one.unit}"
-
-
-def _in(shown, value):
-    return None if value is None else float(shown.from_si(value))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.case.routes import Leg
+from fvsolve.output.column import UnitColumn
 from fvsolve.report.heads import in_units
 from fvsolve.report.legs import SectionWay
-from fvsolve.report.tables import ERROR, ReportTable
+from fvsolve.report.tables import ERROR, ReportTable, in_unit
 
 FIRST = 10  # rows of a ranking on the page
 EXTREMES = (  # quantity, its words, which end of it, when
@@ -62,12 +63,13 @@ def _ranked(result, name: str, words: str, most, when: str) -> ReportTable:
 def of_probes(result) -> ReportTable | None:
     """Least and greatest of each probe over all accepted steps, and when; how far off where it was asked for."""
     peaks, rows = result.summary.get("peaks", {}), []
+    clock = UnitColumn("t", "time", result.summary["time_unit"])
     for name, one in result.extremes.items():
         off = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("least", "greatest")}
-        rows.append([name, result.units[name], one.least, *off["least"], one.t_least, one.greatest, *off["greatest"],
-                     one.t_greatest])  # fmt: skip
+        first, last = (in_unit(clock, t) for t in (one.t_least, one.t_greatest))
+        rows.append([name, result.units[name], one.least, *off["least"], first, one.greatest, *off["greatest"], last])
     heads = [column for side in ("least", "greatest") for column in (side, *[ERROR] * bool(peaks), "time")]
-    units = ["s" if column == "time" else "" for column in heads]
+    units = [clock.unit if column == "time" else "" for column in heads]
     loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
     return ReportTable("Probes", ("probe", "unit", *heads), rows, ("", "", *units), loose=loose,
                  more="in summary.json and in the workbook (--xlsx)") if rows else None  # fmt: skip

@@ -11,7 +11,7 @@ from pathlib import Path
 from fvsolve.doors import CALL, FLAG, PATH, TABLE, THREADS, door
 from fvsolve.draw.beside import Painter, Picture
 from fvsolve.errors import CaseError, RunError
-from fvsolve.output.directory import RunDirectory, pictures_there, read_directory
+from fvsolve.output.directory import ENDED, RunDirectory, pictures_there, read_directory
 from fvsolve.output.memory import MemorySink
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import described, write_summary
@@ -59,8 +59,12 @@ def run(
 
 @door(directory=PATH)
 def open_run(directory: str | Path) -> Result:
-    """Read a run directory back; RunError where it holds no run that ended."""
-    return Result(*read_directory(Path(directory)))
+    """Read a run directory back; RunError where it holds no run that ended, or one of another version."""
+    from fvsolve.run.complete import check
+
+    said = read_directory(Path(directory))
+    check(said[0], Path(directory) / ENDED)
+    return Result(*said)
 
 
 def model_of(case, set: Mapping | None = None, like=None):

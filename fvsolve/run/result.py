@@ -16,6 +16,8 @@ from fvsolve.output.fields import read_series
 from fvsolve.shown import Shown, kept
 from fvsolve.units import show
 
+HOLDS, FAILS, OPEN = "holds", "FAILS", "open"
+
 
 class ResultMark(NamedTuple):
     """First place and time [s] of what the model cannot follow: do not trust results from there on."""
@@ -53,7 +55,8 @@ class Expectation(NamedTuple):
 class LimitVerdict(NamedTuple):
     """A limit of the case: the place that is nearest to it, or beyond it most; lengths in m, times in s, else `unit`.
 
-    margin : how far from the limit, negative beyond it; bound : "least" or "greatest"; until : when the run ended
+    ok : whether it holds beyond doubt; margin : how far from the limit, negative beyond it
+    bound : "least" or "greatest"; until : when the run ended
     error : how far `value` may be off, None where nobody asked
     worst : the same of the worst places of each part
     """
@@ -73,6 +76,18 @@ class LimitVerdict(NamedTuple):
     until: float
     error: float | None
     worst: list[dict]
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether its value may be off by more than its margin."""
+        return None not in (self.error, self.margin) and abs(self.margin) < self.error
+
+    @property
+    def state(self) -> str:
+        """`holds`, `FAILS`, or `open`: not passed in a run that cannot tell, or nearer to the limit than its error."""
+        if self.ok:
+            return HOLDS
+        return OPEN if self.margin is not None and (self.margin >= 0.0 or self.doubtful) else FAILS
 
 
 class Comparison(NamedTuple):

@@ -129,7 +129,8 @@ class Halves:
             return None
         ok = share < WRONG
         said = "it may be wrong" if ok else "the numbers are not to be trusted"
-        text = (f"{place}: steps of {self.step:.6g} s leave it about {100 * share:.2g} % of its range astray, on "
+        steps = self.model.case.step_amount(self.step)
+        text = (f"{place}: steps of {steps} leave it about {100 * share:.2g} % of its range astray, on "
                 f"average, by where two halves of them end; {said}; halve the step")  # fmt: skip
         key = "step" if self.model.case.numerics.step is not None else "courant"
         return Notice("step-error", place, text, key, share, WRONG, ok)

@@ -191,9 +191,8 @@ class Run:
 
     def widen(self, rows: np.ndarray) -> None:
         """Extremes by rows as well, for what lies between steps is as accurate: no row is beyond what is printed."""
-        few = len(self.model.probes)
-        least, t_least, greatest, t_greatest = self.slate.extremes[:, :few]
-        t, values = rows[:, 0], rows[:, 1 : 1 + few]
+        least, t_least, greatest, t_greatest = self.slate.extremes
+        t, values = rows[:, 0], rows[:, 1:]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
         lower = (found := values[at, each]) < least
         if lower.any():
@@ -347,7 +346,7 @@ class Run:
             place = f" at {model.state_names[bad[0]]}" if bad.size else ""
         elif code == slots.BAD_STATUS and loop.out[rec.WHERE] >= 0 and loop.out[rec.STATUS] != rec.NO_WEIGHT:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
-        when = f"t = {loop.t:.6g} s"
+        when = f"t = {model.case.amount(loop.t, 'time', 6)}"
         if code == slots.CHATTERS:
             first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at one time, or crowded over a span
             names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})

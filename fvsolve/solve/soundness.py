@@ -49,8 +49,8 @@ class Soundness:
             return ""
         at = int(np.argmax(ratio))
         name, times = self.model.state_names[at], MOST * float(ratio[at])
-        text = (f"{name} has grown to {times:.3g} times what drives it at t = {t:.6g} s; the step is beyond the "
-                "method's limit: halve it")  # fmt: skip
+        text = (f"{name} has grown to {times:.3g} times what drives it at t = "
+                f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the method's limit: halve it")  # fmt: skip
         self.grown = Notice(
             "growth", name.partition("[")[0], text, None, float(abs(y[at])), float(self.largest[at]), False
         )

@@ -10,7 +10,7 @@ from fvsolve.errors import Notice
 
 SMALL = 0.2  # share of the depth up to which a wave is small
 LIGHT = 0.1  # share of its weight that water may gain or lose by its body's motion, unfelt by its waves
-WEIGHTLESS = "the water in {name} has no weight left at t = {t:.6g} s; wanted a body that falls less fast"
+WEIGHTLESS = "the water in {name} has no weight left at t = {when}; wanted a body that falls less fast"
 NONE = 1e-6  # share of its weight that is rounding
 RISE, LOSS = slice(0, 2), slice(2, 4)
 
@@ -45,7 +45,7 @@ class Unfelt:
                 keep(kept[RISE], rise(y, *lifting), t)
             felt, meant = self.weight(out, *about, modal)
             if felt <= NONE * meant:
-                return f"stopped: {WEIGHTLESS.format(name=name, t=t)}"
+                return f"stopped: {WEIGHTLESS.format(name=name, when=self.model.case.amount(t, 'time', 6))}"
             keep(kept[LOSS], abs(felt / meant - 1.0), t)
         return ""
 
@@ -68,15 +68,15 @@ class Unfelt:
 
     def notices(self) -> list[Notice]:
         """Waves that were not small, and weight that they did not feel."""
-        found = []
+        found, told = [], self.model.case.amount
         for (name, *_), (high, when, lost, then) in zip(self.tanks, self.kept.tolist(), strict=True):
             if high > SMALL:
-                text = f"{name}: at {when:.4g} s its water rises by {high:.2g} of its depth, and modes are linear; "
-                text += 'sloshing = "cells" knows great waves where water is shallow'
+                text = f"{name}: at {told(when, 'time')} its water rises by {high:.2g} of its depth, and modes are "
+                text += 'linear; sloshing = "cells" knows great waves where water is shallow'
                 found.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", high, SMALL))
             if lost > LIGHT:
-                text = f"{name}: at {then:.4g} s its body's rise or fall changes what its water weighs by {lost:.2g} "
-                text += "of that, which its waves do not feel: they swing as if it did not"
+                text = f"{name}: at {told(then, 'time')} its body's rise or fall changes what its "
+                text += f"water weighs by {lost:.2g} of that, which its waves do not feel: they swing as if it did not"
                 found.append(Notice("weight", f"nodes.{name}", text, None, lost, LIGHT))
         return found
 

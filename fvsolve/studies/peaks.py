@@ -32,8 +32,8 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     """Add to the summary of a run how far its peaks and verdicts may be off, from two more runs of its case.
 
     `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order}; `error` is None where another run did
-    not come to its end, `order` None where there is none to believe. Verdicts and expectations get their `error`;
-    `resolution` says how.
+    not come to its end, `order` None where there is none to believe. Verdicts and expectations get their `error`; a
+    limit whose margin is smaller is open, and not ok. `resolution` says how.
     """
     runs = {1.0: result}
     for times in (one for one in LEVELS if one != 1.0):
@@ -64,6 +64,8 @@ def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | Non
     for k, verdict in enumerate(said["verdicts"]):
         triple = values(runs, lambda one, k=k, verdict=verdict: of_bound(one.summary["verdicts"][k], verdict["bound"]))
         verdict["error"] = alone(triple, verdict["unit"], shared, apart)
+        if verdict["error"] is not None and verdict["margin"] is not None:
+            verdict["ok"] = verdict["ok"] and verdict["margin"] >= verdict["error"]
     for k, claim in enumerate(said["expectations"]):
         triple = values(runs, lambda one, k=k: one.summary["expectations"][k]["found"])
         claim["error"] = alone(triple, claim["unit"], shared, apart)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +88,19 @@ def quantity_of(raw: dict[str, Any], key: str) -> Quantity | None:
         forms = value.forms.values() if within else ()
         value = next((one[keys[-1]][0] for one in forms if keys[-1] in one), Quantity(value.dimension, value.range))
     return value if isinstance(value, Quantity) else None
+
+
+def bare_unit(raw: dict[str, Any], key: str) -> str:
+    """SI unit of bare numbers under a key; "" where they have none."""
+    quantity = quantity_of(raw, key)
+    return "" if quantity is None or quantity.dimension == "number" else units.DIMENSIONS[quantity.dimension].si
+
+
+def headed(raw: dict[str, Any], key: str, values: Iterable[Any]) -> str:
+    """A key with the unit of its values where all are bare numbers that have one: `links.main.length [m]`."""
+    bare = all(isinstance(one, (int, float)) and not isinstance(one, bool) for one in values)
+    unit = bare_unit(raw, key) if bare else ""
+    return f"{key} [{unit}]" if unit else key
 
 
 def refuse_unknown(source: Any, values: Mapping[str, Any], raw: dict[str, Any]) -> None:

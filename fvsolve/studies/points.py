@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 from collections.abc import Callable, Iterator
@@ -9,6 +10,7 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
+from fvsolve import jit
 from fvsolve.doors import PATH, Kind
 from fvsolve.errors import RunError
 from fvsolve.output.lock import let_go, locked
@@ -22,7 +24,7 @@ class Points:
     While it is open (`with Points(folder) as points`) no other study writes there: RunError where one does.
 
     A point is reused only for the same case (as resolved, with its files), the same extra settings and the same
-    versions of fvsolve and what it computes with.
+    versions and sources of fvsolve and what it computes with.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -107,8 +109,18 @@ def key_of(case, extra: dict) -> str:
     return hashed(identity(case) | {"resolved": case.table(), "extra": plain(extra)})
 
 
+@functools.cache
+def package_hash() -> str:
+    """What changes with any source of the package: of what compiles, lowers and studies alike."""
+    digest = hashlib.sha256()
+    for path in sorted(jit.PACKAGE.rglob("*.py")):
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
 def hashed(who: dict) -> str:
-    """A name for all that a point depends on."""
+    """A name for all that a point depends on, the sources of fvsolve and of parts from outside among it."""
+    who = who | {"package": package_hash(), "outside": sorted(jit.OUTSIDE.values())}
     return hashlib.sha256(json.dumps(who, sort_keys=True, default=str).encode()).hexdigest()[:24]
 
 

@@ -15,7 +15,7 @@ from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean, gathere
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.verdicts import SIZES
-from fvsolve.studies.plans import is_known, quantity_of
+from fvsolve.studies.plans import bare_unit, is_known, quantity_of
 from fvsolve.units import UNITS, show
 
 GOALS = ("least", "greatest")
@@ -43,7 +43,9 @@ class SizeRun:
 
 @dataclass(frozen=True)
 class Size:
-    """What was found: the value that holds, in `unit`, the bracket (what fails, what holds), the runs as they came.
+    """What was found: the value that holds, the bracket (what fails, what holds), the runs as they came.
+
+    unit : that of the ends; of bare numbers that of the key, SI, "" where it has none
 
     value is None where the limits cannot be met between the ends; nearest is then the run that came nearest.
     """
@@ -205,7 +207,7 @@ def size(
     search = Sizing(made, key, unit, ties or {}, progress)
     value, bracket = search.search(first, last, goal, rtol)
     said = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
-    return Size(key, unit, goal, value, bracket, search.runs, said)
+    return Size(key, unit or bare_unit(made.raw, key), goal, value, bracket, search.runs, said)
 
 
 def asked(

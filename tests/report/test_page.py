@@ -1,9 +1,11 @@
 """The page of a run: peaks stay, text is text, it asks no network, it says first what is not to be trusted."""
 
 import base64
+import copy
 import json
 import re
 import shlex
+import shutil
 from html.parser import HTMLParser
 
 import numpy as np
@@ -16,6 +18,7 @@ from fvsolve.report.figures import as_it_stands
 from fvsolve.report.legs import ways
 from fvsolve.report.page import embedded, page
 from fvsolve.report.report import write_report
+from fvsolve.run.complete import ROWS
 from fvsolve.run.result import Result
 
 WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"
@@ -223,6 +226,29 @@ def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkey
     monkeypatch.setitem(__import__("sys").modules, "xlsxwriter", None)
     with pytest.raises(fvsolve.FvsolveError, match=r'needs xlsxwriter: pip install "fvsolve\[report\]"'):
         write_report(closure.directory, tmp_path / "report.html", xlsx=True)
+
+
+def test_a_directory_of_another_version_is_named_with_what_it_lacks(closure, tmp_path):
+    """Whatever field of whatever row it is."""
+    out = tmp_path / "old"
+    shutil.copytree(closure.directory, out)
+    said, tried = json.loads((out / "summary.json").read_text()) | {"verdicts": [VERDICT]}, 0
+    for key, wanted in ROWS.items():
+        for name in wanted if said.get(key) else ():
+            old = copy.deepcopy(said)
+            (old[key] if isinstance(old[key], list) else list(old[key].values()))[0].pop(name)
+            (out / "summary.json").write_text(json.dumps(old))
+            with pytest.raises(
+                fvsolve.RunError, match=rf"summary\.json lacks {name} of {key}: .* run again with --force"
+            ):
+                write_report(out)
+            tried += 1
+    old = copy.deepcopy(said)
+    old["verdicts"][0] = {**old["verdicts"][0], "colour": 1}
+    (out / "summary.json").write_text(json.dumps(old))
+    with pytest.raises(fvsolve.RunError, match="has colour of verdicts, unknown here"):
+        fvsolve.open_run(out)
+    assert tried > 20
 
 
 def test_the_commands_of_its_page_run(fvs, tmp_path, monkeypatch):

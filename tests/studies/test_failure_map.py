@@ -5,18 +5,20 @@ from __future__ import annotations
 import csv
 import json
 import math
+import shutil
 import sys
 
 import numpy as np
 import pytest
 from truth.scenes import AMBIENT, NO_FRICTION, area, chamber, junction, lake, pipe, reservoir, scene, step, tank, valve
 
+from fvsolve import jit
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.failure.failure_map import failures
 from fvsolve.studies.failure.verdict import FAR, Measures, excess, pace, ranges_of, ringing, verdict
 from fvsolve.studies.failure.watched import WINDOW, watched
-from fvsolve.studies.points import Points
+from fvsolve.studies.points import Points, package_hash
 
 TOLERANCE = 0.02
 
@@ -192,6 +194,21 @@ def test_finished_squares_are_kept_and_reused(tmp_path):
     again = Points(tmp_path)
     assert failures(load(closing()), out=again, **asked) == first
     assert again.reused == len((tmp_path / "points.jsonl").read_text().splitlines()) > 2
+
+
+def test_points_of_other_sources_are_not_taken_up(tmp_path, monkeypatch):
+    """Of studies too, which compile nothing."""
+    jit.source_hash()  # of what is tested
+    made, package = [], shutil.copytree(jit.PACKAGE, tmp_path / "fvsolve", ignore=shutil.ignore_patterns("*.pyc"))
+    study = package / "studies" / "stability" / "stability.py"
+    for words in ("", "", "# another"):
+        study.write_text(study.read_text(encoding="utf-8") + words, encoding="utf-8")
+        monkeypatch.setattr(jit, "PACKAGE", package)
+        package_hash.cache_clear()
+        with Points(tmp_path) as points:
+            points.get(load(closing()), {}, lambda said=words: made.append(said) or {"value": 1.0})
+    package_hash.cache_clear()
+    assert made == ["", "# another"]
 
 
 def test_what_is_watched_steps_as_any_run_does():

@@ -86,8 +86,9 @@ def on_mesh(basin, surface: np.ndarray) -> float:
 
 def said(basin, found: SurfaceWaves) -> str:
     """What a reader has to know."""
+    long, deep = (basin.case.amount(one, "length", 3) for one in (2.0 * math.pi / found.k, found.depth))
     return (
-        f"{basin.name}: waves about {2.0 * math.pi / found.k:.3g} m long in {found.depth:.3g} m of water (k h = "
+        f"{basin.name}: waves about {long} long in {deep} of water (k h = "
         f"{found.k * found.depth:.2g}): real ones run {100.0 * found.wrong:.2g} % slower than shallow water has them"
     )
 
@@ -134,4 +135,4 @@ class Watch:
         """That they are too short, where they are."""
         t, *found = self.kept.tolist()
         one = SurfaceWaves(*found)
-        return [notice(self.basin, one, f", at {t:.4g} s")] if one.wrong > WRONG else []
+        return [notice(self.basin, one, f", at {self.basin.case.amount(t, 'time')}")] if one.wrong > WRONG else []

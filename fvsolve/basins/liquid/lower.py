@@ -103,8 +103,9 @@ class LiquidRows(BasinRows):
     def lower_waves(self, draft, row) -> None:
         """The table of its waves; a wall cannot make them quicker than the fluid's own."""
         if self.waves.speed > (1.0 + 1e-9) * self.waves.own_speed:
-            draft.fault(f"nodes.{self.name}.wave_speed", f"{self.speed:.6g} m/s is faster than sound in the fluid, "
-                        f"{self.waves.own_speed:.6g} m/s; wanted at most that, or another law")  # fmt: skip
+            speed, sound = (draft.case.amount(one, "velocity", 6) for one in (self.speed, self.waves.own_speed))
+            draft.fault(f"nodes.{self.name}.wave_speed", f"{speed} is faster than sound in the fluid, {sound}; "
+                        "wanted at most that, or another law")  # fmt: skip
         row["table"] = draft.to_plane(self.waves.table())
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:

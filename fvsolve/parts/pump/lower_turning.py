@@ -37,7 +37,8 @@ class Turning:
             return -1
         kinks, start = dict(draft.schedules.breaks), draft.case.numerics.start
         if part.trip < start:
-            draft.fault(f"links.{name}.trip", f"{part.trip:g} s lies before the start at {start:g} s")
+            trip, begin = (draft.case.amount(one, "time", 6) for one in (part.trip, start))
+            draft.fault(f"links.{name}.trip", f"{trip} lies before the start at {begin}")
         made = draft.schedules.add(Schedule("step", (part.trip - 1.0 - abs(part.trip), part.trip), (0.0, 1.0)))
         draft.schedules.breaks[part.trip] = kinks.get(part.trip, False)
         return made

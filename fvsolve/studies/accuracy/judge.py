@@ -12,6 +12,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.steppers.methods import METHODS
 from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, order_varies, space_order, starts_with_jump
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
+from fvsolve.studies.accuracy.picture import differences_in
 from fvsolve.studies.accuracy.plane import unit_of
 from fvsolve.studies.accuracy.refine import Level, Plan
 from fvsolve.studies.accuracy.rows import Order, OrderRow
@@ -172,8 +173,9 @@ class Judge:
         notes += [*self.expected(exact), *self.way_out(fits)]
         numerics = self.case.numerics
         known = {name: unit for name in fits if (unit := unit_of(self.case, name)) is not None}
+        shown = {name: differences_in(self.case, name) for name in [*fits, "length"] if name not in known}
         return Order(self.case.name, numerics.scheme, numerics.method, self.plan, kind, words, tuple(rows), fits, own,
-                     tuple(notes), known)  # fmt: skip
+                     tuple(notes), known, shown)  # fmt: skip
 
     def refuse(self, rows, fits, words: str) -> None:
         """FvsolveError where the reference can judge no row in any variable."""

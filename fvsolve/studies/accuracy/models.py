@@ -82,7 +82,7 @@ class Ladder:
     """All rungs, poorest first, and what chooses among them.
 
     richest : the one that the others are measured against, refined until what it errs itself is within the target
-    deep : of water in tanks that ride, how deep it is beside its longest waves, in words
+    deep : of water in tanks that ride, how deep it is beside its longest waves, in words; case : whose units these use
     own : about what the richest errs by its cells [-], None where it has none or no finer one was run
     cheapest : the quickest rung whose error is within the target; travel_time : of a wave along the longest pipe [s]
     change_time : of the quickest schedule, its range over its steepest slope [s]
@@ -100,6 +100,7 @@ class Ladder:
     apart: Apart | None
     own: float | None
     deep: tuple[str, ...] = ()
+    case: Any = field(default=None, repr=False)
 
     @property
     def worth(self) -> str:
@@ -120,9 +121,10 @@ class Ladder:
         if self.travel_time > 0.0 and math.isfinite(self.change_time):
             ratio = self.change_time / self.travel_time
             kind = "waves matter" if ratio < 2.0 else "waves fade" if ratio < 20.0 else "waves hardly matter"
+            crossing, change = (self.case.amount(one, "time", 3) for one in (self.travel_time, self.change_time))
             found.append(
-                f"a wave crosses the longest pipe in {self.travel_time:.3g} s, what acts changes in "
-                f"{self.change_time:.3g} s, {ratio:.3g} times that: {kind}"
+                f"a wave crosses the longest pipe in {crossing}, what acts changes in "
+                f"{change}, {ratio:.3g} times that: {kind}"
             )
         return [*found, self.worth] if self.worth else found
 
@@ -136,7 +138,8 @@ class Ladder:
         if apart.start >= 0.5 * apart.error:
             why = f"{apart.start:.3g} is there from the start: pressures of {apart.level:.2g} K put the laws that far "
             why += f"apart, and all that {apart.probe} moves is {apart.moves:.2g} of itself"
-        why += f"; linear leaves out the velocity head, {apart.swift:.3g} Pa at the start" if apart.swift > 0.0 else ""
+        swift = self.case.amount(apart.swift, "pressure", 3, span=True)
+        why += f"; linear leaves out the velocity head, {swift} at the start" if apart.swift > 0.0 else ""
         return f"{said}, more than dp/K = {self.strain:.2g}: {why}"
 
     def plain(self) -> dict[str, Any]:
@@ -202,7 +205,7 @@ def ladder(
     plain = next((one for one, said in zip(runs, asked, strict=True) if said == (asked[at][0], "linear")), whole)
     top = rungs[-1] if more else rungs[at]
     about = travel, change, strain(richest), apart(plain, whole), own, tuple(said_of_tanks(case, target))
-    return Ladder(rungs, top, target, cheapest, *about)
+    return Ladder(rungs, top, target, cheapest, *about, case)
 
 
 def refined(case, law: str, whole: Outcome, target: float, tell: Callable[[str], None]) -> tuple[list, float | None]:

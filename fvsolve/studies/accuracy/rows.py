@@ -34,7 +34,8 @@ class Order(Shown):
     """An order study of one scheme and method.
 
     fits : variable -> {"L1" | "L2" | "max": Fit}; own : variable -> norm -> the reference's own error
-    units : of variables that are no probe's
+    units : of variables that are no probe's; shown : variable, or "length" -> (size of 1 SI, unit) of its errors as a
+    person reads them, SI if it is not there
     kind : of the reference, "exact" | "finer" | "richardson" | "function"; notes : what must be said of the numbers
     """
 
@@ -49,6 +50,7 @@ class Order(Shown):
     own: dict[str, dict[str, float]]
     notes: tuple[str, ...] = ()
     units: dict[str, str] = field(default_factory=dict)
+    shown: dict[str, tuple[float, str]] = field(default_factory=dict)
 
     picture = "fvsolve.studies.accuracy.picture:order_picture"
 
@@ -64,6 +66,12 @@ class Order(Shown):
                 key = f"{name} {norm}"
                 found[key] = [row.errors.get(name, {}).get(norm, math.nan) for row in self.rows]
         return found | {"rhs": [row.rhs for row in self.rows], "seconds": [row.seconds for row in self.rows]}
+
+    def told(self, variable: str) -> tuple[float, str]:
+        """(size of 1 SI, unit) of errors of a variable as a person reads them."""
+        from fvsolve.studies.accuracy.picture import unit
+
+        return self.shown.get(variable) or (1.0, unit(variable, self.units))
 
     @property
     def variables(self) -> tuple[str, ...]:

@@ -25,7 +25,8 @@ class Port:
 
     work : the integral at its least [J], at `time` [s]; at_start : E0, what the network could give at the start;
     others : what other ports had supplied at the least margin; margin : least of E0 + work + others. course, bound :
-    float64[k]  the integral and -(E0 + others) at the rows of the ledger [J].
+    float64[k]  the integral and -(E0 + others) at the rows of the ledger [J]; text : the verdict as a sentence, in the
+    units of `[output]`.
     """
 
     node: str
@@ -38,24 +39,11 @@ class Port:
     passive: bool
     course: np.ndarray
     bound: np.ndarray
-
-    @property
-    def text(self) -> str:
-        """The verdict as a sentence."""
-        bound = f"-E0 = {0.0 - self.at_start:.6g} J"
-        if self.others:
-            bound = (
-                f"-(E0 + others) = {-(self.at_start + self.others):.6g} J, {self.others:.6g} J of it from other ports"
-            )
-        verdict = "passive over this run" if self.passive else "NOT passive: it gave more than it had"
-        return (
-            f"port {self.node}: integral of p q falls to {self.work:.6g} J at {self.time:.6g} s, its bound is {bound}; "
-            f"least margin {self.margin:.6g} J at {self.t_margin:.6g} s: {verdict}"
-        )
+    text: str = ""
 
     def plain(self) -> dict:
         """For JSON, without its course."""
-        return {name: one for name, one in vars(self).items() if np.ndim(one) == 0} | {"text": self.text}
+        return {name: one for name, one in vars(self).items() if np.ndim(one) == 0}
 
 
 @dataclass(frozen=True)
@@ -182,7 +170,8 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
         lines["scheme"], lines["law"], totals[:, accounts.of("rate")].sum(axis=1) - dead.sum(axis=1) - kept,
         totals[:, -1], supplied - kept - dissipated, available(run.model),
         float(run.model.tables.settings[0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
-        [f"{mark.text}: the ledger from {mark.time:.6g} s on is not to be trusted" for mark in summary.marks],
+        [f"{mark.text}: the ledger from {run.model.case.amount(mark.time, 'time', 6)} on is not to be trusted"
+         for mark in summary.marks],
         None if port is None else judged(run, port),
     )  # fmt: skip
 
@@ -220,10 +209,24 @@ def judged(run: EnergyRun, port: str) -> Port:
     least, worst = int(np.argmin(work)), int(np.argmin(margin))
     size = start + np.max(np.abs(work)) + np.max(np.abs(others))
     t = run.step_times
-    return Port(
+    found = Port(
         port, float(work[least]), float(t[least]), start, float(others[worst]), float(margin[worst]), float(t[worst]),
         bool(margin[worst] >= -ROUNDING * size), work[at_rows], -(start + others)[at_rows],
     )  # fmt: skip
+    return replace(found, text=said(found, run.model.case))
+
+
+def said(port: Port, case) -> str:
+    """The verdict at a port as a sentence."""
+    work, least, own, others, margin = (
+        case.amount(one, "energy", 6)
+        for one in (port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin)
+    )
+    bound = f"-(E0 + others) = {own}, {others} of it from other ports" if port.others else f"-E0 = {least}"
+    verdict = "passive over this run" if port.passive else "NOT passive: it gave more than it had"
+    when, then = (case.amount(one, "time", 6) for one in (port.time, port.t_margin))
+    return (f"port {port.node}: integral of p q falls to {work} at {when}, its bound is {bound}; "
+            f"least margin {margin} at {then}: {verdict}")  # fmt: skip
 
 
 def write_table(one: Energy, path: Path) -> None:

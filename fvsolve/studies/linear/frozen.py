@@ -64,7 +64,7 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     t, y, armed = _arrive(model, at)
     sides = {time: jump for time, jump in model.breaks if time == t}
     side = "before" if before else "after"
-    when = "the start" if at is None else f"t = {t:g} s"
+    when = "the start" if at is None else f"t = {case.amount(t, 'time', 6)}"
     when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
     when += in_cells(model, lines) if lines else ""
     return Frozen(stopped(model, t, before), t, y, when, armed)
