@@ -25,7 +25,8 @@ Found = Iterator[tuple[tuple, str]]
 def network(table: dict[str, Any]) -> Found:
     """Faults of the incidence list, from names alone: unknown places, loose nodes, islands, nothing fixed."""
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
-    places = _places(nodes, links)
+    gone = [name for name in (*nodes, *links) if lost(name, nodes, links)]
+    places = _places(nodes, links, gone)
     ends: dict[str, list[str]] = {}
     unjoined = 0  # ports that join no place that is known
     for name, link in links.items():
@@ -55,11 +56,11 @@ def network(table: dict[str, Any]) -> Found:
     tied = {name: _tied(name, node, places) for name, node in nodes.items()}
     hanging = _hanging(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
-    loose = [name for name, node in nodes.items() if not lost(name, nodes, links)
-             and own_places(name, node) is None and not touched & {name, *points_of(name, node)}]  # fmt: skip
+    loose = [name for name, node in nodes.items() if name not in gone and own_places(name, node) is None
+             and not touched & {name, *points_of(name, node)}]  # fmt: skip
     if len(loose) > unjoined:  # else they may be what ports at fault should join
         yield from ((("nodes", name), "no link touches it") for name in loose)
-    if unjoined or any(lost(name, nodes, links) for name in nodes):
+    if unjoined or gone:
         return  # what hangs together is not known
     own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
     own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := points_of(name, node))}
@@ -239,16 +240,16 @@ def _fits(domain: str, wanted: str) -> bool:
     return domain in wanted.split(" or ")
 
 
-def _places(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, str | None]:
-    """Every place -> its domain, None where its type is at fault."""
+def _places(nodes: dict[str, Any], links: dict[str, Any], gone: list[str]) -> dict[str, str | None]:
+    """Every place -> its domain, None where its type is at fault; gone : parts whose places cannot be told."""
     found: dict[str, str | None] = {}
     for name, node in nodes.items():
         kind, own = _kind("nodes", node), own_places(name, node)
         found |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
         found |= dict.fromkeys(points_of(name, node), "spatial")
     found |= {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
-    named = {place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)}
-    return dict.fromkeys((one for one in named if lost(one.partition(".")[0], nodes, links)), None) | found
+    named = [f"{name}.{place}" for name in gone for place in named_of(name, links)]
+    return dict.fromkeys(named, None) | found
 
 
 def lost(name: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:

@@ -155,7 +155,7 @@ class _Reader:
         kinds = {group: self.kinds(group) for group in parts} | {"scalars": carried}
         has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
         has_cells = has_cells or None in (*kinds["links"].values(), *kinds["nodes"].values())  # it may be one
-        kinds["uncut"] = dict.fromkeys(self.uncounted())
+        kinds["uncut"] = dict.fromkeys(self.uncounted() if self.faults else ())
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         for name, node in parts["nodes"].items():
