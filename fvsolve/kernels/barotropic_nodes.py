@@ -49,6 +49,8 @@ from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
 from fvsolve.kernels.valves import flow_at_drop, transition_of
 
+NEARLY = 0.01  # of what a node lacks, what flows of valves may yet be off their laws
+
 
 @njit
 def head_pressure(st, floats, head):
@@ -228,21 +230,39 @@ def balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matri
 
 @njit
 def newton_step(cluster, out, tables, g, m, c, held, slope, wide, work):
-    """One Newton step of a cluster; returns its greatest change, relative. wide: as of `restriction_step`."""
+    """One Newton step of a cluster; returns its greatest change, relative, and whether it points to the root.
+
+    It does where flows of valves, by now so near to those of their laws that Newton's error is of second order, cannot
+    turn what nodes lack. wide: as of `restriction_step`.
+    """
     n, k = c.size, g.size
     matrix, right = work[: n * n], work[n * n : n * n + n]
     at = n * n + n
     a, s, lift = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : at + 3 * k]
     balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right)
+    left = largest(right)
     side = solve_dense(matrix, right, n)
     if side <= 0.0 and not wide and let_fall(cluster, tables, g, m):
         balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right)
+        left = largest(right)
         side = solve_dense(matrix, right, n)
     if side == 0.0:
         out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"]]
-        return 0.0
+        return 0.0, True
+    off = 0.0
+    for e in range(k):
+        off += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
     shorten(tables.settings[0]["beta"], a, right)
-    return move(cluster, tables, out, m, a, s, lift, right)
+    return move(cluster, tables, out, m, a, s, lift, right), off <= NEARLY * left
+
+
+@njit(forceinline=True)
+def largest(a):
+    """The greatest magnitude."""
+    most = 0.0
+    for i in range(a.size):
+        most = max(most, abs(a[i]))
+    return most
 
 
 @njit
@@ -297,22 +317,31 @@ def node_space(tables):
         work[3 * n : 4 * n],
         g,
         m,
-        rest[4 * tables.clusters.size :],
+        rest[5 * tables.clusters.size :],
     )
 
 
 @njit
 def cluster_space(tables):
-    """How far each cluster is: (whether it is done, its last change and the one before it, wide)."""
+    """How far each cluster is: (whether it is done, its last change and the one before it, wide, sure).
+
+    sure : whether its last step points to the root; it may point away while flows of valves have yet to turn
+    """
     n, v, many = tables.nodes.size, tables.valves.size, tables.clusters.size
     work = tables.scratch[4 * n + 2 * v :]
-    return work[:many], work[many : 2 * many], work[2 * many : 3 * many], work[3 * many : 4 * many]
+    return (
+        work[:many],
+        work[many : 2 * many],
+        work[2 * many : 3 * many],
+        work[3 * many : 4 * many],
+        work[4 * many : 5 * many],
+    )
 
 
 @njit
 def begin_clusters(out, tables, space):
     """Flows and openings of all clusters before Newton's first step; done: as in the profile, but for pipe ends."""
-    clusters, (_, c, held, _, g, m, _), (done, moved, _, wide) = tables.clusters, space, cluster_space(tables)
+    clusters, (_, c, held, _, g, m, _), (done, moved, _, wide, _) = tables.clusters, space, cluster_space(tables)
     a, b = 0, 0
     for which in range(clusters.size):
         cluster = clusters[which]
@@ -328,7 +357,7 @@ def begin_clusters(out, tables, space):
 @njit
 def step_clusters(sweep, out, tables, space):
     """A Newton step of every cluster that something reaches and that is not done."""
-    clusters, (slope, c, held, _, g, m, rest), (done, moved, past, wide) = (
+    clusters, (slope, c, held, _, g, m, rest), (done, moved, past, wide, sure) = (
         tables.clusters, space, cluster_space(tables),
     )  # fmt: skip
     a, b = 0, 0
@@ -342,15 +371,18 @@ def step_clusters(sweep, out, tables, space):
                 done[which] = 0.0
         if done[which] == 0.0:
             past[which] = moved[which]
-            step = newton_step(cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, wide[which] == 1.0, rest)
+            step, near = newton_step(
+                cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, wide[which] == 1.0, rest
+            )
             moved[which] = max(0.0, step)  # one that is no number ends here: the rates say it
+            sure[which] = 1.0 if near else 0.0
         a, b = i, j
 
 
 @njit
 def settle_clusters(out, tables, space):
     """Which clusters are done, each by its own last change; returns whether one goes on."""
-    clusters, m, (done, moved, past, wide), b, on = tables.clusters, space[5], cluster_space(tables), 0, False
+    clusters, m, (done, moved, past, wide, _), b, on = tables.clusters, space[5], cluster_space(tables), 0, False
     for which in range(clusters.size):
         j = b + clusters[which]["valves"]
         if done[which] == 0.0 and settled(moved[which], past[which]):

@@ -14,13 +14,16 @@ from fvsolve.kernels.barotropic_nodes import (
     settle_clusters,
     step_clusters,
 )
+from fvsolve.kernels.clusters import BAR
 from fvsolve.kernels.density import pressure_of_mass
 from fvsolve.kernels.density.mixture import enthalpy, relative_volume
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import JUNCTION
+from fvsolve.kernels.records import JUNCTION, NOT_CONVERGED, STATUS, WHERE
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
 
 ROUNDING = 1e-12  # of a node's pressure: the least that its gas has
+LEFT = 1e-7  # of what a pressure as high as that of the node brings: the most that rounding leaves of a balance
+NARROW = 1e-9  # of a pressure: bounds that are nearer to each other, and Newton wants beyond, have lost the root
 LONG = 30  # sweeps after which Newton is helped along
 
 
@@ -110,11 +113,12 @@ def cavitating_ends(out, tables, slope, final):
 def hold_back(sweep, out, tables, before, low, high):
     """Keep Newton's step of every node inside what is known of its root; note how far each cluster moved, relative.
 
-    A node alone in its cluster takes in less the higher its pressure is, so each step bounds its root on one side;
-    after a while the bounds are halved. Others keep above the floor, and then take half steps.
+    A node alone in its cluster takes in less the higher its pressure is, so each step that is sure of its direction
+    bounds its root on one side; after a while the bounds are halved. Others keep above the floor, and then take half
+    steps.
     """
     st, nodes, clusters = tables.settings[0], tables.nodes, tables.clusters
-    pressure, floor, (done, moved, _, _) = tables.layout[0]["pressure"], st["floor"], cluster_space(tables)
+    pressure, floor, (done, moved, _, _, sure) = tables.layout[0]["pressure"], st["floor"], cluster_space(tables)
     for which in range(clusters.size):
         if done[which] == 1.0 or clusters[which]["nodes"] == 0:
             continue
@@ -126,9 +130,13 @@ def hold_back(sweep, out, tables, before, low, high):
             if clusters[which]["nodes"] > 1:
                 q = max(p + 0.5 * (q - p) if sweep > LONG else q, floor + FALL * (p - floor), least)
             elif q != p:
-                low[i], high[i] = (p, high[i]) if q > p else (low[i], p)
+                if sure[which] == 1.0 or sweep > LONG:
+                    low[i], high[i] = (p, high[i]) if q > p else (low[i], p)
+                if sweep <= LONG and high[i] - low[i] <= NARROW * (BAR + p):  # one was wrong, or there is a kink
+                    low[i], high[i] = floor, UNBOUNDED
                 if sweep > LONG or not low[i] < q < high[i]:  # a kink can lead Newton to and fro
-                    q = max(between(floor, low[i], high[i], p), least)
+                    under, above = (p, high[i]) if q > p else (low[i], p)
+                    q = max(between(floor, under, above, p), least)
             out[pressure + i] = q - base
             moved[which] = max(moved[which], abs(q - p) / (1e5 + abs(p)))
 
@@ -136,7 +144,7 @@ def hold_back(sweep, out, tables, before, low, high):
 @njit
 def unbind(tables, low, high, first):
     """Forget the bounds of clusters that begin: at the first sweep, and where the wide look at lifts is over."""
-    clusters, (_, moved, _, _) = tables.clusters, cluster_space(tables)
+    clusters, (_, moved, _, _, _) = tables.clusters, cluster_space(tables)
     for which in range(clusters.size):
         if first or moved[which] == 1e300:
             for k in range(clusters[which]["nodes"]):
@@ -168,16 +176,24 @@ def close_cavitating(t, y, dydt, out, handle):
 
 @njit
 def balance_junctions(t, y, dydt, out, handle):
-    """What Newton has left at junctions goes to their pipe ends, by what these hold: rounding, but mass is kept."""
+    """What Newton has left at junctions goes to their pipe ends, by what these hold: rounding, but mass is kept.
+
+    More than that at a junction full of liquid is a failure. Where a cavity lies, more may be asked for than comes, as
+    nothing flows to a place quicker than sound.
+    """
     tables = open_tables(handle)
     layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile
     left, held, some = tables.scratch[: nodes.size], tables.scratch[nodes.size : 2 * nodes.size], False
+    floor = tables.settings[0]["floor"]
     for i in range(nodes.size):
         left[i], held[i] = 0.0, 0.0
         if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
             left[i] = out[layout["net"] + i] + (out[layout["supply"] + i] + nodes[i]["demand"])
             out[layout["net"] + i] -= left[i]
             some = some or left[i] != 0.0
+            p = nodes[i]["pressure"] + out[layout["pressure"] + i]
+            if p - floor > BAR and abs(left[i]) > LEFT * nodes[i]["admittance"] * (BAR + abs(p)):
+                out[STATUS], out[WHERE] = NOT_CONVERGED, i
     for turn in range(2 if some else 0):
         for k in range(pipes.size):
             for side in range(2):

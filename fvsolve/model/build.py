@@ -240,7 +240,7 @@ def scratch_of(draft: Draft) -> int:
     system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in draft.cluster_table), default=0)
     rigid = int(np.sum(draft.node_table["columns"] > 1))
     system = max(system, rigid * (rigid + 3))
-    system += 6 * nodes + 2 * len(draft.valve_table) + 4 * len(draft.cluster_table)
+    system += 6 * nodes + 2 * len(draft.valve_table) + 5 * len(draft.cluster_table)
     held = int(sum(draft.pin_table["rows"]))
     spatial = 8 * len(draft.freedom_table) + draft.factor_size + 16 * len(draft.body_table)
     spatial += held * (2 * len(draft.freedom_table) + held + 1)
