@@ -219,6 +219,38 @@ def test_the_pattern_of_the_jacobian_holds_while_cavities_are_open():
     assert not np.any(model.jacobian(state.t, state.y)[pattern == 0])
 
 
+THROAT = {"nodes": {"shaft": {"type": "tank", "elevation": 470.0, "area": 2.0, "level": 20.0}},
+          "links": {"neck": {"type": "valve", "from": "shaft", "to": "v", "diameter": 0.6, "loss_coefficient": 2.0},
+                    "gate": {"type": "valve", "from": "v", "to": "river", "area": 0.8}}}  # fmt: skip
+OPENINGS = [(1.0, [0.16, 0.3, 0.41], [-0.12, 0.1, 0.3]), (0.2, [0.04, 0.072, 0.1], [-0.04, 0.01, 0.055])]
+HILL = [{"opening": a, "unit_speed": [0.0, 60.0, 150.0], "unit_flow": flow, "unit_torque": torque}
+        for a, flow, torque in OPENINGS]  # fmt: skip
+UNIT = {"nodes": {}, "links": {"gate": {"type": "turbine", "from": "v", "to": "river", "diameter": 2.0,
+                                        "speed": 30.0, "hill_chart": HILL}}}  # fmt: skip
+
+
+@pytest.mark.parametrize("beside", [THROAT, UNIT], ids=["throat", "turbine"])
+def test_where_no_cavity_is_near_following_cavities_changes_nothing(beside) -> None:
+    """A flow through a throat that turns, a turbine that shuts: the root of their node lay beyond its start."""
+    nodes = {
+        "lake": lake(500.0, elevation=480.0), "v": junction(elevation=392.0),
+        "river": lake(395.0, elevation=390.0),
+    }  # fmt: skip
+    links = {"pen": pipe("lake", "v", 400.0, 2.8, 1100.0, 20, friction={"model": "steady", "factor": 0.012})}
+    links |= {name: dict(one) for name, one in beside["links"].items()}
+    times, openings = [0.5, 1.0, 7.0, 13.0, 13.5], [0.8, 0.8, 0.3, 0.2, 0.2]
+    links["gate"]["opening"] = {"time": times, "value": openings, "kind": "smooth"}
+    found = []
+    for follows in (True, False):
+        fluid = {"name": "Water", "law": "mixture", "air_fraction": 1e-7, "cavitation": follows}
+        case = scene(nodes | beside["nodes"], links, 14.0, PLAIN, ["v.head", "gate.flow"], 0.02, fluid=fluid)
+        found.append(fvsolve.run(case))
+    followed, plain = found
+    assert followed.ok and plain.ok and not followed.summary["cavities"]
+    for probe, most in (("v.head", 1e-3), ("gate.flow", 2e-4)):
+        assert np.max(np.abs(followed[probe] - plain[probe])) < most * np.ptp(plain[probe])
+
+
 def test_without_an_event_nothing_moves_by_one_bit():
     case = network()
     case["links"]["tap"]["opening"] = 1.0
