@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -57,6 +57,22 @@ class Leg:
     def chainage(self, distance: Any) -> Any:
         """Of places at distances from the pipe's `from` end [m]."""
         return self.end - distance if self.backwards else self.begin + distance
+
+    def distance(self, chainage: Any) -> Any:
+        """From the pipe's `from` end [m] of places at chainages."""
+        return self.end - chainage if self.backwards else chainage - self.begin
+
+
+def is_cut(name: str, pipes: Sequence[str]) -> bool:
+    """Whether a route is but the way along a pipe that was cut."""
+    return list(pipes) == [f"{name}-{k + 1}" for k in range(len(pipes))]
+
+
+def alone(pipe: str, links: dict[str, Any]) -> Leg:
+    """The way along a pipe as it is drawn, by the chainages of its profile where it has one."""
+    profile = links[pipe].profile
+    begin = 0.0 if profile is None else float(profile.chainage[0])
+    return Leg(pipe, begin, begin + links[pipe].length, False)
 
 
 def spread(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) -> Route:

@@ -14,12 +14,12 @@ LONGEST = 22  # letters over a chainage
 
 
 @style.as_it_stands
-def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=(), labels=(), title=""):
+def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=(), labels=(), title="", cap=None):
     """Heads along one chainage with the pipe, lines of vapour, classes and limits; shaded where liquid parted.
 
     chainage, along["greatest_head"] ... : float64[n] in `units`; lines : name -> float64[n]; posts : chainages
     beyond : (chainage, head, name) where a limit is passed
-    labels : (chainage, names, whether more than a joint)
+    labels : (chainage, names, whether more than a joint); cap : ends of the axis of heads
     """
     figure = style.figure(4.6)
     axes = figure.subplots()
@@ -34,7 +34,7 @@ def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=()
               label="initial head")  # fmt: skip
     axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
     for name, line in lines.items():
-        axes.plot(chainage, line, label=name, **LINES.get(name, LIMIT))
+        axes.plot(chainage, line, label=name, **LINES.get(name.partition(" (")[0], LIMIT))
     if parted:
         axes.fill_between([], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached")
     if beyond:
@@ -42,6 +42,7 @@ def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=()
         axes.plot(at, heads, "x", color=style.DOUBT, markersize=7, markeredgewidth=2.0, clip_on=False, zorder=5,
                   label="limit passed")  # fmt: skip
     axes.set_xlim(min([chainage[0], *posts]), max([chainage[-1], *posts]))
+    axes.set_ylim(cap)
     _places(axes, posts, labels)
     axes.set_xlabel(f"chainage [{units['distance']}]", fontsize=8.5, color=style.INK)
     axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)

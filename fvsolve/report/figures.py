@@ -23,6 +23,7 @@ LINES = {"vapour line": {"colour": VAPOUR, "width": 1.4, "dash": "dot"},
          "class line": {"colour": CLASS, "width": 1.8, "dash": "dashdot"}}  # fmt: skip
 LIMIT = {"colour": CLASS, "width": 1.3, "dash": "longdash"}
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # lines stay apart in grey print too
+TOOLS = 22  # pixels of the bar of tools, below which names stand
 LONGEST = 22  # letters over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 
@@ -38,7 +39,7 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str, b
         _line("pipe", x, lines["elevation"], MUTED, width=3.5),
     ]
     for name, line in one.lines.items():
-        data.append(_line(name, x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
+        data.append(_line(one.told(name), x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
     if one.parted:
         data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
                      "marker": {"symbol": "square", "size": 11, "color": VAPOUR, "opacity": 0.35}})  # fmt: skip
@@ -53,9 +54,10 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str, b
     shapes += [_post(device.chainage) for device in one.devices]
     layout = _layout(f"head [{unit}]", f"chainage [{along}]", 460)
     names = _names(one)
-    above = 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
+    above = TOOLS + 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
     layout |= {"shapes": shapes, "annotations": names, "margin": {"l": 62, "r": 14, "t": above, "b": 50}}
     layout["xaxis"]["range"] = list(one.ends)
+    _cap(layout, one)
     made: dict[str, Any] = {"data": data, "layout": layout}
     if moving is not None:
         made["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
@@ -70,7 +72,7 @@ def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> 
     x = numbers(first.chainage[k], "f4")
     data = [_line("pipe", x, numbers(first.along["elevation"][k], "f4"), MUTED, width=3.5)]
     for name, line in first.lines.items():
-        data.append(_line(name, x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
+        data.append(_line(first.told(name), x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
     for n, (name, one) in enumerate(several):
         colour, k = COLOURS[n % len(COLOURS)], one.picked()
         x, group = numbers(one.chainage[k], "f4"), {"legendgroup": f"run {n}"}
@@ -78,11 +80,12 @@ def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> 
         data.append(_line(name or "the case", x, high, colour, width=2, **group))
         data.append(_line("", x, low, colour, width=2, dash="dash", showlegend=False, **group))
     names = _names(first)
-    above = 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
+    above = TOOLS + 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
     layout = _layout(f"head [{unit}]", f"chainage [{along}]", 440)
     layout |= {"annotations": names, "shapes": [_post(device.chainage) for device in first.devices],
                "margin": {"l": 62, "r": 14, "t": above, "b": 50}}  # fmt: skip
     layout["xaxis"]["range"] = list(first.ends)
+    _cap(layout, *(section for _, section in several))
     return {"data": data, "layout": layout}
 
 
@@ -153,6 +156,13 @@ def _span(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:
 def _post(x: float) -> dict[str, Any]:
     return {"type": "line", "xref": "x", "yref": "paper", "x0": x, "x1": x, "y0": 0, "y1": 1.015,
             "line": {"color": HAIR, "width": 1}, "layer": "below"}  # fmt: skip
+
+
+def _cap(layout: dict[str, Any], *sections: Section) -> None:
+    """End the axis of heads below lines far above them; a double click shows all."""
+    caps = [one.cap() for one in sections]
+    if caps and None not in caps:
+        layout["yaxis"] |= {"range": [min(low for low, _ in caps), max(high for _, high in caps)]}
 
 
 def _names(one: Section) -> list[dict[str, Any]]:

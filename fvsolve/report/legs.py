@@ -9,7 +9,7 @@ from __future__ import annotations
 import heapq
 from typing import NamedTuple
 
-from fvsolve.case.routes import Leg, joined
+from fvsolve.case.routes import Leg, alone, is_cut, joined
 from fvsolve.case.routes import legs as legs_of
 
 MOST = 6  # sections of a run, unless it has more routes
@@ -61,8 +61,9 @@ def ways(result) -> list[SectionWay]:
 def _within(way: SectionWay, ways: list[SectionWay]) -> bool:
     """Whether it is a cut pipe, a route by itself, whose pieces all lie on another route."""
     pipes = [leg.pipe for leg in way.legs]
-    cut = pipes == [f"{way.name}-{k + 1}" for k in range(len(pipes))]
-    return cut and any(set(pipes) <= {leg.pipe for leg in one.legs} for one in ways if one is not way)
+    return is_cut(way.name, pipes) and any(
+        set(pipes) <= {leg.pipe for leg in one.legs} for one in ways if one is not way
+    )
 
 
 def _in_line(link, case) -> bool:
@@ -73,10 +74,8 @@ def _in_line(link, case) -> bool:
 def _chained(chain: list[tuple[str, bool, float]], result) -> SectionWay:
     """A chain with its chainages, turned so that the head falls along it at the start; one pipe as it was drawn."""
     if len(chain) == 1:
-        pipe, _, length = chain[0]
-        profile = result.case.links[pipe].profile
-        begin = 0.0 if profile is None else float(profile.chainage[0])
-        return _way(pipe, [Leg(pipe, begin, begin + length, False)], result.case.links)
+        pipe = chain[0][0]
+        return _way(pipe, [alone(pipe, result.case.links)], result.case.links)
     first, last = chain[0], chain[-1]
     begins = _start_head(result, first[0], last=first[1])
     ends = _start_head(result, last[0], last=not last[1])

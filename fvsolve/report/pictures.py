@@ -93,6 +93,6 @@ def _section_figure(result, way: SectionWay):
     k, title = one.picked(), "\n".join(filter(None, [result.summary["title"], way.name]))
     return section_figure(
         one.chainage[k], {name: values[k] for name, values in one.along.items()}, result.summary["envelope_units"],
-        {name: line[k] for name, line in one.lines.items()}, one.parted, one.beyond,
-        [device.chainage for device in one.devices], one.labels(), title,
+        {one.told(name): line[k] for name, line in one.lines.items()}, one.parted, one.beyond,
+        [device.chainage for device in one.devices], one.labels(), title, one.cap(),
     )  # fmt: skip

@@ -12,10 +12,13 @@ from fvsolve.output.routes import strung
 from fvsolve.report.heads import head_of, in_units
 from fvsolve.report.legs import SectionWay
 from fvsolve.report.limits import limit_lines
+from fvsolve.run.verdicts import Chainages
 
 ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
          "t_least", "t_greatest")  # fmt: skip
+HEADS = ("elevation", "initial_head", "least_head", "greatest_head")
 APART = 0.035  # of the length: names nearer to each other than this would cover each other
+HIGH = 2.0  # times what heads and pipe span, how far above them a line is still shown
 BINS = 150  # of a long line at most: of each the greatest and the least head and elevation stand, and where
 
 
@@ -63,6 +66,23 @@ class Section:
         kept = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
         return np.unique([0, *kept, n - 1])
 
+    def cap(self) -> tuple[float, float] | None:
+        """Ends of the axis of heads where a line, such as that of a class, lies so far above them that it would flatten
+        them; None as a rule."""
+        values = np.concatenate([self.along[name] for name in HEADS] + [*self.lines.values()])
+        heads = values[: len(HEADS) * len(self.chainage)]
+        low, high = float(np.nanmin(heads)), float(np.nanmax(heads))
+        far = high + HIGH * max(high - low, 1.0)
+        if not any(lowest_of(line) > far for line in self.lines.values()):
+            return None
+        margin = 0.05 * max(high - low, 1.0)
+        return float(np.nanmin(values)) - margin, high + 2.0 * margin
+
+    def told(self, name: str) -> str:
+        """A line's name, and from where on it runs if that is above the picture."""
+        cap, lowest = self.cap(), lowest_of(self.lines[name])
+        return name if cap is None or not lowest > cap[1] else f"{name} (above, from {lowest:.4g})"
+
     def labels(self) -> list[tuple[float, str, bool]]:
         """Chainages with names, and whether more than a joint stands there; none would cover another.
 
@@ -79,6 +99,11 @@ class Section:
             elif device.parts:
                 near[0][1].extend(name for name in names if name not in near[0][1])
         return [(chainage, ", ".join(names), stands) for chainage, names, stands in shown]
+
+
+def lowest_of(line: np.ndarray) -> float:
+    """The least value of a line, nan of one that is nowhere."""
+    return float(np.nanmin(line)) if np.isfinite(line).any() else np.nan
 
 
 def section(result, way: SectionWay) -> Section:
@@ -121,16 +146,14 @@ def _parted(result, least: np.ndarray, chainage: np.ndarray, way: SectionWay) ->
 
 def _beyond(result, way: SectionWay, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
     """Places of a way where a limit on pressure or head is passed: chainage [m], head there, name of the limit."""
-    found = []
+    found, told = [], Chainages(result.case)
     for one in result.summary["verdicts"]:
+        on = result.case.limits[one["name"]].extent.on
         for worst in one["worst"] if one["quantity"] in OF_PRESSURE else []:
             leg = next((leg for leg in way.legs if leg.pipe == worst["place"]), None)
             if leg is None or worst["margin"] is None or worst["margin"] >= 0.0:
                 continue
-            at = worst["chainage"]
-            if way.name not in result.case.routes:  # of a pipe on none it counts along the pipe
-                profile = result.case.links[leg.pipe].profile
-                at = float(leg.chainage(at - (0.0 if profile is None else profile.chainage[0])))
+            at = float(leg.chainage(told.leg(leg.pipe, on).distance(worst["chainage"])))
             if leg.begin <= at <= leg.end:
                 line = along["least_head" if worst["bound"] == "least" else "greatest_head"]
                 found.append((at, float(line[np.argmin(np.abs(chainage - at))]), one["name"]))

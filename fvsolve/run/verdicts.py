@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.case import horizon
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.case.limits import VACUUM
-from fvsolve.case.routes import legs
+from fvsolve.case.routes import Leg, alone, is_cut, legs
 from fvsolve.output.column import UnitColumn, column
 from fvsolve.run.met import Met, in_quantity, met
 
@@ -123,17 +123,21 @@ class Chainages:
 
     def of(self, part: Met, at: int, on: tuple[str, ...]) -> float | None:
         """Chainage of a place of a part [m]; None of what lies on none."""
-        if part.group == "links" and not math.isfinite(part.distance[at]):
-            return None
-        ordered = [*(name for name in on if name in self.legs), *self.legs]
-        for name in ordered:
+        if part.group == "links":
+            distance = part.distance[at]
+            return float(self.leg(part.part, on).chainage(distance)) if math.isfinite(distance) else None
+        for name in self.ordered(on):
             for leg in self.legs[name]:
-                if part.group == "links" and leg.pipe == part.part:
-                    return float(leg.chainage(part.distance[at]))
                 link = self.case.links[leg.pipe]
-                if part.group == "nodes" and part.part in (link.from_, link.to):
+                if part.part in (link.from_, link.to):
                     return float(leg.chainage(0.0 if part.part == link.from_ else link.length))
-        if part.group == "links" and math.isfinite(part.distance[at]):
-            profile = self.case.links[part.part].profile
-            return float(part.distance[at] + (0.0 if profile is None else profile.chainage[0]))
         return None
+
+    def leg(self, pipe: str, on: tuple[str, ...]) -> Leg:
+        """The way through a pipe along which chainage is told."""
+        found = next((leg for name in self.ordered(on) for leg in self.legs[name] if leg.pipe == pipe), None)
+        return alone(pipe, self.case.links) if found is None else found
+
+    def ordered(self, on: tuple[str, ...]) -> list[str]:
+        """Names of routes, those that a limit is on first, and last what is but the way along a pipe that was cut."""
+        return sorted(self.legs, key=lambda name: (is_cut(name, self.case.routes[name].pipes), name not in on))
