@@ -8,7 +8,7 @@ from typing import Any
 
 from fvsolve.case.probe import Kinds, Probe, of_uncut
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts import KINDS, Pipe
+from fvsolve.parts import KINDS, Pipe, Reservoir
 from fvsolve.parts.value import Misfit
 from fvsolve.units import show
 
@@ -111,7 +111,7 @@ def parts_of(one: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -
     if of_uncut(one, kinds) or (one in ALL and None in kinds[ALL[one]].values()):
         return None
     if one in ALL:
-        wanted = (lambda kind: kind is Pipe) if one == "pipes" else (lambda kind: quantity in quantities_of(kind))
+        wanted = (lambda kind: kind is Pipe) if one == "pipes" else (lambda kind: judged(kind, quantity))
         found = [(ALL[one], name) for name, kind in kinds[ALL[one]].items() if kind is not None and wanted(kind)]
         if not found:
             if one == "pipes":
@@ -120,6 +120,11 @@ def parts_of(one: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -
         return found
     known = [*kinds["nodes"], *kinds["links"], *routes, *ALL]
     raise ValueError(f"no part or route named {show(one)}{did_you_mean(one, known) or f'; there are {listing(known)}'}")
+
+
+def judged(kind: Any, quantity: str) -> bool:
+    """Whether a kind of node is among "nodes": a reservoir's pressure is given, perhaps at no elevation of its own."""
+    return quantity in quantities_of(kind) and not (kind is Reservoir and quantity in OF_PRESSURE)
 
 
 def quantities_of(kind: Any) -> dict[str, str]:

@@ -106,6 +106,9 @@ def _innermost(error: BaseException) -> str:
     chain = [error]
     while chain[-1].__cause__ is not None:
         chain.append(chain[-1].__cause__)
+    if isinstance(chain[-1], UnicodeDecodeError):
+        found = chain[-1]
+        return f"byte {found.object[found.start]:#x} is not UTF-8 text, as EPANET on Windows writes; save it as UTF-8"
     coded = [one for one in chain if "(Error " in str(one)]
     said = str(coded[-1] if coded else chain[-1]).replace("%s", "").replace(" ()", "")
     if said[:1] == said[-1:] and said[:1] in "\"'":

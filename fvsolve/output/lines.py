@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import RunError
-from fvsolve.output.column import UnitColumn, column, converted
+from fvsolve.output.column import column, converted
 from fvsolve.output.history import quoted
 
 AXES = {"u": 0, "v": 1}  # of velocities
@@ -60,7 +60,7 @@ class LineReading:
         self.cells, self.weights = (np.concatenate([one[k] for one in read]) for k in (0, 1))
         self.row = np.repeat(np.arange(said.points), [one[0].size for one in read])
         self.lost = np.array([one[0].size == 0 for one in read])
-        self.columns = [UnitColumn(name, "length", "m") for name in ("distance", "x", "y")]
+        self.columns = [column("distance", "length", case), *(column(name, "position", case) for name in ("x", "y"))]
         self.columns += [column(name, dimension, case) for name, dimension in fields.items()]
         labels = {name: scalar.unit for name, scalar in case.scalars.items()} if basin.scalars else {}
         self.columns += [column(name, "number", case, label) for name, label in labels.items()]

@@ -14,6 +14,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.report.libraries import library
+from fvsolve.units import span
 
 OF = ("pressure", "gauge_pressure", "head")
 SMALL = 1e-3  # of the greatest range: what is less is not counted
@@ -58,7 +59,7 @@ def cycles(result, probes: list[str] | None = None, strength: Strength | None = 
     made = []
     for name in probes or known:
         found = counted(np.asarray(result[name]))
-        row: dict[str, Any] = {"probe": name, "unit": result.units[name], "cycles": found}
+        row: dict[str, Any] = {"probe": name, "unit": span(result.units[name]), "cycles": found}
         if strength is not None:
             row["share"] = float(sum(count / strength.allowed(size) for size, count in found))
         made.append(row)

@@ -148,7 +148,8 @@ def _beyond(result, way: SectionWay, chainage: np.ndarray, along: dict) -> list[
     """Places of a way where a limit on pressure or head is passed: chainage [m], head there, name of the limit."""
     found, told = [], Chainages(result.case)
     for one in result.summary["verdicts"]:
-        on = result.case.limits[one["name"]].extent.on
+        limit = result.case.limits.get(one["name"])
+        on = limit.extent.on if limit is not None else ()
         for worst in one["worst"] if one["quantity"] in OF_PRESSURE else []:
             leg = next((leg for leg in way.legs if leg.pipe == worst["place"]), None)
             if leg is None or worst["margin"] is None or worst["margin"] >= 0.0:

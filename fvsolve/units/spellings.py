@@ -77,6 +77,7 @@ DIMENSIONS = {
     "power": Dimension("a power", "W", "3 kW"),
     "frequency": Dimension("a frequency", "Hz", "3 Hz"),
     "rate": Dimension("a rate", "1/s", "0.5 1/day", base="frequency"),
+    "compliance": Dimension("a compliance", "1/Pa", "0.1 1/GPa"),
     "impedance": Dimension("an impedance", "Pa s/m", "1.5e6 Pa s/m"),
     "position": Dimension("a position", "m", "120 mm", base="length"),
     "stiffness": Dimension("a stiffness", "N/m", "50 N/mm"),
@@ -182,6 +183,7 @@ SPELLINGS: dict[str, dict[str, Any]] = {
     "energy": {"J": 1, "kJ": 1000, "MJ": 10**6, "kWh": 3.6e6},
     "power": {"W": 1, "kW": 1000, "MW": 10**6, "hp": 550 * FOOT * POUND_FORCE},
     "frequency": {"Hz": 1, "kHz": 1000, "1/s": 1, "1/min": (1, MINUTE), "1/h": (1, HOUR), "1/day": (1, DAY)},
+    "compliance": {"1/Pa": 1, "1/MPa": (1, 10**6), "1/GPa": (1, 10**9), "1/bar": (1, 10**5), "1/psi": 1 / PSI},
     "impedance": {"Pa s/m": 1},
     "stiffness": {
         "N/m": 1, "N/mm": 1000, "N/um": 10**6, "kN/m": 1000, "kN/mm": 10**6, "MN/m": 10**6,

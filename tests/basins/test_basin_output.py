@@ -275,7 +275,7 @@ def test_a_line_that_lies_in_no_basin_is_refused():
     with pytest.raises(CaseError) as error:
         fvsolve.load(draining([], output={"fields": 0, "lines": lines}))
     for says in (
-        'output.lines.a.basin: no basin named "pol"; basins are pool',
+        'output.lines.a.basin: no basin named "pol"; did you mean "pool"?',
         "output.lines.b.to: 12,2 m lies outside the mesh or in a hole; the nearest point inside is",
         "output.lines.c.to: is where the line starts",
         '"d d" is no name',

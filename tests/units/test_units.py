@@ -66,6 +66,7 @@ l/min/bar: liter/minute/bar | L/min/bar: liter/minute/bar | ml/min/bar: millilit
 cm3/s/bar: centimeter**3/second/bar | cm3/min/bar: centimeter**3/minute/bar | J: joule
 kJ: kilojoule | MJ: megajoule | kWh: kilowatt_hour | W: watt | kW: kilowatt | MW: megawatt
 hp: horsepower | Hz: 1/second | kHz: 1000/second | 1/s: 1/second | 1/min: 1/minute | 1/h: 1/hour | 1/day: 1/day
+1/Pa: 1/pascal | 1/MPa: 1/megapascal | 1/GPa: 1/gigapascal | 1/bar: 1/bar | 1/psi: 1/psi
 Pa s/m: pascal*second/meter | rad: radian | deg: degree
 rad/s: radian/second | rpm: revolution/minute | RPM: revolution/minute | N m: newton*meter
 Nm: newton*meter | kN m: kilonewton*meter | kNm: kilonewton*meter | lbf ft: pound_force*foot
@@ -86,7 +87,7 @@ PINT_SI = {
     "K": "kelvin", "-": "dimensionless", "m2/s": "meter**2/second", "kg": "kilogram",
     "kg/s": "kilogram/second",
     "N": "newton", "J": "joule", "W": "watt", "Hz": "1/second", "1/s": "1/second", "rad": "radian",
-    "Pa s/m": "pascal*second/meter",
+    "1/Pa": "1/pascal", "Pa s/m": "pascal*second/meter",
     "rad/s": "radian/second", "N m": "newton*meter", "kg m2": "kilogram*meter**2",
     "N m s": "newton*meter*second", "N s": "newton*second",
     "kg m2/s": "kilogram*meter**2/second", "C": "coulomb", "F": "farad",

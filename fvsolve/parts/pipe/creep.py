@@ -44,7 +44,7 @@ class Positives(Value):
         return {"type": "array", "items": {"type": ["number", "string"]}}
 
 
-LISTS = {"compliance": (Positives("number"), NEEDED), "time": (Positives("time"), NEEDED)}
+LISTS = {"compliance": (Positives("compliance"), NEEDED), "time": (Positives("time"), NEEDED)}
 
 
 class Elements(Value):
