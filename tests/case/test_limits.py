@@ -9,6 +9,8 @@ import pytest
 from truth.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
 
 import fvsolve
+from fvsolve.report.legs import ways
+from fvsolve.report.section import section
 
 LENGTH, DIAMETER, SPEED = 1000.0, 0.3, 1000.0
 SHUT, VELOCITY, HEAD = 0.1, 0.5, 100.0
@@ -51,6 +53,34 @@ def test_a_planted_exceedance_is_found_at_its_chainage_and_time(turned: bool) ->
     assert found["vacuum"].value == pytest.approx(least, rel=1e-12)
     assert found["vacuum"].chainage == pytest.approx(6000.0)  # the very end, no cell's middle
     assert found["vacuum"].elevation == pytest.approx(20.0)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_picture_has_it_where_it_stands_whatever_the_unit_and_however_the_pipe_is_cut(turned: bool) -> None:
+    """Lengths in feet, the pipe cut by a device, the limit on the pipe and not on the route: one chainage everywhere."""
+    found = []
+    for more in ({}, {"tap": {"type": "junction", "on": "low", "at": "250 m"}}):
+        case = shut(turned, limits={"top": {"on": ["low", "high"], "greatest": "14 bar"}},
+                    routes={"line": {"pipes": ["low", "high"], "start": "5 km"}})  # fmt: skip
+        case["nodes"] |= more
+        case["output"]["units"] = {"length": "ft"}
+        result = fvsolve.run(case)
+        one = section(result, ways(result)[0])
+        (top,) = result.verdicts
+        assert top.chainage == pytest.approx(5025.0) and one.ends == pytest.approx((5000 / 0.3048, 6000 / 0.3048))
+        assert min(abs(at - 5025.0 / 0.3048) for at, _, name in one.beyond) < 1e-6
+        assert {device.place: device.chainage for device in one.devices}["gate"] == pytest.approx(6000 / 0.3048)
+        found.append(top)
+    assert found[0].value == found[1].value
+
+
+def test_among_the_nodes_a_reservoir_is_not_judged() -> None:
+    """Its pressure is given, perhaps at no elevation of its own: here it stands at its head, under no pressure."""
+    case = shut(limits={"low": {"on": "nodes", "quantity": "pressure_head", "least": "5 m"}})
+    case["nodes"]["lake"] = lake(HEAD, elevation=HEAD)
+    assert {one["place"] for one in judged(case)["low"].worst} == {"middle", "gate"}
+    case["limits"]["low"]["on"] = "lake"
+    assert judged(case)["low"].value == pytest.approx(0.0, abs=1e-9)
 
 
 def test_the_same_limit_said_in_other_words_has_the_same_verdict() -> None:

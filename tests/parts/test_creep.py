@@ -202,7 +202,7 @@ def test_a_resumed_run_is_the_unbroken_one_to_the_bit(tmp_path):
 def test_a_wall_of_no_elements_has_no_state_and_elements_that_give_nothing_change_nothing():
     none = fvsolve.build(fvsolve.load(line(9, creep=None)))
     assert none.y_size == 18 and not none.creeps
-    small = {"compliance": [1e-30], "time": [1.0]}
+    small = {"compliance": ["1e-21 1/GPa"], "time": [1.0]}
     one, other = (np.array(fvsolve.run(line(20, end=1.0, creep=creep))["gate.pressure"]) for creep in (None, small))
     assert one == approx(other, rel=1e-12)
 
