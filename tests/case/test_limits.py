@@ -57,7 +57,7 @@ def test_a_planted_exceedance_is_found_at_its_chainage_and_time(turned: bool) ->
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_picture_has_it_where_it_stands_whatever_the_unit_and_however_the_pipe_is_cut(turned: bool) -> None:
-    """Lengths in feet, the pipe cut by a device, the limit on the pipe and not on the route: one chainage everywhere."""
+    """Lengths in feet, the pipe cut by a device, the limit on pipes and not on the route: one chainage everywhere."""
     found = []
     for more in ({}, {"tap": {"type": "junction", "on": "low", "at": "250 m"}}):
         case = shut(turned, limits={"top": {"on": ["low", "high"], "greatest": "14 bar"}},
