@@ -65,8 +65,8 @@ class Hydraulics:
         """Growth of a pipe's area with pressure [1/Pa], as its law has it; none may be negative."""
         found = self.case.law.compliance(speed)
         if found < -1e-9 / self.fluid.bulk_modulus:
-            found, sound = (self.case.amount(one, "velocity", 6) for one in (speed, self.fluid.sound_speed))
-            fault(f"links.{name}.wave_speed", f"{found} is faster than sound in the fluid, {sound}; wanted at most "
+            told, sound = (self.case.amount(one, "velocity", 6) for one in (speed, self.fluid.sound_speed))
+            fault(f"links.{name}.wave_speed", f"{told} is faster than sound in the fluid, {sound}; wanted at most "
                   'that, or law = "linear"')  # fmt: skip
         return found if found > 1e-9 / self.fluid.bulk_modulus else 0.0
 

@@ -1,8 +1,8 @@
 """Where a network is drawn: plan positions of nodes, paths of links. Knows lengths; knows no physics.
 
-Stated positions are used where every node has one. Otherwise nodes are laid out so that their distances
-in the plan come near the lengths along the network (classical scaling, then stress majorization; Gansner,
-Koren and North 2004). The same network is always laid out alike.
+Stated positions are used where every node has one, or lies where a pipe between two of them is cut. Otherwise nodes are
+laid out so that their distances in the plan come near the lengths along the network (classical scaling, then stress
+majorization; Gansner, Koren and North 2004). The same network is always laid out alike.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from __future__ import annotations
 import heapq
 
 import numpy as np
+
+from fvsolve.case.routes import is_cut
 
 ROUNDS = 200  # of majorization
 DENSE = 400  # nodes up to which all pairs are laid out at once
@@ -23,6 +25,7 @@ def positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
     named = [one for found in ports.values() for one in found] + [place(one) for one in case.places]
     owners = dict.fromkeys(one for one in named if one not in case.nodes)
     stated = {name: node.position for name, node in case.nodes.items() if node.position is not None}
+    stated |= between_ends(case, stated)
     if len(stated) == len(case.nodes):
         plan = {name: np.array(place, float) for name, place in stated.items()}
         return plan | {name: np.mean([plan[port] for port in ports[name]], 0) for name in owners}
@@ -37,6 +40,23 @@ def positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
     ]
     plan = _plan(len(names), edges)
     return dict(zip(names, plan, strict=True))
+
+
+def between_ends(case, stated: dict[str, tuple]) -> dict[str, tuple]:
+    """Positions of nodes at which a pipe is cut: on a straight line between its ends, by their distances along it."""
+    found = {}
+    for name, route in case.routes.items():
+        if not is_cut(name, route.pipes):
+            continue
+        pieces = [case.links[pipe] for pipe in route.pipes]
+        ends = pieces[0].from_, pieces[-1].to
+        if all(end in stated for end in ends):
+            share = np.cumsum([piece.length for piece in pieces]) / sum(piece.length for piece in pieces)
+            first, last = (np.array(stated[end], float) for end in ends)
+            found |= {
+                piece.to: tuple(first + at * (last - first)) for piece, at in zip(pieces[:-1], share, strict=False)
+            }
+    return {name: one for name, one in found.items() if name in case.nodes and name not in stated}
 
 
 def place(port: str) -> str:

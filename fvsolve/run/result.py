@@ -79,15 +79,15 @@ class LimitVerdict(NamedTuple):
 
     @property
     def doubtful(self) -> bool:
-        """Whether its value may be off by more than its margin."""
-        return None not in (self.error, self.margin) and abs(self.margin) < self.error
+        """Whether it is not passed, but its value may be off by more than its margin."""
+        return None not in (self.error, self.margin) and 0.0 <= self.margin < self.error
 
     @property
     def state(self) -> str:
-        """`holds`, `FAILS`, or `open`: not passed in a run that cannot tell, or nearer to the limit than its error."""
+        """`holds`, `FAILS` where it is passed, or `open`: not passed, but a run cannot tell, or the error is more."""
         if self.ok:
             return HOLDS
-        return OPEN if self.margin is not None and (self.margin >= 0.0 or self.doubtful) else FAILS
+        return OPEN if self.margin is not None and self.margin >= 0.0 else FAILS
 
 
 class Comparison(NamedTuple):

@@ -225,12 +225,27 @@ def network(links: dict[str, tuple[str, str]], **positions) -> SimpleNamespace:
         places=dict.fromkeys(names),
         nodes={name: SimpleNamespace(position=positions.get(name)) for name in names},
         links={name: SimpleNamespace(ports={"from": a, "to": b}) for name, (a, b) in links.items()},
+        routes={},
     )
 
 
 def test_stated_positions_are_used():
     places = layout.positions(network({"x": ("a", "b")}, a=(1.0, 2.0), b=(3.0, 4.0)), {"x": 9.0})
     assert places["a"].tolist() == [1.0, 2.0] and places["b"].tolist() == [3.0, 4.0]
+
+
+def test_where_a_pipe_is_cut_its_place_is_that_along_the_pipe():
+    """A vessel by chainage leaves a plan of stated positions as it is."""
+    case = {
+        "schema": 1, "fluid": {"name": "Water"}, "numerics": {"end": 1.0},
+        "nodes": {"a": {"type": "reservoir", "head": 20.0, "elevation": 0.0, "position": [100.0, 0.0]},
+                  "b": {"type": "junction", "elevation": 0.0, "position": [100.0, 400.0]},
+                  "tap": {"type": "junction", "on": "main", "at": 100.0}},
+        "links": {"main": {"type": "pipe", "from": "a", "to": "b", "length": 400.0, "diameter": 0.1,
+                           "wave_speed": 1000.0, "friction": {"model": "none"}, "cells": 40}},
+    }  # fmt: skip
+    places = layout.positions(fvsolve.load(case), {"main-1": 100.0, "main-2": 300.0})
+    assert places["tap"].tolist() == [100.0, 100.0] and places["b"].tolist() == [100.0, 400.0]
 
 
 def test_a_chain_is_laid_out_straight_and_to_scale():

@@ -191,8 +191,10 @@ def test_verdicts_stand_first_those_that_fail_before_others(closure):
     mark = {"what": "below vapor pressure", "place": "links.main", "time": 1.0, "text": "main: below"}
     later = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False}], marks=[mark])).text
     assert "vacuum: from a time on the numbers are not to be trusted." in later
-    unsure = read(changed(closure, verdicts=[VERDICT | {"error": 4.0}])).text
-    assert "open. class: their margins are smaller than the error" in unsure and "open 13.5 4" in unsure
+    unsure = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "error": 0.4}])).text
+    assert "open. vacuum: their margins are smaller than the error" in unsure and "open 0.5 0.4" in unsure
+    passed = read(changed(closure, verdicts=[VERDICT | {"error": 4.0}])).text
+    assert "The limit does not hold. class" in passed and "FAILS 13.5 4" in passed
 
 
 def test_what_is_no_number_is_none_in_the_page():

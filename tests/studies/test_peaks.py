@@ -101,6 +101,11 @@ def test_the_command_says_how_far_peaks_and_verdicts_are_off(fvs, tmp_path, monk
     assert abs(fine.verdicts[0].value - verdict["value"]) <= verdict["error"]
     assert fvsolve.open_run(tmp_path / "runs" / "scene").verdicts[0].error == verdict["error"]
     assert "+-" not in fvs("run", "scene.toml", "--out", "plain", "--no-pictures")[1]
+    for share, state, wanted in ((0.5, "open", 1), (2.0, "holds", 0), (-0.5, "FAILS", 1)):  # of the band, as a margin
+        limit = f"limits.top.greatest={verdict['value'] + share * verdict['error']!r} Pag"
+        status, text, _ = fvs("run", "scene.toml", "--error", "--no-pictures", "--set", limit, "--out", state)
+        (one,) = fvsolve.open_run(tmp_path / state).verdicts
+        assert (one.state, status) == (state, wanted) and ("its margin is smaller" in text) == (state == "open")
 
 
 def test_a_finer_case_is_finer_in_all_that_has_a_resolution() -> None:
