@@ -41,7 +41,7 @@ TARGETS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 def made(name: str) -> Chart:
     """The chart of a scene, its picture written."""
     case, keys, about = SCENES[name]
-    found = chart(shipped.find(case), keys, folder=POINTS / name)
+    found = chart(shipped.find(case), keys, out=POINTS / name)
     PICTURES.mkdir(parents=True, exist_ok=True)
     picture = write(found, POINTS / name, title=f"{name}: {about}", dpi=80)[1]
     (PICTURES / picture.with_stem(name).name).write_bytes(picture.read_bytes())
