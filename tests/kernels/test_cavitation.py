@@ -249,6 +249,10 @@ def test_where_no_cavity_is_near_following_cavities_changes_nothing(beside) -> N
     assert followed.ok and plain.ok and not followed.summary["cavities"]
     for probe, most in (("v.head", 1e-3), ("gate.flow", 2e-4)):
         assert np.max(np.abs(followed[probe] - plain[probe])) < most * np.ptp(plain[probe])
+    turned = links["pen"] | {"from": "v", "to": "lake"}
+    case = scene(nodes | beside["nodes"], links | {"pen": turned}, 14.0, PLAIN, ["v.head"], 0.02,
+                 fluid=fluid | {"cavitation": True})  # fmt: skip
+    assert fvsolve.run(case)["v.head"] == approx(followed["v.head"], rel=1e-9)
 
 
 def test_without_an_event_nothing_moves_by_one_bit():
