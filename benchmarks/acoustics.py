@@ -13,6 +13,7 @@ from scipy.sparse.linalg import expm_multiply
 
 from fvsolve.case import load
 from fvsolve.model import Slate, State, build
+from fvsolve.steppers.signatures import addresses, rhs_at
 
 LENGTH = SPEED = 1000.0  # [m, m/s]
 END = 2.0  # [s] there and back
@@ -81,7 +82,7 @@ class Acoustics:
 
     def _rhs(self):
         """fvsolve's own compiled rhs as f(t, y, dydt); its tables and `out` by their addresses."""
-        rhs, slate, out = self.model.functions.rhs, Slate(self.model), self.model.new_out()
+        at, slate, out = int(addresses((self.model.functions.rhs,))[0]), Slate(self.model), self.model.new_out()
         self._kept, handle = (slate, out), slate.handle
         handle_at, handle_size, out_at, out_size = handle.ctypes.data, handle.size, out.ctypes.data, out.size
 
@@ -89,7 +90,7 @@ class Acoustics:
         def function(t, y, dydt):
             tables = numba.carray(pointer(handle_at), handle_size, np.int64)
             beside = numba.carray(pointer(out_at), out_size, np.float64)
-            rhs(t, y, dydt, beside, tables)
+            rhs_at(at)(t, y, dydt, beside, tables)
 
         return function
 

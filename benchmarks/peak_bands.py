@@ -1,51 +1,119 @@
-"""Bands of `fvsolve run --error` held against finer runs of all shipped cases.
+"""Bands of `fvsolve run --error` held against finer runs of all shipped cases, or of random mains.
 
 python benchmarks/peak_bands.py [CASE]...
+python benchmarks/peak_bands.py --random 160 [--seed 0]
 
 Of every peak and claim the band, and how far it is from the run of four times the resolution (twice where there are
-basins, whose finest run then is one of the three). Prints those outside their band, and how wide bands are beside the
-difference.
+basins, whose finest run then is one of the three); of random mains from that of eight times, with limits at 0.9 to 1.1
+of each peak, whose verdicts the finer run turns or not. Prints those outside their band, how many have none, and how
+wide bands are beside the differences, of those above 5e-6 of their value, the least band.
 """
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
+from typing import NamedTuple
 
 import numpy as np
+from random_mains import limits_near, random_main
 
 from fvsolve.case import load, shipped
+from fvsolve.errors import FvsolveError
 from fvsolve.run import run
 from fvsolve.studies.levels import finer
-from fvsolve.studies.peaks import SIDES, peak_errors
+from fvsolve.studies.peaks import LEAST, SIDES, peak_errors
+
+QUIET = {"output.fields": 0, "output.lines": {}}
 
 
-def held(name: str) -> list[tuple[str, float, float]]:
-    """(peak or claim, band, difference to the finer run) of a case."""
+class Row(NamedTuple):
+    """A peak or claim: its band, its value and that of a finer run."""
+
+    name: str
+    band: float | None
+    value: float
+    fine: float
+
+    @property
+    def off(self) -> float:
+        return abs(self.fine - self.value)
+
+
+def rows_of(name: str, said: dict, fine: dict) -> list[Row]:
+    """Peaks and claims of a case beside those of a finer run."""
+    rows = [Row(f"{name} {side} {probe}", peak[side]["error"], peak[side]["value"], fine["extremes"][probe][side])
+            for probe, peak in said["peaks"].items() for side in SIDES]  # fmt: skip
+    return rows + [Row(f"{name} {one['text']}", one["error"], one["found"], other["found"])
+                   for one, other in zip(said["expectations"], fine["expectations"], strict=True)]  # fmt: skip
+
+
+def of_shipped(name: str) -> list[Row]:
     case = load(name)
     times = 2.0 if case.meshes else 4.0
-    quiet = {"output.fields": 0, "output.lines": {}}
-    said = peak_errors(run(case, set=quiet), case)
-    fine = run(case, set=finer(case, times) | quiet | {"output.every": case.output.every / times}).summary
-    rows = [(f"{name} {side} {probe}", peak[side]["error"], peak[side]["value"], fine["extremes"][probe][side])
-            for probe, peak in said["peaks"].items() for side in SIDES]  # fmt: skip
-    rows += [(f"{name} {one['text']}", one["error"], one["found"], other["found"])
-             for one, other in zip(said["expectations"], fine["expectations"], strict=True)]  # fmt: skip
-    return [(what, band, abs(there - here)) for what, band, here, there in rows if band is not None]
+    said = peak_errors(run(case, set=QUIET), case)
+    fine = run(case, set=finer(case, times) | QUIET | {"output.every": case.output.every / times}).summary
+    return rows_of(name, said, fine)
 
 
-def main(names: list[str]) -> None:
-    rows, began = [], time.perf_counter()
-    for name in names:
-        rows += held(name)
-    misses = [row for row in rows if row[2] > row[1]]
-    for what, band, off in misses:
-        print(f"outside: {what}: off by {off:.3g}, band {band:.3g}")
-    wide = sorted(band / off for _, band, off in rows if off > 1e-6 * band)
-    print(f"{len(rows)} peaks and claims of {len(names)} cases, {len(misses)} outside their band; band over "
-          f"difference: median {np.median(wide):.3g}, quarters {np.quantile(wide, 0.25):.3g} and "
-          f"{np.quantile(wide, 0.75):.3g}; {time.perf_counter() - began:.0f} s")  # fmt: skip
+def of_main(seed: int) -> tuple[list[Row], list[Row], list[str]]:
+    """Peaks, places of limits, and verdicts that turn, of one random main."""
+    case = load(random_main(seed))
+    parts = {name: whole(run(case, pictures=False), name) for name in ("end", "j", "a", "b")}
+    case = load(random_main(seed) | {"limits": limits_near(parts, seed)})
+    said = peak_errors(run(case, pictures=False), case)
+    fine = run(case, set=finer(case, 8.0) | {"output.every": case.output.every / 8.0}, pictures=False).summary
+    limits = list(zip(said["verdicts"], fine["verdicts"], strict=True))
+    rows = [Row(f"{seed} {one['name']}", one["error"], one["value"], other["value"]) for one, other in limits]
+    turned = [f"{seed} {one['name']}: {one['state']}, margin {one['margin']:.4g} within {one['error']}, "
+              f"by the finer run {other['margin']:.4g}"
+              for one, other in limits if one["state"] == "holds" and other["margin"] < 0.0]  # fmt: skip
+    return rows_of(str(seed), said, fine), rows, turned
+
+
+def whole(result, name: str) -> tuple[float, float]:
+    """Least and greatest pressure of a part."""
+    if name in result.envelope:
+        one = result.envelope[name]
+        return float(one["least_pressure"].min()), float(one["greatest_pressure"].max())
+    peak = result.extremes[f"{name}.pressure"]
+    return peak.least, peak.greatest
+
+
+def tell(rows: list[Row], what: str) -> None:
+    known = [row for row in rows if row.band is not None]
+    misses = [row for row in known if row.off > row.band]
+    for row in misses:
+        print(f"outside: {row.name}: off by {row.off:.3g}, band {row.band:.3g} of {row.value:.4g}")
+    wide = [row.band / row.off for row in known if row.off > LEAST * abs(row.value)]
+    quarters = " ".join(f"{one:.3g}" for one in np.quantile(wide, [0.25, 0.5, 0.75])) if wide else "-"
+    share = 100.0 * len(misses) / max(len(known), 1)
+    print(f"{what}: {len(rows)}, {len(rows) - len(known)} without a band, {len(misses)} outside ({share:.2g} %)")
+    print(f"  band over difference, quarters and median: {quarters}")
+
+
+def main() -> None:
+    wanted = argparse.ArgumentParser()
+    wanted.add_argument("cases", nargs="*")
+    wanted.add_argument("--random", type=int, default=0, metavar="N")
+    wanted.add_argument("--seed", type=int, default=0, help="of the first main")
+    asked, began = wanted.parse_args(), time.process_time()
+    if asked.random:
+        made = []
+        for seed in range(asked.seed, asked.seed + asked.random):
+            try:
+                made.append(of_main(seed))
+            except FvsolveError as error:
+                print(f"{seed}: {error}")
+        peaks, places, turned = (sum(parts, []) for parts in zip(*made, strict=True))
+        tell(peaks, "peaks")
+        tell(places, "limits")
+        print(f"verdicts turned: {len(turned)}", *turned, sep="\n  ")
+    else:
+        names = asked.cases or list(shipped.names())
+        tell([row for name in names for row in of_shipped(name)], f"peaks and claims of {len(names)} cases")
+    print(f"{time.process_time() - began:.0f} s of processor time")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or list(shipped.names()))
+    main()

@@ -1,6 +1,15 @@
 """Hydraulic transients by finite volumes. Knows the public names and where they live; imports none of them."""
 
-from fvsolve.names import offer
+import sys
+
+LEAST = 3, 11  # version of Python
+if sys.version_info < LEAST:
+    raise ImportError(
+        f"fvsolve needs Python {LEAST[0]}.{LEAST[1]} or later; {sys.executable} is {sys.version.split()[0]}. Make the "
+        "environment with a later one: python3.12 -m venv .venv"
+    )
+
+from fvsolve.names import offer  # noqa: E402
 
 _HOMES = {
     "Case": "case",

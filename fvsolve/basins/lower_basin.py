@@ -143,9 +143,9 @@ class BasinRows:
         """What there is to know of deviations at the start."""
         return []
 
-    def watch(self, y: np.ndarray) -> Any:
-        """What watches a run from deviations y: it can `look` at (t, state), has `kept` numbers, makes `notices`."""
-        return None
+    def watches(self, y: np.ndarray) -> list[Any]:
+        """What watches a run from deviations y: each can `look` at (t, state), has `kept` numbers, makes `notices`."""
+        return []
 
     # ----------------------------------------------------------------------------------------------------------
 
@@ -256,12 +256,12 @@ class BasinRows:
         """Areas of cells over those as drawn, in a state of a model : float64[n]."""
         return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
 
-    def normal_at(self, out: np.ndarray, layout) -> np.ndarray:
-        """Of what rides on a body, its normal in the world, for each cell : float64[n, 3]."""
-        from fvsolve.basins.lower_frames import corners
+    def vectors_at(self, fields: dict[str, np.ndarray], out: np.ndarray, layout) -> dict[str, np.ndarray]:
+        """Velocities of cells of a basin on a body, and its normal, along axes of the world : float64[n, 3] each."""
+        from fvsolve.basins.lower_frames import axes_in_world
 
-        ends = corners(self, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), out, layout)
-        return np.tile(ends[1] - ends[0], (self.n, 1))
+        axes = axes_in_world(self, out, layout)[1]
+        return {"velocity": fields["velocity"] @ axes.T, "normal": np.tile(axes[:, 2], (self.n, 1))}
 
     def points_at(self, y: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
         """Corners of cells in a state of a model, of what rides on a body in the world : float64[p, 3] [m]."""
@@ -270,9 +270,10 @@ class BasinRows:
         points = np.column_stack([plan, self.ground(x, z)])
         if self.part.on is None:
             return points
-        from fvsolve.basins.lower_frames import corners
+        from fvsolve.basins.lower_frames import axes_in_world
 
-        return corners(self, points, out, layout)
+        origin, axes = axes_in_world(self, out, layout)
+        return origin + points @ axes.T
 
     def at_rest(self) -> np.ndarray | float:
         """Its first quantity at rest."""

@@ -83,12 +83,11 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
     return np.maximum(level_over(drawn, tilt, basin.mesh.area, volume) - (drawn + tilt), 0.0)
 
 
-def corners(basin, points: np.ndarray, out: np.ndarray, layout) -> np.ndarray:
-    """Points in axes of a basin where they are in the world : float64[p, 3] [m]."""
+def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarray]:
+    """Origin float64[3] [m] and axes float64[3, 3], one a column, of a basin on a body, in the world."""
     from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE
     from fvsolve.kernels.records import BODY_OUT
 
     first = int(layout["body"]) + BODY_OUT * int(basin.row["body"])
-    turn = out[first + ATTITUDE :][:9].reshape(3, 3)
-    at = np.array(basin.part.place)
-    return out[first + PLACE :][:3] + (at + points @ basin.part.turn.T) @ turn.T
+    place, turn = out[first + PLACE :][:3], out[first + ATTITUDE :][:9].reshape(3, 3)
+    return place + turn @ np.array(basin.part.place), turn @ basin.part.turn

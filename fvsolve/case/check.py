@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, riding_networks, sloshing
+from fvsolve.case import basins, bodies, riding, riding_networks, sloshing
 from fvsolve.case.bodies import WORLD
 from fvsolve.case.claims import Expect
 from fvsolve.case.raw import Raw
@@ -110,6 +110,7 @@ def parts(
         yield from bodies.open_pins(nodes, links, poses)
         yield from sloshing.misfits(nodes, lumped, poses)
         yield from sloshing.weightless(nodes, gravity)
+        yield from riding.overturned(nodes, poses)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
     for group, found in (("links", links), ("nodes", nodes)):
         for name, part in found.items():

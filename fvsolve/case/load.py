@@ -198,7 +198,8 @@ class _Reader:
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
             carries = bool(carried) and any(parts["nodes"][name].own.carries for name in meshes)
-            numerics = numerics.filled(has_cells, carries, check.follows_cavities(fluid, has_cells))
+            rubs = any(parts["nodes"][name].own.rubs(parts["nodes"][name]) for name in meshes)
+            numerics = numerics.filled(has_cells, carries, rubs, check.follows_cavities(fluid, has_cells))
         self.add(scalars.misfits(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)
         if None not in (numerics, output, properties) and not self.faults:

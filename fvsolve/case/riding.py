@@ -56,6 +56,19 @@ def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any) -> F
         yield (*key, "elevation"), f"it rides on {node.on}; say where with at, in axes of that body"
 
 
+def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Found:
+    """Faults of water upside down on fixed joints: nothing ever presses it on its bed."""
+    for name, node in nodes.items():
+        on = getattr(node, "on", None)
+        wet = node.kind == "tank" or (node.kind == "basin" and node.own.sloshes and node.sloshing != "frozen")
+        if not wet or on not in poses or any(nodes[one].joint.kind != "fixed" for one in carriers(on, nodes)):
+            continue
+        turn = poses[on].attitude @ getattr(node, "turn", np.eye(3))
+        if turn[2, 2] <= 0.0:
+            text = f"its bottom is {np.degrees(np.arccos(turn[2, 2])):.3g} deg off level on {on}, which is fixed"
+            yield ("nodes", name, "on"), f"{text}: what is in it would run out; expected less than 90 deg"
+
+
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
     """Faults of the body that something rides on; named : tables of all nodes, of those at fault too."""
     bodies = [one for one, node in nodes.items() if isinstance(node, Body)]

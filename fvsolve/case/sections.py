@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from fvsolve import units
-from fvsolve.errors import did_you_mean
+from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OILY
 from fvsolve.parts.pipe.part import LINES
+from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.table import Named, Table
 from fvsolve.parts.value import (
     COUNTED,
@@ -37,6 +39,7 @@ from fvsolve.parts.value import (
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.steppers.structure import KINDS
+from fvsolve.steppers.tableau import OWN, method_of_file
 from fvsolve.units import show
 
 STARTS = ("steady", "equilibrium", "rest")
@@ -46,7 +49,7 @@ CAVITY_SCHEMES = tuple(name for name, one in SCHEMES.items() if one.cavities)
 # error control elsewhere.
 DEFAULT_SCHEME, DEFAULT_LIMITER = "weno5", "van-leer"
 DEFAULT_METHOD, DEFAULT_COURANT = "rk4", 0.9
-DEFAULT_METHOD_CARRIED = "ssp-rk3"  # where basins carry scalars, whose bounds rk4 does not keep
+DEFAULT_METHOD_SSP = "ssp-rk3"  # where basins carry scalars, whose bounds rk4 does not keep, or have friction
 CAVITY_SCHEME, CAVITY_METHOD, CAVITY_COURANT = "muscl", "ssp-rk2", 0.5  # where cavities are followed in pipes
 CAVITY_AIR = 1e-7  # of a degassed liquid, what they grow from
 DEFAULT_METHOD_RTOL, DEFAULT_RTOL = AUTO, 1e-6
@@ -124,6 +127,30 @@ class MethodNames(Collection):
         return 1 + len(METHODS)
 
 
+class MethodChoice(Choice):
+    """A method by name, or by a file that holds its tableau as text."""
+
+    def read(self, given: Any, setting: Setting) -> str:
+        if not isinstance(given, str) or given in OWN or given == AUTO:
+            return super().read(given, setting)
+        if not Path(given).suffix or (given in METHODS and METHODS[given].name == given):
+            return super().read(given, setting)
+        path = find_file(given, setting)
+        name = copy_name(path, setting)
+        try:
+            METHODS[name] = method_of_file(path)
+        except FvsolveError as error:
+            raise ValueError(str(error)) from None
+        return name
+
+    @property
+    def takes(self) -> str:
+        return f'{super().takes}, or a file that holds a tableau as text, `"ssp43.txt"`'
+
+    def json(self) -> dict[str, Any]:
+        return {"anyOf": [super().json(), {"type": "string", "pattern": "[.]"}]}
+
+
 class Numerics(Table):
     """`[numerics]`: the span of time, how space and time are cut, where to start from."""
 
@@ -152,11 +179,11 @@ class Numerics(Table):
     limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "of the scheme muscl")] = DEFAULT_LIMITER
     method: Annotated[
         str | None,
-        Choice(
+        MethodChoice(
             "method",
             MethodNames(),
-            f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}) "
-            "if left out",
+            f"Runge-Kutta method; {DEFAULT_METHOD} (with rtol {DEFAULT_METHOD_RTOL}, with cavitation {CAVITY_METHOD}, "
+            f"with scalars or friction in basins {DEFAULT_METHOD_SSP}) if left out",
             changes=PROFILE,
         ),
     ] = None
@@ -205,10 +232,11 @@ class Numerics(Table):
     ] = DEFAULT_ACCURACY
     below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = "continue"
 
-    def filled(self, has_cells: bool, carries: bool, parts: bool) -> Numerics:
+    def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> Numerics:
         """The same with the scheme, step control and method that are the default.
 
-        carries : whether basins carry scalars; parts : whether cavities are followed in pipes.
+        carries : whether basins carry scalars; rubs : whether their beds brake the flow; parts : whether
+        cavities are followed in pipes.
         """
         changes: dict[str, Any] = {}
         if self.scheme is None:
@@ -219,7 +247,7 @@ class Numerics(Table):
             changes |= {"courant": courant} if by_courant else {"rtol": DEFAULT_RTOL}
         adaptive = self.rtol is not None or "rtol" in changes
         if self.method is None:
-            by_step = CAVITY_METHOD if parts else DEFAULT_METHOD_CARRIED if carries else DEFAULT_METHOD
+            by_step = CAVITY_METHOD if parts else DEFAULT_METHOD_SSP if carries or rubs else DEFAULT_METHOD
             changes["method"] = DEFAULT_METHOD_RTOL if adaptive else by_step
         return self.model_copy(update=changes)
 

@@ -74,7 +74,7 @@ def misfits(
         )
         if f"{name}.{patch}" in joined:
             yield (*key, patch), "a link joins here, and it is a wall that moves; join a patch that stands still"
-    yield from (((*key, *below), text) for below, text in faults_between(basin, mesh, walls))
+    yield from (((*key, *below), text) for below, text in faults_between(basin, mesh, walls, times))
     if walls and basin.holes:
         yield ("nodes", name, "holes"), "would be drawn out where lines move; wanted none beside a wall that moves"
 
@@ -186,8 +186,9 @@ def bed_faults(basin: Any, mesh: Any, patch: str) -> Iterator[tuple[tuple, str]]
         yield ("zone",), text
 
 
-def faults_between(basin: Any, mesh: Any, walls: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
+def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
     """Faults of several walls, and of other patches that lie on one."""
+    yield from crossing_faults(basin, mesh, walls, times)
     axes = {patch: outward(mesh, patch) for patch in walls}
     first = next(iter(axes), None)
     for patch, (axis, _) in axes.items():
@@ -202,3 +203,24 @@ def faults_between(basin: Any, mesh: Any, walls: dict[str, Any]) -> Iterator[tup
             lies = np.abs(mesh.middle[mesh.patch(patch), axis] - end) < 1e-9 * np.ptp(mesh.points[:, axis])
             if lies.any():
                 yield (patch,), f"lies on {wall}, a wall that moves; wanted on a side that stands still"
+
+
+def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -> Iterator[tuple[tuple, str]]:
+    """Faults of walls with a travel that leave a cell between them no room, though each alone does."""
+    driven = {patch: one.travel for patch, one in walls.items() if one.travel is not None}
+    if len(driven) < 2 or len({outward(mesh, patch)[0] for patch in driven}) > 1:
+        return
+    inside = np.concatenate([one.time for one in driven.values()])
+    at = np.unique([*np.linspace(*times, SAMPLES), *inside[(inside > times[0]) & (inside < times[1])]])
+    wide, alone = np.ones((mesh.area.size, at.size)), np.ones(len(driven), bool)
+    for k, (patch, travel) in enumerate(driven.items()):
+        axis, _ = outward(mesh, patch)
+        places = value(travel, at)
+        grown = np.outer(widened(mesh, axis, weights(basin, mesh, patch, mesh.points[:, axis])), places - places[0])
+        wide += grown
+        alone[k] = grown.min() > -1.0
+    if alone.all() and wide.min() <= 0.0:
+        last, first = list(driven)[-1], next(iter(driven))
+        when = at[np.argmax(wide.min(axis=0) <= 0.0)]
+        text = f"meets {first}: together they leave a cell no room from t = {when:.4g} s on"
+        yield (last, "travel"), f"{text}; expected less travel, or a wider basin"

@@ -36,7 +36,8 @@ def main() -> None:
     0: done. 1: a run stopped early or an expectation failed. 2: bad input. 130: interrupted.
     """
     for stream in (sys.stdout, sys.stderr):
-        stream.reconfigure(errors="backslashreplace")  # a terminal of few letters ends no run
+        if hasattr(stream, "reconfigure"):  # not where a caller has put another file in its place
+            stream.reconfigure(errors="backslashreplace")  # a terminal of few letters ends no run
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
         for room in _wanted(sys.argv[1:2]):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import json
 import sys
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -89,9 +88,6 @@ def _overrides(texts: list[str]) -> tuple[dict, list[Fault]]:
         key, equals, value = text.partition("=")
         if not (equals and key.strip()):
             faults.append(Fault(text, "wanted KEY=VALUE, for example links.main.cells=400", override=True))
-        elif key.strip() == "numerics.method" and (file := Path(value.strip())).suffix and file.is_file():
-            said = f"{file} is a file; studies take it as --method {file}; wanted the name of a method that fvsolve has"
-            faults.append(Fault(key.strip(), said, override=True))
         else:
             found[key.strip()] = value_of(value)
     return found, faults

@@ -35,8 +35,8 @@ def study(
 
 def _show(found) -> None:
     from fvsolve.cli import terminal
-    from fvsolve.cli.report import when, where_and_when
-    from fvsolve.run.result import FAILS
+    from fvsolve.cli.report import open_as, when, where_and_when
+    from fvsolve.run.result import FAILS, OPEN
     from fvsolve.studies.design import name_of
     from fvsolve.units import span
 
@@ -47,7 +47,7 @@ def _show(found) -> None:
     rows = []
     for row in found.rows:
         verdicts = {one["name"]: one for one in row["verdicts"]}
-        cells = [_cell(verdicts.get(name)) for name in limits]
+        cells = [_cell(verdicts.get(name), row) for name in limits]
         rows.append([name_of(row), standing(row), *cells])
     terminal.table(["run", "", *(f"margin of {name}" for name in limits.values())], rows, console)
     for row in found.rows:
@@ -61,14 +61,18 @@ def _show(found) -> None:
             if note["kind"] == "end":
                 terminal.line(console, f"{name_of(row)}: {note['text']}", "yellow")
         for one in verdicts_of(row):
-            if one.state == FAILS or one.doubtful:
+            if one.state in (FAILS, OPEN):
                 value = "-" if one.value is None else f"{one.value:.6g}"
                 text = f"{name_of(row)}: {one.name}: {value} {one.unit} ({where_and_when(one._asdict(), row)})"
-                why = "" if one.state == FAILS else ": open, as its margin is smaller than its error"
+                why = "" if one.state == FAILS else f": open, as {open_as(one, row)}"
                 terminal.line(console, text + why, "red" if one.state == FAILS else "yellow")
     names = [name or "the case as it is" for name in found.holds]
-    told = f"all limits hold in all events: {', '.join(names)}" if names else "nothing holds all limits in all events"
-    terminal.line(console, told, "green" if names else "bold red")
+    if found.limited:
+        told = f"all limits hold in all events: {', '.join(names)}"
+        told = told if names else "nothing holds all limits in all events"
+        terminal.line(console, told, "green" if names else "bold red")
+    else:
+        terminal.line(console, "no limits are stated, so none can hold or fail", "yellow")
     terminal.line(console, f"{found.folder}: study.json, study.csv and a run directory for each")
 
 
@@ -81,14 +85,18 @@ def verdicts_of(row: dict) -> list:
 
 def standing(row: dict) -> str:
     """Of a run in one word."""
-    from fvsolve.run.result import FAILS, HOLDS, OPEN
+    from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN
 
     states = [FAILS] * (not row["ok"]) + [one.state for one in verdicts_of(row)]
-    return next((one for one in (FAILS, OPEN) if one in states), HOLDS)
-
-
-def _cell(verdict) -> str:
-    if verdict is None or verdict["margin"] is None:
+    if not states:
         return "-"
+    return IN_WORDS[next((one for one in (FAILS, OPEN) if one in states), HOLDS)]
+
+
+def _cell(verdict, row: dict) -> str:
+    from fvsolve.run.result import not_valid
+
+    if verdict is None or verdict["margin"] is None:
+        return "-" if verdict is None else not_valid(row) or "-"
     error = "" if verdict["error"] is None else f" +- {verdict['error']:.2g}"
     return f"{verdict['margin']:.5g}{error}"

@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed, methods_of, told
+from fvsolve.cli.studying import Out, folder_of, listed, methods_of, replaced, told
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Column, Sheet, text
 
@@ -90,6 +90,7 @@ def ledger(case, port, out, as_json: bool) -> None:
     from fvsolve.studies.energy.energy import write_table
 
     folder = folder_of(case, "energy", out)
+    replaced(folder, FILES[0])
     with leaving(f"interrupted: no ledger, {folder} may lack files; {AGAIN}"):
         with watched(case) as progress:
             one = study(case, port=port, progress=progress)

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed
+from fvsolve.cli.studying import Out, folder_of, listed, replaced
 from fvsolve.studies.sheet import Sheet, write
 
 SHOWN = 24  # poles on the terminal; the others are in the file
@@ -58,6 +58,9 @@ def linearise(
     values = poles_of(found.a, energy_form(found.at.model, found.at.y))
     poles = values.poles()
     folder = folder_of(found.at.model.case, "linearise", out)
+    replaced(folder, "linear.npz")
+    for name in ("A.csv", "A-sparse.csv"):  # of which one is written
+        (folder / name).unlink(missing_ok=True)
     Sheet(POLES, poles).write(folder / "poles.csv")
     write_matrices(folder, found)
     said = found.plain() | {"poles": poles, "poles_are": values.said, "directory": str(folder)}

@@ -38,7 +38,8 @@ def one(name: str, out: Path | None) -> Said:
     """One method: its tableau, R(s), facts and a picture of its stability region, which is written."""
     from fvsolve.draw.region import region_figure
 
-    method = method_named(method_from(name))
+    name = method_from(name)
+    method = method_named(name)
     facts = analyse(method)
     path = out or Path(f"{name}.png")
     if path.suffix.lower() not in PICTURES:

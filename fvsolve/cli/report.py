@@ -66,7 +66,7 @@ def result(one) -> None:
     for name, ledger in said["ledgers"].items():
         _line(console, f"{name} ledger: {_ledger(ledger)}")
     for claim in said["expectations"]:
-        _line(console, _claim(claim), "green" if claim["ok"] else "bold red")
+        _line(console, _claim(claim, said), "green" if claim["ok"] else "bold red")
     for verdict in said["verdicts"]:
         _line(console, _verdict(verdict, said), "green" if verdict["ok"] else "bold red")
     for measured in said["comparisons"]:
@@ -74,6 +74,8 @@ def result(one) -> None:
     _notices(console, said["warnings"])
     if "resolution" in said:
         _line(console, said["resolution"]["words"])
+        for text in said["resolution"]["reasons"]:
+            _line(console, text)
     end = "" if "at t = " in said["reason"] else f" at t = {told(said['t'])}"
     _line(console, f"{said['reason']}{end}; {_cost(said)}", None if one.ok else "bold red")
 
@@ -284,9 +286,12 @@ def differences(found: dict, said: dict) -> None:
 
 def _extremes(console, one) -> None:
     from fvsolve.output.column import UnitColumn
+    from fvsolve.run.result import not_valid
 
     clock = UnitColumn("at", "time", one.summary["time_unit"])
-    rows = [[name, one.units[name], _number(found.least), _number(_in(clock, found.t_least)), _number(found.greatest),
+    none = not_valid(one.summary) or "-"
+    rows = [[name, one.units[name], none if found.least is None else _number(found.least),
+             _number(_in(clock, found.t_least)), none if found.greatest is None else _number(found.greatest),
              _number(_in(clock, found.t_greatest))] for name, found in one.extremes.items()]  # fmt: skip
     heads = ["probe", "unit", "least", clock.header, "greatest", clock.header]
     if "peaks" in one.summary:
@@ -315,8 +320,11 @@ def _ledger(ledger: dict) -> str:
     return f"{kept}, {_number(ledger['relative'])} of the largest term" if "relative" in ledger else kept
 
 
-def _claim(one: dict) -> str:
-    verdict = "holds" if one["ok"] else "FAILS"
+def _claim(one: dict, said: dict) -> str:
+    from fvsolve.run.result import IN_WORDS, OPEN
+
+    why = "" if one["state"] != OPEN else why_open(said) or "its value is not known"
+    verdict = f"OPEN, as {why}" if why else IN_WORDS[one["state"]]
     return (
         f"{verdict}: {one['text']} = {_number(one['claimed'])} {one['unit']} within "
         f"{_number(one['tolerance'])} {span(one['unit'])}: found {_number(one['found'])}"
@@ -339,13 +347,13 @@ def where_and_when(one: dict, said: dict) -> str:
 
 
 def _verdict(one: dict, said: dict) -> str:
-    from fvsolve.run.result import OPEN, LimitVerdict
+    from fvsolve.run.result import IN_WORDS, OPEN, LimitVerdict, not_valid
 
     this = LimitVerdict(**one)
     beside = "at least" if one["bound"] == "least" else "at most"
     found = f"{one['quantity'].replace('_', ' ')} {_number(one['value'])} {one['unit']} ({where_and_when(one, said)})"
-    held = this.state if this.state != OPEN else f"OPEN, as {open_as(this, said)}"
-    margin = "-" if one["margin"] is None else f"{_number(one['margin'])} {span(one['unit'])}"
+    held = IN_WORDS[this.state] if this.state != OPEN else f"OPEN, as {open_as(this, said)}"
+    margin = not_valid(said) or "-" if one["margin"] is None else f"{_number(one['margin'])} {span(one['unit'])}"
     text = f"{held}: {one['name']}: {found}, {beside} {_number(one['limit'])}; margin {margin}"
     if one["error"] is not None and one["margin"] is not None:
         text += f" within {one['error']:.2g}"
@@ -356,7 +364,9 @@ def _verdict(one: dict, said: dict) -> str:
 
 def open_as(verdict, said: dict) -> str:
     """Why a limit that may be passed, or is not, does not hold either."""
-    return "its margin is smaller than its error" if verdict.doubtful else why_open(said)
+    if verdict.doubtful:
+        return "its margin is smaller than its error"
+    return why_open(said) or f"its {'value' if verdict.margin is None else 'error'} is not known"
 
 
 def marks_of(marks: list[dict], told) -> list[str]:
@@ -374,10 +384,14 @@ def marks_of(marks: list[dict], told) -> list[str]:
 
 
 def why_open(said: dict) -> str:
-    """Why a run cannot tell whether a limit holds that it does not pass."""
+    """Why a run cannot tell whether a limit holds that it does not pass; "" where it can."""
+    from fvsolve.run.result import not_valid
+
     late = [one["text"] for one in said["warnings"] if one["kind"] == "end"]
+    if text := not_valid(said):
+        return f"the run is {text}"
     if not said["marks"]:
-        return late[0] if said["ok"] and late else f"the run is not ok ({said['reason']})"
+        return (late[0] if late else "") if said["ok"] else f"the run is not ok ({said['reason']})"
     first = min(said["marks"], key=lambda mark: mark["time"])
     return f"results from {when(said)(first['time'])} on are not to be trusted"
 

@@ -22,6 +22,9 @@ def size(
         list[str], typer.Option(metavar='"KEY = formula"', help="another key as a formula of x, the value in SI")
     ] = [],  # noqa: B006
     rtol: Annotated[float, typer.Option(help="how closely it is bracketed, of itself")] = 0.01,
+    error: Annotated[
+        bool, typer.Option("--error", help="limits hold by more than their errors, by two more runs of each value")
+    ] = False,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
@@ -43,7 +46,7 @@ def size(
         raise CaseError(faults, case)
     with told(kept=False) as progress:
         found = sizing.size(made, key, *listed, goal, ties, None, rtol,
-                            lambda done, what: progress(done, sizing.MOST_RUNS, what))  # fmt: skip
+                            lambda done, what: progress(done, sizing.MOST_RUNS, what), error)  # fmt: skip
     if as_json:
         print_json(found.plain())
     else:

@@ -40,24 +40,21 @@ def methods_of(text: str | None) -> list[str] | None:
 
 def method_from(word: str) -> str:
     """The name of a method; of a file that holds its tableau as text, the file's own, known from then on."""
-    from fvsolve.steppers.tableau import METHODS, tableau
+    from fvsolve.steppers.tableau import METHODS, method_of_file
 
     path = Path(word)
-    if word in METHODS or not path.is_file():
-        return word
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FvsolveError(f"{path} cannot be read as a tableau: {error}") from None
-    try:
-        return tableau(path.stem, text, source=str(path)).name
-    except FvsolveError as error:
-        raise FvsolveError(f"{path}: {error}") from None
+    return word if word in METHODS or not path.is_file() else method_of_file(path).name
 
 
 def folder_of(case, study: str, out: Path | None) -> Path:
     """Where a study of a case leaves its files: runs/NAME.STUDY by default, created."""
     return writable(out or Path("runs") / f"{case.name}.{study}")
+
+
+def replaced(folder: Path, name: str) -> None:
+    """Say that an earlier result goes, whose file `name` stands in the folder."""
+    if (folder / name).exists():
+        print(f"{folder}: replaces the results of an earlier command there; --out DIR keeps them", file=sys.stderr)
 
 
 def writable(folder: Path) -> Path:
@@ -86,9 +83,11 @@ def told(kept: bool = True) -> Iterator[Callable[[int, int, str], None]]:
             print(f"\r\033[K{latest[0]}", end="", file=sys.stderr, flush=True)
 
     def repeat() -> None:
+        last = ""
         while not over.wait(NOW_AND_THEN):
-            if latest[0]:
-                print(latest[0], file=sys.stderr, flush=True)
+            if latest[0] != last:
+                last = latest[0]
+                print(last, file=sys.stderr, flush=True)
 
     if not shows:
         threading.Thread(target=repeat, daemon=True).start()

@@ -17,10 +17,11 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import AMENDED, STATUS, table_types
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
-# SEE makes of a state what the pieces of all but RHS see of it, where that is something else (`basins.walls`).
-RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, SEE, JOBS = range(9)
+# SEE makes of a state what the pieces of all but RHS see of it, where that is something else (`basins.walls`). DAMP
+# divides rates of a stage by what is quick in them (`steppers.semi_implicit`).
+RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, SEE, DAMP, JOBS = range(10)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # arguments of pieces
-ARGUMENTS = dict.fromkeys((RHS, CLOSE, SEE), RATES)
+ARGUMENTS = dict.fromkeys((RHS, CLOSE, SEE, DAMP), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
 HOOKS = {  # of the law of a part: arguments, and what it returns
     "set": (
@@ -221,6 +222,13 @@ def rhs_in_turn(t, y, dydt, out, handle):
     if dydt.size == 0 and at >= 0:
         rates = tables.work[at : at + y.size]
     run(RHS, t, y, rates, out, handle)
+
+
+@njit
+def damp_in_turn(h, y, rates, quick, handle):
+    """Every piece that divides rates of a stage y by 1 + h r; quick : h r of the states that it divides."""
+    see(0.0, y, open_tables(handle).seen, quick, handle)
+    run(DAMP, h, y, rates, quick, handle)
 
 
 @njit

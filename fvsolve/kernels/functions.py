@@ -30,6 +30,7 @@ class Functions:
             self.hang(*MOVING, *["lead"] * cast.columns)
         self.enter(calls.CLOSE, cast.functions(*CLOSING))
         self.enter(calls.SEE, cast.functions("see"))
+        self.enter(calls.DAMP, cast.functions("damp"))
         self.observe = self.all(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
         self.enter(calls.RECORD, cast.functions("record"))
         self.enter(calls.EVENTS, cast.functions("events"))

@@ -20,6 +20,10 @@ if COMPILING:
         """int64[3 n]: the handle of tables at these places."""
         return np.array(places, dtype=np.int64)
 
+    def room_within() -> np.ndarray:
+        """Room for a handle among the tables behind another."""
+        return np.zeros(3 * len(Called._fields), dtype=np.int64)
+
     @Intrinsic
     def open_tables(typingctx, handle):
         """The tables behind a handle, uncounted; `tables.nodes` loads one."""
@@ -36,11 +40,30 @@ else:
         """The handle of these tables."""
         return Called(*places, *[None] * (len(Called._fields) - len(places)))
 
+    def room_within() -> np.ndarray:
+        """Room for a handle among the tables behind another."""
+        return np.empty(1, dtype=object)
+
     def open_tables(handle):
-        """The tables behind a handle."""
-        return handle
+        """The tables behind a handle, or behind one that stands among others."""
+        return handle[0] if isinstance(handle, np.ndarray) else handle
 
 
 def make_handle(tables: tuple):
     """The handle of these tables."""
     return joined(places_of(tables))
+
+
+def linked(shared: tuple, sharp: tuple, written: tuple, called: tuple):
+    """The handle of a model's tables at these places and what a run writes; behind its `sharp` with others of these.
+
+    shared, sharp : places of the model's tables, and of those that a jump of a delay line meets
+    """
+    own = places_of((*written, *called))
+    if written.sharp.size > 0:
+        within = joined((*sharp, *own))
+        if COMPILING:
+            written.sharp[:] = within
+        else:
+            written.sharp[0] = within
+    return joined((*shared, *own))

@@ -50,6 +50,7 @@ class Pieces:
     power: str = ""
     stored: str = ""
     see: str = ""  # makes of states what all these see of them, in place of dydt
+    damp: str = ""  # divides rates dydt of a stage by 1 + h r, of a step h in place of t; h r in place of out
     home: str = HOME
 
 

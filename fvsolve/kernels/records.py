@@ -29,6 +29,7 @@ LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 # Status codes that travel up; the message is made in Python.
 OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_ROOM, NO_WEIGHT = 0, 1, 2, 3, 4, 5, 6
 AMENDED = 7  # no fault: what notes an accepted state has put it right, and it is to be looked at again
+ARRIVED = 8  # no fault: what notes an accepted state is to let jumps arrive that end the step
 
 SETTINGS = np.dtype(
     [
@@ -140,6 +141,7 @@ DELAY = np.dtype(  # a pipe as a delay line: stretches of equal travel time, fri
         ("passes", "f8"),  # share of a small change of flow that friction in the middle of a stretch lets pass
         ("places", "i8"),  # at which fields and envelopes are told
         ("couple", "f8"),  # of a shorter one, flow between its ends per pressure [kg/s per Pa]
+        ("acts", "i8"),  # ends whose nodes act at once: 1 `from`, 2 `to`, 3 both
     ],
     align=True,
 )
@@ -453,8 +455,9 @@ LAYOUT = np.dtype(
 BODY_OUT = 45  # numbers of each body in `out`
 GN = 14  # place of g_n among the numbers of a frame, see `basins.frames`
 TANK_OUT = 24  # numbers in `out` of what rides on bodies, see `mechanism.tanks`
-RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # first entries of `out`
-OUT_HEAD = 4
+RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # first entries of `out`
+OUT_HEAD = 5
+NEVER = -1e300  # in ARRIVES: no jump is on its way to where something acts at once
 FELT, ASKED = 1, 2  # how heavy a stretch is: its body feels it; and someone asks what joints hold
 
 PROBE = np.dtype(
@@ -522,6 +525,8 @@ BASIN = np.dtype(
         ("period", "f8"),  # of its turning back [s]; 0 for none
         ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
         ("roughness", "f8"),  # Manning's n, or a factor
+        ("held", "f8"),  # bound of the rate of friction [1/s]; infinity where steps need not follow it
+        ("damped", "i8"),  # 1 where steps are divided by friction, and so need not follow it
         ("unsplit", "f8"),  # what counts as rate of its cells over that of the kernels
         ("rest", "f8"),  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
         ("wall", "i8"),  # first of its walls that move, and
@@ -641,12 +646,12 @@ Written = namedtuple(
     "Written",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
-        "past",
+        "past", "sharp",
     ),
 )  # fmt: skip
 Called = namedtuple("Called", (*Tables._fields, *Written._fields, "calls", "hooks"))
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are no records float64[:]
-INTEGERS = ("integers", "bands", "joint", "sums", "calls", "hooks")  # but int64
+INTEGERS = ("integers", "bands", "joint", "sums", "sharp", "calls", "hooks")  # but int64
 
 
 @functools.cache

@@ -15,7 +15,7 @@ from fvsolve.kernels import limits
 from fvsolve.kernels import records as rec
 from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes
-from fvsolve.model.delay import at_ends, cut_lines, followed, lower_delays
+from fvsolve.model.delay import at_ends, cut_lines, followed, lower_delays, tables_for_jumps
 from fvsolve.model.device import lower_devices
 from fvsolve.model.draft import Draft
 from fvsolve.model.lowering import lowering_of
@@ -162,8 +162,8 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
     draft.shapes = rec.Written(
         clock=1, work=draft.work_size, marks=marks_of(draft),
         armed=limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
-        scratch=scratch_of(draft), spare=int(layout["size"][0]), seen=draft.size if len(draft.wall_table) else 0,
-        bands=2 * len(draft.basin_table), joint=0, sums=0,
+        scratch=scratch_of(draft), spare=spare_of(draft), seen=draft.size if len(draft.wall_table) else 0,
+        bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=past_size(draft.delay_table),
     )  # fmt: skip
 
@@ -233,6 +233,12 @@ def marks_of(draft: Draft) -> int:
     return parts + own + (3 * len(draft.pipe_table) if draft.case.law.cavitates else 0)
 
 
+def spare_of(draft: Draft) -> int:
+    """Numbers beside `out`: closed nodes for events; with delay lines those of two states, and values, see `record`."""
+    size, beside = int(draft.tables.layout["size"][0]), len(draft.probe_table) + len(draft.node_table)
+    return size if not len(draft.delay_table) else 2 * size + 3 * beside
+
+
 def scratch_of(draft: Draft) -> int:
     """Numbers that the rhs needs to work with, at most."""
     many, nodes = len(draft.scalar_table), len(draft.node_table)
@@ -263,5 +269,5 @@ def model_of(draft: Draft) -> Model:
         draft.mass_names, draft.body_names, draft.bushing_names,
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
-        draft.basins, case.watched, draft.watched_start,
+        draft.basins, case.watched, draft.watched_start, tables_for_jumps(draft),
     )  # fmt: skip

@@ -33,6 +33,7 @@ def sort_nodes(draft) -> None:
                 touched.setdefault(group[i], [])
                 if k not in touched[group[i]]:
                     touched[group[i]].append(k)
+    mark_acting(draft, group)
     known = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
     integers = draft.integers
     clusters = []
@@ -73,6 +74,21 @@ def sort_nodes(draft) -> None:
             name = list(draft.case.places)[i]
             draft.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
                        "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+
+
+def mark_acting(draft, group) -> None:
+    """Note the ends of delay lines at junctions that share what they take with a device that acts at an event."""
+    inner, valves, acting = draft.node_table["kind"] == rec.JUNCTION, draft.valve_table, set()
+    for v in valves:
+        if v["hooks"] >= 0 or (v["device"] >= 0 and draft.devices[v["device"]][2].events):
+            acting |= {int(v["from_node"]), int(v["to_node"])}
+    acting |= {int(row["node"]) for row, (_, _, device) in zip(draft.device_table, draft.devices, strict=True)
+               if device.events}  # fmt: skip
+    roots = {group[i] for i in acting if i >= 0 and inner[i]}
+    for row in draft.delay_table:
+        pipe = draft.pipe_table[row["pipe"]]
+        ends = [int(pipe[end]) for end in ("from_node", "to_node")]
+        row["acts"] = sum(side for side, i in zip((1, 2), ends, strict=True) if inner[i] and group[i] in roots)
 
 
 def inverted(draft, members, couples) -> int:

@@ -7,15 +7,18 @@ shorter than the longest step h, the curvature of that over its delay, tau (h - 
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
+from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.delay.lines import drag_and_slope
-from fvsolve.kernels.schedules import WAVE
+from fvsolve.kernels.schedules import POWER, WAVE
+from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.past import past_size, rings_of
 from fvsolve.steppers import automatic
 from fvsolve.steppers.methods import AUTO
@@ -23,6 +26,7 @@ from fvsolve.steppers.tableau import method_named
 
 FELT = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start where friction is looked at
 DRIVEN = 1e-9  # of a bar's wave: what friction leaves of a drop
+BEND = 0.1  # of what a step brings: overshoot of six entries behind a kink
 ROUGH = 0.5  # of a wave: friction of a line shorter than a step may take no more
 
 
@@ -45,7 +49,7 @@ def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
     found, lines = {}, []
     for name, link in pipes.items():
         line = link.line or case.numerics.line
-        lacks = "" if line == "cells" else what_needs_cells(case, link)
+        lacks = "" if line == "cells" else what_needs_cells(case, name, link)
         if line == "cells" or lacks:
             found[name] = Followed("cells", lacks or f'line = "{line}"')
         elif name in unfit:
@@ -74,8 +78,8 @@ def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
     return {name: found[name] for name in pipes}
 
 
-def what_needs_cells(case, link) -> str:
-    """What in a pipe changes its waves as they travel; "" for nothing."""
+def what_needs_cells(case, name: str, link) -> str:
+    """Reason why a pipe needs cells; "" for none."""
     if not case.law.linear:
         return f'law = "{case.law.name}" changes waves as they travel'
     if case.scalars:
@@ -86,6 +90,10 @@ def what_needs_cells(case, link) -> str:
         return "its wall creeps in every cell"
     if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
         return "a body that it rides on drives its cells"
+    if any(
+        one.quantity == "force" and (one.part, one.name) == ("links", name) for one in (*case.probes, *case.watched)
+    ):
+        return "its force is asked for, which is found from cells"
     return ""
 
 
@@ -120,6 +128,27 @@ def lower_delays(draft) -> None:
         draft.integers += there
 
 
+def tables_for_jumps(draft) -> dict[str, np.ndarray]:
+    """Tables that differ where lines shorter than a step are as all others: what a jump meets. Empty without these."""
+    short = draft.delay_table["now"] > 0.0
+    if not short.any():
+        return {}
+    own, tables = copy.copy(draft), draft.tables
+    own.node_table, own.valve_table, own.delay_table = (
+        one.copy() for one in (draft.node_table, draft.valve_table, draft.delay_table)
+    )
+    own.integers, own.floats, own.faults = tables.integers.tolist(), tables.floats.tolist(), []
+    for pipe in draft.pipe_table[draft.delay_table["pipe"][short]]:
+        for end in ("from_node", "to_node"):
+            own.node_table["admittance"][pipe[end]] += pipe["admittance"] * (1.0 - at_ends(draft, pipe))
+    own.delay_table["now"] = own.delay_table["couple"] = 0.0
+    sort_nodes(own)
+    return {
+        "nodes": own.node_table, "valves": own.valve_table, "delays": own.delay_table, "clusters": own.cluster_table,
+        "integers": np.array(own.integers), "floats": np.array(own.floats),
+    }  # fmt: skip
+
+
 def at_ends(draft, pipe) -> float:
     """Admittance of a pipe's ends over that of its waves: less of a line whose ends know each other."""
     beta = draft.delay_table["now"][pipe["delay"]] if pipe["delay"] >= 0 else 0.0
@@ -132,7 +161,7 @@ def cut_lines(draft) -> list[str]:
     found = draft.steady["lines"] = {}
     for name, chosen in draft.followed.items():
         found[name] = {"line": chosen.line, "line_bound": None, "line_why": chosen.why}
-    scale = time_scale(draft) if len(draft.delay_table) else 0.0
+    scale, ramp = time_scales(draft) if len(draft.delay_table) else (0.0, 0.0)
     for row in draft.delay_table:
         name = draft.pipe_names[row["pipe"]]
         pipe, chosen = draft.pipe_table[row["pipe"]], draft.followed[name]
@@ -147,7 +176,8 @@ def cut_lines(draft) -> list[str]:
         row["passes"] = 1.0 / (1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1])
         row["hold"] = row["hold"] if row["now"] > 0.0 else row["tau"]
         at += many
-        off = 0.25 * takes / many + by_interpolation(float(row["tau"]), chosen.longest, scale)
+        smoothed = by_interpolation(float(row["tau"]), chosen.longest, scale, ramp)
+        off = 0.25 * takes / many + smoothed
         found[name]["line_bound"] = off
         force = float(drag_and_slope(pipe, float(pipe["flow"]))[0])
         if abs(float(pipe["drag"]) - force) > DRIVEN * float(pipe["admittance"]) * 1e5 / travel:
@@ -163,6 +193,8 @@ def cut_lines(draft) -> list[str]:
         asked = case.links[name].line or case.numerics.line
         if asked == "auto" and off > case.numerics.accuracy:
             unfit.append(name)
+        elif smoothed > case.numerics.accuracy and off < math.inf:
+            draft.warnings.append(too_quick(case, name, chosen.longest, min(scale, ramp or scale), smoothed))
         elif off == math.inf:
             longest = draft.case.step_amount(chosen.longest, 4)
             draft.fault(f"links.{name}.line", f'"delay" does not fit: friction takes {takes:.3g} of a wave in a line '
@@ -171,21 +203,40 @@ def cut_lines(draft) -> list[str]:
     return unfit
 
 
-def by_interpolation(tau: float, step: float, scale: float) -> float:
-    """Bound of what reading between steps is off by, of half a cosine of duration `scale` [s]."""
+def too_quick(case, name: str, step: float, scale: float, off: float) -> Notice:
+    """Notice that a schedule changes too quickly for the steps of a delay line."""
+    text = (
+        f"{name}: a schedule changes something within {case.step_amount(scale, 3)}, and steps of "
+        f"{case.step_amount(step, 3)} may put its waves off by {off:.2g} of the change; "
+        f'wanted shorter steps, or line = "cells"'
+    )
+    return Notice("lines", f"links.{name}", text, "line", off, case.numerics.accuracy)
+
+
+def by_interpolation(tau: float, step: float, scale: float, ramp: float) -> float:
+    """Bound of what reading between steps is off by, as a share of what a schedule changes.
+
+    scale : duration of half a cosine [s], 0 for none; ramp : of a straight ramp, whose kinks the polynomial through
+    six entries overshoots by up to a tenth of what a step brings
+    """
+    kinks = BEND * step / ramp if ramp > 0.0 else 0.0
     bend = math.pi * step / scale if scale > 0.0 else 0.0
     if tau < step:
-        return 0.25 * (math.pi / scale) ** 2 * tau * (step - tau) if scale > 0.0 else 0.0
+        kinks = tau * (step - tau) / (step * ramp) if ramp > 0.0 else 0.0
+        return max(kinks, 0.25 * (math.pi / scale) ** 2 * tau * (step - tau) if scale > 0.0 else 0.0)
     if abs(tau / step - round(tau / step)) < 1e-9:
         return 0.0
     if tau >= 3.0 * step:
-        return 0.5 * 0.0049 * bend**6
-    return 0.5 * (0.0234 * bend**4 if tau >= 2.0 * step else 0.0642 * bend**3)
+        return max(kinks, 0.5 * 0.0049 * bend**6)
+    return max(kinks, 0.5 * (0.0234 * bend**4 if tau >= 2.0 * step else 0.0642 * bend**3))
 
 
-def time_scale(draft) -> float:
-    """The shortest time in which a schedule changes its value [s]; 0 where none does but by jumps, which are kept."""
-    found, schedules = math.inf, draft.schedules
+def time_scales(draft) -> tuple[float, float]:
+    """The shortest time in which a schedule changes its value, and of these that of a straight ramp [s].
+
+    0 where none does but by jumps, which are kept.
+    """
+    found, ramp, schedules = math.inf, math.inf, draft.schedules
     for first, count in schedules.records:
         rows = schedules.rows[first : first + count]
         for k, row in enumerate(rows):
@@ -193,7 +244,9 @@ def time_scale(draft) -> float:
                 found = min(found, math.pi / row[5]) if row[4] != 0.0 else found
             elif 0 < k < count - 1 and (row[1] != 0 or any(row[4:7])):
                 found = min(found, rows[k + 1][0] - row[0])
-    return found if math.isfinite(found) else 0.0
+                if row[1] == POWER or not any(row[5:7]):
+                    ramp = min(ramp, rows[k + 1][0] - row[0])
+    return tuple(one if math.isfinite(one) else 0.0 for one in (found, ramp))
 
 
 def shape_past(draft) -> None:

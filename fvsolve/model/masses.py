@@ -99,6 +99,25 @@ def add_states(draft) -> None:
             draft.states([f"{name}.velocity"], max(speed, abs(masses[i]["velocity"])))
 
 
+def pushed_masses(draft) -> np.ndarray:
+    """Of all pushes the two masses that they join : int64[pushes, 2]."""
+    ends = ((draft.brace_table, "from_mass", "to_mass"), (draft.stop_table, "from_mass", "to_mass"),
+            (draft.piston_table, "case", "rod"))  # fmt: skip
+    return np.concatenate([np.column_stack([table[a], table[b]]) for table, a, b in ends])
+
+
+def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
+    """Sum of pushes, and of what water at rest does to walls, on each mass : float64[masses] [N]."""
+    total = np.zeros(len(draft.mass_table))
+    for push, (first, second) in zip(pushes, pushed_masses(draft), strict=True):
+        total[first] -= push
+        total[second] += push
+    for row in draft.wall_table:
+        if row["mass"] >= 0:
+            total[row["mass"]] += row["outward"] * row["rest"]
+    return total
+
+
 def start_masses(draft, start) -> list[str]:
     """The forces of the start and what is left of them on each mass; returns what moves, in words."""
     nodes, masses, ambient = draft.node_table, draft.mass_table, draft.case.ambient_pressure
@@ -114,16 +133,12 @@ def start_masses(draft, start) -> list[str]:
         pushed, back = row["area_a"] * (a["pressure"] - ambient), row["area_b"] * (b["pressure"] - ambient)
         row["force"] = pushed - back - row["damping"] * row["speed"]
         size[[row["case"], row["rod"]]] += abs(pushed) + abs(back)
-    total = np.zeros(len(masses))
-    for table, ports in ((draft.brace_table, ("from_mass", "to_mass")), (draft.stop_table, ("from_mass", "to_mass")),
-                         (draft.piston_table, ("case", "rod"))):  # fmt: skip
-        for row in table:
-            for port, sign in zip(ports, (-1.0, 1.0), strict=True):
-                total[row[port]] += sign * row["force"]
-                size[row[port]] += abs(row["force"])
+    pushes = np.concatenate([table["force"] for table in (draft.brace_table, draft.stop_table, draft.piston_table)])
+    total = forces_on_masses(draft, pushes)
+    for push, ends in zip(pushes, pushed_masses(draft), strict=True):
+        size[ends] += abs(push)
     for row in draft.wall_table:
         if row["mass"] >= 0:
-            total[row["mass"]] += row["outward"] * row["rest"]
             size[row["mass"]] += abs(row["rest"])
     masses["force"] = np.where(np.abs(total) > rounding(draft) * size, total, 0.0)
     moving = []

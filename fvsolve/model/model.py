@@ -152,13 +152,14 @@ class Model(Shown):
     basins: list[BasinRows]  # as their table has them
     watched: list[Probe]  # beside the probes, for their extremes alone
     watched_start: np.ndarray  # what those of pressure along pipes are in the profile [Pa], nan of others
+    sharp: dict[str, np.ndarray]  # tables that a jump meets in place of these, see `model.delay`
     slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
     packed: list = field(default_factory=list, init=False)  # its draft before the start, where others are made of it
 
     picture = "fvsolve.draw.objects:model_figure"
 
     def __post_init__(self) -> None:
-        for array in (*self.tables, self.scale, self.start, *self.profiles.values()):
+        for array in (*self.tables, self.scale, self.start, *self.profiles.values(), *self.sharp.values()):
             array.flags.writeable = False
 
     def said(self) -> str:
@@ -241,6 +242,11 @@ class Model(Shown):
         return functions(cast)
 
     @property
+    def damped(self) -> bool:
+        """Whether stages of explicit steps are divided by friction, see `steppers.semi_implicit`."""
+        return bool(self.tables.basins["damped"].any())
+
+    @property
     def layout(self):
         """Offsets of what the rhs writes beside dydt."""
         return self.tables.layout[0]
@@ -255,7 +261,9 @@ class Model(Shown):
 
     def new_out(self) -> np.ndarray:
         """An array for what the rhs writes beside dydt."""
-        return np.zeros(int(self.layout["size"]))
+        found = np.zeros(int(self.layout["size"]))
+        found[rec.ARRIVES] = rec.NEVER
+        return found
 
     def given(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
         """A time and a state as kernels take them; FvsolveError where they are none of this model, or not finite."""
@@ -393,9 +401,6 @@ class Model(Shown):
             found[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
         found["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
                            if basin.moves or basin.part.on is not None}  # fmt: skip
-        for basin in self.basins:
-            if basin.part.on is not None:
-                found[basin.name]["normal"] = basin.normal_at(out, self.layout)
         found["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])

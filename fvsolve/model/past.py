@@ -33,7 +33,7 @@ def past_size(delays: np.ndarray, wider: int = 1) -> int:
     if not len(delays):
         return 0
     many, entries = int(delays["stretches"].sum()), wider * int((delays["room"] * delays["stretches"]).sum())
-    per_stretch = at.ARRIVALS + 2 * at.HEADS + 4 * queue_of(many) + at.APART
+    per_stretch = at.ARRIVALS + 2 * at.HEADS + 6 * queue_of(many) + at.APART
     return at.HEAD + wider * int(delays["room"].max()) + per_stretch * many + 2 * entries
 
 
@@ -50,6 +50,7 @@ def begin_past(past: np.ndarray, delays: np.ndarray) -> None:
     sizes = [at.CAPACITY, at.QUEUE, at.STRETCHES, at.WIDER, at.KNOWN_TIME, at.MENDED]
     wider = 1 if past.size == past_size(delays) else wider_of(past, delays)
     past[sizes] = wider * int(delays["room"].max()), queue_of(many), many, wider, math.nan, -math.inf
+    past[at.NEXT] = at.INFINITE
 
 
 def wider_of(past: np.ndarray, delays: np.ndarray) -> int:
@@ -79,10 +80,10 @@ def times_of_jumps(past: np.ndarray, delays: np.ndarray, begin: float, end: floa
     heads = past[places[1] : places[2]].reshape(-1, at.HEADS)
     line_of, found = np.repeat(np.arange(len(delays)), delays["stretches"]), []
     for head in np.flatnonzero(heads[:, at.MANY]):
-        line, first = delays[line_of[head // 2]], places[2] + 2 * queue * head
+        line, first = delays[line_of[head // 2]], places[2] + 3 * queue * head
         order = (int(heads[head, at.FIRST]) + np.arange(int(heads[head, at.MANY]))) % queue
         sent = past[first + order]
-        found += [sent + line["hold"], sent + (line["hold"] if line["now"] > 0.0 else 0.5 * line["hold"])]
+        found += [sent + line["tau"], sent + 0.5 * line["tau"]]
     times, apart = np.sort(np.concatenate([[], *found])), at.same_time(past)
     times = times[(times > begin + apart) & (times < end - apart)]
     return times[np.diff(times, prepend=-np.inf) > apart]

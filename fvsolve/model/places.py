@@ -11,6 +11,7 @@ import numpy as np
 
 from fvsolve.basins.lower import at_start
 from fvsolve.kernels import records as rec
+from fvsolve.model.masses import pushed_masses
 from fvsolve.model.statics import GAPS, HOLD, LINES, MOTION, Statics
 
 BESIDE = 1e-6  # [rad], [m] by which differences are taken
@@ -74,7 +75,7 @@ class Displaced(Statics):
         if self.freedoms:
             found[: self.freedoms] = self.sizes(pushes)
         net = found[self.freedoms :]
-        for push, ends in zip(pushes, self.on_axis(), strict=True):
+        for push, ends in zip(pushes, pushed_masses(self.draft), strict=True):
             net += abs(push) * np.isin(self.free, ends)
         for row in self.draft.piston_table:
             parts = [self.draft.node_table[row[side]]["pressure"] * row[f"area_{side}"] for side in "ab"]
@@ -82,12 +83,6 @@ class Displaced(Statics):
         for row in self.draft.wall_table:
             net += abs(row["rest"]) * (self.free == row["mass"])
         return found
-
-    def on_axis(self) -> np.ndarray:
-        """Of all pushes the two masses that they join : int64[pushes, 2]."""
-        ends = ((self.draft.brace_table, "from_mass", "to_mass"), (self.draft.stop_table, "from_mass", "to_mass"),
-                (self.draft.piston_table, "case", "rod"))  # fmt: skip
-        return np.concatenate([np.column_stack([table[a], table[b]]) for table, a, b in ends])
 
     def rows(self, y: np.ndarray) -> np.ndarray:
         """What each constraint of size one is to freedoms and masses : float64[constraints, size]."""

@@ -29,7 +29,12 @@ def wiped(shapes: rec.Written) -> rec.Written:
     """What runs write, of these shapes, all zero."""
     found = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
     found |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
-    return rec.Written(**found | {"clock": np.zeros(1, rec.CLOCK), "work": lined(shapes.work)})
+    found |= {"clock": np.zeros(1, rec.CLOCK), "work": lined(shapes.work)}
+    if shapes.sharp:
+        from fvsolve.kernels.handle import room_within
+
+        found["sharp"] = room_within()
+    return rec.Written(**found)
 
 
 class Slate:
@@ -63,11 +68,17 @@ class Slate:
     @cached_property
     def handle(self) -> np.ndarray:
         """The tables of the model, what is written here, and what there is to call, as compiled functions take them."""
-        from fvsolve.kernels.handle import joined, places_of
+        functions = self.model.functions
+        return self.linked(self.written, (functions.calls, functions.hooks))
 
-        functions, model = self.model.functions, self.model
+    def linked(self, written: rec.Written, called: tuple) -> np.ndarray:
+        """The handle of the tables with these arrays that are written, and these functions."""
+        from fvsolve.kernels.handle import linked, places_of
+
+        model = self.model
         shared = model.places if self.tables is model.tables else places_of(self.tables)
-        return joined((*shared, *places_of((*self.written, functions.calls, functions.hooks))))
+        sharp = places_of(self.tables._replace(**model.sharp)) if model.sharp else shared
+        return linked(shared, sharp, written, called)
 
     def blank(self, armed: np.ndarray | float = 0.0) -> None:
         """Ready for a look at another state: flags as given, nothing sent into delay lines."""

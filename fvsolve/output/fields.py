@@ -82,14 +82,16 @@ class FieldSeries:
         """Add the frame at time `t` [s]: pipe -> quantity -> float64[cells], SI."""
         name = f"fields/{self.frames:06d}.vtu"
         for part, (basin, (points, cells, units)) in enumerate(self.basins.items(), 1):
-            file = f"fields/{basin}-{self.frames:06d}.vtu"
+            file, whole = f"fields/{basin}-{self.frames:06d}.vtu", self.model.basins[part - 1]
             if self.pieces is not None and basin in self.pieces.rows:
                 file = f"fields/{basin}-{self.frames:06d}.pvtu"
-                whole = self.model.basins[part - 1]
                 self.pieces.write(self.folder / file, whole, self.places[basin], frame[basin], units)
                 self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
                 continue
-            found = {key: parted(value, cells) for key, value in frame[basin].items()}
+            values = frame[basin]
+            if whole.part.on is not None:
+                values = values | whole.vectors_at(values, frame["out"], self.model.layout)
+            found = {key: parted(value, cells) for key, value in values.items()}
             if basin in frame["points"]:  # what moves
                 points = np.append(self.places[basin], 0.0) + frame["points"][basin]
             write_frame(self.folder / file, points, cells, found, units)

@@ -14,7 +14,8 @@ from fvsolve.output.envelope import envelope_columns
 
 # What a reader looks for.
 NEEDED = (
-    "title", "case", "reason", "ok", "t", "marks", "probes", "time_unit", "envelope_units", "ambient_pressure",
+    "title", "case", "reason", "ok", "t", "invalid_from", "marks",
+    "probes", "time_unit", "envelope_units", "ambient_pressure",
     "extremes", "ledgers", "expectations", "comparisons", "verdicts", "versions", "warnings", "files",
 )  # fmt: skip
 
@@ -27,6 +28,7 @@ def described(summary, model) -> dict:
         "reason": summary.reason,
         "ok": bool(summary.ok),
         "t": float(summary.t),
+        "invalid_from": plain(float(summary.invalid_from)),
         "marks": [
             {"what": mark.what, "place": mark.place, "time": float(mark.time), "text": mark.text}
             for mark in summary.marks
@@ -91,14 +93,15 @@ def read_summary(path: Path) -> dict:
 
 
 def _extremes(summary, model) -> dict:
+    """Extremes in units of the probes; None from when on a run that blew up is not valid."""
     found = {}
     for one in probe_columns(model):
-        least, t_least, greatest, t_greatest = summary.extremes[one.name]
-        found[one.name] = {
-            "unit": one.unit,
-            "least": plain(float(one.from_si(least))),
-            "t_least": plain(float(t_least)),
-            "greatest": plain(float(one.from_si(greatest))),
-            "t_greatest": plain(float(t_greatest)),
-        }
+        least, t_least, greatest, t_greatest = (*summary.extremes[one.name],)
+        sides = {"least": (least, t_least), "greatest": (greatest, t_greatest)}
+        made: dict = {"unit": one.unit}
+        for side, (value, t) in sides.items():
+            valid = not t >= summary.invalid_from
+            made |= {side: plain(float(one.from_si(value))) if valid else None,
+                     f"t_{side}": plain(float(t)) if valid else None}  # fmt: skip
+        found[one.name] = made
     return found

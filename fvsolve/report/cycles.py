@@ -58,6 +58,8 @@ def cycles(result, probes: list[str] | None = None, strength: Strength | None = 
                            f"there are {listing(known) or 'none'}")  # fmt: skip
     made = []
     for name in probes or known:
+        if not np.isfinite(result[name]).all():
+            raise FvsolveError(f"{name} is not finite at all times: its cycles cannot be counted")
         found = counted(np.asarray(result[name]))
         row: dict[str, Any] = {"probe": name, "unit": span(result.units[name]), "cycles": found}
         if strength is not None:

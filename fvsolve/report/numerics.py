@@ -26,7 +26,9 @@ def settings(result) -> ReportTable:
              ["steps", said["steps"]], ["steps taken again", said["rejections"]], ["calls of rates", said["rhs"]],
              ["seconds of stepping", said["seconds"]]]  # fmt: skip
     if "resolution" in said:
-        rows.append(["errors of peaks (\u00b1)", said["resolution"]["words"]])
+        rows.append(
+            ["errors of peaks (\u00b1)", "; ".join([said["resolution"]["words"], *said["resolution"]["reasons"]])]
+        )
     return ReportTable("Method", ("", ""), [[key, worded(value)] for key, value in rows])
 
 

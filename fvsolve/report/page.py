@@ -17,6 +17,7 @@ from fvsolve.report.libraries import charts, template
 from fvsolve.report.motion import motions
 from fvsolve.report.section import BINS, Section, section
 from fvsolve.report.tables import ReportTable, worded
+from fvsolve.run.result import not_valid
 
 HERE = Path(__file__).parent
 SHARED = 900  # bins of all sections together
@@ -29,6 +30,7 @@ def page(result, ways: list[SectionWay]) -> str:
     figures: dict[str, Any] = {}
     probes = worst.of_probes(result)
     filled = {
+        "invalid": not_valid(result.summary),
         "title": visible(result.summary["title"] or result.summary["case"]), "run": result.summary,
         "description": visible(result.case.description), "source": visible(result.case.source),
         "ended": result.summary.get("ended", ""), "words": trust.words(result), "ink": INK,

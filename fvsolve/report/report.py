@@ -34,7 +34,7 @@ def write_report(directory: str | Path, out: str | Path | None = None, xlsx: boo
     if (Path(directory) / STUDY).is_file():
         return _write_study(Path(directory), path, xlsx)
     result = opened(Path(directory))
-    found = ways(result)
+    found = [] if result.summary["invalid_from"] is not None else ways(result)  # heads along it would be no results
     written(path, page(result, found))
     return [path, write_workbook(result, found, path.with_suffix(".xlsx"))] if xlsx else [path]
 

@@ -12,7 +12,8 @@ from fvsolve.output.routes import strung
 from fvsolve.report.heads import head_of, in_units
 from fvsolve.report.legs import SectionWay
 from fvsolve.report.limits import limit_lines
-from fvsolve.run.verdicts import Chainages
+from fvsolve.run.result import FAILS
+from fvsolve.run.verdicts import NEAR, Chainages
 
 ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
          "t_least", "t_greatest")  # fmt: skip
@@ -113,8 +114,9 @@ def section(result, way: SectionWay) -> Section:
     chainage, pipe = distances.to_si(strung_up["chainage"]), strung_up["pipe"]
     along = {name: strung_up[name] for name in ALONG}
     lines, boils = {}, result.summary["fluid"]["vapor_pressure"]
-    if boils is not None:
-        lines["vapour line"] = head_of(result, boils, along["elevation"])
+    if boils is not None:  # at that pressure itself a gas would fill all, so a law with cavities has no head there
+        left = 1.0 + NEAR * result.case.law.cavitates
+        lines["vapour line"] = head_of(result, boils * left, along["elevation"])
     lines |= limit_lines(result, pipe, along["elevation"])
     parted = _parted(result, along["least_pressure"], chainage, way)
     beyond = _beyond(result, way, chainage, along)
@@ -129,8 +131,7 @@ def section(result, way: SectionWay) -> Section:
 
 def boiling(result) -> float | None:
     """The pressure [Pa] at which a pipe counts as parted: the vapour pressure, twice it where cavities are followed."""
-    boils = result.summary["fluid"]["vapor_pressure"]
-    return None if boils is None else boils * (2.0 if result.case.law.cavitates else 1.0)
+    return None if result.summary["fluid"]["vapor_pressure"] is None else result.case.law.cavity_pressure
 
 
 def _parted(result, least: np.ndarray, chainage: np.ndarray, way: SectionWay) -> list[tuple[float, float]]:
@@ -152,7 +153,7 @@ def _beyond(result, way: SectionWay, chainage: np.ndarray, along: dict) -> list[
         on = limit.extent.on if limit is not None else ()
         for worst in one["worst"] if one["quantity"] in OF_PRESSURE else []:
             leg = next((leg for leg in way.legs if leg.pipe == worst["place"]), None)
-            if leg is None or worst["margin"] is None or worst["margin"] >= 0.0:
+            if leg is None or worst["state"] != FAILS:
                 continue
             at = float(leg.chainage(told.leg(leg.pipe, on).distance(worst["chainage"])))
             if leg.begin <= at <= leg.end:

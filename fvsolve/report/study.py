@@ -17,7 +17,7 @@ from fvsolve.report.page import WARNINGS, rendered
 from fvsolve.report.section import section
 from fvsolve.report.tables import ERROR, ReportTable, in_unit
 from fvsolve.report.trust import Word
-from fvsolve.run.result import FAILS, HOLDS, OPEN
+from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
 from fvsolve.units import span
 
 POINTS = 400  # of a series
@@ -57,7 +57,7 @@ def words(said: dict[str, Any], runs: list) -> list[Word]:
               for row, result in runs for one in result.warnings if not one.ok]  # fmt: skip
     doubted = [name_of(row) for row, result in runs if result.marks]
     if doubted:
-        text = "liquid below its vapour pressure, tanks dry or spilling: see the runs' own reports"
+        text = "liquid below its vapour pressure, tanks dry: see the runs' own reports"
         found.append(Word("doubt", f"In part not to be trusted: {', '.join(doubted)}.", text))
     if not any(result.verdicts for _, result in runs):
         return [
@@ -87,8 +87,11 @@ def matrix(runs: list) -> ReportTable:
         state = next((one for one in (FAILS, OPEN) if one in states), HOLDS)
         if state == FAILS:
             bad.add(k)
-        margins = [getattr(found.get(name), key, None) for name in names for key in ("margin", *["error"] * asked)]
-        rows.append([row["event"] or "", row["protection"] or "", state, *margins])
+        none = not_valid(result.summary) or None
+        margins = [none if key == "margin" and value is None and name in found else value
+                   for name in names for key in ("margin", *["error"] * asked)
+                   for value in [getattr(found.get(name), key, None)]]  # fmt: skip
+        rows.append([row["event"] or "", row["protection"] or "", IN_WORDS[state] if states else "", *margins])
     heads = ["event", "protection", "verdict"]
     heads += [word for name in names for word in (f"margin of {name}", *[ERROR] * asked)]
     units = ["", "", ""] + [span(unit) for unit in names.values() for _ in range(1 + asked)]
@@ -98,8 +101,8 @@ def matrix(runs: list) -> ReportTable:
 def failing(runs: list) -> ReportTable | None:
     """Every limit that fails or is open, where and when."""
     length, time = (column("", what, runs[0][1].case) for what in ("length", "time"))
-    rows = [[name_of(row), one.name, one.state, one.value, one.limit, one.unit, one.margin, span(one.unit), one.place,
-             in_unit(length, one.chainage), in_unit(time, one.time)]
+    rows = [[name_of(row), one.name, IN_WORDS[one.state], one.value, one.limit, one.unit, one.margin, span(one.unit),
+             one.place, in_unit(length, one.chainage), in_unit(time, one.time)]
             for row, result in runs for one in result.verdicts if not one.ok]  # fmt: skip
     heads = ("run", "limit", "verdict", "value", "allowed", "unit", "margin", "unit", "worst at", "chainage", "time")
     units = ("",) * 9 + (length.unit, time.unit)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from fvsolve.output.column import column
 from fvsolve.report.tables import ERROR, ReportTable, in_unit, worded
-from fvsolve.run.result import FAILS, HOLDS, OPEN
+from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
 from fvsolve.units import span
 
 BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
@@ -31,10 +31,11 @@ def words(result) -> list[Word]:
         found.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; the rest is not known."))
     found += [Word("bad", "Not to be trusted.", one.text) for one in result.warnings if not one.ok]
     found += [*_doubt(result), verdict(result)]
-    failed = [one for one in result.expectations if not one.ok]
-    if failed:
-        more = f"; and {len(failed) - 1} more, under Numerics" if len(failed) > 1 else ""
-        found.append(Word("bad", "The case claims what this run does not show.", claim(failed[0]) + more))
+    for state, level, head in ((FAILS, "bad", "The case claims what this run does not show."),
+                               (OPEN, "doubt", "Whether the case's claims hold is open.")):  # fmt: skip
+        if those := [one for one in result.expectations if one.state == state]:
+            more = f"; and {len(those) - 1} more, under Numerics" if len(those) > 1 else ""
+            found.append(Word(level, head, claim(those[0]) + more))
     return found
 
 
@@ -70,7 +71,9 @@ def verdict(result) -> Word:
     unsure = [one.name for one, how in zip(verdicts, states, strict=True) if how == OPEN]
     if unsure:
         why = "their margins are smaller than the error of the numbers"
-        if not result.ok or result.marks:
+        if text := not_valid(result.summary):
+            why = f"the run is {text}"
+        elif not result.ok or result.marks:
             why = "the run is not sound" if not result.ok else "from a time on the numbers are not to be trusted"
         elif any(one.kind == "end" for one in result.warnings):
             why = "what is scheduled goes on after the end of the run"
@@ -92,7 +95,10 @@ def verdicts(result) -> ReportTable | None:
         apart = span(one.unit)
         said = one.unit if apart == one.unit else f"{one.unit}, margin {apart}"
         where = in_unit(length, one.chainage), in_unit(height, one.elevation), in_unit(time, one.time)
-        rows.append([one.name, asks, one.state, one.value, *[one.error] * asked, one.margin, said, one.place, *where])
+        margin = not_valid(result.summary) or None if one.margin is None else one.margin
+        rows.append(
+            [one.name, asks, IN_WORDS[one.state], one.value, *[one.error] * asked, margin, said, one.place, *where]
+        )
     heads = ("limit", "asks for", "verdict", "value", *[ERROR] * asked, "margin", "unit", "worst at")
     heads += ("chainage", "elevation", "time")
     bad = frozenset(k for k, one in enumerate(found) if one.state == FAILS)
@@ -106,24 +112,28 @@ def worst(result) -> list[ReportTable]:
     made = []
     for one in result.verdicts:
         told = ((length, "chainage"), (height, "elevation"), (time, "time"))
-        rows = [[row["place"], *(in_unit(shown, row[key]) for shown, key in told),
-                 row["value"], row["limit"], row["margin"]] for row in one.worst]  # fmt: skip
-        bad = frozenset(k for k, row in enumerate(rows) if row[-1] is None or row[-1] < 0.0)
-        units = ("", length.unit, height.unit, time.unit, one.unit, one.unit, span(one.unit))
-        heads = ("place", "chainage", "elevation", "time", one.quantity.replace("_", " "), BOUNDS[one.bound], "margin")
+        asked = any(row["error"] is not None for row in one.worst)
+        rows = [[row["place"], *(in_unit(shown, row[key]) for shown, key in told), row["value"],
+                 *[row["error"]] * asked, BOUNDS[row["bound"]], row["limit"], row["margin"], IN_WORDS[row["state"]]]
+                for row in one.worst]  # fmt: skip
+        bad = frozenset(k for k, row in enumerate(one.worst) if row["state"] == FAILS)
+        apart = span(one.unit)
+        units = ("", length.unit, height.unit, time.unit, one.unit, *[apart] * asked, "", one.unit, apart, "")
+        heads = ("place", "chainage", "elevation", "time", one.quantity.replace("_", " "), *[ERROR] * asked)
+        heads += ("", "limit", "margin", "verdict")
         made += [ReportTable(f"Limit {one.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
     return made
 
 
 def claims(result) -> ReportTable | None:
     """What the case claims of its own results."""
-    rows = [[one.text, one.claimed, one.found, one.tolerance, one.unit, "holds" if one.ok else "FAILS"]
+    rows = [[one.text, one.claimed, one.found, one.tolerance, one.unit, IN_WORDS[one.state]]
             for one in result.expectations]  # fmt: skip
-    bad = frozenset(k for k, one in enumerate(result.expectations) if not one.ok)
+    bad = frozenset(k for k, one in enumerate(result.expectations) if one.state == FAILS)
     heads = ("claim", "claimed", "found", "tolerance", "unit", "verdict")
     return ReportTable("What the case claims", heads, rows, bad=bad, loose=frozenset({1, 2, 3})) if rows else None
 
 
 def claim(one) -> str:
     """A claim in words."""
-    return f"{one.text}: claimed {one.claimed:.6g}, found {one.found:.6g} {one.unit}"
+    return f"{one.text}: claimed {one.claimed:.6g}, found {worded(one.found)} {one.unit}"

@@ -9,6 +9,7 @@ from fvsolve.output.column import UnitColumn
 from fvsolve.report.heads import in_units
 from fvsolve.report.legs import SectionWay
 from fvsolve.report.tables import ERROR, ReportTable, in_unit
+from fvsolve.run.result import not_valid
 
 FIRST = 10  # rows of a ranking on the page
 EXTREMES = (  # quantity, its words, which end of it, when
@@ -22,7 +23,7 @@ EXTREMES = (  # quantity, its words, which end of it, when
 def of_all(result, ways: list[SectionWay]) -> ReportTable | None:
     """The worst of all pipes: each extreme, its pipe, where along it, chainage of the one section, elevation, time."""
     envelope = result.envelope
-    if not envelope:
+    if not envelope or not_valid(result.summary):
         return None
     legs = {leg.pipe: leg for way in ways for leg in way.legs}
     if len(ways) > 1 or all(leg.begin == 0.0 and not leg.backwards for leg in legs.values()):
@@ -43,7 +44,7 @@ def of_all(result, ways: list[SectionWay]) -> ReportTable | None:
 
 def by_pipe(result) -> list[ReportTable]:
     """Pipes by their greatest and by their least pressure, the worst first; none where there is but one pipe."""
-    if len(result.envelope) < 2:
+    if len(result.envelope) < 2 or not_valid(result.summary):
         return []
     return [_ranked(result, name, words, most, when) for name, words, most, when in EXTREMES[:2]]
 
@@ -62,12 +63,13 @@ def _ranked(result, name: str, words: str, most, when: str) -> ReportTable:
 
 def of_probes(result) -> ReportTable | None:
     """Least and greatest of each probe over all accepted steps, and when; how far off where it was asked for."""
-    peaks, rows = result.summary.get("peaks", {}), []
+    peaks, rows, none = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
     clock = UnitColumn("t", "time", result.summary["time_unit"])
     for name, one in result.extremes.items():
         off = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("least", "greatest")}
         first, last = (in_unit(clock, t) for t in (one.t_least, one.t_greatest))
-        rows.append([name, result.units[name], one.least, *off["least"], first, one.greatest, *off["greatest"], last])
+        low, high = (none if value is None else value for value in (one.least, one.greatest))
+        rows.append([name, result.units[name], low, *off["least"], first, high, *off["greatest"], last])
     heads = [column for side in ("least", "greatest") for column in (side, *[ERROR] * bool(peaks), "time")]
     units = [clock.unit if column == "time" else "" for column in heads]
     loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")

@@ -20,7 +20,8 @@ ROWS = WHOLE | {
     "peaks": ("least", "greatest"),
 }  # fmt: skip
 WITHIN = {  # rows of rows
-    ("verdicts", "worst"): ("place", "chainage", "elevation", "time", "bound", "value", "limit", "margin"),
+    ("verdicts", "worst"): ("place", "chainage", "elevation", "time", "bound", "value", "limit", "margin",
+                            "error", "state"),
     ("peaks", "least"): ("error",), ("peaks", "greatest"): ("error",),
 }  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -47,7 +47,14 @@ def met(model, summary, extent) -> list[Met]:
             z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
             found = summary.watched[f"{group}.{name}.{quantity}"]
             made.append(Met(group, name, np.array([np.nan]), np.array([z]), *np.array([found]).T))
-    return made
+    return made if np.isinf(summary.invalid_from) else [valid(one, summary.invalid_from) for one in made]
+
+
+def valid(part: Met, until: float) -> Met:
+    """Places of a part, with nan for extremes from a time on."""
+    sides = {side: np.where(getattr(part, f"t_{side}") < until, getattr(part, side), np.nan)
+             for side in ("least", "greatest")}  # fmt: skip
+    return replace(part, **sides)
 
 
 def along(summary, pipe, rows: list) -> Met:
@@ -65,3 +72,12 @@ def in_quantity(model, quantity: str, pressure, elevation):
         return pressure - model.case.ambient_pressure
     head = model.head(pressure, elevation)
     return head if quantity == "head" else head - elevation
+
+
+def pressure_of(model, quantity: str, value: float, elevation):
+    """The absolute pressure [Pa] of a quantity of pressure [SI]; nan below what the fluid can have."""
+    if quantity == "pressure":
+        return value
+    if quantity == "gauge_pressure":
+        return value + model.case.ambient_pressure
+    return model.case.law.pressure_under(value - elevation if quantity == "head" else value)

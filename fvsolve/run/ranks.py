@@ -13,6 +13,7 @@ from functools import cache
 from fvsolve.errors import FvsolveError
 from fvsolve.solve.bands import cut, threads_of
 from fvsolve.solve.loop import Loop
+from fvsolve.solve.soundness import Soundness
 
 SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PALS_SIZE")  # how MPI's starters say how many processes there are
 EXTRA = 'pip install "fvsolve[mpi]"'
@@ -105,6 +106,7 @@ def follow(make: Callable) -> None:
         return
     try:
         loop = Loop(model, comm=comm)
+        loop.stepper.largest = Soundness(loop.slate).watched
         loop.team.serve(*loop.functions)
     except BaseException as error:  # the others wait for this one
         print(f"fvsolve: rank {comm.rank}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)

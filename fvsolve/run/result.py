@@ -10,13 +10,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fvsolve.doors import AMOUNT, NUMBER, PATH, TEXT, door
-from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean
+from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
 from fvsolve.output.column import UnitColumn
 from fvsolve.output.fields import read_series
 from fvsolve.shown import Shown, kept
 from fvsolve.units import show
 
-HOLDS, FAILS, OPEN = "holds", "FAILS", "open"
+FIELDED = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
+
+HOLDS, OPEN, FAILS = "holds", "open", "fails"  # states of a limit
+IN_WORDS = {HOLDS: "holds", OPEN: "open", FAILS: "FAILS"}
+
+
+def not_valid(said: dict) -> str:
+    """From when on the numbers of a run that blew up are no results, by its summary; "" of another."""
+    if said["invalid_from"] is None:
+        return ""
+    clock = UnitColumn("t", "time", said["time_unit"])
+    return f"not valid from t = {float(clock.from_si(said['invalid_from'])):.6g} {clock.unit} on"
 
 
 class ResultMark(NamedTuple):
@@ -29,7 +40,10 @@ class ResultMark(NamedTuple):
 
 
 class Extremes(NamedTuple):
-    """Least and greatest over all accepted steps and rows, in the unit of the probe, and when [s]."""
+    """Least and greatest over all accepted steps and rows, in the unit of the probe, and when [s].
+
+    None of what a run that blew up came to where it is not valid.
+    """
 
     least: float
     t_least: float
@@ -40,29 +54,33 @@ class Extremes(NamedTuple):
 class Expectation(NamedTuple):
     """A claim of the case; `claimed`, `found`, `tolerance` and `error` in `unit`.
 
+    state : `holds`, `fails`, or `open` where the run cannot tell; ok : whether it holds
     error : how far `found` may be off, None where nobody asked
     """
 
     text: str
     claimed: float
-    found: float
+    found: float | None
     tolerance: float
     unit: str
+    state: str
     ok: bool
     error: float | None
 
 
 class LimitVerdict(NamedTuple):
-    """A limit of the case: the place that is nearest to it, or beyond it most; lengths in m, times in s, else `unit`.
+    """A limit of the case, and the place that decides it; lengths in m, times in s, else `unit`.
 
-    ok : whether it holds beyond doubt; margin : how far from the limit, negative beyond it
+    state : `holds`; `fails` where it is passed; `open` where a run cannot tell, or the error of a place is more than
+    its margin; ok : whether it holds; margin : how far from the limit, negative beyond it
     bound : "least" or "greatest"; until : when the run ended
     error : how far `value` may be off, None where nobody asked
-    worst : the same of the worst places of each part
+    worst : the same of the worst places, a row for each bound of each part
     """
 
     name: str
     ok: bool
+    state: str
     place: str
     chainage: float | None
     elevation: float | None
@@ -79,15 +97,8 @@ class LimitVerdict(NamedTuple):
 
     @property
     def doubtful(self) -> bool:
-        """Whether it is not passed, but its value may be off by more than its margin."""
-        return None not in (self.error, self.margin) and 0.0 <= self.margin < self.error
-
-    @property
-    def state(self) -> str:
-        """`holds`, `FAILS` where it is passed, or `open`: not passed, but a run cannot tell, or the error is more."""
-        if self.ok:
-            return HOLDS
-        return OPEN if self.margin is not None and self.margin >= 0.0 else FAILS
+        """True if it is not passed, but its value may be off by more than its margin."""
+        return self.state == OPEN and None not in (self.error, self.margin) and self.margin < self.error
 
 
 class Comparison(NamedTuple):
@@ -126,6 +137,7 @@ class Result(Shown):
         self.summary = summary
         self.units = {name: probe["unit"] for name, probe in summary["probes"].items()}
         self.directory = directory
+        self.places: list[list[dict]] | None = None  # rows of every limit (`verdicts.places`); None if read back
         self._read_table = table
         self._read_envelope = envelope
 
@@ -300,18 +312,25 @@ class Result(Shown):
     def _lumped(self) -> bool:
         """Whether there is nothing that has fields."""
         kinds = {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
-        return self.directory is not None and not kinds & {"pipe", "basin", "body"}
+        return self.directory is not None and not kinds & FIELDED
 
     def _frames(self) -> list[tuple[float, Path]]:
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
-            raise RunError(
-                "no frames to draw: the case has no pipes, no basins and no bodies, "
-                "[output] fields is 0, or nothing was written"
-            )
+            raise RunError(f"no frames to draw: {self._no_frames()}")
         frames = read_series(self.directory / "fields.pvd")
         if not frames:
             raise RunError(f"{self.directory / 'fields.pvd'} lists no frames")
         return frames
+
+    def _no_frames(self) -> str:
+        """The reason why a run has no frames."""
+        if self.directory is None:
+            return "nothing was written; give the run a directory"
+        if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & FIELDED:
+            return f"the case has none of {listing(sorted(FIELDED))}"
+        if self.case.output.fields == 0:
+            return "[output] fields is 0; run again with --set output.fields=20"
+        return f"{self.directory / 'fields.pvd'} is missing; run again with --force"
 
     def _draw(self, times: list[float], field: str | None, path, suffix: str, contours: int) -> Path:
         from fvsolve.draw.view import view

@@ -17,7 +17,7 @@ from fvsolve.errors import FvsolveError, RunError
 from fvsolve.run.crew import Crew
 
 LINEAR = ("dense", "banded", "sparse")  # kinds of `steppers.structure`
-STEPS = ("explicit", "diagonal", "full", "linear")  # kinds of methods
+STEPS = ("explicit", "damped", "diagonal", "full", "linear")  # kinds of methods
 
 
 @dataclass(frozen=True)

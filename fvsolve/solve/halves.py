@@ -101,7 +101,12 @@ class Halves:
         if self.stepper is None:
             model = self.model
             self.stepper = Stepper(
-                loop.stepper.method, model.y_size, model.ledgers, lambda: model.structure, model.scale.copy()
+                loop.stepper.method,
+                model.y_size,
+                model.ledgers,
+                lambda: model.structure,
+                model.scale.copy(),
+                model.damped,
             )
             self.stepper.out = model.new_out()
         if fresh:

@@ -47,7 +47,7 @@ class Loop:
         leaps = leap_allowed(model, method)
         self.leap = leap_function(leaps)
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
-        self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy())
+        self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
         sums = [
             *model.tables.nodes["y"],
             *model.tables.masses["y"],
@@ -73,6 +73,8 @@ class Loop:
         for control, key in ((slots.COURANT, "courant"), (slots.FIXED_STEP, "step"), (slots.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[slots.CONTROL], self.orders[slots.SIZE] = control, getattr(numerics, key)
+        if self.orders[slots.CONTROL] != slots.TOLERANCE:  # given steps do not hang on rows
+            self.orders[slots.LANDS] = 0.0
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
         if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest
@@ -129,7 +131,7 @@ class Loop:
         while (room := self.slate.room()) < budget:
             code = self.steps(room)
             left, budget = self.orders[slots.BUDGET], budget - room
-            if code != slots.CHUNK or left > 0.0 or automatic.wants_change(self.stepper):
+            if code != slots.CHUNK or left != 0.0 or automatic.wants_change(self.stepper):
                 return code
         return self.steps(budget)
 

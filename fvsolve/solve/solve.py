@@ -27,6 +27,7 @@ from fvsolve.solve.summary import (
     find_watched,
     mass_ledger,
     run_downs,
+    spills,
 )
 from fvsolve.solve.team import undisturbed
 from fvsolve.steppers import automatic, slots
@@ -35,7 +36,7 @@ from fvsolve.units import show
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
-FEW = 16.0  # steps at a time where they are beyond a limit, so that growth is seen early
+FEW = slots.CHECKED  # steps at a time where `Soundness.look` is needed as often
 PERSISTENT = ("extremes", "envelope", "marks", "armed")
 
 
@@ -104,12 +105,14 @@ class Run:
         self.loop.now[:] = state.y
         self.loop.memory[slots.T] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
-        self.watches = [one for basin in model.basins if (one := basin.watch(basin.of(model.start)))]
+        self.watches = [one for basin in model.basins for one in basin.watches(basin.of(model.start))]
         self.soundness = Soundness(self.slate)
+        self.loop.stepper.largest = self.soundness.watched
         if self.soundness.close:
             self.budget = FEW
         self.processor = 0.0  # seconds of CPU time of the steps of this process
-        self.left, self.spent = self.budget, 0.0  # of a chunk, which rows, frames and new segments do not end
+        self.invalid_from = np.inf  # s, once it has blown up
+        self.left, self.paused = self.budget, self.saved  # of a chunk, which rows, frames and new segments do not end
         if not self.fresh:
             try:
                 self.remember(state.memory)
@@ -291,13 +294,13 @@ class Run:
             before, steps, busy = time.perf_counter(), self.loop.memory[slots.STEPS], self.busy
             code = self.loop.run(min(self.left, self.soundness.halves.room(steps)))
             self.processor += self.busy - busy
-            self.left = max(1.0, self.left - (self.loop.memory[slots.STEPS] - steps))
-            self.spent += time.perf_counter() - before
+            self.left = max(0.0, self.left - (self.loop.memory[slots.STEPS] - steps))
             self.seconds += time.perf_counter() - before
             self.flush()
             self.soundness.halves.look(self.loop)
             grown = self.soundness.look(self.loop.t, self.loop.now)
             if grown and code != slots.CHATTERS:  # which names the parts
+                self.invalid_from = self.soundness.sound
                 return grown
             if code == slots.FIELD:
                 count = self.loop.memory[slots.NEXT_FIELD] - 1
@@ -305,9 +308,9 @@ class Run:
                 self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
             elif code == slots.CHUNK and automatic.wants_change(self.loop.stepper):
                 self.changes.append(automatic.change(self.loop.stepper))
-            elif code == slots.CHUNK and self.left <= 1.0:
-                self.pause(self.spent)
-                self.left, self.spent = self.budget, 0.0
+            elif code == slots.CHUNK and self.left <= 0.0:
+                self.pause()
+                self.left, self.paused = self.budget, time.perf_counter()
             elif code == slots.DONE:
                 return ""
             elif code not in (slots.CHUNK, slots.ROWS_FULL):
@@ -318,8 +321,9 @@ class Run:
         """CPU time of all threads that step it [s]."""
         return time.thread_time() + (0.0 if self.loop.team is None else self.loop.team.seconds)
 
-    def pause(self, spent: float) -> None:
+    def pause(self) -> None:
         """Between chunks: report, save, and aim at a tenth of a second for the next."""
+        spent = time.perf_counter() - self.paused
         factor = CHUNK_SECONDS / spent if spent > 0 else 4.0
         most = FEW if self.soundness.close else 1e9
         self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, most))
@@ -342,6 +346,7 @@ class Run:
         model, loop = self.model, self.loop
         place = ""
         if code == slots.BAD_VALUE:
+            self.invalid_from = self.soundness.sound
             bad = np.flatnonzero(~np.isfinite(loop.now))
             place = f" at {model.state_names[bad[0]]}" if bad.size else ""
         elif code == slots.BAD_STATUS and loop.out[rec.WHERE] >= 0 and loop.out[rec.STATUS] != rec.NO_WEIGHT:
@@ -397,7 +402,8 @@ class Run:
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         told = [notice for one in self.watches for notice in one.notices()]
-        warnings = [*self.told, *told, *self.soundness.warnings(ledgers), *run_downs(self.slate)]
+        warnings = [*self.told, *told, *self.soundness.warnings(ledgers), *run_downs(self.slate),
+                    *spills(self.slate)]  # fmt: skip
         warnings += drifts(model, loop.now)
         warnings += parted(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(one.ok for one in warnings)
@@ -406,7 +412,7 @@ class Run:
             find_envelope(self.slate), find_points(self.slate), find_watched(self.slate),
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
-            find_cavities(self.slate), warnings, self.threads,
+            find_cavities(self.slate), warnings, self.threads, self.invalid_from,
         )  # fmt: skip
         self.sink.end(summary)
         return summary

@@ -12,6 +12,7 @@ from fvsolve.solve.halves import Halves
 from fvsolve.solve.unfelt import Unfelt
 
 MOST = 1e6  # times what drives a scene: what is beyond has grown by itself
+SURE = 10.0  # times the same, which waves that add up may come to: up to there a state is no sign of growth
 OPEN = 1e-8  # of the largest term of a ledger: what does not close to that is wrong
 
 
@@ -20,6 +21,7 @@ class Soundness:
 
     largest : float64[n]  what no state may exceed: MOST times the largest of the spread of the start, the range of what
     is given over time, and the jump that stopping the start's flows makes (Joukowsky)
+    sound : time of the last state looked at that showed no growth [s]
     """
 
     def __init__(self, slate) -> None:
@@ -32,11 +34,17 @@ class Soundness:
         self.unfelt = Unfelt(model)
         self.largest = MOST * drives(model)
         self.grown: Notice | None = None
+        self.sound = model.case.numerics.start
 
     @property
     def close(self) -> bool:
-        """Whether it has to look every few steps."""
-        return bool(self.predicted or self.unfelt.tanks)
+        """True if `look` has to be called every few steps: for more than growth, which the time loop looks for."""
+        return bool(self.unfelt.tanks or (self.predicted and self.moving))
+
+    @property
+    def watched(self) -> np.ndarray:
+        """`largest` where a limit is near, for the time loop; else nothing."""
+        return np.array(np.broadcast_to(self.largest, self.model.y_size)) if self.predicted else np.zeros(0)
 
     def look(self, t: float, y: np.ndarray) -> str:
         """At a state: keep the pace of basins; why the run has to stop, or nothing."""
@@ -45,6 +53,8 @@ class Soundness:
         if stops := self.unfelt.look(t, y):
             return stops
         ratio = np.abs(y) / self.largest
+        if np.all(ratio <= SURE / MOST):
+            self.sound = t
         if not np.any(ratio > 1.0):
             return ""
         at = int(np.argmax(ratio))

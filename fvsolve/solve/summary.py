@@ -68,6 +68,7 @@ class Summary:
     cavities: list[Cavity] = field(default_factory=list)  # that the law `mixture` followed
     warnings: list[Notice] = field(default_factory=list)  # of what came about, beside those of the model
     threads: int = 1
+    invalid_from: float = np.inf  # s, of a run that blew up; what comes later is no result
 
     @property
     def finished(self) -> bool:
@@ -86,7 +87,8 @@ class Summary:
 
 
 def find_marks(slate: Slate) -> list[Mark]:
-    """First time and place of everything the model cannot really follow; cavities are none where the law has them."""
+    """First time and place of everything the model cannot really follow; cavities are none where the law has them, nor
+    is what tanks spill, which is in the ledger."""
     model, marks = slate.model, slate.marks
     if np.isnan(marks).all():
         return []
@@ -111,13 +113,25 @@ def find_marks(slate: Slate) -> list[Mark]:
             f"{model.case.law.to_cavitate}cavitation = true in [fluid] would follow it"
         ),
         "dry": "no water is left where outflow is asked for; what flows is made up",
-        "spilling": "the tank is full to its height and spills",
     }
     return [
         Mark(what, place, float(time), f"{place.split('.', 1)[1]}: {texts[what]}")
         for (what, place), time in zip(kinds, marks[: len(kinds)], strict=True)
-        if np.isfinite(time) and not (what == "below vapor pressure" and model.cavitates)
+        if np.isfinite(time) and what in texts and not (what == "below vapor pressure" and model.cavitates)
     ]
+
+
+def spills(slate: Slate) -> list[Notice]:
+    """Tanks that were full to their height, from when on."""
+    model, found = slate.model, []
+    first = len(model.pipes) + 2 * len(model.node_names)
+    for node, time in zip(model.node_names, slate.marks[first:], strict=False):
+        if np.isfinite(time):
+            name = node.removesuffix(".inside")
+            when = model.case.amount(float(time), "time", 6)
+            text = f"{name}: full to its height, it spills from {when} on; the mass ledger has what is lost"
+            found.append(Notice("spilling", f"nodes.{name}", text, "height", float(time)))
+    return found
 
 
 def run_downs(slate: Slate) -> list[Notice]:

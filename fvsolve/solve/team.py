@@ -20,7 +20,6 @@ import numpy as np
 
 from fvsolve.kernels import joint
 from fvsolve.kernels.functions import functions
-from fvsolve.kernels.handle import make_handle
 from fvsolve.model import Slate
 from fvsolve.model.slate import lined
 from fvsolve.solve.bands import Cut
@@ -72,8 +71,7 @@ class Member:
     def open(self) -> None:
         """What is written here, and the handle that opens it: anew where a past of delay lines has more room."""
         self.written = self.slate.written._replace(**self.mine)
-        self.tables = (*self.slate.tables, *self.written, *self.called)
-        self.handle = make_handle(self.tables)
+        self.handle = self.slate.linked(self.written, self.called)
 
     def take(self, name: str, values: np.ndarray) -> None:
         """Take over one of `WRITTEN`."""
@@ -89,7 +87,8 @@ class Member:
             getattr(self.stepper, name)[...] = getattr(self.loop.stepper, name)
         for name in WRITTEN:
             self.take(name, getattr(self.loop.slate.written, name))
-        self.stepper.times, now = self.loop.stepper.times, self.loop.flags[slots.NOW]
+        self.stepper.times, self.stepper.largest = self.loop.stepper.times, self.loop.stepper.largest
+        now = self.loop.flags[slots.NOW]
         for one in states:
             self.stepper.y[now, one] = self.loop.stepper.y[now, one]
 
@@ -113,7 +112,8 @@ class Member:
 
 def twin(stepper: Stepper) -> Stepper:
     """Another of the same method, with arrays of its own but for what steps only read."""
-    found = Stepper(stepper.method, stepper.scale.size, stepper.supply.shape[1], stepper.structure, stepper.scale)
+    found = Stepper(stepper.method, stepper.scale.size, stepper.supply.shape[1], stepper.structure, stepper.scale,
+                    stepper.damped)  # fmt: skip
     found.stored, found.carry, found.within = stepper.stored, stepper.carry.copy(), stepper.within
     for name in ("out", "out_row", "values", "g", "g_new", "rows"):
         setattr(found, name, getattr(stepper, name).copy())

@@ -11,6 +11,7 @@ from fvsolve.steppers.slots import (
     ERROR_OLD,
     EXPLICIT,
     KIND,
+    LANDS,
     LAST,
     LEFT,
     N_MARK,
@@ -35,6 +36,7 @@ BOUNDARY = 3.0  # of h times the spectral radius: `dormand-prince` bears 3.3 on 
 HELD = 2.5  # held by stability it swings from 1 to 3.5, held by accuracy it hardly moves
 CALM = 0.4  # what a step that is not held takes off the count
 CLOSED = 0.15  # share of an opening that may shut in a given step; of x ~ (time left)^(1/3) that is half the time left
+HUGE = 1e308  # for a time that never comes [s]
 DEAD_BAND = 1.2  # an implicit step that may grow by less keeps its length, and with it its factors
 
 
@@ -81,10 +83,22 @@ def next_step(orders, memory, out_rate, k, scale):
 
 
 @njit(forceinline=True)
-def end_of(orders, memory, h, last):
+def landing(orders, memory, due, h):
+    """Time at which a step of h is to end early, for a row due within it; infinity for none [s]."""
+    if orders[LANDS] == 0.0 or due >= memory[T] + h * (1.0 - 1e-9) or too_short(orders, memory, due - memory[T]):
+        return HUGE
+    if orders[CONTROL] != TOLERANCE and memory[LEFT] == 0.0:  # in parts that end where it would have
+        memory[LEFT] = h
+    return due
+
+
+@njit(forceinline=True)
+def end_of(orders, memory, h, last, due):
     """Time at which a step of h ends [s]: of whole given steps a multiple, so that no rounding adds up."""
     if last:
         return orders[END]
+    if h == due - memory[T]:
+        return due
     if orders[CONTROL] != TOLERANCE and (h == memory[STEP] or h == memory[LEFT]):
         return memory[T_MARK] + (memory[N_MARK] + (0.0 if memory[LEFT] > h else 1.0)) * memory[STEP]
     return memory[T] + h
@@ -99,6 +113,17 @@ def closing_step(memory, closing, h, least):
         memory[LEFT] = h
         memory[PARTED] += 1.0
     return max(least, min(0.5 * h, CLOSED / closing))
+
+
+@njit(forceinline=True)
+def arriving_step(orders, memory, arrives, h):
+    """A step h, or the part of it up to the time [s] at which a jump arrives where something acts at once."""
+    rest = arrives - memory[T]
+    if not 0.0 < rest < h * (1.0 - 1e-9):
+        return h
+    if orders[CONTROL] != TOLERANCE and memory[LEFT] == 0.0:
+        memory[LEFT] = h
+    return rest
 
 
 @njit(forceinline=True)

@@ -8,14 +8,29 @@ from math import isfinite
 
 from fvsolve.jit import COMPILING, njit
 from fvsolve.kernels.sums import BAD, LOOK, MODE, OFF
-from fvsolve.steppers.coefficients import error_of, row_of, weights_of
-from fvsolve.steppers.control import closing_step, end_of, grown, kept, next_step, reduced, shortest, too_short, watch
+from fvsolve.steppers.coefficients import bend_of, error_of, row_of, weights_of
+from fvsolve.steppers.control import (
+    HUGE,
+    arriving_step,
+    closing_step,
+    end_of,
+    grown,
+    kept,
+    landing,
+    next_step,
+    reduced,
+    shortest,
+    too_short,
+    watch,
+)
 from fvsolve.steppers.events import arm, fallen, locate, turned
 from fvsolve.steppers.ledger import book, book_error
-from fvsolve.steppers.rows import emit, next_due
+from fvsolve.steppers.rows import emit, next_due, row_due
 from fvsolve.steppers.signatures import ATTEMPT, compiled_as
 from fvsolve.steppers.slots import (
     AMENDED,
+    ARRIVED,
+    ARRIVES,
     BAD_STATUS,
     BAD_VALUE,
     BEHIND,
@@ -23,6 +38,7 @@ from fvsolve.steppers.slots import (
     BUDGET,
     CALLS,
     CASES,
+    CHECKED,
     CHUNK,
     CLOSING,
     CONTROL,
@@ -30,6 +46,7 @@ from fvsolve.steppers.slots import (
     EMIT,
     END,
     ERROR_OLD,
+    EXCEEDED,
     EXPLICIT,
     FRESH,
     FSAL,
@@ -69,7 +86,16 @@ from fvsolve.steppers.slots import (
     WHERE,
     T,
 )
-from fvsolve.steppers.step import BEGIN, STOP, add_stored, all_finite, copy, keep_carry
+from fvsolve.steppers.step import (
+    BEGIN,
+    STOP,
+    add_stored,
+    all_finite,
+    bend_at_start,
+    copy,
+    exceeded,
+    keep_carry,
+)
 
 if COMPILING:
     from fvsolve.steppers.signatures import (
@@ -114,7 +140,7 @@ def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, join, handle,
     coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale,
     out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work, vectors, store,
-    store_complex,
+    store_complex, largest,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -127,11 +153,13 @@ def march(
     ledger : float64[5 m], sums of out[where:] (`ledger.py`); stored : int64[q],
     states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
     within_at, within_by : what rows are held to, see `rows.keep_within`; work, vectors, store, store_complex : what an
-    implicit step keeps.
+    implicit step keeps; largest : float64[n], what no state may exceed, looked at every CHECKED steps, or empty.
     """
     s, reuse, met, t_new = k.shape[0], False, False, 0.0  # met: g_new is of the end of the step behind
     formed = orders[KIND] == EXPLICIT and shape.size > 0
-    b = weights_of(coefficients, s)
+    b, bend = weights_of(coefficients, s), bend_of(coefficients, s)
+    if orders[CONTROL] != TOLERANCE:  # a given step may be far longer than what its start tells of
+        bend = bend[:0]
     steep = orders[KIND] == NEWTON_SOLVED and dense.shape[0] == 0  # slopes at ends: f magnifies what Newton left,
     for j in range(s):  # the last stage does not, where it is the end
         steep = steep and row_of(coefficients, s, s - 1)[j] == b[j]
@@ -184,7 +212,8 @@ def march(
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
                 why = emit(
                     rhs, observe, handle, spans, orders, memory, times, flags, memory[T] - memory[LAST], y[old],
-                    f_old, y[now], k[s - 1] if steep else k[0], k, dense, out_row, y_out, rows, within_at, within_by,
+                    f_old, y[now], k[s - 1] if steep else k[0], k, dense, bend, out_row, y_out, rows, within_at,
+                    within_by,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -196,6 +225,13 @@ def march(
                 if orders[KIND] != EXPLICIT:
                     work[HAS], work[SEEN] = 0.0, -1.0
                 return SWITCHED
+            if out[ARRIVES] == memory[T]:  # a jump is here: what is noted next lies behind it, and events act before
+                out[STATUS] = ARRIVED
+                record(memory[T], y[now], out, handle, values)
+                flags[BEHIND], flags[PHASE] = 0, FRESH
+                if orders[KIND] != EXPLICIT:
+                    work[HAS], work[SEEN] = 0.0, -1.0
+                continue
             flags[PHASE] = READY
         if too_short(orders, memory, orders[END] - memory[T]):  # what is left of the segment is rounding
             memory[T] = orders[END]
@@ -207,6 +243,7 @@ def march(
         h = memory[LEFT] if memory[LEFT] > 0.0 else next_step(orders, memory, out[RATE], k, scale)
         if orders[CONTROL] != TOLERANCE:
             h = closing_step(memory, out[CLOSING], h, shortest(orders, memory))
+        whole, h = h, arriving_step(orders, memory, out[ARRIVES], h)
         leaping, last = may_leap(orders, memory, times, h), False
         if leaping:
             memory[CALLS] += 1.0
@@ -216,6 +253,8 @@ def march(
             memory[CALLS] -= 1.0
             continue
         failed, rate = TINY_STEP, out[RATE]
+        due = HUGE if leaping else landing(orders, memory, row_due(orders, memory, times), h)
+        h = min(h, due - memory[T])
         while not leaping:
             rest = orders[END] - memory[T]
             last = h >= rest * (1.0 - 1e-9)
@@ -232,7 +271,7 @@ def march(
             if e != NEWTON_FAILED:
                 e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
                 if bearable(e, passing):
-                    t_new, met = end_of(orders, memory, h, last), True
+                    t_new, met = end_of(orders, memory, h, last, due), True
                     rounded = add_stored(h, b, k, y[now], y[new], stored, carry)
                     if g.size > 0:
                         events(t_new, y[new], handle, g_new)
@@ -253,7 +292,7 @@ def march(
                 if orders[CONTROL] != TOLERANCE and memory[LEFT] == 0.0:  # in parts that end where it would have
                     memory[LEFT] = h
                     memory[PARTED] += 1.0
-                h *= 0.25
+                h = whole = 0.25 * h
                 if orders[CONTROL] == TOLERANCE:
                     memory[STEP] = h
                 continue
@@ -263,17 +302,18 @@ def march(
                 grow = grown(orders, memory, h, e)
                 if failed == NEWTON_STUCK:
                     grow = min(grow, 1.0)
-                if (not last or grow < 1.0) and not kept(orders, grow):
+                cut = last or h == due - memory[T] or h < whole
+                if (not cut or grow < 1.0) and not kept(orders, grow):
                     memory[STEP] = h * grow
                 memory[ERROR_OLD] = e
                 if orders[WATCH] != 0.0 and watch(orders, memory, h, e, rate):
                     memory[CASES], orders[BUDGET] = -1.0, 1.0  # come back after this step, for another kind
                 break
             memory[REJECTIONS] += 1.0
-            h *= reduced(orders, e)
+            h = whole = h * reduced(orders, e)
             memory[STEP] = h
         if not met:
-            t_new, rounded = end_of(orders, memory, h, last), add_stored(h, b, k, y[now], y[new], stored, carry)
+            t_new, rounded = end_of(orders, memory, h, last, due), add_stored(h, b, k, y[now], y[new], stored, carry)
         keep_carry(h, b, k, y[now], stored, carry)
         memory[UNBOOKED] = h
         t_old = memory[T]
@@ -284,11 +324,18 @@ def march(
         memory[LAST] = memory[T] - t_old
         memory[STEPS] += 1.0
         orders[BUDGET] -= 1.0
+        if largest.size > 0 and memory[STEPS] % CHECKED == 0.0 and exceeded(join, handle, spans, sums, y[new], largest):
+            orders[BUDGET] = EXCEEDED
         if next_due(orders, memory, times) <= memory[T]:
-            slopes = vectors[s - 1] if steep and work[KNOWN] == 1.0 else k[0]
+            known = orders[KIND] == NEWTON_SOLVED and work[KNOWN] == 1.0
             for m in range(spans.shape[0]):
                 begin, end = spans[m, BEGIN], spans[m, STOP]
-                copy(slopes[begin:end], f_old[begin:end])
+                if bend.size > 0:
+                    bend_at_start(begin, end, bend, k, vectors[s - 1], known, f_old)
+                elif steep and known:
+                    copy(vectors[s - 1, begin:end], f_old[begin:end])
+                else:
+                    copy(k[0, begin:end], f_old[begin:end])
         reuse = orders[FSAL] == 1.0 and orders[CONTROL] == TOLERANCE and not last and not rounded
         flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
     return DONE
@@ -298,7 +345,7 @@ def march(
 def march_at(
     calls, handle, coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where,
     ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work,
-    vectors, store, store_complex,
+    vectors, store, store_complex, largest,
 ):  # fmt: skip
     """`march` with the functions at these addresses, in its order."""
     return march(
@@ -306,7 +353,7 @@ def march_at(
         rhs_at(calls[5]), factor_at(calls[6]), solve_at(calls[7]), factor_complex_at(calls[8]),
         solve_complex_at(calls[9]), join_at(calls[10]), handle, coefficients, shape, spans, sums, dense, orders,
         memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
-        stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex,
+        stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex, largest,
     )  # fmt: skip
 
 
@@ -328,7 +375,7 @@ def compiled():
     """The loop as Python calls it: its functions as `addresses` gives them, then all else that `march` takes."""
     if not COMPILING:
         return lambda functions, *others: march(*functions, *others)
-    return compiled_as(march_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvz")
+    return compiled_as(march_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvzv")
 
 
 def compiled_attempt():

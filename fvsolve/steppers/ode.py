@@ -36,8 +36,7 @@ def integrate(
     rtol : relative tolerance of methods with an error estimate (default 1e-6); atol : absolute one, a number or
     float64[n], default rtol; step : fixed step [s], for every method
     counts : a dict to be filled with the numbers of steps, rejections, rhs, jacobians, factorisations, newton, ...
-    Times are met by dense output; where its order lies far below that of the error estimate (at a fixed step: of the
-    method), by stepping onto them.
+    Times are met by dense output; where its order lies below that of the method, by stepping onto them.
     Raises FvsolveError for two step settings, a method without an error estimate and no step, times out of order,
     and where the solution does not stay finite or Newton fails.
     """
@@ -76,29 +75,22 @@ def integrate(
 
 
 def _stepped(stepper: Stepper, functions: tuple, key: int, t, y0) -> np.ndarray:
-    """States at t : float64[len(t), n], by dense output, or by stepping onto them where that is much less accurate."""
+    """States at t : float64[len(t), n]."""
     orders, memory, flags = stepper.orders, stepper.memory, stepper.flags
-    method, fixed, handle = stepper.method, orders[slots.CONTROL] != slots.TOLERANCE, np.array([key])
-    lands = stepper.dense_order < (method.order - 2 if fixed else method.error_order - 1)
-    stops = t[1:] if lands else t[-1:]
-    stepper.times, stepper.rows = t[1:][: 0 if lands else None], np.zeros((t.size, y0.size + 1))
+    stepper.times, stepper.rows = np.ascontiguousarray(t[1:]), np.zeros((t.size, y0.size + 1))
     found = np.empty((t.size, y0.size))
     found[0] = y0
-    for i, stop in enumerate(stops, t.size - len(stops)):
-        orders[slots.END], kept = stop, memory[slots.STEP]
-        flags[slots.PHASE], flags[slots.BEHIND] = slots.FRESH, 0
-        code = slots.CHUNK
-        while code == slots.CHUNK:
-            if automatic.wants_change(stepper):
-                automatic.change(stepper)
-            orders[slots.BUDGET] = NO_LIMIT
-            code = stepper.call(*functions, handle, WHERE, stepper.none)
-        if code != slots.DONE:
-            raise FvsolveError(_failure(stepper.method, code, memory)) from _RAISED.get(key)
-        found[i] = stepper.y[flags[slots.NOW]]
-        memory[slots.STEP] = 0.0 if fixed else memory[slots.STEP] or kept
-    if not lands:
-        found[1:-1] = stepper.rows[: t.size - 2, 1:]
+    orders[slots.END] = t[-1]
+    flags[slots.PHASE], flags[slots.BEHIND] = slots.FRESH, 0
+    code = slots.CHUNK
+    while code == slots.CHUNK:
+        if automatic.wants_change(stepper):
+            automatic.change(stepper)
+        orders[slots.BUDGET] = NO_LIMIT
+        code = stepper.call(*functions, np.array([key]), WHERE, stepper.none)
+    if code != slots.DONE:
+        raise FvsolveError(_failure(stepper.method, code, memory)) from _RAISED.get(key)
+    found[1:-1], found[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[flags[slots.NOW]]
     return found
 
 
@@ -180,7 +172,7 @@ WHERE = 3  # no ledger behind it in `out`
 
 
 def _call_python(t, y, dydt, out, handle):
-    out[:] = (0.0, 0.0, -1.0, 0.0)
+    out[:4] = (0.0, 0.0, -1.0, 0.0)
     if dydt.size > 0:
         with objmode():
             _python(t, y, dydt, int(handle[0]))
@@ -223,7 +215,7 @@ def _functions(f, t0, y0):
     if not COMPILING:
 
         def plain(t, y, dydt, out, handle):
-            out[:] = (0.0, 0.0, -1.0, 0.0)
+            out[:4] = (0.0, 0.0, -1.0, 0.0)
             if dydt.size > 0:
                 _python(t, y, dydt, int(handle[0]))
 

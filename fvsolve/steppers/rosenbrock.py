@@ -101,7 +101,7 @@ class Rosenbrock(Method):
             return np.array([0.0, *map(float, values)])
 
         m, error = led([*a[-1][:-1], 1]), led([0] * (s - 1) + [1])
-        flat = [framed(a).ravel(), m, led(c), error, framed(big_c).ravel(), led(d), [float(Fraction(self.gamma))]]
+        flat = [framed(a).ravel(), m, led(c), error, framed(big_c).ravel(), led(d), [float(Fraction(self.gamma))], [0]]
         h = np.vstack([led(row) for row in h])
         dense = np.column_stack([m + h[0], *(h[i + 1] - h[i] for i in range(len(h) - 1)), -h[-1]])
         return np.concatenate(flat), np.ascontiguousarray(dense), s + 1

@@ -75,8 +75,8 @@ def keep_within(at, by, y_old, y, out):
 
 @njit
 def emit(
-    rhs, observe, handle, spans, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, out, y_out, rows,
-    within_at, within_by,
+    rhs, observe, handle, spans, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, bend, out, y_out,
+    rows, within_at, within_by,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h = memory[T], memory[T] - t_old
@@ -90,7 +90,7 @@ def emit(
             return ROWS_FULL
         for m in range(spans.shape[0]):
             begin, end = spans[m, BEGIN], spans[m, STOP]
-            interpolate(begin, end, (due - t_old) / h, h, y_old, f_old, y, f, k, dense, y_out)
+            interpolate(begin, end, (due - t_old) / h, h, y_old, f_old, y, f, k, dense, bend, y_out)
         keep_within(within_at, within_by, y_old, y, y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:

@@ -14,9 +14,11 @@ COUNTS = {
 # What a call is told.
 START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)
 # Power of h of the error estimate; whether the last stage is the next first; the kind of step; whether stiffness is
-# watched, and then the price of an implicit step in explicit ones.
-ORDER, FSAL, KIND, WATCH, PRICE = range(11, 16)
-ORDERS = 16
+# watched, and then the price of an implicit step in explicit ones; whether steps end where a row is due.
+ORDER, FSAL, KIND, WATCH, PRICE, LANDS = range(11, 17)
+ORDERS = 17
+CHECKED = 16.0  # steps between two looks for growth
+EXCEEDED = -1.0  # in orders[BUDGET]: a state has grown, come back
 EXPLICIT, NEWTON_SOLVED, LINEARLY_IMPLICIT = 0, 1, 2  # values of KIND
 COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of CONTROL
 # Why a call came back.
@@ -26,8 +28,9 @@ DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON
 PHASE, BEHIND, NOW, OLD, ROWS, BENT = range(6)
 FRESH, LEAPT, EMIT, READY = range(4)
 
-RATE, STATUS, WHERE, CLOSING = 0, 1, 2, 3  # the entries of `out` that the loop reads
-AMENDED = 7  # in STATUS: the state was put right as it was noted
+RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # the entries of `out` that the loop reads
+NEVER = -1e300  # in ARRIVES: no jump is on its way
+AMENDED, ARRIVED = 7, 8  # in STATUS: the state was put right as it was noted; a jump is to arrive now
 NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
 NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved with this step

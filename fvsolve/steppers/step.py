@@ -68,8 +68,25 @@ def weight(theta, dense, j):
 
 
 @njit
-def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, out):
-    """Dense output at t + theta h, of [begin:end]: the method's own polynomial, else the cubic through both ends."""
+def bend_at_start(begin, end, bend, k, slope, known, out):
+    """out: by how much the slope at the start of a step differs from that of its polynomial.
+
+    Where the last stage of a step before is not known, f there, unless it differs by more than the stages do: stiff.
+    """
+    s = k.shape[0]
+    for i in range(begin, end):
+        found = slope[i] if known else k[0, i]
+        for j in range(1, s):
+            found -= bend[j - 1] * k[j, i]
+        out[i] = found if known or abs(found) <= abs(k[s - 1, i] - k[1, i]) else 0.0
+
+
+@njit
+def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, bend, out):
+    """Dense output at t + theta h, of [begin:end]: the method's own polynomial, else the cubic through both ends.
+
+    bend : see `coefficients.bent`; then f is what `bend_at_start` found
+    """
     if dense.shape[0] > 0:
         w = h * weight(theta, dense, 0)
         for i in range(begin, end):
@@ -85,6 +102,12 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, out):
                 for i in range(begin, end):
                     out[i] += w * ka[i]
             j += 2
+        if bend.size > 0:
+            w, many = 0.0, dense.shape[1] + 1
+            for m in range(many):
+                w = (w + bend[bend.size - 1 - m]) * theta
+            for i in range(begin, end):
+                out[i] += h * w * f[i]
         return
     s, r = theta, 1.0 - theta
     h01, h10, h11 = s * s * (1.0 + 2.0 * r), h * s * r * r, -h * s * s * r
@@ -98,7 +121,7 @@ def all_finite(join, handle, spans, sums, y, formed, looked):
 
     A single sum is that of one band, of all. formed : see `kernels.sums`; looked : whether who found rates has looked
     """
-    bad, last = 0, spans.shape[0] - 1
+    bad = 0
     if looked:
         bad, first = formed[BAD], HEAD + formed[BASINS]
         for r in range(formed[OTHERS]):
@@ -108,17 +131,33 @@ def all_finite(join, handle, spans, sums, y, formed, looked):
     else:
         for m in range(spans.shape[0]):
             bad += endless(spans[m, BEGIN], spans[m, STOP], y)
+    return sum_of_bands(bad, join, handle, spans, sums) == 0.0
+
+
+@njit(forceinline=True)
+def sum_of_bands(own, join, handle, spans, sums):
+    """Sum over all bands of a number that each has; sums : room for what bands tell each other."""
     if sums.size == 1:
-        return bad == 0
+        return float(own)
     for m in range(spans.shape[0]):
         for r in range(spans[m, FIRST], spans[m, FIRST] + spans[m, SUMS]):
             sums[r] = 0.0
-    sums[spans[last, FIRST]] = bad  # of rows of this band, or of what all have
+    sums[spans[spans.shape[0] - 1, FIRST]] = own  # of rows of this band, or of what all have
     join(sums, spans, handle)
     total = 0.0
     for r in range(sums.size):
         total += sums[r]
-    return total == 0.0
+    return total
+
+
+@njit
+def exceeded(join, handle, spans, sums, y, largest):
+    """True if a state of any band is beyond its largest, or not a number."""
+    beyond = 0
+    for m in range(spans.shape[0]):
+        for i in range(spans[m, BEGIN], spans[m, STOP]):
+            beyond += not abs(y[i]) <= largest[i]
+    return sum_of_bands(beyond, join, handle, spans, sums) > 0.0
 
 
 @njit(forceinline=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.jit import beside, once
 from fvsolve.steppers import slots
-from fvsolve.steppers.coefficients import coefficients
+from fvsolve.steppers.coefficients import bent, coefficients
 from fvsolve.steppers.ledger import SUMS
 from fvsolve.steppers.march import compiled, compiled_attempt
 from fvsolve.steppers.signatures import addresses, compiled_step, no_algebra, no_joint
@@ -21,19 +21,21 @@ class Stepper:
     """Buffers of one run, and the compiled functions that are the method's.
 
     structure() : of the Jacobian, asked for by implicit methods alone; scale : float64[n], what small deviations are
-    measured against; ledgers : rows of rates beside dydt.
+    measured against; ledgers : rows of rates beside dydt; damped : whether stages are divided, see `semi_implicit`.
     """
 
     def __init__(
-        self, method: Method, n: int, ledgers: int, structure: Callable[[], Structure], scale: np.ndarray
+        self, method: Method, n: int, ledgers: int, structure: Callable[[], Structure], scale: np.ndarray, damped=False
     ) -> None:
-        self.structure, self.scale, self.march = structure, scale, compiled()
+        self.structure, self.scale, self.march, self.damped = structure, scale, compiled(), damped
         self.y, self.f_old, self.ledger = np.zeros((4, n)), np.zeros(n), np.zeros(SUMS * ledgers)
         self.memory, self.orders = np.zeros(slots.MEMORY), np.zeros(slots.ORDERS)
         self.flags = np.array([slots.FRESH, 0, 0, 1, 0, 0], dtype=np.int64)
         self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
-        self.out, self.out_row, self.values = np.zeros(4), np.zeros(4), np.zeros(0)
+        self.largest = self.none  # what no state may exceed, where growth is looked for
+        self.out, self.out_row, self.values = np.zeros(5), np.zeros(5), np.zeros(0)
+        self.out[slots.ARRIVES] = slots.NEVER
         self.g = self.g_new = self.none
         self.y_out, self.rows = np.zeros(n), np.zeros((1, 1))
         self.within = self.nobody, np.zeros((0, 4))
@@ -44,18 +46,21 @@ class Stepper:
         """Step by this method from now on."""
         n, ledgers = self.scale.size, self.ledger.size // SUMS
         self.method = method
-        self.coefficients, self.dense, s = coefficients(method)
+        self.coefficients, self.dense, s = coefficients(method, self.damped)
         self.algebra = no_algebra()
         self.k, self.supply = np.zeros((s, n)), np.zeros((s, ledgers))
         self.shape, self.work, self.vectors = self.nobody, self.none, np.zeros((0, n))
         self.store, self.store_complex, self.kept = self.none, np.zeros(0, dtype=complex), 0
-        if method.explicit:
+        if self.damped:
+            self.attempt, self.store = attempt_of("damped"), np.zeros(2 * n)
+        elif method.explicit:
             self.attempt = attempt_of(method.kind)
         else:
             structure = self.structure()
             self.attempt = attempt_of(method.kind, structure.kind)
             self.solve_by(structure, s, n, ledgers)
         self.orders[slots.ORDER] = method.control_order
+        self.orders[slots.LANDS] = self.dense_order + 1 < method.order  # else rows are as good as ends of steps
         self.orders[slots.FSAL] = method.explicit and method.first_same_as_last
         self.orders[slots.KIND] = KINDS[method.kind][1]
         self.flags[slots.PHASE], self.flags[slots.BEHIND] = slots.FRESH, 0
@@ -85,7 +90,8 @@ class Stepper:
     @property
     def dense_order(self) -> int:
         """Order of what stands between steps: of the method's polynomial, else of the cubic through both ends."""
-        return min(self.dense.shape[1], self.method.order) if self.dense.size else 3
+        more = self.method.kind == "full" and bent(self.method).size > 0
+        return min(self.dense.shape[1] + more, self.method.order) if self.dense.size else 3
 
     def forget(self) -> None:
         """Remember nothing over a kink but what has been counted."""
@@ -140,13 +146,14 @@ class Stepper:
             self.coefficients, self.shape, self.spans, self.sums, self.dense, self.orders, self.memory, self.times,
             self.flags, self.y, self.k, self.f_old, self.supply, where, self.ledger, self.scale, self.out,
             self.out_row, self.values, self.g, self.g_new, armed, self.stored, self.carry, self.y_out, self.rows,
-            *self.within, self.work, self.vectors, self.store, self.store_complex,
+            *self.within, self.work, self.vectors, self.store, self.store_complex, self.largest,
         )  # fmt: skip
 
 
 # Kinds of methods: the file of their steps, and what they are to the loop.
 KINDS = {
     "explicit": ("erk", slots.EXPLICIT),
+    "damped": ("semi_implicit", slots.EXPLICIT),
     "diagonal": ("dirk", slots.NEWTON_SOLVED),
     "full": ("irk", slots.NEWTON_SOLVED),
     "linear": ("ros", slots.LINEARLY_IMPLICIT),

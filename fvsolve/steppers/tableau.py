@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 
@@ -192,6 +193,24 @@ def tableau(
     method.exact  # noqa: B018  (raises)
     METHODS[name] = method
     return method
+
+
+def method_of_file(path: Path) -> Method:
+    """The method whose tableau a file holds as text, known by the name of the file, without its ending, from then on.
+
+    Raises FvsolveError for a file that is no tableau, and where that name is another method's.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FvsolveError(f"{path} cannot be read as a tableau: {error}") from None
+    source, known = str(path.resolve()), METHODS.get(path.stem)
+    if known is not None and path.stem not in OWN and known.source != source and known.text != text:
+        raise FvsolveError(f'{path}: "{path.stem}" is another method already, from {known.source}; rename the file')
+    try:
+        return tableau(path.stem, text, source=source)
+    except FvsolveError as error:
+        raise FvsolveError(f"{path}: {error}") from None
 
 
 def printed(a: Sequence, b: Sequence, c: Sequence | None = None) -> str:

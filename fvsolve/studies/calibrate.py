@@ -24,6 +24,9 @@ DESCENTS = 3  # from the best of them
 STEP = 1e-4  # of the range, over which slopes are taken
 TIED = 0.999  # of a correlation, beyond which two keys are not told apart
 EDGE = 1e-3  # of the range, within which a value lies at an end
+ROUNDS = 6  # of weights, at most
+SETTLED = 0.01  # of a weight, by which the next round may change it
+LEAST = 1e-6  # of the range of a series, which its scatter is at least: digits of files, and steps
 FAILED = 1e6  # what stands for the differences of a run that failed
 
 
@@ -31,8 +34,8 @@ FAILED = 1e6  # what stands for the differences of a run that failed
 class Calibration(Plain):
     """What came nearest.
 
-    values, sigma : by key [SI], and their standard deviations as the scatter of the differences tells them, infinite
-    where nothing does;
+    values, sigma : by key [SI], and their standard deviations as the scatter of each series tells them, infinite where
+    nothing does;
     correlation : of their errors, rows and columns as keys; rms : by probe, differences in its SI unit
     doubts : in words, what the measurements cannot tell; runs : how many it took
     """
@@ -72,6 +75,8 @@ class Differences(RowMaker):
             time = one.t + one.shift
             within = (time >= case.numerics.start) & (time <= case.numerics.end)
             computed = interpolated(result.seconds, result.si(one.probe.text), time[within])
+            if not np.isfinite(computed).all():
+                return f"{one.probe.text} is not finite"
             found.append((computed - one.v[within]) / spread(one.v))
         return found
 
@@ -96,6 +101,8 @@ def calibrate(
 ) -> Calibration:
     """Fit keys within their ranges to the series of `[compare]`, by least squares (`scipy.optimize.least_squares`).
 
+    Of several series each is weighed by its own scatter about the fit, in rounds from equal weights (Aitken 1935).
+
     A sample of all ranges comes first, `jobs` at a time, and descents begin at the best of it: waves that are out of
     phase have many valleys. Raises FvsolveError where there is nothing to compare with, and where no run succeeds.
     """
@@ -117,13 +124,35 @@ class Fitting:
         self.low, high = (np.array(side) for side in zip(*bounds.values(), strict=True))
         self.width = high - self.low
         self.work, self.runs = Differences(case, {"expect": {}}), 0
+        self.weights = np.ones(len(case.compare))
 
     def found(self, jobs: int, dask: str | None) -> Calibration:
         """The best of all descents, with what it is worth."""
         from scipy.optimize import least_squares
 
         answers = [self.descend(least_squares, x) for x in self.beginnings(jobs, dask)]
-        return self.judged(min(answers, key=lambda one: one.cost))
+        best = min(answers, key=lambda one: one.cost)
+        for _ in range(ROUNDS if self.weights.size > 1 else 0):
+            before, self.weights = self.weights, 1.0 / self.scatter(best)
+            if np.allclose(self.weights / self.weights[0], before / before[0], rtol=SETTLED):
+                break
+            best = self.descend(least_squares, best.x)
+        return self.judged(best)
+
+    def scatter(self, answer: Any) -> np.ndarray:
+        """Standard deviation of each series about the fit, in shares of its range: its squares over its points less
+        its share of the keys, the trace of its part of J (J' J)^-1 J'. All together's where a series has no more."""
+        found = self.differences(answer.x)
+        parts = np.split(answer.jac, np.cumsum([one.size for one in found])[:-1])
+        inverse = np.linalg.pinv(answer.jac.T @ answer.jac)
+        free = np.array([len(part) - np.einsum("ij,jk,ik->", part, inverse, part) for part in parts])
+        squares = np.array([float(one @ one) for one in found])
+        pooled = squares.sum() / max(1.0, sum(one.size for one in found) - answer.x.size)
+        return np.sqrt(np.maximum(np.where(free > 1.0, squares / np.maximum(free, 1.0), pooled), LEAST**2))
+
+    def weighed(self, found: list[np.ndarray]) -> np.ndarray:
+        """Differences of all series, each over its own scatter."""
+        return np.concatenate([weight * one for weight, one in zip(self.weights, found, strict=True)])
 
     def beginnings(self, jobs: int, dask: str | None) -> list[np.ndarray]:
         """The best points of the sample."""
@@ -146,7 +175,7 @@ class Fitting:
 
         def misfit(x: np.ndarray) -> np.ndarray:
             found = self.differences(x)
-            return np.concatenate(found) if found else np.full(size, FAILED)
+            return self.weighed(found) if found else np.full(size, FAILED)
 
         def slopes(x: np.ndarray) -> np.ndarray:
             return np.column_stack([self.slope(x, k, size) for k in range(x.size)])
@@ -159,7 +188,7 @@ class Fitting:
         for at in (x[k] - STEP, x[k] + STEP, x[k]):
             near = np.clip(np.where(np.arange(x.size) == k, at, x), 0.0, 1.0)
             if len(ran) < 2 and (found := self.differences(near)):
-                ran.append((near[k], np.concatenate(found)))
+                ran.append((near[k], self.weighed(found)))
         return (ran[1][1] - ran[0][1]) / (ran[1][0] - ran[0][0]) if len(ran) == 2 else np.zeros(size)
 
     def differences(self, x: np.ndarray) -> list[np.ndarray]:

@@ -60,7 +60,7 @@ class Search:
         self.case, self.key, self.minimise, self.knots, self.progress = case, key, minimise, knots, progress
         self.begin, self.end, self.first, self.last = span
         self.laws: list[ValveLaw] = []
-        self.unit = ""
+        self.unit = self.why = ""
 
     def law(self, z: np.ndarray) -> tuple[list[float], list[float]]:
         """Times and values of the knots; z : float64[knots], logarithms of rises over that of the last piece."""
@@ -79,10 +79,12 @@ class Search:
             raise KeyboardInterrupt
         found = result.expectations[0]
         self.unit = found.unit
-        self.laws.append(ValveLaw(time, value, found.found if result.ok else None))
+        peak = found.found if result.ok else None
+        self.laws.append(ValveLaw(time, value, peak))
+        self.why = self.why or ("" if result.ok else result.reason)
         if self.progress is not None:
-            self.progress(len(self.laws), "no end" if self.laws[-1].peak is None else f"{found.found:.6g} {found.unit}")
-        return found.found if result.ok else np.inf
+            self.progress(len(self.laws), "no end" if peak is None else f"{peak:.6g} {found.unit}")
+        return np.inf if peak is None else peak
 
 
 def optimise(
@@ -94,7 +96,7 @@ def optimise(
     key : of a schedule that goes from one value to another, such as a ramp; minimise : what `[expect]` knows,
     "max(gate.pressure)" or "greatest(main.head)"; it goes one way, as its linear law does, and takes as long. Simplexes
     of Nelder and Mead 1965 from laws that are linear, quick and slow at first. Raises FvsolveError for what is no such
-    schedule, CaseError for what is no case.
+    schedule and where no run has a finite peak, CaseError for what is no case.
     """
     from scipy.optimize import minimize
 
@@ -113,6 +115,8 @@ def optimise(
         left = (runs - len(search.laws)) // (len(STARTS) - k)
         minimize(search, z, method="Nelder-Mead",
                  options={"maxfev": left, "initial_simplex": simplex, "xatol": 1e-2, "fatol": 0.0})  # fmt: skip
+    if all(law.peak is None for law in search.laws):
+        raise FvsolveError(f"no law gives {minimise} a finite value: {search.why or 'it is not a number'}")
     linear = search.laws[0]
     best = min(search.laws, key=lambda law: np.inf if law.peak is None else law.peak)
     return Optimum(key, minimise, search.unit, linear, best, len(search.laws), search.laws)

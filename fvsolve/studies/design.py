@@ -30,14 +30,22 @@ class Studied:
 
     @property
     def holds(self) -> list[str]:
-        """Protections (the case itself where there are none) whose runs are ok and hold all limits in all events."""
-        names = list(dict.fromkeys(row["protection"] or "" for row in self.rows))
-        return [name for name in names if all(passed(row) for row in self.rows if (row["protection"] or "") == name)]
+        """Protections (the case itself where there are none) whose runs are ok and hold all limits in all events; none
+        without limits."""
+        of: dict[str, list[dict[str, Any]]] = {}
+        for row in self.rows:
+            of.setdefault(row["protection"] or "", []).append(row)
+        return [name for name, rows in of.items() if all(map(passed, rows)) and any(row["verdicts"] for row in rows)]
+
+    @property
+    def limited(self) -> bool:
+        """True if a run has limits."""
+        return any(row["verdicts"] for row in self.rows)
 
     @property
     def ok(self) -> bool:
-        """Whether all runs are, and one protection at least holds all limits."""
-        return all(row["ok"] for row in self.rows) and bool(self.holds)
+        """True if all runs are ok, and one protection at least holds all limits, if there are any."""
+        return all(row["ok"] for row in self.rows) and (bool(self.holds) or not self.limited)
 
     def plain(self) -> dict[str, Any]:
         """As study.json has it."""
@@ -94,8 +102,8 @@ class DesignRun:
             peak_errors(result, case)
             write_summary(place / "summary.json", result.summary)
         said = result.summary
-        kept = ("ok", "reason", "t", "verdicts", "extremes", "peaks", "marks", "events", "expectations", "time_unit",
-                "envelope_units", "warnings")  # fmt: skip
+        kept = ("ok", "reason", "t", "invalid_from", "verdicts", "extremes", "peaks", "marks", "events",
+                "expectations", "time_unit", "envelope_units", "warnings")  # fmt: skip
         return {key: task[key] for key in ("event", "protection", "directory")} | {
             key: plain(said[key]) for key in kept if key in said
         }
@@ -111,7 +119,7 @@ def name_of(row: dict[str, Any]) -> str:
 
 
 def write_study(found: Studied) -> None:
-    """study.json and study.csv: a row a run, value, margin and verdict of every limit."""
+    """study.json and study.csv: a row a run, value, margin and state of every limit."""
     said = found.plain()
     for row in said["runs"]:
         row["directory"] = os.path.relpath(row["directory"], found.folder)
@@ -119,14 +127,16 @@ def write_study(found: Studied) -> None:
     fresh.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
     os.replace(fresh, found.folder / STUDY)
     limits = list(dict.fromkeys(one["name"] for row in found.rows for one in row["verdicts"]))
-    columns = [f"{name} {what}" for name in limits for what in ("value", "margin", "unit", "ok", "place", "time [s]")]
+    columns = [
+        f"{name} {what}" for name in limits for what in ("value", "margin", "unit", "state", "place", "time [s]")
+    ]
     with open(found.folder / "study.csv", "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["event", "protection", "ok", "reason", *columns])
         for row in found.rows:
             verdicts = {one["name"]: one for one in row["verdicts"]}
             cells = [verdicts.get(name, {}).get(key) for name in limits
-                     for key in ("value", "margin", "unit", "ok", "place", "time")]  # fmt: skip
+                     for key in ("value", "margin", "unit", "state", "place", "time")]  # fmt: skip
             table.writerow([row["event"] or "", row["protection"] or "", row["ok"], row["reason"], *cells])
 
 

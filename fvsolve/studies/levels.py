@@ -6,7 +6,7 @@ from typing import Any
 
 from fvsolve.studies.accuracy.cells import counts, from_files, loads, scaled
 from fvsolve.studies.accuracy.cells import keys as cell_keys
-from fvsolve.studies.lines import lines, settled
+from fvsolve.studies.lines import lines, settled, slowest
 
 
 def finer(case, times: float) -> dict[str, Any]:
@@ -25,7 +25,19 @@ def finer(case, times: float) -> dict[str, Any]:
         found["numerics.rtol"] = min(numerics.rtol / times**2, 0.5)
     if lines(case):
         found["numerics.accuracy"] = min(numerics.accuracy / times, 0.5)
+        found |= finer_steps(case, times)
     return found | settled(case)
+
+
+def finer_steps(case, times: float) -> dict[str, Any]:
+    """Keys by which delay lines take `times` as many steps: without cells the Courant number, else `cells` of the line
+    whose places steps go by."""
+    if case.numerics.step is not None:
+        return {}
+    if case.numerics.courant is not None and not counts(case):
+        return {"numerics.courant": case.numerics.courant / times}
+    name = slowest(case)
+    return {f"links.{name}.cells": max(1, round(case.links[name].cells * times))}
 
 
 def kept(case) -> list[str]:

@@ -27,6 +27,11 @@ def lines(case) -> list[str]:
     return [name for name, one in followed(case).items() if one.line == "delay"]
 
 
+def slowest(case) -> str:
+    """The delay line that waves pass last, whose `cells` say how long steps are."""
+    return max(lines(case), key=lambda name: case.links[name].length / case.wave_speed(name))
+
+
 def settled(case) -> dict[str, str]:
     """Keys by which pipes that `auto` decides stay what they are now, whatever a study changes."""
     from fvsolve.run import model_of

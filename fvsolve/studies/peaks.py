@@ -1,133 +1,187 @@
-"""How far peaks are off: those of a run beside the same at half and twice its resolution. Knows runs; draws nothing.
+"""How far peaks and limits are off: those of a run beside the same at half and twice its resolution. Knows runs.
 
-Of values c, m, f at half, one and twice the resolution an order q = log2(|m - c| / |f - m|) of 1 to 2 is believed
-where the differences agree in sign and those of all peaks in that unit together show as much. Then m is off by
-(f - m) 2^q / (2^q - 1), or (m - c) / (2^q - 1), whichever is more (Richardson 1927), times 1.25 (Roache 1994). Where
-there is no such order, the band is that of order one half: 3.4 times the greater difference; so it is where liquid
-parts, as blows of cavities come to their limit at an order below one (docs/cavitation.md), whatever three grids show.
+Each is bounded from the local extrema of its signal (`extrema.py`), that of a limit from those of some places of each
+part. Where liquid parts no order is believed, as blows of cavities come to their limit slowly (docs/cavitation.md).
 Where nothing has cells, a peak between rows is missed by an eighth of their second difference.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from fvsolve.case import load
+from fvsolve.errors import CaseError
 from fvsolve.run import Result, run
+from fvsolve.run.result import HOLDS, OPEN
+from fvsolve.run.verdicts import BESIDE, MAGNITUDES, Beside, verdict
+from fvsolve.studies.extrema import greatest_error
 from fvsolve.studies.levels import finer, kept
+from fvsolve.studies.unresolved import Parts, reasons, unknown_parts
 
 LEVELS = (0.5, 1.0, 2.0)
-SAFETY = 1.25  # Roache's, of three grids
-HALF = math.sqrt(2.0) / (math.sqrt(2.0) - 1.0)  # of order one half, to what twice the resolution leaves and all beyond
-MOST = 2.0  # order that is believed at most
 LEAST = 5e-6  # of a value: what iterations, rows between steps, and swings that have all but died leave
 ROUNDING = 1e-12  # of the greatest value in that unit, of angles of a radian at least
-SIDES = ("least", "greatest")
+SIGNS = {"least": -1.0, "greatest": 1.0}
+SIDES = tuple(SIGNS)
+QUIET = {"output.fields": 0, "output.lines": {}}
+FEWEST_ROWS, MOST_ROWS = 500, 4000  # of signals, at the resolution of the run itself
+PLACES, MOST_PLACES = 12, 400  # of a part under a bound, and of all limits, whose signals are followed
 
 
 def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
-    """Add to the summary of a run how far its peaks and verdicts may be off, from two more runs of its case.
+    """Add to the summary of a run how far its peaks and verdicts may be off, from more runs of its case.
 
     `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order}; `error` is None where another run did
-    not come to its end, `order` None where there is none to believe. Verdicts and expectations get their `error`; a
-    limit whose margin is smaller is open, and not ok. `resolution` says how.
+    not come to its end, `order` None where there is none to believe. Expectations get their `error`, and so does every
+    bound of every place of a limit: a limit is open where a margin is smaller than its error. `resolution` says how.
     """
-    runs = {1.0: result}
-    for times in (one for one in LEVELS if one != 1.0):
-        keys = finer(case, times)
-        if keys:
-            if progress is not None:
-                progress(f"{times:g} times the resolution")
-            every = {"output.every": case.output.every / times, "output.fields": 0, "output.lines": {}}
-            runs[times] = run(case, set=keys | every, pictures=False)
+    own = result if result.places is not None else run(case, set=QUIET, pictures=False)
+    runs, unknown = levels(own, case, progress), unknown_parts(case)
     said = result.summary
-    triples = {(name, side): values(runs, lambda one, n=name, s=side: one.summary["extremes"][n][s])
-               for name in said["extremes"] for side in SIDES}  # fmt: skip
-    shared = pooled({key: (said["extremes"][key[0]]["unit"], triple) for key, triple in triples.items()})
-    apart = parted(runs)
-    if apart:
-        shared = dict.fromkeys(shared, 0.0)
-    smooth, largest = not said["cells"], {"rad": 1.0}
-    for one in said["extremes"].values():
-        largest[one["unit"]] = max([largest.get(one["unit"], 0.0), *(abs(one[side] or 0.0) for side in SIDES)])
-    said["peaks"] = {}
-    for name, one in said["extremes"].items():
-        made: dict[str, Any] = {"unit": one["unit"]}
-        rounded = ROUNDING * largest[one["unit"]]
-        for side in SIDES:
-            missed = rounded + (between_rows(result, name, side) if smooth else 0.0)
-            made[side] = {"value": one[side], **band(triples[name, side], shared[one["unit"]], missed)}
-        said["peaks"][name] = made
-    for k, verdict in enumerate(said["verdicts"]):
-        triple = values(runs, lambda one, k=k, verdict=verdict: of_bound(one.summary["verdicts"][k], verdict["bound"]))
-        verdict["error"] = alone(triple, verdict["unit"], shared, apart)
-        if verdict["error"] is not None and verdict["margin"] is not None:
-            verdict["ok"] = verdict["ok"] and verdict["margin"] >= verdict["error"]
+    said["peaks"] = peaks(result, runs)
+    for probe in case.probes:
+        if (probe.part, probe.name) in unknown:
+            for side in SIDES:
+                said["peaks"][probe.text][side] |= {"error": None, "order": None}
+    said["verdicts"] = [verdict([judged(runs, k, j, row, unknown) for j, row in enumerate(rows)])
+                        for k, rows in enumerate(own.places)]  # fmt: skip
     for k, claim in enumerate(said["expectations"]):
-        triple = values(runs, lambda one, k=k: one.summary["expectations"][k]["found"])
-        claim["error"] = alone(triple, claim["unit"], shared, apart)
-    said["resolution"] = {"levels": sorted(runs), "kept": kept(case), "words": words(runs, case)}
+        claim["error"] = of_claim(runs, case.expect[claim["text"]], k, said["peaks"])
+    said["resolution"] = {"levels": sorted(runs), "kept": kept(case), "words": words(runs, case),
+                          "reasons": reasons(case, runs)}  # fmt: skip
     return said
 
 
-def alone(triple: tuple[float | None, ...], unit: str, shared: dict[str, float], apart: bool) -> float | None:
-    """The band of what is no peak of a probe; its order is its own where none is shared in that unit."""
-    own = 0.0 if apart else pooled({0: ("", triple)})[""]
-    return band(triple, shared.get(unit, own))["error"]
+def levels(own: Result, case: Any, progress: Callable[[str], None] | None) -> dict[float, Result]:
+    """Runs at half, one and twice the resolution, with rows so dense that they show every peak."""
+    named = [probe.text for probe in case.output.probes]
+    rows = min(max(own.summary["steps"], FEWEST_ROWS), MOST_ROWS)
+    every = min(case.output.every, own.summary["t"] / rows) if own.summary["t"] > 0.0 else case.output.every
+    shared, runs = QUIET | {"output.probes": [*named, *followed(own, case, named)]}, {}
+    for times in LEVELS:
+        keys = finer(case, times) if times != 1.0 else {}
+        if keys or times == 1.0:
+            if progress is not None:
+                progress(f"{times:g} times the resolution")
+            runs[times] = run(case, set=keys | shared | {"output.every": every / times}, pictures=False)
+    return runs
+
+
+def followed(own: Result, case: Any, named: list[str]) -> list[str]:
+    """Probes of places of limits whose signals are read, those that the case can say."""
+    rows = [row[BESIDE] for rows in own.places for row in rows]
+    texts = dict.fromkeys(one.probes[at] for one in rows for at in chosen(one, len(rows)))
+    extra = [text for text in texts if text not in named]
+    return extra if says(case, extra) else [text for text in extra if says(case, [text])]
+
+
+def chosen(one: Beside, rows: int) -> list[int]:
+    """The place with the least margin, those with the least beside them, and some between."""
+    margins, most = np.where(np.isfinite(one.margins), one.margins, -np.inf), max(MOST_PLACES // rows, 1)
+    beside = np.pad(margins, 1, constant_values=np.inf)
+    least = np.flatnonzero((margins <= beside[:-2]) & (margins <= beside[2:]))
+    least = least[np.argsort(margins[least], kind="stable")][: max(min(PLACES, most) // 2, 1)]
+    even = np.linspace(0, len(margins) - 1, min(PLACES, most) - len(least)).astype(int) if most > len(least) else []
+    return list(dict.fromkeys([int(np.argmin(margins)), *least.tolist(), *list(even)]))
+
+
+def says(case: Any, texts: list[str]) -> bool:
+    """True if a case can have these probes."""
+    try:
+        load(case, {"output.probes": texts})
+    except CaseError:
+        return False
+    return True
+
+
+def peaks(result: Result, runs: dict[float, Result]) -> dict[str, Any]:
+    """`peaks` of a summary."""
+    said, largest, made = result.summary, {"rad": 1.0}, {}
+    for one in said["extremes"].values():
+        largest[one["unit"]] = max([largest.get(one["unit"], 0.0), *(abs(one[side] or 0.0) for side in SIDES)])
+    for name, one in said["extremes"].items():
+        made[name] = {"unit": one["unit"]}
+        for side, sign in SIGNS.items():
+            missed = 0.0 if said["cells"] else between_rows(result, name, side)
+            triple = values(runs, lambda run, n=name, s=side: run.summary["extremes"][n][s], sign)
+            error = bounded(runs, triple, [signals(runs, name, lambda v, sign=sign: sign * v)])
+            if error is not None:
+                error += 2.0 * (missed + ROUNDING * largest[one["unit"]]) + LEAST * abs(one[side])
+                error += abs(sign * one[side] - triple[1])
+            made[name][side] = {"value": one[side], "error": error, "order": order(triple, parted(runs))}
+    return made
+
+
+def bounded(runs: dict[float, Result], triple: Sequence[float | None], places: Sequence = ()) -> float | None:
+    """The error of the second of three values that rise, with signals of its places; None where it is not known."""
+    c, *known = triple
+    if not all(one is not None and math.isfinite(one) for one in known):
+        return None
+    whole = c is not None and math.isfinite(c)
+    places = [one if whole else one[-2:] for one in places if usable(one)]
+    return greatest_error(places, triple if whole else known, not parted(runs))
+
+
+def usable(one: Sequence) -> bool:
+    """True if there are signals, all of numbers."""
+    return len(one) > 1 and all(len(v) > 0 and bool(np.isfinite(v).all()) for _, v in one)
+
+
+def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]) -> list:
+    """Times and values of a probe at every resolution that came to its end; none where it is no probe."""
+    done = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
+    return [(one.seconds, rising(one[probe])) for one in done if probe in one.units]
+
+
+def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unknown: Parts) -> dict[str, Any]:
+    """A row of a limit with its error: one that holds is open where its margin is smaller or nothing is known."""
+    sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
+    triple = values(runs, lambda one: one.places[limit][k]["margin"], -1.0)
+    places = []
+    for at, probe in enumerate(row[BESIDE].probes):
+        allowed = float(row[BESIDE].limits[at])
+        places.append(signals(runs, probe, lambda v, a=allowed: sign * ((np.abs(v) if magnitude else v) - a)))
+    part = (row[BESIDE].probes[0].split(".")[0], row["place"])
+    error = None if part in unknown else bounded(runs, triple, places)
+    if error is not None:
+        error += LEAST * abs(row["value"] or 0.0)
+    doubtful = row["state"] == HOLDS and (error is None or not row["margin"] >= error)
+    return row | {"error": error, "state": OPEN if doubtful else row["state"]}
+
+
+def of_claim(runs: dict[float, Result], expect: Any, k: int, found: dict[str, Any]) -> float | None:
+    """The error of what a claim is about: that of a peak, or by three values alone."""
+    side = {"min": "least", "least": "least", "max": "greatest", "greatest": "greatest"}.get(expect.function)
+    if side is not None and expect.probe is not None and expect.probe.text in found:
+        return found[expect.probe.text][side]["error"]
+    triple = values(runs, lambda one: one.summary["expectations"][k]["found"])
+    error = bounded(runs, triple)
+    return None if error is None else error + LEAST * abs(triple[1])
 
 
 def parted(runs: dict[float, Result]) -> bool:
-    """Whether liquid parted in one of them."""
+    """True if liquid parted in one of them."""
     return any(one.summary["cavities"] for one in runs.values())
 
 
-def of_bound(verdict: dict[str, Any], bound: str) -> float | None:
-    """The value of a limit at its worst place for one of its bounds."""
-    return next((one["value"] for one in verdict["worst"] if one["bound"] == bound), None)
-
-
-def values(runs: dict[float, Result], of: Callable) -> tuple[float | None, ...]:
+def values(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
     """Of half, one and twice the resolution; None of a run that is not there or did not come to its end."""
-    return tuple(of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS)
+    found = [of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS]
+    return tuple(None if one is None else sign * one for one in found)
 
 
-def order(first: float, second: float) -> float:
-    """By which differences fall from one halving to the next."""
-    return math.log2(first / second) if first > 0.0 and second > 0.0 else math.inf if first > 0.0 else 0.0
-
-
-def pooled(triples: dict) -> dict[str, float]:
-    """Unit -> the order of all peaks in it together: an order that one of them shows alone is luck."""
-    sums: dict[str, list[float]] = {}
-    for unit, (c, m, f) in triples.values():
-        both = sums.setdefault(unit, [0.0, 0.0])
-        if None not in (c, m, f):
-            both[0] += abs(m - c)
-            both[1] += abs(f - m)
-    return {unit: order(*both) for unit, both in sums.items()}
-
-
-def band(triple: tuple[float | None, ...], shared: float, missed: float = 0.0) -> dict[str, float | None]:
-    """`error` and `order` of the middle one of three values, see the top."""
-    c, m, f = triple
-    if m is None or f is None or not all(map(math.isfinite, (m, f))):
-        return {"error": None, "order": None}
-    second = f - m
-    if c is None or not math.isfinite(c):
-        return {"error": HALF * abs(second) + 2.0 * missed + LEAST * abs(m), "order": None}
-    first = m - c
-    own = order(abs(first), abs(second)) if first * second >= 0.0 else 0.0
-    q = min(own, shared, MOST)
-    if max(abs(first), abs(second)) == 0.0:
-        error, q = 0.0, None
-    elif q >= 1.0 - 1e-6:
-        error = SAFETY * max(abs(second) * 2.0**q, abs(first)) / (2.0**q - 1.0)
-    else:
-        error, q = HALF * max(abs(first), abs(second)), None
-    return {"error": error + 2.0 * missed + LEAST * abs(m), "order": q}
+def order(triple: Sequence[float | None], apart: bool) -> float | None:
+    """The order that three values show, 2 at most; None of less than one, or where their differences differ in sign."""
+    if apart or any(one is None or not math.isfinite(one) for one in triple):
+        return None
+    first, second = triple[1] - triple[0], triple[2] - triple[1]
+    if first == 0.0 or first * second < 0.0 or abs(second) > 0.5 * abs(first) * (1.0 + 1e-6):
+        return None
+    return min(math.log2(first / second), 2.0) if second else 2.0
 
 
 def between_rows(result: Result, probe: str, side: str) -> float:

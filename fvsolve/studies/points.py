@@ -16,6 +16,7 @@ from fvsolve.errors import RunError
 from fvsolve.output.lock import let_go, locked
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import plain
+from fvsolve.steppers.tableau import METHODS, OWN
 
 
 class Points:
@@ -121,7 +122,9 @@ def package_hash() -> str:
 def hashed(who: dict) -> str:
     """A name for all that a point depends on, the sources of fvsolve and of parts from outside among it."""
     who = who | {"package": package_hash(), "outside": sorted(jit.OUTSIDE.values())}
-    return hashlib.sha256(json.dumps(who, sort_keys=True, default=str).encode()).hexdigest()[:24]
+    text = json.dumps(who, sort_keys=True, default=str)
+    arrays = [method.text for name, method in METHODS.items() if name not in OWN and f'"{name}"' in text]
+    return hashlib.sha256("\n".join([text, *arrays]).encode()).hexdigest()[:24]
 
 
 OUT = Kind(lambda given: PATH.holds(given) or isinstance(given, Points), PATH.wanted)

@@ -93,6 +93,8 @@ def sensitivity(
     points = [dict(zip(bounds, row, strict=True)) for row in np.concatenate([sobol, morris]).tolist()]
     if callable(case):
         values = np.array([float(case(point)) for point in points])
+        if not np.isfinite(values).all():
+            raise FvsolveError("the function is not finite at some points; wanted ranges in which it is")
     else:
         if outcome is None:
             raise FvsolveError('no outcome; wanted one such as "max(gate.pressure)"')

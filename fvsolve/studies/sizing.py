@@ -14,7 +14,9 @@ from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean, gathered
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
+from fvsolve.run.result import FAILS
 from fvsolve.run.verdicts import SIZES
+from fvsolve.studies.peaks import peak_errors
 from fvsolve.studies.plans import bare_unit, is_known, quantity_of
 from fvsolve.units import UNITS, show
 
@@ -29,8 +31,9 @@ _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*"
 class SizeRun:
     """One run: the value of the key, whether all limits hold, the least margin over its limit, and of which limit.
 
-    open : why a run that passes no limit holds none either, as what it schedules goes on after its end, or its numbers
-    are not to be trusted; else empty
+    margin : less its error where that is known
+    open : why a run that passes no limit holds none either, as what it schedules goes on after its end, its numbers
+    are not to be trusted, or an error is more than its margin; else empty
     """
 
     value: float
@@ -99,8 +102,9 @@ def ends(low: Any, high: Any) -> tuple[float, float, str]:
 class Sizing:
     """One search while it lasts."""
 
-    def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None) -> None:
-        self.case, self.key, self.unit, self.progress = case, key, unit, progress
+    def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None,
+                 error: bool = False) -> None:  # fmt: skip
+        self.case, self.key, self.unit, self.progress, self.error = case, key, unit, progress, error
         self.runs: list[SizeRun] = []
         self.rules = {tied: Arithmetic(text) for tied, text in ties.items()}
 
@@ -124,7 +128,8 @@ class Sizing:
         if self.progress is not None:
             self.progress(len(self.runs), f"{self.key} = {value:.6g} {self.unit}".rstrip())
         try:
-            result = run(load(self.case, {**self.keys(value), "output.fields": 0, "output.lines": {}}))
+            case = load(self.case, {**self.keys(value), "output.fields": 0, "output.lines": {}})
+            result = run(case)
         except CaseError as error:
             if not self.runs:
                 raise
@@ -132,12 +137,9 @@ class Sizing:
             return self.runs[-1]
         if result.reason.startswith("interrupted"):
             raise KeyboardInterrupt
-        worst = min(result.verdicts, key=relative)
-        ok = result.ok and all(one.ok for one in result.verdicts)
-        known = result.ok and (ok or relative(worst) < 0.0)
-        doubts = [one.text for one in result.marks] + [one.text for one in result.warnings if one.kind == "end"]
-        why = doubts[0] if result.ok and not known and doubts else ""
-        self.runs.append(SizeRun(value, ok, relative(worst) if known else None, worst.name, result.reason, why))
+        if self.error and result.ok:
+            peak_errors(result, case)
+        self.runs.append(sized(value, result))
         return self.runs[-1]
 
     def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
@@ -176,24 +178,38 @@ class Sizing:
         return bad + share * (good - bad)
 
 
-def relative(verdict: Any) -> float:
-    """The margin of a verdict over its limit; of a pressure or head, over an atmosphere where its limit is less."""
-    if verdict.margin is None:
+def sized(value: float, result: Any) -> SizeRun:
+    """The run of a value in a row."""
+    margins = [(relative(row, one.quantity), one.name) for one in result.verdicts for row in one.worst]
+    margin, name = min(margins)
+    ok, failed = all(one.ok for one in result.verdicts), any(one.state == FAILS for one in result.verdicts)
+    doubts = [one.text for one in result.marks] + [one.text for one in result.warnings if one.kind == "end"]
+    doubts += [f"{one.name}: its margin is smaller than its error" for one in result.verdicts if one.doubtful]
+    why = "" if ok or failed or not result.ok else next(iter(doubts), f"{name}: its margin is not known")
+    known = result.ok and (ok or margin < 0.0) and math.isfinite(margin)
+    return SizeRun(value, result.ok and ok, margin if known else None, name, result.reason, why)
+
+
+def relative(row: Mapping[str, Any], quantity: str) -> float:
+    """The margin of a place, less its error, over its limit; of a pressure or head, over an atmosphere where its limit
+    is less."""
+    if row["margin"] is None:
         return -math.inf
-    shown = UNITS.get(verdict.unit)
-    usual = SIZES.get(verdict.quantity, 0.0)
+    shown = UNITS.get(row["unit"])
+    usual = SIZES.get(quantity, 0.0)
     least = usual / abs(float(shown.si(1.0) - shown.si(0.0))) if usual and shown is not None else usual
-    return verdict.margin / (max(abs(verdict.limit), least) or abs(verdict.value) or 1.0)
+    return (row["margin"] - (row["error"] or 0.0)) / (max(abs(row["limit"]), least) or abs(row["value"]) or 1.0)
 
 
 def size(
     case, key: str, low: Any, high: Any, goal: str = "least", ties: Mapping[str, str] | None = None,
-    set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None,
+    set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None, error: bool = False,
 ) -> Size:  # fmt: skip
     """The least (or greatest) value of a key between `low` and `high` at which a case holds all its limits.
 
     Bracketed to `rtol` of itself; between two ends of which neither holds, places are tried where margins are greatest.
-    ties : other keys as formulas of x, the value in SI. Raises FvsolveError where the case has no limits, CaseError for
+    ties : other keys as formulas of x, the value in SI. error : each limit holds by more than its error, from two more
+    runs of each value. Raises FvsolveError where the case has no limits, CaseError for
     what is no case.
     """
     faults: list[Fault] = []
@@ -204,7 +220,7 @@ def size(
     if faults:
         raise CaseError(faults, "case" if made is None else made.name)
     first, last, unit = ends(low, high)
-    search = Sizing(made, key, unit, ties or {}, progress)
+    search = Sizing(made, key, unit, ties or {}, progress, error)
     value, bracket = search.search(first, last, goal, rtol)
     said = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
     return Size(key, unit or bare_unit(made.raw, key), goal, value, bracket, search.runs, said)

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 
 from fvsolve.units.spellings import DIMENSIONS, Unit
 
 _ASKABLE = re.compile(r"\(?[^\W\d]+(?: ?(?:\*\*|\^)? ?-?\d)?\)?(?: ?[*/ ] ?\(?[^\W\d]+(?:(?:\*\*|\^)?-?\d)?\)?){0,5}")
+
+BASE = {
+    "[length]": "m", "[mass]": "kg", "[time]": "s", "[current]": "A", "[temperature]": "K", "[substance]": "mol",
+    "[luminosity]": "cd",
+}  # fmt: skip
 
 
 def ask_pint(spelling: str) -> Unit | None:
@@ -29,4 +35,16 @@ def ask_pint(spelling: str) -> Unit | None:
         si = dimension.si.replace("-", "").replace("m2", "m**2").replace("m3", "m**3").replace("s2", "s**2")
         if not dimension.base and registry.Quantity(1.0, si.replace(" ", "*")).check(one.dimensionality):
             return Unit(name, factor, offset=float(zero.magnitude) / factor)
-    return Unit(f"quantity of [{one.units:~P}]", factor)
+    return Unit(f"quantity of [{base_units(one.dimensionality)}]", factor)
+
+
+def base_units(dimensionality: Mapping[str, float]) -> str:
+    """Base units of a quantity by the alphabet, "kg·m²/s³": the order of pint changes with its version."""
+    powers = sorted((BASE.get(name, name), power) for name, power in dimensionality.items())
+    over = "·".join(unit + raised(power) for unit, power in powers if power > 0) or "1"
+    return "/".join([over, *(unit + raised(-power) for unit, power in powers if power < 0)])
+
+
+def raised(power: float) -> str:
+    """A power above the line, nothing for 1."""
+    return "" if power == 1 else f"{power:g}".translate(str.maketrans("0123456789.-", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻"))

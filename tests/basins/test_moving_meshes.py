@@ -369,7 +369,7 @@ def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, schem
     start |= {"level": "1 + 0.2 * cos(5 * x)"} if water else {"pressure": "1e6 * cos(5 * x)"}
     more = {"start": start} | ({"pressure": 6e6} if law == "table" else {})
     nodes = {"b": pool(tub(tmp_path), patches, "free-surface" if water else "liquid", **more)}
-    case = scene(nodes, {}, 1.0, {"scheme": scheme, "step": 1e-3, "method": "euler"},
+    case = scene(nodes, {}, 0.9, {"scheme": scheme, "step": 1e-3, "method": "euler"},
                  fluid=fluid("linear" if water else law))  # fmt: skip
     model = build(load(case))
     basin, y = model.basins[0], model.start
@@ -419,7 +419,7 @@ def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, 
         nodes = {"b": {"type": "basin", "physics": "liquid", "thickness": 0.1, "patches": patches,
                        "pressure": 6e6 if law == "table" else 2e5, **shape}}  # fmt: skip
         model = build(
-            load(scene(nodes, {}, 0.1, {"scheme": "upwind", "method": "euler", "step": 1e-6}, fluid=fluid(law)))
+            load(scene(nodes, {}, 0.09, {"scheme": "upwind", "method": "euler", "step": 1e-6}, fluid=fluid(law)))
         )
         basin, y = model.basins[0], model.start.copy()
         y[[int(row["y"]) for row in model.tables.walls]] = 0.1, -0.05

@@ -236,3 +236,17 @@ def test_a_stream_that_passes_the_outline_by_little_is_still_refused():
     case = carrying({"stream": "0.1*sin(pi*x)*sin(pi*y) + 1e-9*x*y"}, size=[1.0, 1.0], cells=[8, 8])
     with pytest.raises(CaseError, match="passes the outline at"):
         fvsolve.build(fvsolve.load(case))
+
+
+@pytest.mark.parametrize(("stream", "leak"), [("x*y*(2 - x)", "y = 1 m"), ("y", "x = [02] m"), ("0.1*x", "y = [01] m")])
+def test_a_wall_that_leaks_is_named_and_not_the_hole_behind_it(stream, leak):
+    case = carrying({"stream": stream}, size=[2.0, 1.0], cells=[20, 10], holes=[[0.8, 0.4, 1.2, 0.6]])
+    with pytest.raises(CaseError, match=f"nodes.pool.velocity: .*outline at .*{leak}"):
+        fvsolve.build(fvsolve.load(case))
+
+
+def test_a_hole_that_leaks_alone_is_named():
+    case = carrying({"stream": "where((x - 1)**2 + (y - 0.5)**2 < 0.09, x, 0)"}, size=[2.0, 1.0], cells=[20, 10],
+                    holes=[[0.8, 0.4, 1.2, 0.6]])  # fmt: skip
+    with pytest.raises(CaseError, match=r"outline at x = (0\.[89]|1)[\d.]* m, y = 0\.[456]"):
+        fvsolve.build(fvsolve.load(case))

@@ -464,7 +464,8 @@ def test_the_page_of_the_parts_has_the_defaults():
     assert float(told["start"]) == case.numerics.start
     assert told["scheme"] == f"{defaults.DEFAULT_SCHEME} (with cavitation {defaults.CAVITY_SCHEME})"
     with_rtol, with_cavities = f"with rtol {defaults.DEFAULT_METHOD_RTOL}", f"with cavitation {defaults.CAVITY_METHOD}"
-    assert told["method"] == f"{defaults.DEFAULT_METHOD} ({with_rtol}, {with_cavities})"
+    in_basins = f"with scalars or friction in basins {defaults.DEFAULT_METHOD_SSP}"
+    assert told["method"] == f"{defaults.DEFAULT_METHOD} ({with_rtol}, {with_cavities}, {in_basins})"
     assert told["courant"].startswith(f"{defaults.DEFAULT_COURANT} ")
     assert told["courant"].endswith(f"(with cavitation {defaults.CAVITY_COURANT})")
     assert float(told["rtol"].split()[0]) == case.numerics.rtol

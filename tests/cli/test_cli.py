@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import signal
 import subprocess
@@ -282,3 +284,14 @@ def test_a_case_beside_the_mesh_it_comes_with_is_copied_and_another_mesh_is_kept
     mesh.write_text("another")
     code, _, err = fvs("new", "flooding", "three.toml")
     assert code == 2 and "exists" in err and mesh.read_text() == "another" and not (tmp_path / "three.toml").exists()
+
+
+def test_a_caller_may_put_any_text_stream_in_place_of_standard_output(monkeypatch):
+    """A notebook's has no `reconfigure`, nor has `io.StringIO`."""
+    from fvsolve.cli import main
+
+    monkeypatch.setattr(sys, "argv", ["fvsolve", "--version"])
+    with contextlib.redirect_stdout(io.StringIO()) as said, contextlib.redirect_stderr(io.StringIO()):
+        with contextlib.suppress(SystemExit):
+            main()
+    assert fvsolve.__version__ in said.getvalue()

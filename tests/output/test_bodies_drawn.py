@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from fvsolve import run
+from fvsolve.errors import RunError
 from fvsolve.output.fields import read_series
 from tests.truth.scenes import scene
 
@@ -41,3 +42,46 @@ def test_a_turning_boom_and_its_tank_are_written_where_they_are(tmp_path):
         corner = tip + east + north + [0, 0, 0.5]
         assert np.abs(other.points - corner).sum(axis=1).min() < 1e-9
         assert other.cell_data["normal"][0] == pytest.approx(np.tile([0, 0, 1.0], (4, 1)))
+
+
+@pytest.mark.parametrize(
+    ("physics", "attitude", "along"),
+    [
+        ({"level": 0.2}, {"yaw": "90 deg"}, [0.0, 1.0, 0.0]),
+        ({"physics": "liquid", "thickness": 0.1, "pressure": "2 bar"}, {"yaw": "90 deg"}, [0.0, 1.0, 0.0]),
+        (
+            {"physics": "liquid", "thickness": 0.1, "pressure": "2 bar"},
+            {"pitch": "-30 deg"},
+            [math.sqrt(0.75), 0.0, 0.5],
+        ),
+    ],
+)
+def test_velocities_in_frames_are_along_axes_of_the_world_and_on_lines_along_those_of_the_basin(
+    physics, attitude, along, tmp_path
+):
+    hull = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0], "joint": {"kind": "fixed", "attitude": attitude}}
+    tank = {"type": "basin", "on": "hull", "size": [1.0, 1.0], "cells": [4, 4], "start": {"u": 0.3}, **physics}
+    case = scene({"hull": hull, "tank": tank}, {}, 1e-6, {"scheme": "upwind"})
+    case["output"] |= {"fields": 1, "lines": {"cut": {"basin": "tank", "from": [0.2, 0.5], "to": [0.8, 0.5]}}}
+    run(case, out=tmp_path / "r")
+    frame = meshio.read(tmp_path / "r" / "fields" / "tank-000000.vtu")
+    assert frame.cell_data["velocity"][0] == pytest.approx(np.tile(0.3 * np.array(along), (16, 1)), abs=1e-12)
+    line = np.genfromtxt(tmp_path / "r" / "lines" / "cut-000000.csv", delimiter=",", names=True)
+    assert line["u_ms"] == pytest.approx(np.full(line.size, 0.3)) and np.abs(line["v_ms"]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("fields", "out", "reason"), [(0, True, "fields is 0"), (2, False, "nothing was written"), (2, None, "has none of")]
+)
+def test_a_run_without_frames_says_the_one_reason(fields, out, reason, tmp_path):
+    stone = {"type": "body", "mass": 1.0, "inertia": [1.0, 1.0, 1.0]}
+    weight = {"type": "mass", "mass": 1.0}
+    coil = {"type": "spring", "from": "wall", "to": "weight", "stiffness": 1.0}
+    lone = out is None
+    nodes = {"weight": weight, "wall": {"type": "frame"}} if lone else {"stone": stone}
+    case = scene(nodes, {"coil": coil} if lone else {}, 0.1, {"method": "rk4", "step": 0.01, "scheme": "upwind"})
+    case["output"]["fields"] = fields
+    found = run(case, out=None if out is False else tmp_path / "r")
+    with pytest.raises(RunError, match=reason) as told:
+        found.view(field="speed")
+    assert sum(one in str(told.value) for one in ("fields is 0", "nothing was written", "has none of")) == 1

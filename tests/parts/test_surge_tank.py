@@ -95,5 +95,9 @@ def test_marks_and_what_moves_name_the_tank_itself():
     assert [mark.place for mark in result.marks] == ["nodes.t"] and result["t.level"][-1] == pytest.approx(
         0.0, abs=1e-6
     )
+    full = {"t": nodes["t"] | {"height": 0.6}, "spring": {"type": "inflow", "flow": 0.02}}
+    spilt = fvsolve.run(scene(full, {"way": valve("spring", "t", 0.02)}, 40.0, {}, ["t.level"]))
+    (note,) = [one for one in spilt.warnings if one.kind == "spilling"]
+    assert (note.place, note.value) == ("nodes.t", pytest.approx(5.0, abs=1e-6)) and "inside" not in note.text
     moving = fvsolve.build(fvsolve.load(scene(nodes, {"hole": valve("t", "air", 0.02)}, 1.0, {}))).steady["moving"]
     assert moving[0].startswith("tank t falls at")

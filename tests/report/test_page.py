@@ -24,7 +24,7 @@ from fvsolve.run.result import Result
 WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"
 
 VERDICT = {"name": "class", "ok": False, "place": "main", "chainage": 480.0, "elevation": 0.0, "time": 1.25,
-           "bound": "greatest", "value": 13.5, "limit": 10.0, "margin": -3.5, "unit": "bar",
+           "bound": "greatest", "state": "fails", "value": 13.5, "limit": 10.0, "margin": -3.5, "unit": "bar",
            "quantity": "gauge_pressure", "until": 3.0, "error": None, "worst": []}  # fmt: skip
 
 
@@ -181,17 +181,25 @@ def test_marks_and_warnings_that_spoil_numbers_stand_at_the_top(closure):
 
 
 def test_verdicts_stand_first_those_that_fail_before_others(closure):
-    holds = {"name": "vacuum", "ok": True, "value": 0.5, "limit": 0.2, "margin": 0.3, "bound": "least"}
+    holds = {
+        "name": "vacuum",
+        "ok": True,
+        "state": "holds",
+        "value": 0.5,
+        "limit": 0.2,
+        "margin": 0.3,
+        "bound": "least",
+    }
     verdicts = [VERDICT | holds, VERDICT]
     text = read(changed(closure, verdicts=verdicts)).text
     assert "1 of 2 limits does not hold. class" in text and "class gauge pressure at most 10 bar FAILS 13.5" in text
     assert text.index("FAILS") < text.index("vacuum") < text.index("Worst of all pipes")
-    early = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False}], ok=False)).text
+    early = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "state": "open"}], ok=False)).text
     assert "Whether a limit holds is open. vacuum: the run is not sound." in early and "FAILS" not in early
     mark = {"what": "below vapor pressure", "place": "links.main", "time": 1.0, "text": "main: below"}
-    later = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False}], marks=[mark])).text
+    later = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "state": "open"}], marks=[mark])).text
     assert "vacuum: from a time on the numbers are not to be trusted." in later
-    unsure = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "error": 0.4}])).text
+    unsure = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "state": "open", "error": 0.4}])).text
     assert "open. vacuum: their margins are smaller than the error" in unsure and "open 0.5 0.4" in unsure
     passed = read(changed(closure, verdicts=[VERDICT | {"error": 4.0}])).text
     assert "The limit does not hold. class" in passed and "FAILS 13.5 4" in passed

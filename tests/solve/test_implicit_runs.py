@@ -149,8 +149,8 @@ def test_a_tank_spills_from_the_moment_it_is_full(numerics):
     nodes = {"basin": tank(2.0, 1.0, height=1.5), "spring": {"type": "inflow", "flow": 0.02}}
     case = scene(nodes, {"pipe": valve("spring", "basin", 0.05)}, 100.0, numerics, ["basin.level"], 1.0)
     result = fvsolve.run(case)
-    (mark,) = result.marks
-    assert (mark.what, mark.time) == ("spilling", pytest.approx(50.0, abs=1e-9))
+    (note,) = (one for one in result.warnings if one.kind == "spilling")
+    assert (note.place, note.value) == ("nodes.basin", pytest.approx(50.0, abs=1e-9)) and not result.marks
     assert result.ledger["mass"]["spilled"] == pytest.approx(1000.0, rel=1e-12)
     assert result["basin.level"] == pytest.approx(np.minimum(1.0 + 0.01 * result.t, 1.5), abs=1e-9)
 
@@ -215,7 +215,7 @@ BALL = {  # rtol, method: errors at the end as measured, of the position [m] and
     (1e-4, "auto"): (5.2e-4, 1.7e-2),
     (1e-4, "rodas-5p"): (4.4e-5, 1.6e-5),
     (1e-4, "radau-iia-5"): (6.5e-5, 6.3e-4),
-    (1e-4, "radau-iia-9"): (8.6e-5, 9.8e-4),
+    (1e-4, "radau-iia-9"): (8.6e-5, 1.6e-3),  # its steps end on rows
     (1e-4, "esdirk-4"): (8.5e-4, 6.3e-3),
     (1e-6, "dormand-prince"): (3.1e-5, 6.2e-4),
     (1e-6, "auto"): (3.1e-5, 6.2e-4),

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from solve.test_threads import SCENES, water
+from solve.test_threads import SCENES, liquid, water
 
 import fvsolve
 from fvsolve.draw.frames import read
@@ -72,6 +72,16 @@ def test_ranks_give_the_bits_of_one_process(tmp_path, many):
         assert same(tmp_path / "one" / name, tmp_path / "ranks" / name), name
         said = json.loads((tmp_path / "ranks" / name / "summary.json").read_text())
         assert said["threads"] == many and run.summary["threads"] == 1
+
+
+def test_growth_without_end_stops_all_ranks_at_the_step_of_one(tmp_path):
+    case = liquid()
+    case["numerics"] |= {"courant": 2.0, "end": 1.0}
+    found = ranks(2, sys.executable, "-c", SCRIPT, json.dumps({"grows": case}), tmp_path, "{}")
+    assert found.returncode == 0, found.stderr
+    said, one = json.loads((tmp_path / "grows" / "summary.json").read_text()), fvsolve.run(case)
+    assert said["threads"] == 2 and "has grown" in said["reason"]
+    assert (said["steps"], said["reason"]) == (one.summary["steps"], one.reason)
 
 
 def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_path):

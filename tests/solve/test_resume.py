@@ -7,6 +7,7 @@ import random
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -199,3 +200,42 @@ def test_what_was_seen_of_a_basin_before_is_known_after(tmp_path):
     again = Run(model, run.state(), MemorySink(model), None)
     assert again.soundness.rates == run.soundness.rates
     assert [one.kept.tolist() for one in again.watches] == [one.kept.tolist() for one in run.watches]
+
+
+class Keeping(MemorySink):
+    """A sink of rows in memory that keeps checkpoints too."""
+
+    def __init__(self, model) -> None:
+        super().__init__(model)
+        self.states = []
+
+    def checkpoint(self, state, extra) -> None:
+        self.states.append(state)
+
+
+@pytest.mark.parametrize(
+    "output",
+    [{"fields": 40, "every": 1.0}, {"fields": 80, "every": 1.0}, {"fields": 0, "every": 5e-5}],
+    ids=["a frame at each step", "two frames in each step", "more rows in a step than are held"],
+)
+def test_a_run_whose_steps_all_write_pauses_and_goes_on_from_there(output, monkeypatch):
+    monkeypatch.setattr(import_module("fvsolve.solve.solve"), "CHECKPOINT_SECONDS", 0.0)
+    case = branched()
+    case["numerics"] = {"end": 2.0, "scheme": "upwind", "method": "implicit-midpoint", "step": 0.05}
+    case["output"] |= output
+    model, times = fvsolve.build(fvsolve.load(case)), []
+
+    def go(state):
+        sink = Keeping(model)
+        run = Run(model, state, sink, lambda t, seconds, steps: times.append(t))
+        run.budget = run.left = 10.0
+        assert run.go().reason == "finished"
+        return sink, run.loop.now.copy()
+
+    whole, end = go(fvsolve.initial_state(model))
+    assert times and 0.0 < times[0] < 2.0
+    half = whole.states[0]
+    again, same = go(half)
+    assert 0.0 < half.t < 2.0 and np.array_equal(same, end)
+    rows = whole.table()
+    assert np.array_equal(again.table(), rows[rows[:, 0] > half.t])

@@ -22,10 +22,11 @@ def dead_end(**numerics) -> dict:
 
 
 def two_tanks(**numerics) -> dict:
-    """They level out after 15 s."""
+    """They level out after 15 s; steps of `radau-iia-9` end where rows are due."""
+    every = 10.0 if numerics["method"] == "radau-iia-9" else 1.0
     nodes = {"a": tank(1.0, 2.0), "b": tank(0.5, 1.0)}
     links = {"pipe": valve("a", "b", 0.01)}
-    return scene(nodes, links, 200.0, numerics, ["a.level"], 1.0, exact={"name": "levelling"})
+    return scene(nodes, links, 200.0, numerics, ["a.level"], every, exact={"name": "levelling"})
 
 
 @pytest.mark.parametrize("name", DAMPING)

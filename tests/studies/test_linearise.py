@@ -132,6 +132,71 @@ def test_a_spool_at_its_middle_is_no_place_to_linearise_an_input_but_beside_it_i
     assert found.b[found.states.index("cyl.A.excess"), 0] == pytest.approx(gain, rel=1e-6)
 
 
+OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.4e9, "viscosity": 46e-6, "law": "linear"}
+HOSE = 9e-3  # diameter of its orifice [m]
+
+
+def behind_hoses(**spool):
+    """A spool whose chambers stand behind hoses at a drop of zero: their laminar slope is 1e6 times that of the oil."""
+    nodes = {
+        "P": reservoir(2e7), "T": reservoir(3e5), "A": chamber(4e-4, 5e6), "B": chamber(4e-4, 4e6),
+        "a": chamber(2e-4, 5e6), "b": chamber(2e-4, 4e6),
+    }  # fmt: skip
+    links = {
+        "spool": {"type": "spool-valve", "ports": {port: port for port in "PTAB"}, "area": 2e-5, "position": 0.0},
+        "hoseA": valve("A", "a", area(HOSE)), "hoseB": valve("B", "b", area(HOSE)),
+    }  # fmt: skip
+    links["spool"] |= spool
+    return scene(nodes, links, 1.0, TIGHT, fluid=OIL)
+
+
+def gain(drop):
+    """Mass flow of a spool of 20 mm2 at a drop, over its position."""
+    return 0.61 * 2e-5 * math.sqrt(2 * OIL["density"] * drop)
+
+
+@pytest.mark.parametrize("outputs", [[], ["spool.flow_P"]])
+def test_a_shut_spool_is_refused_whatever_stands_behind_its_chambers(outputs):
+    """One way P fills A and B drains, the other way P fills B and A drains: slopes of B are gain(37) and gain(160)."""
+    with pytest.raises(FvsolveError, match="spool.position = 0 is no place.*from side to side"):
+        linearise(behind_hoses(), ["spool.position"], outputs)
+
+
+@pytest.mark.parametrize("position, flows", [(0.01, (150e5, -37e5)), (-0.01, (47e5, -160e5))])
+def test_a_spool_beside_its_middle_has_the_slope_of_that_side(position, flows):
+    found = linearise(behind_hoses(position=position), ["spool.position"])
+    rows = [found.states.index(f"{port}.mass") for port in "AB"]
+    assert found.b[rows, 0] == pytest.approx([math.copysign(gain(abs(x)), x) for x in flows], rel=1e-6)
+    assert found.error["BD"] < 1e-6
+
+
+def test_a_shut_valve_has_the_slope_of_its_opening_whatever_stands_behind_it():
+    """Its law is laminar at the first thousandth of the opening: not there, where a hose wants steps of 1e-11."""
+    nodes = {"P": reservoir(2e7), "A": chamber(4e-4, 5e6), "a": chamber(2e-4, 5e6)}
+    links = {"v": valve("P", "A", 2e-5, 0.0), "hose": valve("A", "a", area(HOSE))}
+    found = linearise(scene(nodes, links, 1.0, TIGHT, fluid=OIL), ["v.opening"], ["v.flow"])
+    assert found.b[0, 0] == pytest.approx(2e-5 * math.sqrt(2 * 870.0 * 1.5e7), rel=1e-6)
+    assert found.d[0, 0] == pytest.approx(found.b[0, 0] / 870.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("hose", [False, True])
+def test_a_relief_valve_at_its_set_pressure_is_refused_whatever_stands_beside_it(hose):
+    """It opens one way alone; a hose's laminar slope in the same row hid that, and half the slope was said."""
+    nodes = {"T": reservoir(3e5), "A": chamber(4e-4, 5e6)} | ({"a": chamber(4e-4, 5e6)} if hose else {})
+    links = {"relief": {"type": "relief-valve", "from": "A", "to": "T", "diameter": 8e-3,
+                        "set_pressure": 5e6, "overpressure": 1.5e6}}  # fmt: skip
+    links |= {"hose": valve("A", "a", area(HOSE))} if hose else {}
+    with pytest.raises(FvsolveError, match="A.mass: its slope differs from side to side"):
+        linearise(scene(nodes, links, 1.0, TIGHT, fluid=OIL))
+
+
+def test_an_output_that_opens_one_way_is_refused_by_its_name():
+    """The loop of a closed linkage has no gap: its probe is the length of a vector, which has no slope at zero."""
+    with pytest.raises(FvsolveError, match="loop.gap cannot be linearised.*--outputs"):
+        linearise("four-bar", outputs=["two.angle", "loop.gap"])
+    assert linearise("four-bar", outputs=["two.angle"]).c.shape[0] == 1
+
+
 def line(cells, friction=None, demand=0.0, scheme="upwind5"):
     made = pipe("top", "end", 600.0, 0.5, 1200.0, cells, **({"friction": friction} if friction else {}))
     return scene({"top": lake(50.0), "end": junction(demand)}, {"main": made}, 1.0, {**LINES, "scheme": scheme})
@@ -281,6 +346,15 @@ def test_the_command_writes_matrices_with_names_and_one_json_object(tmp_path, mo
     assert kept["A"].tolist() == found["A"] and kept["states"].tolist() == found["states"]
     table = (tmp_path / "runs" / "chamber-and-orifice.linearise" / "B.csv").read_text().splitlines()
     assert table[0] == ",hole.opening" and float(table[1].split(",")[1]) == found["B"][0][0]
+
+
+def test_a_folder_that_is_written_again_is_named(tmp_path, fvs):
+    """What was there goes, with a word: another size leaves no matrix of the first beside its own."""
+    first = fvs("linearise", "two-tanks", "--out", tmp_path)[2]
+    (tmp_path / "A-sparse.csv").write_text("of a larger case")
+    again = fvs("linearise", "two-tanks", "--out", tmp_path)[2]
+    assert str(tmp_path) not in first and str(tmp_path) in again and "--out" in again
+    assert not (tmp_path / "A-sparse.csv").exists()
 
 
 def leave(main):

@@ -173,7 +173,7 @@ def test_ctrl_c_during_a_rung_ends_the_ladder(tmp_path):
         import os, signal, sys
         from fvsolve.cli import main
         from fvsolve.solve.solve import Run
-        Run.pause = lambda self, spent: os.kill(os.getpid(), signal.SIGINT)  # after 1000 steps
+        Run.pause = lambda self: os.kill(os.getpid(), signal.SIGINT)  # after 1000 steps
         main()"""
     command = [sys.executable, "-c", script, "chart", "line.toml", "--models"]
     left = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)

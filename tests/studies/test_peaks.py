@@ -4,51 +4,13 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
 from truth.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.studies.levels import finer
-from fvsolve.studies.peaks import band, peak_errors, pooled
-
-
-def triple(order: float, coefficient: float = 0.1, exact: float = 3.0) -> tuple[float, float, float]:
-    return tuple(exact + coefficient * h**order for h in (2.0, 1.0, 0.5))
-
-
-@pytest.mark.parametrize("order", [0.5, 0.7, 1.0, 1.3, 2.0, 3.0, 5.0])
-@pytest.mark.parametrize("coefficient", [0.1, -0.02])
-def test_a_band_holds_the_error_of_any_order(order: float, coefficient: float) -> None:
-    values = triple(order, coefficient)
-    found = band(values, shared=order)
-    assert found["error"] >= abs(coefficient) * (1.0 - 1e-9)
-    if 1.0 <= order <= 2.0:
-        assert found["error"] <= 1.5 * abs(coefficient) and found["order"] == pytest.approx(order)
-    if order < 1.0:
-        assert found["order"] is None
-        assert found["error"] >= 3.4 * max(abs(values[1] - values[0]), abs(values[2] - values[1]))
-
-
-def test_where_no_order_shows_it_is_3_4_times_the_greatest_difference() -> None:
-    for values in ((1.0, 1.2, 1.1), (1.0, 1.1, 1.3), (1.0, 1.0, 1.2)):
-        found = band(values, shared=5.0)
-        assert found["order"] is None
-        assert found["error"] == pytest.approx(3.414 * np.max(np.abs(np.diff(values))), rel=1e-3)
-
-
-def test_an_order_that_one_peak_shows_alone_is_luck() -> None:
-    lucky = (1.0, 1.2, 1.2001)
-    shared = pooled({"a": ("m", lucky), "b": ("m", (2.0, 1.0, 2.5)), "c": ("Pa", lucky)})
-    assert band(lucky, shared["m"])["order"] is None and band(lucky, shared["Pa"])["order"] == 2.0
-    assert band(lucky, shared["m"])["error"] == pytest.approx(3.414 * 0.2, rel=1e-3)
-
-
-def test_what_did_not_run_bounds_nothing() -> None:
-    assert band((1.0, 1.1, None), 1.0) == {"error": None, "order": None}
-    assert band((1.0, None, 1.1), 1.0) == {"error": None, "order": None}
-    assert band((None, 1.1, 1.0), 1.0)["error"] == pytest.approx(0.3414, rel=1e-3)
-    assert band((1.0, 1.0, 1.0), 1.0)["error"] == pytest.approx(5e-6)
+from fvsolve.studies.peaks import peak_errors
+from fvsolve.studies.unresolved import differing
 
 
 @pytest.mark.parametrize(
@@ -95,13 +57,13 @@ def test_the_command_says_how_far_peaks_and_verdicts_are_off(fvs, tmp_path, monk
     said = json.loads((tmp_path / "runs" / "scene" / "summary.json").read_text())
     peak, verdict = said["peaks"]["gate.pressure"]["greatest"], said["verdicts"][0]
     assert peak["value"] == said["extremes"]["gate.pressure"]["greatest"]
-    assert verdict["error"] == pytest.approx(peak["error"], rel=0.2)
+    assert peak["error"] <= verdict["error"] <= 0.01 * verdict["value"]  # of the whole pipe, whose places differ more
     fine = fvsolve.run(case, set=finer(fvsolve.load(case), 8.0))
     assert abs(fine.extremes["gate.pressure"].greatest - peak["value"]) <= peak["error"]
     assert abs(fine.verdicts[0].value - verdict["value"]) <= verdict["error"]
     assert fvsolve.open_run(tmp_path / "runs" / "scene").verdicts[0].error == verdict["error"]
     assert "+-" not in fvs("run", "scene.toml", "--out", "plain", "--no-pictures")[1]
-    for share, state, wanted in ((0.5, "open", 1), (2.0, "holds", 0), (-0.5, "FAILS", 1)):  # of the band, as a margin
+    for share, state, wanted in ((0.5, "open", 1), (2.0, "holds", 0), (-0.5, "fails", 1)):  # of the band, as a margin
         limit = f"limits.top.greatest={verdict['value'] + share * verdict['error']!r} Pag"
         status, text, _ = fvs("run", "scene.toml", "--error", "--no-pictures", "--set", limit, "--out", state)
         (one,) = fvsolve.open_run(tmp_path / state).verdicts
@@ -114,4 +76,84 @@ def test_a_finer_case_is_finer_in_all_that_has_a_resolution() -> None:
     stepped = fvsolve.load(case, {"numerics.step": "2 ms"})
     assert finer(stepped, 2.0) == {"links.main.cells": 60, "numerics.step": 0.001}
     line = fvsolve.load(case, {"numerics.line": "delay", "numerics.rtol": 1e-5})
-    assert finer(line, 0.5) == {"numerics.rtol": 4e-5, "numerics.accuracy": 0.02}
+    assert finer(line, 0.5) == {"numerics.rtol": 4e-5, "numerics.accuracy": 0.02, "links.main.cells": 15}
+    line = fvsolve.load(case, {"numerics.line": "delay", "numerics.courant": 0.9})
+    assert finer(line, 2.0) == {"numerics.courant": 0.45, "numerics.accuracy": 0.005}  # by which its steps go
+
+
+def two_pipes(limits: dict) -> dict:
+    """A line closes by 70 % behind an air vessel: its trough comes late, and sharper on finer cells."""
+    nodes = {"lake": lake(87.473, elevation=0.0), "end": junction(elevation=0.0),
+             "j": {"type": "accumulator", "volume": 0.116436, "gas_volume": 0.0103807, "elevation": 0.0,
+                   "connection": {"diameter": 0.1, "loss_in": 2.0, "loss_out": 2.0}},
+             "out": reservoir(101325.0, elevation=0.0)}  # fmt: skip
+    factors = ({"model": "quasi-steady", "factor": one} for one in (0.0153954, 0.0200779))
+    links = {"a": pipe("lake", "j", 429.123, 0.15, 1127.6, 88, friction=next(factors)),
+             "b": pipe("j", "end", 852.191, 0.4, 1176.878, 50, friction=next(factors)),
+             "v": valve("end", "out", 0.61 * 0.003315159, ramp(0.2, 0.02, 1.0, 0.3))}  # fmt: skip
+    return scene(nodes, links, 5.505426, {}, ["end.pressure"], 0.02, limits=limits)
+
+
+def test_a_trough_that_finer_cells_deepen_leaves_a_limit_open() -> None:
+    """On all three resolutions the start is the least; on eight times the cells a later trough is lower by 31 kPa."""
+    case = two_pipes({"low": {"on": "end", "quantity": "pressure", "least": "6.3 bar"}})
+    said = peak_errors(fvsolve.run(case), fvsolve.load(case))
+    peak, (verdict,) = said["peaks"]["end.pressure"]["least"], said["verdicts"]
+    fine = fvsolve.run(case, set=finer(fvsolve.load(case), 8.0)).extremes["end.pressure"].least
+    assert said["extremes"]["end.pressure"]["t_least"] == 0.0 and fine < 6.2e5 < verdict["limit"] < peak["value"]
+    assert peak["value"] - fine < peak["error"] and verdict["state"] == "open"
+
+
+def stub(cells: int, opening: dict, beside: int = 100, **more) -> dict:
+    """A valve behind a short pipe of few cells at the end of a long one."""
+    nodes = {"lake": lake(50.0), "j": junction(), "gate": junction(), "out": reservoir(101325.0)}
+    links = {"main": pipe("lake", "j", 1000.0, 0.3, 1000.0, beside),
+             "short": pipe("j", "gate", 8.0, 0.15, 1000.0, cells),
+             "v": valve("gate", "out", 0.61e-3, opening)}  # fmt: skip
+    return scene(nodes, links, 4.0, {"line": "cells"}, ["gate.head", "main.head@0.5"], **more)
+
+
+def test_one_cell_cannot_be_halved() -> None:
+    case = stub(1, ramp(0.5, 0.0, 1.0, 0.0), limits={"low": {"on": "gate", "quantity": "head", "least": 0.0}})
+    said = peak_errors(fvsolve.run(case), fvsolve.load(case))
+    assert said["peaks"]["gate.head"]["least"]["error"] is None and said["verdicts"][0]["state"] == "open"
+    assert said["peaks"]["main.head@0.5"]["least"]["error"] > 0.0
+    assert any("links.short.cells = 4" in text for text in said["resolution"]["reasons"])
+
+
+def test_a_pipe_shorter_than_a_cell_beside_it_is_not_known() -> None:
+    """The wave from the lake is smeared over more than the short pipe, whatever its own cells: 22.3 m for -63.54."""
+    case = stub(8, ramp(0.5, 0.0, 1.0, 0.0))
+    said = peak_errors(fvsolve.run(case), fvsolve.load(case))
+    assert said["peaks"]["gate.head"]["least"]["error"] is None
+    assert any("links.main.cells = 500" in text for text in said["resolution"]["reasons"])
+    case["links"]["main"]["cells"], case["links"]["short"]["cells"] = 500, 4
+    said = peak_errors(fvsolve.run(case), fvsolve.load(case))
+    peak = said["peaks"]["gate.head"]["least"]
+    assert abs(peak["value"] + 63.54) <= peak["error"] and not said["resolution"]["reasons"]
+
+
+def test_a_pulse_that_no_cell_shows_is_not_known() -> None:
+    opening = {"time": [0.5, 0.502, 0.506], "value": [1.0, 0.1, 0.8], "kind": "linear"}
+    opening["time"] = [0.5, 0.501, 0.5015]
+    said = peak_errors(fvsolve.run(stub(4, opening, 500)), fvsolve.load(stub(4, opening, 500)))
+    assert said["peaks"]["gate.head"]["greatest"]["error"] is None
+    assert "links.v.opening" in said["resolution"]["reasons"][0]
+    opening["time"] = [0.5, 0.54, 0.6]
+    said = peak_errors(fvsolve.run(stub(4, opening, 500)), fvsolve.load(stub(4, opening, 500)))
+    assert said["peaks"]["gate.head"]["greatest"]["error"] > 0.0
+
+
+def test_events_that_differ_between_resolutions_are_named() -> None:
+    runs = {times: Finished([{"name": "nrv"}] * many + [{"name": "pump"}])
+            for times, many in ((0.5, 2), (1.0, 2), (2.0, 150))}  # fmt: skip
+    assert differing(runs) == ["events differ between resolutions: nrv (2, 2, 150)"]
+
+
+class Finished:
+    """A run with events."""
+
+    reason = "finished"
+
+    def __init__(self, events: list) -> None:
+        self.summary = {"events": events}

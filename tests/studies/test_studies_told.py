@@ -67,6 +67,15 @@ def test_without_a_terminal_a_study_says_now_and_then_where_it_is(monkeypatch, c
     assert said.splitlines()[0] == "3 of 9: upwind with rk4"
 
 
+def test_a_line_of_progress_is_not_repeated_unchanged(monkeypatch, capsys):
+    monkeypatch.setattr(studying, "NOW_AND_THEN", 1e-3)
+    with studying.told() as progress:
+        for done in (3, 4):
+            progress(done, 9, "rk4")
+            time.sleep(0.1)
+    assert capsys.readouterr().err.splitlines() == ["3 of 9: rk4", "4 of 9: rk4"]
+
+
 @pytest.mark.parametrize("study", ["chart", "order", "map", "stability"])
 def test_a_setting_that_belongs_to_the_method_asked_for_is_read_with_it(fvs, path, study):
     own = ["--set", "numerics.rtol=1e-5", "--method", "dormand-prince"]

@@ -96,7 +96,7 @@ def test_ctrl_c_during_a_run_keeps_the_rows_that_are_finished(line, tmp_path):
         import os, signal, sys
         from fvsolve.cli import main
         from fvsolve.solve.solve import Run
-        Run.pause = lambda self, spent: os.kill(os.getpid(), signal.SIGINT)  # after 1000 steps
+        Run.pause = lambda self: os.kill(os.getpid(), signal.SIGINT)  # after 1000 steps
         main()"""
     command = [sys.executable, "-c", script, "sweep", "line.toml", "--set", "numerics.end=0.5,2000,0.4", "--out", "o"]
     left = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)

@@ -7,12 +7,12 @@ from math import sqrt
 
 from fvsolve.basins.behind import area_of, counted, length_of, weight
 from fvsolve.basins.energy import at_rest, row_of
-from fvsolve.basins.free_surface.friction import FASTEST
+from fvsolve.basins.free_surface.friction import drag_per_flow
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.kinds import kind_of
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import MANNING, NO_DRAG
+from fvsolve.kernels.records import NO_DRAG
 
 MINE = kind_of(__package__)
 
@@ -42,7 +42,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def water_power(st, basin, plane, y, dydt, rows):
-    """Friction, held to FASTEST as in the rates, and rate of storage of water with a free surface."""
+    """Friction, held as in the rates, and rate of storage of water with a free surface."""
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
     weight, rest, area = st["rho"] * st["gravity"], at_rest(st, basin), plane[basin["area"] :]
@@ -56,19 +56,17 @@ def water_power(st, basin, plane, y, dydt, rows):
         level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
         moves = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
         rate += drawn[i] * (level * dydt[o + i] + st["rho"] * moves)
-        friction += area[i] * drag_power(st, basin, depth, u * u + v * v)
+        friction += area[i] * drag_power(st, basin, depth, sqrt(qx * qx + qy * qy), u * u + v * v)
     rows[2], rows[3] = friction, rate
 
 
 @njit
-def drag_power(st, basin, depth, square):
+def drag_power(st, basin, depth, flow, square):
     """What the bed takes of water that runs over it, per area [W/m2]; square : of its velocity."""
-    if basin["friction"] == NO_DRAG or square == 0.0:
+    if basin["friction"] == NO_DRAG:
         return 0.0
-    rate, wet = 0.125 * basin["roughness"] * sqrt(square) / max(depth, THIN), max(depth, THIN)
-    if basin["friction"] == MANNING:
-        rate = st["gravity"] * basin["roughness"] ** 2 * sqrt(square) / wet ** (4.0 / 3.0)
-    return st["rho"] * depth * square * rate / (1.0 + rate / FASTEST)
+    rate = drag_per_flow(basin["friction"], st["gravity"], basin["roughness"], depth) * flow
+    return st["rho"] * depth * square * rate / (1.0 + rate / basin["held"])
 
 
 @njit

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
-from fvsolve.basins.free_surface import faces, grid
+from fvsolve.basins.free_surface import faces, grid, lower_films
+from fvsolve.basins.free_surface.friction import FASTEST
 from fvsolve.basins.free_surface.lower_dispersion import Watch, deep, notices
 from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.basins.lower_pieces import MARKED, TURNING
 from fvsolve.case.cells import means, samples
+from fvsolve.case.riding import free_joints
 from fvsolve.errors import Notice
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import Pieces
+from fvsolve.steppers.analysis.monotone import in_euler_steps
+from fvsolve.steppers.methods import AUTO, METHODS
 
 HOME = __package__
 WATER = Pieces(
@@ -25,6 +31,7 @@ WATER = Pieces(
 SCALE = 0.1  # [m] of depth
 ROUNDING = 1e-12  # of levels and beds, less than which is no water
 TINY = 1e-300
+UNBOUND = 1e100  # rate of friction [1/s] that none exceeds
 UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one,
 SHORES = 6.0  # and sixths of cells under fifth order where there is a shore
 
@@ -64,6 +71,8 @@ class FreeSurfaceRows(BasinRows):
         yield WATER
         if self.part.on is not None:
             yield TURNING
+        if self.damped:
+            yield Pieces(home=HOME, damp="rates: damp_stages")
         if self.moves:
             yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED
@@ -86,11 +95,42 @@ class FreeSurfaceRows(BasinRows):
         if part.manning is not None or part.factor is not None:
             row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
             row["roughness"] = part.factor if part.manning is None else part.manning
+            row["held"], row["damped"] = self.greatest_rate, self.damped
         if self.is_grid:
             self.lower_grid(draft, row)
         else:
             self.lower_faces(draft, row)
         row["plan"] = draft.to_plane(plan)
+        if not (self.depth + self.start()[0]).max() > 0.0:
+            told = draft.case.amount
+            text = f"basin {self.name} starts dry: level {told(part.level, 'level')} is not above its bed, lowest at "
+            text += told(float(self.bed.min()), "level")
+            draft.warnings.append(Notice("start", f"nodes.{self.name}", text, "level", part.level, self.bed.min()))
+
+    @property
+    def rubs(self) -> bool:
+        """True if the bed has friction."""
+        return self.part.own.rubs(self.part)
+
+    @property
+    def damped(self) -> bool:
+        """True if stages of steps are divided by friction: not where a body feels the rates of the flow."""
+        method, on = METHODS.get(self.case.numerics.method), self.part.on
+        felt = on is not None and any(free_joints(on, self.case.nodes))
+        return self.rubs and method is not None and in_euler_steps(method) and not felt
+
+    @property
+    def capped(self) -> bool:
+        """True if the rate of friction is capped at FASTEST, so that explicit steps can follow it."""
+        method = METHODS.get(self.case.numerics.method)
+        return self.rubs and method is not None and method.explicit and not self.damped
+
+    @property
+    def greatest_rate(self) -> float:
+        """Bound of the rate of friction [1/s]; infinity where no step has to follow it either."""
+        if self.capped:
+            return FASTEST
+        return UNBOUND if self.case.numerics.method == AUTO else math.inf
 
     def lower_grid(self, draft, row) -> None:
         dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
@@ -164,10 +204,10 @@ class FreeSurfaceRows(BasinRows):
         return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
 
     def notices(self, y: np.ndarray) -> list[Notice]:
-        return [*notices(self, y), *deep(self)]
+        return [*notices(self, y), *deep(self), *lower_films.notices(self, y)]
 
-    def watch(self, y: np.ndarray) -> Watch | None:
-        return None if notices(self, y) else Watch(self)
+    def watches(self, y: np.ndarray) -> list[Any]:
+        return [*([] if notices(self, y) else [Watch(self)]), *lower_films.watches(self, y)]
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)

@@ -54,6 +54,10 @@ class FreeSurface(Physics, name="free-surface"):
     ] = None  # fmt: skip
 
     @classmethod
+    def rubs(cls, basin) -> bool:
+        return bool(basin.manning or basin.factor)
+
+    @classmethod
     def rest(cls, basin, mean, cells, area) -> dict[str, Any]:
         """At the mean height of the bed that is under water, or of the lowest of it."""
         bed = mean(basin.bed)

@@ -1,8 +1,10 @@
 """Rates of the cells of water with a free surface. Knows the tables; knows no flux."""
 
+from math import inf
+
 from fvsolve.basins.bands import cells_of
 from fvsolve.basins.free_surface import faces, grid
-from fvsolve.basins.free_surface.friction import FASTEST, add_friction
+from fvsolve.basins.free_surface.friction import add_friction, add_held_friction, damp_flows
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import book_open, wanted, weight_of
 from fvsolve.basins.stretch import seen_of
@@ -30,7 +32,7 @@ def through_faces(begin, stop, kx, ky, flow_x, flow_y):
 
 @njit
 def rub(tables, b, a, z, y, rates, out):
-    """Add friction to rates of cells `a` to `z` of water, and let steps follow it."""
+    """Add friction to rates of cells `a` to `z` of water, and let steps follow it where it is held."""
     basin = tables.basins[b]
     n, o, seen, roughness = (
         basin["n"],
@@ -39,13 +41,33 @@ def rub(tables, b, a, z, y, rates, out):
         tables.basins["roughness"][b : b + 1],
     )
     east, north = o + n, o + 2 * n
-    fades = add_friction(
-        basin["friction"], tables.settings[0]["gravity"], roughness, FASTEST, tables.plane[basin["plan"] + a :],
-        seen[o + a : o + z], seen[east + a : east + z], seen[north + a : north + z],
-        y[east + a : east + z], y[north + a : north + z],
-        rates[n + a : n + z], rates[2 * n + a : 2 * n + z],
-    )  # fmt: skip
-    out[RATE] = max(out[RATE], fades)
+    law, g, depths = basin["friction"], tables.settings[0]["gravity"], tables.plane[basin["plan"] + a :]
+    dh, qx, qy = seen[o + a : o + z], seen[east + a : east + z], seen[north + a : north + z]
+    held_x, held_y = y[east + a : east + z], y[north + a : north + z]
+    rate_x, rate_y = rates[n + a : n + z], rates[2 * n + a : 2 * n + z]
+    if basin["held"] == inf:
+        add_friction(law, g, roughness, depths, dh, qx, qy, held_x, held_y, rate_x, rate_y)
+    else:
+        fades = add_held_friction(law, g, roughness, basin["held"], depths, dh, qx, qy, held_x, held_y, rate_x, rate_y)
+        out[RATE] = max(out[RATE], fades)
+
+
+@njit
+def damp_stages(h, y, rates, quick, handle):
+    """Divide rates of a stage of all basins by friction over a step h."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["kind"] == MINE and basin["damped"] == 1:
+            (a, z), n, o = cells_of(tables, b), basin["n"], basin["y"]
+            east, north, seen = o + n, o + 2 * n, seen_of(basin, tables.seen, y)
+            damp_flows(
+                basin["friction"], tables.settings[0]["gravity"], tables.basins["roughness"][b : b + 1], h,
+                tables.plane[basin["plan"] + a :], seen[o + a : o + z], seen[east + a : east + z],
+                seen[north + a : north + z], y[east + a : east + z], y[north + a : north + z],
+                rates[east + a : east + z], rates[north + a : north + z], quick[east + a : east + z],
+                quick[north + a : north + z],
+            )  # fmt: skip
 
 
 @njit

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows, velocity_flows
+from fvsolve.basins.transport.lower_velocity import around_outside, face_flows, grid_flows, velocity_flows
 from fvsolve.errors import CaseError
 from fvsolve.kernels import records as rec
 from fvsolve.kernels.phases import Pieces
@@ -52,7 +52,9 @@ class TransportRows(BasinRows):
         self.passing = passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
-            at = mesh.middle[own[np.argmax(flows[own] != 0.0)]]
+            speed = np.abs(flows[own]) / mesh.length[own]
+            around = around_outside(mesh)[own - mesh.inner]  # else a hole is blamed for what a wall lets in
+            at = mesh.middle[own[np.argmax(np.where(around, speed, 0.0) if speed[around].any() else speed)]]
             what = f"it passes the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where no patch is named"
             draft.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
             draft.check()

@@ -135,6 +135,17 @@ def along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
     return stream[first[stretch]]
 
 
+def around_outside(mesh: Mesh) -> np.ndarray:
+    """True of faces of the outline that lie around all cells, not around a hole : bool[faces of the outline]."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    one, other = mesh.ends[mesh.inner :].T
+    many = len(mesh.points)
+    loop = connected_components(coo_array((np.ones(one.size), (one, other)), shape=(many, many)))[1]
+    return loop[one] == loop[np.argmin(mesh.points[:, 0])]
+
+
 def velocity_flows(mesh: Mesh, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Flows of velocities at the middles of faces : float64[f]; none across the outline but for rounding."""
     normal = u * mesh.normal[:, 0] + v * mesh.normal[:, 1]

@@ -7,26 +7,31 @@ accepted are never read.
 
 past = [head, times of entries, what arrives at the ends of stretches at a time, of each stretch heads of the jumps of
 both waves: sum of those that have arrived, which is the first, how many there are, how many of them have arrived in the
-last step; times and sizes of these jumps; and at last of each stretch a ring of entries (u forward, u backward), as
-long as its own delay asks for]. So a step through a large network touches little: the ends of rings, and heads.
+last step; times, sizes and sums so far of these jumps; and at last of each stretch a ring of entries (u forward, u
+backward), as long as its own delay asks for]. So a step through a large network touches little: the ends of rings, and
+heads.
 """
 
 from fvsolve.jit import njit
 
-HEAD = 16
+HEAD = 24
 COUNT, CAPACITY, QUEUE, STRETCHES = 0, 1, 2, 3  # entries so far, room for times, for jumps of a wave
 WIDER = 4  # rings are so many times as long as at first
 STEP, EVEN = 5, 6  # length of the last step [s], and how many were of that length
 STEP_BEFORE, EVEN_BEFORE = 7, 8  # both without the last entry
 GREATEST, CROWDED, LIVE = 9, 10, 11  # the greatest jump [Pa], the greatest that found no room, how many there are now
 KNOWN_TIME, KNOWN_COUNT = 12, 13  # of the arrivals that are kept
-MENDED = 14  # time of the last state whose stores were put right [s]
+MENDED = 14  # time of the last state that was put right [s]
+NEXT = 15  # when a jump arrives next where something acts at once [s]: before it has arrived no reading counts it
+HELD = 16  # 1 while only jumps that have been passed on are counted
+SWING = 17  # the greatest wave so far, as a deviation from the profile [Pa]
+INFINITE = 1e300  # time [s]
 ZEROS = 8  # entries before the first, of the profile
 SUM, FIRST, MANY, ARRIVED, HEADS = 0, 1, 2, 3, 4  # of the jumps of a wave
 ARRIVALS = 3  # of a stretch: backward wave at its beginning, forward one at its end, delta
 APART = 8  # numbers between rings, a cache line: or entries of one time would all fall into the same few of a cache
-SAME = 1e-9  # of a step: times that are as good as one
-RATIO = 3.0  # of neighbouring steps, above which a polynomial through them is a line
+SAME, ROUNDING = 1e-9, 1e-14  # of a step, and of a time at least: times that are as good as one
+RATIO = 1.9  # of neighbouring steps, above which a polynomial through them is a line: so it is where a step was cut
 
 
 @njit(forceinline=True)
@@ -41,7 +46,7 @@ def places_of(past):
     many, arrivals = int(past[STRETCHES]), HEAD + int(past[CAPACITY])
     heads = arrivals + ARRIVALS * many
     jumps = heads + 2 * HEADS * many
-    return arrivals, heads, jumps, jumps + 4 * int(past[QUEUE]) * many, int(past[WIDER])
+    return arrivals, heads, jumps, jumps + 6 * int(past[QUEUE]) * many, int(past[WIDER])
 
 
 @njit(forceinline=True)
@@ -59,14 +64,14 @@ def jumps_at(places, s, wave):
 
 @njit(forceinline=True)
 def queue_at(places, queue, at):
-    """Where the times of jumps lie whose head is at a place; sizes follow."""
-    return places[2] + 2 * queue * ((at - places[1]) // HEADS)
+    """Where the times of jumps lie whose head is at a place; sizes and sums follow."""
+    return places[2] + 3 * queue * ((at - places[1]) // HEADS)
 
 
 @njit(forceinline=True)
 def same_time(past):
     """Difference of times that is none [s]."""
-    return SAME * past[STEP]
+    return max(SAME * past[STEP], ROUNDING * abs(time_of(past, int(past[COUNT]) - 1)))
 
 
 @njit(forceinline=True)
@@ -183,23 +188,62 @@ def both_waves(past, at, mask, k, w):
     return r, l
 
 
+@njit(forceinline=True)
+def turn(i, queue):
+    """Place in a ring of jumps that lies i behind another."""
+    return i if i < queue else i - queue
+
+
+@njit
+def first_after(past, queue, times, first, many, t):
+    """Number of the first jump of a list that was sent after t."""
+    low, high = 0, many
+    while low < high:
+        middle = (low + high) // 2
+        if past[times + turn(first + middle, queue)] > t:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@njit(forceinline=True)
+def sum_of_first(past, places, at, count):
+    """Sum of the jumps of a wave before the list and of the first ones in it; at : their head."""
+    if count == 0:
+        return past[at + SUM]
+    queue = int(past[QUEUE])
+    return past[queue_at(places, queue, at) + 2 * queue + turn(int(past[at + FIRST]) + count - 1, queue)]
+
+
 @njit
 def some_jumps(past, places, at, t):
     """Sum of the jumps of a wave up to t, of which it has some; at : their head."""
-    total, many, queue, first = past[at + SUM], int(past[at + MANY]), int(past[QUEUE]), int(past[at + FIRST])
+    many, queue, first = int(past[at + MANY]), int(past[QUEUE]), int(past[at + FIRST])
     times = queue_at(places, queue, at)
-    for i in range(many):
-        place = times + (first + i) % queue
-        if past[place] > t:
-            break
-        total += past[place + queue]
-    return total
+    if past[times + turn(first + many - 1, queue)] <= t:
+        return sum_of_first(past, places, at, many)
+    return sum_of_first(past, places, at, first_after(past, queue, times, first, many, t))
 
 
 @njit(forceinline=True)
 def jumps_until(past, places, at, t):
     """Sum of the jumps of a wave up to t; at : their head."""
     return some_jumps(past, places, at, t) if past[at + MANY] > 0.0 else past[at + SUM]
+
+
+@njit(forceinline=True)
+def passed_jumps(past, places, at):
+    """Sum of the jumps of a wave that have been passed on where they arrive; at : their head."""
+    return sum_of_first(past, places, at, int(past[at + ARRIVED]))
+
+
+@njit(forceinline=True)
+def arrived_until(past, places, clock, at, t, tau):
+    """Sum of the jumps of a wave that have arrived by t, after a travel time tau; at : their head."""
+    if past[HELD] > 0.0:
+        return passed_jumps(past, places, at)
+    return jumps_until(past, places, at, min(t + clock[4], past[NEXT] - clock[4]) - tau)
 
 
 @njit(forceinline=True)
@@ -217,22 +261,35 @@ def push_jump(past, places, at, t, size):
     """Note a jump of a wave; what is too many joins the smooth part."""
     queue, first, many = int(past[QUEUE]), int(past[at + FIRST]), int(past[at + MANY])
     i, times = many, queue_at(places, queue, at)
-    while i > 0 and past[times + (first + i - 1) % queue] > t + same_time(past):
+    while i > 0 and past[times + turn(first + i - 1, queue)] > t + same_time(past):
         i -= 1
-    before = times + (first + i - 1) % queue
+    before = times + turn(first + i - 1, queue) if i > 0 else times
     if i > int(past[at + ARRIVED]) and abs(past[before] - t) <= same_time(past):
         past[before + queue] += size
+        add_up(past, places, at, i - 1)
         return True
     if many == queue:
         return False
     for j in range(many, i, -1):
-        here, there = times + (first + j) % queue, times + (first + j - 1) % queue
+        here, there = times + turn(first + j, queue), times + turn(first + j - 1, queue)
         past[here], past[here + queue] = past[there], past[there + queue]
-    here = times + (first + i) % queue
+    here = times + turn(first + i, queue)
     past[here], past[here + queue] = t, size
     past[at + MANY] = many + 1.0
     past[LIVE] += 1.0
+    add_up(past, places, at, i)
     return True
+
+
+@njit
+def add_up(past, places, at, begin):
+    """Sums of the jumps of a wave, from that of a number on; at : their head."""
+    queue, first = int(past[QUEUE]), int(past[at + FIRST])
+    total, times = sum_of_first(past, places, at, begin), queue_at(places, queue, at)
+    for j in range(begin, int(past[at + MANY])):
+        here = times + turn(first + j, queue)
+        total += past[here + queue]
+        past[here + 2 * queue] = total
 
 
 @njit
@@ -242,7 +299,7 @@ def forget_jumps(past, places, at, t):
     times = queue_at(places, queue, at)
     while past[at + ARRIVED] > 0.0 and past[times + int(past[at + FIRST])] < t:
         past[at + SUM] += past[times + int(past[at + FIRST]) + queue]
-        past[at + FIRST] = (int(past[at + FIRST]) + 1) % queue
+        past[at + FIRST] = turn(int(past[at + FIRST]) + 1, queue)
         past[at + MANY] -= 1.0
         past[at + ARRIVED] -= 1.0
         past[LIVE] -= 1.0
@@ -268,3 +325,11 @@ def begin_entry(past, t):
     past[HEAD + (k & mask)] = t
     past[COUNT] = k + 1.0
     return k
+
+
+@njit(forceinline=True)
+def write(past, places, line, q, k, wave, value):
+    """Keep the smooth part of a wave as entry k."""
+    at, mask = ring_of(places, line, q)
+    jumps = jumps_until(past, places, jumps_at(places, line["stretch"] + q, wave), INFINITE)
+    past[at + 2 * (k & mask) + wave] = value - jumps

@@ -12,12 +12,18 @@ from fvsolve.kernels.clusters import inner_of
 from fvsolve.kernels.delay.history import (
     ARRIVALS,
     COUNT,
+    HEADS,
     KNOWN_COUNT,
     KNOWN_TIME,
+    arrived_until,
+    both_waves,
     clock_of,
+    jumps_at,
+    jumps_until,
     newest_before,
     places_of,
-    read_both,
+    ring_of,
+    stencil,
 )
 from fvsolve.kernels.friction import EXPONENT, drag, power_of_square
 from fvsolve.kernels.handle import open_tables
@@ -40,9 +46,15 @@ def drag_and_slope(pipe, flow):
 
 
 @njit(forceinline=True)
+def rubs(pipe):
+    """True if friction takes something of a wave."""
+    return not (pipe["friction"] == FRICTION_NONE and pipe["drag"] == 0.0)
+
+
+@njit(forceinline=True)
 def rubbed(pipe, line, r, l):
     """delta [kg/s] where waves r and l meet in the middle of a stretch, by Newton: what takes it is monotone."""
-    if pipe["friction"] == FRICTION_NONE and pipe["drag"] == 0.0:
+    if not rubs(pipe):
         return 0.0
     kappa, x, flow, drag0 = 0.5 * line["tau"], r - l, pipe["flow"], pipe["drag"]
     rough = ROUGH if pipe["friction"] == FRICTION_ROUGH else 0.0
@@ -61,13 +73,19 @@ def rubbed(pipe, line, r, l):
 def arrive(past, places, clock, line, pipe, q, t):
     """What arrives at the ends of stretch q of a line at t, into its place in past.
 
-    Of a short line both waves are those at p' = 0 at its ends.
+    Of a short line both waves are those at p' = 0 at its ends; jumps travel through it as through any other.
     """
-    r, l = read_both(past, places, clock, line, q, t - line["hold"])
+    ring, mask = ring_of(places, line, q)
+    k, w = stencil(past, clock, t - line["hold"])
+    u, v = both_waves(past, ring, mask, k, w)
+    head = jumps_at(places, line["stretch"] + q, 0)
+    r = u + arrived_until(past, places, clock, head, t, line["tau"])
+    l = v + arrived_until(past, places, clock, head + HEADS, t, line["tau"])
     delta, beta = rubbed(pipe, line, r, l), line["now"]
     back, ahead = l + delta, r - delta
     if beta > 0.0:
-        ahead, back = ahead - beta * r, back - beta * l
+        ahead -= beta * (u + jumps_until(past, places, head, t + clock[4]))
+        back -= beta * (v + jumps_until(past, places, head + HEADS, t + clock[4]))
         per = 1.0 / (1.0 - beta * beta)
         ahead, back = per * (ahead - beta * back), per * (back - beta * ahead)
     at = places[0] + ARRIVALS * (line["stretch"] + q)

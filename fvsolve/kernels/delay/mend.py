@@ -17,11 +17,13 @@ NAN = float("nan")
 
 
 @njit(forceinline=True)
-def missed_by(past, tables, t, when):
+def missed_by(past, tables, t, when, sent):
     """How long what begins within the step that ends at t has been there, and how long its weights book it [s].
 
-    Stages before it know nothing of it, those behind it that it was always there.
+    Stages before it know nothing of it, those behind it that it was always there; none knows what was sent since.
     """
+    if sent > time_of(past, int(past[COUNT]) - 1) + same_time(past):
+        return t - when, 0.0
     before, settings = time_of(past, int(past[COUNT]) - 1), tables.settings[0]
     h, booked, at, many = t - before, 0.0, settings["weights"], settings["stages"]
     for i in range(many):
@@ -81,9 +83,12 @@ def mend_columns(past, tables, y, i, change, missed):
 
 
 @njit
-def mend_behind(past, tables, y, out, missed):
-    """The same where nodes were closed by valves: stores behind these, fed by the lines before them, and columns."""
-    layout, spare, valves, nodes = tables.layout[0], tables.spare, tables.valves, tables.nodes
+def mend_behind(past, tables, y, spare, out, missed):
+    """The same where nodes were closed by valves: stores behind these, fed by the lines before them, and columns.
+
+    spare, out : before and behind the jump
+    """
+    layout, valves, nodes = tables.layout[0], tables.valves, tables.nodes
     pressure, given, fed = layout["pressure"], 0.0, 0.0
     if tables.columns.size > 0:
         for i in range(nodes.size):

@@ -218,6 +218,11 @@ class Physics(Table):
         Basin.__doc__ = "\n".join([ABOUT, "", *(f"{name}: {one.__doc__}" for name, one in Physics.kinds.items())])
 
     @classmethod
+    def rubs(cls, basin: Basin) -> bool:
+        """Whether its bed or its walls brake the flow."""
+        return False
+
+    @classmethod
     def rest(
         cls, basin: Basin, mean: Callable[[Any], np.ndarray], cells: np.ndarray, area: np.ndarray
     ) -> dict[str, Any]:

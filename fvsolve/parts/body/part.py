@@ -203,6 +203,12 @@ class Body(Node, kind="body"):
     points: Annotated[dict[str, tuple[float, ...]], PlacesByName()] = {}
     joint: Annotated[Joint, Inside(Joint, "by which it hangs on another, or on the world")] = Joint()
 
+    @classmethod
+    def key_faults(cls, given: dict[str, Any]) -> list:
+        faults = super().key_faults(given)
+        where = "decides nothing: a body is where joint.at, angle or travel put it; leave it out"
+        return faults + [((key,), where) for key in ("elevation", "position") if key in given]
+
     def moment(self) -> np.ndarray:
         """Its inertia about the centre of mass in its own axes [kg m2] : float64[3, 3]."""
         given = np.array(self.inertia, dtype=float)

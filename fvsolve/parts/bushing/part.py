@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
+from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import VALUE, Quantity, nonnegative
 
@@ -18,6 +19,10 @@ class Bushing(TwoPort, kind="bushing"):
 
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
     quantities: ClassVar[dict[str, str]] = {"gap": "length", "force": "force", "torque": "torque"}
+
+    def faults(self, name: str, around: Around) -> Faults:
+        if not any((self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)):
+            yield ("stiffness",), "is 0, as are damping and both of turning: it holds nothing; expected one above 0"
 
     stiffness: Annotated[float, Quantity("stiffness", nonnegative, "force per gap [N/m]", changes=VALUE)] = 0.0
     damping: Annotated[float, Quantity("damping", nonnegative, "force per rate of that [N s/m]", changes=VALUE)] = 0.0

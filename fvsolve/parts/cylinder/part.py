@@ -55,13 +55,15 @@ class Cylinder(Link, kind="cylinder"):
     initial_pressure_A: Annotated[
         float | None,
         Quantity(
-            "pressure", about="at the start [Pa]; in equilibrium with its links (ambient without any) if left out"
+            "pressure",
+            about="at the start [Pa]; what holds its load if shut, else as its links leave it if left out",
         ),
     ] = None
     initial_pressure_B: Annotated[
         float | None,
         Quantity(
-            "pressure", about="at the start [Pa]; in equilibrium with its links (ambient without any) if left out"
+            "pressure",
+            about="at the start [Pa]; what holds its load if shut, else as its links leave it if left out",
         ),
     ] = None
     leakage: Annotated[float, Quantity("leakage", nonnegative, "flow from A to B per pressure [m3/s/Pa]")] = 0.0

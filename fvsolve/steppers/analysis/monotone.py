@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from fractions import Fraction
 
@@ -32,6 +33,14 @@ def ssp_radius(method: Method) -> float:
             high = middle
     simple = low.limit_denominator(1000)
     return float(simple if abs(simple - low) < Fraction(1, 1 << 40) and _monotone(k, simple) else low)
+
+
+@functools.cache
+def in_euler_steps(method: Method) -> bool:
+    """Whether every stage is a mean of Euler steps of the whole length, the second at the end of the step."""
+    if not method.explicit or method.adaptive or method.kind == "linear":
+        return False
+    return (method.stages == 1 or method.c[1] == 1.0) and ssp_radius(method) == 1.0
 
 
 def _used(method: Method) -> list[list]:

@@ -15,6 +15,7 @@ from fvsolve.doors import CALL, COUNT, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.shown import Shown
 from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.tableau import OWN
 from fvsolve.studies.accuracy.cells import from_files
 from fvsolve.studies.accuracy.front import FrontRow, Point, cheapest, coarser, curves, errors_of, row, setting_between
 from fvsolve.studies.accuracy.pareto import targets
@@ -320,8 +321,8 @@ class _Study:
                 setting_between(self.case, curve[where.coarser].setting, curve[where.finer].setting, share)
             )
             if made.ok and made.trajectory <= target:
-                return _aim(target, made)
-        return _aim(target, curve[where.finer])
+                return _aim(target, made, self.case)
+        return _aim(target, curve[where.finer], self.case)
 
 
 def nothing(reason: str) -> dict:
@@ -337,10 +338,21 @@ def grows(setting: MethodSetting) -> bool:
     return setting.method != AUTO and METHODS[setting.method].explicit
 
 
-def _aim(target: float, point: Point) -> Aim:
+def _aim(target: float, point: Point, case: Case) -> Aim:
     keys = point.setting.keys
+    if "numerics.method" in keys:
+        keys = keys | {"numerics.method": _written(keys["numerics.method"], case)}
     own = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
     return Aim(target, point, own, {key: value for key, value in keys.items() if not key.startswith("numerics.")})
+
+
+def _written(method: str, case: Case) -> str:
+    """A method as the case file says it: of a tableau in a file the path, relative to the case where it lies below."""
+    path = Path(METHODS[method].source) if method in METHODS and method not in OWN else None
+    if path is None or not path.is_file():
+        return method
+    folder = None if case.path is None else case.path.resolve().parent
+    return path.relative_to(folder).as_posix() if folder and path.is_relative_to(folder) else str(path)
 
 
 def _useless(case: Case, points: list[Point], floor: dict) -> str:

@@ -102,7 +102,7 @@ def sloshing(case, rung: str) -> dict[str, Any]:
 def delayed(case, pipes: dict[str, Any]) -> dict[str, Any]:
     """All pipes as delay lines."""
     for name, pipe in pipes.items():
-        if lacks := what_needs_cells(case, pipe):
+        if lacks := what_needs_cells(case, name, pipe):
             raise Unsayable(f"{name} is no delay line: {lacks}")
     return {f"links.{name}.line": "delay" for name in pipes}
 

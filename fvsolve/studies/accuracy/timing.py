@@ -24,9 +24,9 @@ class Capped(Run):
 
     most_seconds, most_steps = np.inf, np.inf
 
-    def pause(self, spent: float) -> None:
+    def pause(self) -> None:
         """As of every run, until it is given up."""
-        super().pause(spent)
+        super().pause()
         self.check()
 
     def check(self) -> None:

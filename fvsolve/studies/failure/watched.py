@@ -27,7 +27,7 @@ class Watched(Capped):
         self.budget = self.left = 1.0
         self.most_seconds = LONGEST
 
-    def pause(self, spent: float) -> None:
+    def pause(self) -> None:
         """Note the probes; after a window of a long run, let it run on to the next one, or give it up."""
         self.check()
         self.bursts[-1].append(self.slate.observe(self.loop.t, self.loop.now, self.loop.stepper.out))

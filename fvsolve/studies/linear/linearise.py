@@ -15,7 +15,7 @@ from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import hold
 from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter
 from fvsolve.studies.linear.matrices import output_matrix, responses, state_matrix
-from fvsolve.studies.linear.slopes import SMOOTH, central, kinks, one_sided, settled
+from fvsolve.studies.linear.slopes import COARSE, SMOOTH, longest, one_sided, two_sided
 from fvsolve.units import DIMENSIONS
 
 EPS = ("eps_x", "eps_y", "eps_z")
@@ -176,7 +176,9 @@ def input_column(at, name, one, value, size, outputs, steps) -> tuple[np.ndarray
     model = at.model
     width = np.array([input_width(at, one, value)])
     low, high = one.sort.least, one.sort.greatest
-    scheme = central
+    scheme = two_sided
+    if one.sort.bounded:
+        steps = np.concatenate([COARSE, steps])
     if value <= low or value >= high:
         scheme, width = one_sided, width if value <= low else -width
     elif one.sort.bounded:
@@ -187,15 +189,10 @@ def input_column(at, name, one, value, size, outputs, steps) -> tuple[np.ndarray
         return responses(held, at.y, outputs)
 
     x = np.array([value])
-    base = at_input(x)
-    slopes, sides = scheme(at_input, x, width, base, steps)
-    reach = np.concatenate([size, np.zeros(outputs)]) + np.abs(slopes[len(steps) // 2])
-    reach = np.where(reach > 0.0, reach, 1.0)
-    start = np.zeros(1, dtype=int)
-    found, error = settled(slopes, reach, start)
-    kink = kinks(sides, reach, start)[0]
-    if error[0] > SMOOTH or kink > SMOOTH:
-        why = "from side to side" if kink > SMOOTH else "with every step"
+    sides = scheme(at_input, x, width, at_input(x), steps)
+    found, error, kink = longest(*sides, np.concatenate([size, np.zeros(outputs)]), steps)
+    if max(np.max(error), np.max(kink)) > SMOOTH:
+        why = "from side to side" if np.max(kink) > SMOOTH else "with every step"
         raise FvsolveError(f"{name} = {value:g} is no place to linearise: its effect differs {why} there; hold it "
                            "elsewhere with --set, or choose another time with --at")  # fmt: skip
-    return found / width[0], float(error[0])
+    return found / width[0], float(np.max(error))

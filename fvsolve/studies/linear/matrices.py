@@ -11,7 +11,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import records as rec
 from fvsolve.studies.linear.frozen import Frozen
-from fvsolve.studies.linear.slopes import FINER, SMOOTH, STEPS, central, kinks, settled
+from fvsolve.studies.linear.slopes import FINER, NOISE, SMOOTH, STEPS, central, hidden_kinks, kinks, settled
 
 DENSE = 1000  # states up to which A is a full array
 LONGEST, LARGEST = 20.0, 10_000_000  # that C may take [s], entries that it may have
@@ -56,7 +56,9 @@ def state_matrix(at: Frozen) -> tuple[Any, np.ndarray, float, np.ndarray]:
         size = np.maximum(size, ROUNDING * width * np.max(size / width, initial=0.0))
         row_size = np.where(size > 0.0, size, 1.0)[rows]
         values, errors = settled(slopes, row_size, starts)
-        bent = kinks(sides, row_size, starts)
+        coarse = np.bincount(rows, np.abs(slopes[0]), n)[rows]
+        hidden = hidden_kinks(sides, coarse, row_size, starts, steps) & ~in_basins(model)
+        bent = kinks(sides, row_size, starts) + hidden
         if max(np.max(errors), np.max(bent)) <= SMOOTH:
             break
     else:
@@ -78,6 +80,12 @@ def entries(at: Frozen, width, rows, columns, steps) -> tuple[np.ndarray, np.nda
         sides.append(side)
     picked = (slice(None), structure.colors[columns], rows)
     return np.array(slopes).transpose(1, 0, 2)[picked], np.array(sides).transpose(1, 0, 2)[picked]
+
+
+def in_basins(model) -> np.ndarray:
+    """True for states of basins : bool[n]; upwind fluxes of still water bend by some 1e-4 of their row."""
+    ahead = tuple(f"{basin.name}." for basin in model.basins)
+    return np.array([name.startswith(ahead) for name in model.state_names]) if ahead else np.zeros(model.y_size, bool)
 
 
 def refuse(model, j: int, what: str) -> None:
@@ -120,16 +128,25 @@ def output_matrix(at: Frozen, outputs: int, steps: np.ndarray) -> tuple[np.ndarr
     if n * outputs > LARGEST:
         raise too_large(n, outputs)
     latest, base = time.monotonic() + LONGEST, responses(at, at.y, outputs)
-    slopes = np.zeros((len(steps), n, outputs))
+    slopes, sides = np.zeros((2, len(steps), n, outputs))
     for j in seen(at, outputs, base[n:], width):
         if time.monotonic() > latest:
             raise too_large(n, outputs)
         direction = np.zeros(n)
         direction[j] = width[j]
-        slopes[:, j] = central(lambda y: responses(at, y, outputs), at.y, direction, base, steps)[0][:, n:]
+        found = central(lambda y: responses(at, y, outputs), at.y, direction, base, steps)
+        slopes[:, j], sides[:, j] = (one[:, n:] for one in found)
     size = np.sum(np.abs(slopes[len(steps) // 2]), axis=0)
+    size = np.maximum(size, NOISE / steps[0] * np.abs(base[n:]))
     row_size = np.tile(np.where(size > 0.0, size, 1.0), n)
-    values, errors = settled(slopes.reshape(len(steps), -1), row_size, np.arange(n) * outputs)
+    each = np.arange(n * outputs)  # with a step of its own: what a hose wants rounds off what a valve says
+    values, errors = settled(slopes.reshape(len(steps), -1), row_size, each)
+    bent = np.maximum(kinks(sides.reshape(len(steps), -1), row_size, each), errors)
+    if np.max(bent) > SMOOTH:
+        j, k = divmod(int(np.argmax(bent)), outputs)
+        raise FvsolveError(f"{at.model.case.probes[k].text} cannot be linearised along {at.model.state_names[j]}: its "
+                           "slope differs there from side to side, or with every step; leave it out of --outputs, or "
+                           "choose another time with --at")  # fmt: skip
     return values.reshape(n, outputs).T / width, float(np.max(errors))
 
 

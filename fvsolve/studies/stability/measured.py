@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,9 @@ from fvsolve.studies.stability.bracket import RISE, Limit, halved
 from fvsolve.studies.stability.growth import STEPS, THRESHOLD, looked_at
 
 SMALL = 10.0 ** -np.arange(6.0, 16.0)  # greatest deviation at the start, in units of what counts as a small one
+CERTAIN = 1e-6  # a start as large as this is not hidden by rounding and what Newton's iteration leaves
+WIDER, ALIKE = 10.0, 0.02  # times a smaller one, whose growth it has but for this share, if a start is what grew
+SAME_END = 2.0  # steps between the ends of two runs that break off for the same reason
 STAGES = 10.0  # times as far as states, at most, the stages of a step reach
 RANDOM = 2  # starts at random, beside the one that is predicted to grow most
 BELOW = (0.3, 0.6, 0.85)  # of the predicted limit: steps that are to be safe, tried too
@@ -39,7 +43,7 @@ class Runs:
         rng = np.random.default_rng(7)
         starts = [*([] if worst is None else [worst]), *rng.standard_normal((RANDOM, form.size))]
         shapes = [self.shaped(start) for start in starts]
-        self.starts = [y * (small or self.linear_width(y, a)) for y in shapes]
+        self.starts = [(y, small or self.linear_width(y, a)) for y in shapes]
         self.looks = looked_at(self.steps)
         self.strides = np.diff([0, *self.looks]).astype(float)
         self.still = not np.any(at.rate)
@@ -79,23 +83,64 @@ class Runs:
         return made
 
     def growth(self, h: float) -> tuple[float, int]:
-        """(greatest growth over all starts, after how many steps); a run that breaks off: infinite."""
-        size, at = 1.0, 0
-        for start in self.starts:
-            runs = [self.loop(self.at.y + start, h)] + ([] if self.still else [self.loop(self.at.y, h)])
-            first = np.linalg.norm(self.form.forth @ start)
-            for n, more in zip(self.looks, self.strides, strict=True):
-                if time.monotonic() > self.latest:
-                    raise TimeoutError
-                if any(run.run(more) != slots.CHUNK for run in runs):
-                    return np.inf, n
-                apart = runs[0].now - (self.at.y if self.still else runs[1].now)
-                here = float(np.linalg.norm(self.form.forth @ apart)) / first
-                if not here <= self.threshold:
-                    return here if here > self.threshold else np.inf, n
-                if here > size:
-                    size, at = here, n
+        """(greatest growth over all starts, after how many steps); a run that breaks off: infinite.
+
+        A wider start that grows alike says that the start grew, and not the rounding of the runs or what Newton's
+        iteration leaves, which are as large as before: else the wider one counts, and so on.
+        """
+        size, at, still = 1.0, 0, self.standing(h)
+        for start, width in self.starts:
+            here, n = self.grown(width * start, h, still)
+            while here > self.threshold and width < CERTAIN:
+                width, before, after = WIDER * width, here, n
+                here, n = self.grown(width * start, h, still)
+                if n == after and (here == before or abs(here - before) <= ALIKE * before):
+                    break
+            if here > size:
+                size, at = here, n
+            if size > self.threshold:
+                break
         return size, at
+
+    def standing(self, h: float) -> Callable[[int], np.ndarray | None]:
+        """k -> the state from which deviations are counted at the k-th look; None where a run from it breaks off."""
+        run, known = None if self.still else self.loop(self.at.y, h), []
+
+        def state(k: int) -> np.ndarray | None:
+            while run and len(known) <= k:
+                known.append(run.now.copy() if run.run(self.strides[len(known)]) == slots.CHUNK else None)
+            return known[k] if run else self.at.y
+
+        return state
+
+    def grown(self, start: np.ndarray, h: float, still: Callable) -> tuple[float, int]:
+        """(greatest growth of one start, after how many steps), as soon as it passes the threshold."""
+        size, at, run = 1.0, 0, self.loop(self.at.y + start, h)
+        first = np.linalg.norm(self.form.forth @ start)
+        for k, n in enumerate(self.looks):
+            if time.monotonic() > self.latest:
+                raise TimeoutError
+            base = still(k)
+            if base is None or run.run(self.strides[k]) != slots.CHUNK:
+                return (size, at) if self.end_of_state(h) <= n * h else (np.inf, n)
+            here = float(np.linalg.norm(self.form.forth @ (run.now - base))) / first
+            if not here <= self.threshold:
+                return here if here > self.threshold else np.inf, n
+            if here > size:
+                size, at = here, n
+        return size, at
+
+    def end_of_state(self, h: float) -> float:
+        """Time [s] after which a run from the state itself breaks off, with this step as with half of it; else inf.
+
+        It is the scene that ends there, a piston at the end of its cylinder, and no step that fails.
+        """
+        ends = [self.broken_off(self.loop(self.at.y, step), self.steps * h / step) for step in (h, 0.5 * h)]
+        return min(ends) if abs(ends[0] - ends[1]) <= SAME_END * h else np.inf
+
+    def broken_off(self, run: Loop, steps: float) -> float:
+        """Time [s] after which a run breaks off within so many steps; inf where it does not."""
+        return np.inf if run.run(steps) in (slots.CHUNK, slots.DONE) else run.t - self.at.t
 
     def fails(self, h: float) -> bool:
         """Whether some run grows beyond the threshold."""
@@ -148,7 +193,13 @@ def measured(runs: Runs, guess: float, size: float) -> dict:
         return {"measured": found.step, "measured_up_to": found.fails if np.isfinite(found.fails) else runs.tried}
     if guess == 0.0 or size == 0.0:
         return {}
-    for factor in NEVER:
-        if runs.fails(factor / size):
-            return {"measured": runs.below(factor / size).step, "measured_up_to": factor / size}
-    return {"measured": np.inf, "measured_up_to": NEVER[-1] / size}
+    passed = 0.0
+    try:
+        for factor in NEVER:
+            if runs.fails(factor / size):
+                return {"measured": runs.below(factor / size).step, "measured_up_to": factor / size}
+            passed = factor / size
+    except TimeoutError:
+        if passed == 0.0:
+            raise
+    return {"measured": np.inf, "measured_up_to": passed}

@@ -1,0 +1,97 @@
+"""Bands of `fvsolve run --error` of random networks of delay lines, held against eight times their resolution.
+
+python benchmarks/line_bands.py [--seed 1] [--random 22]
+
+Pipes of 3 to 900 m, with and without friction, between a lake and an end at which a valve or a demand stops at once or
+by a ramp; a check valve on the way in some; steps by Courant number, by length or by tolerance.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+
+import numpy as np
+
+from fvsolve.run import model_of, run
+from fvsolve.studies.levels import finer
+from fvsolve.studies.peaks import SIDES, peak_errors
+
+WATER = {"name": "user", "density": 1000, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2000}
+FRICTIONS = (
+    {"model": "none"}, {"model": "steady", "factor": 0.02}, {"model": "quasi-steady", "roughness": 2e-4},
+)  # fmt: skip
+
+
+def network(random: np.random.Generator) -> dict:
+    """A random chain of two to four pipes with a branch."""
+    many = int(random.integers(2, 5))
+    nodes = {"lake": {"type": "reservoir", "head": float(random.uniform(40, 150))}}
+    links, before, friction = {}, "lake", FRICTIONS[int(random.integers(3))]
+    for i in range(many):
+        nodes[f"n{i}"] = {"type": "junction"}
+        links[f"p{i}"] = pipe(random, before, f"n{i}", friction)
+        before = f"n{i}"
+    if random.random() < 0.5:
+        nodes["dead"] = {"type": "junction"}
+        links["side"] = pipe(random, "n0", "dead", friction)
+    if random.random() < 0.3:
+        nodes["c"] = {"type": "junction"}
+        links["check"] = {"type": "check-valve", "from": before, "to": "c", "diameter": 0.3, "loss_coefficient": 1.0}
+        links["beyond"] = pipe(random, "c", "end", friction)
+        nodes["end"] = {"type": "junction"}
+        before = "end"
+    duration = float(random.choice([0.0, 0.0, 0.05, 0.3]))
+    nodes["out"] = {"type": "reservoir", "pressure": "0 barg"}
+    opening = {"start": 0.3, "duration": duration, "value": [1.0, float(random.choice([0.0, 0.3]))]}
+    links["v"] = {"type": "valve", "from": before, "to": "out", "area": float(random.uniform(5e-4, 4e-3)),
+                  "opening": opening}  # fmt: skip
+    control = [{"courant": 0.9}, {"step": float(10.0 ** random.uniform(-2.5, -1.3))}, {"rtol": 1e-5}]
+    numerics = {"end": 4.0, "line": "delay", **control[int(random.integers(3))]}
+    numerics["method"] = "bogacki-shampine" if "rtol" in numerics else str(random.choice(["euler", "rk4"]))
+    probes = [f"{name}.head" for name, node in nodes.items() if node["type"] == "junction"] + ["p0.flow", "v.flow"]
+    output = {"every": 0.02, "fields": 0, "probes": [*probes, "p0.pressure@0.37"]}
+    return {"fluid": WATER, "nodes": nodes, "links": links, "numerics": numerics, "output": output}
+
+
+def pipe(random: np.random.Generator, one: str, other: str, friction: dict) -> dict:
+    """A pipe of 3 to 900 m."""
+    return {"type": "pipe", "from": one, "to": other, "length": float(10.0 ** random.uniform(0.5, 2.95)),
+            "diameter": float(random.choice([0.15, 0.2, 0.3])), "wave_speed": float(random.uniform(900, 1300)),
+            "friction": friction, "cells": int(random.integers(4, 30))}  # fmt: skip
+
+
+def bands(given: dict) -> list[tuple[str, float, float]]:
+    """(peak, band, difference to eight times the resolution), of a band that is not known infinite."""
+    case = model_of(given).case
+    said = peak_errors(run(given, pictures=False), case)
+    every = {"output.every": case.output.every / 8.0}
+    fine = run(given, set=finer(case, 8.0) | every, pictures=False).summary["extremes"]
+    return [(f"{side} {probe}", math.inf if one[side]["error"] is None else one[side]["error"],
+             abs(fine[probe][side] - one[side]["value"]))
+            for probe, one in said["peaks"].items() for side in SIDES]  # fmt: skip
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--seed", type=int, default=1)
+    options.add_argument("--random", type=int, default=22)
+    given, began, rows = options.parse_args(), time.perf_counter(), []
+    for k in range(given.random):
+        scene = network(np.random.default_rng([given.seed, k]))
+        found = bands(scene)
+        rows += found
+        for what, band, off in found:
+            if off > band:
+                print(f"scene {k} ({scene['numerics']['method']}): {what}: off by {off:.3g}, band {band:.3g}")
+    outside, known = sum(off > band for _, band, off in rows), [row for row in rows if math.isfinite(row[1])]
+    wide = [band / off for _, band, off in known if off > 0.0]
+    print(
+        f"{len(rows)} peaks of {given.random} networks: {outside} outside their band, {len(rows) - len(known)} "
+        f"not known; band over difference, median {np.median(wide):.3g}; {time.perf_counter() - began:.0f} s"
+    )
+
+
+if __name__ == "__main__":
+    main()

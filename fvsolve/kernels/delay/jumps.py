@@ -1,0 +1,203 @@
+"""Jumps of delay lines: which are kept as such, and how friction and the joints of stretches pass them on.
+
+What a schedule, a valve or an event changes at once is a jump; one below `numerics.accuracy` joins the smooth part.
+Friction in the middle of a stretch turns back what it takes more with the jump than without it.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.calls import CLOSE, run
+from fvsolve.kernels.delay.history import (
+    ARRIVALS,
+    ARRIVED,
+    COUNT,
+    CROWDED,
+    FIRST,
+    GREATEST,
+    HEADS,
+    INFINITE,
+    KNOWN_COUNT,
+    KNOWN_TIME,
+    MANY,
+    MENDED,
+    QUEUE,
+    arrived_until,
+    both_waves,
+    clock_of,
+    jumps_at,
+    jumps_until,
+    newest_before,
+    passed_jumps,
+    push_jump,
+    queue_at,
+    ring_of,
+    same_time,
+    stencil,
+    turn,
+    write,
+)
+from fvsolve.kernels.delay.lines import arrive, arrive_all, rubbed, rubs
+from fvsolve.kernels.records import AMENDED, STATUS
+
+NAN = float("nan")
+NOISE = 1e-13  # of half a bar's wave: a jump that is rounding
+
+
+@njit(forceinline=True)
+def shorter_lines(tables):
+    """True if a line is shorter than a step."""
+    for i in range(tables.delays.size):
+        if tables.delays[i]["now"] > 0.0:
+            return True
+    return False
+
+
+@njit(forceinline=True)
+def enough(past, tables, pipe):
+    """The least jump of a wave that is kept as one [kg/s]."""
+    return max(tables.settings[0]["jumps"] * past[GREATEST], NOISE * 0.5e5) * pipe["admittance"]
+
+
+@njit
+def keep(past, places, s, wave, t, size, pipe):
+    """A jump that enters stretch s is kept as one, if there is room for it."""
+    if not push_jump(past, places, jumps_at(places, s, wave), t, size):
+        past[CROWDED] = max(past[CROWDED], abs(size) / pipe["admittance"])
+
+
+@njit
+def send(past, places, tables, s, wave, t, size, pipe):
+    """A jump enters stretch s; a small one joins the smooth part."""
+    if abs(size) > enough(past, tables, pipe):
+        keep(past, places, s, wave, t, size, pipe)
+
+
+@njit(forceinline=True)
+def first_left(past, places, s, wave):
+    """Place of the first jump of a wave of stretch s that has not been passed on, -1 without one."""
+    at, queue = jumps_at(places, s, wave), int(past[QUEUE])
+    if not past[at + ARRIVED] < past[at + MANY]:
+        return -1
+    return queue_at(places, queue, at) + turn(int(past[at + FIRST]) + int(past[at + ARRIVED]), queue)
+
+
+@njit
+def turned_back(past, places, tables, line, pipe, q, wave, size, t):
+    """What friction in the middle of stretch q turns back of a jump of a wave that has not been passed on [kg/s]."""
+    if not rubs(pipe):
+        return 0.0
+    ring, mask = ring_of(places, line, q)
+    k, w = stencil(past, clock_of(past, newest_before(past, t)), t - line["hold"])
+    r, l = both_waves(past, ring, mask, k, w)
+    head = jumps_at(places, line["stretch"] + q, 0)
+    r, l = r + passed_jumps(past, places, head), l + passed_jumps(past, places, head + HEADS)
+    before = rubbed(pipe, line, r, l)
+    if wave == 0:
+        return rubbed(pipe, line, r + size, l) - before
+    return before - rubbed(pipe, line, r, l + size)
+
+
+@njit
+def pass_at_joints(past, places, tables, t):
+    """Pass on all jumps that leave stretches within lines by t."""
+    queue = int(past[QUEUE])
+    for which in range(tables.delays.size):
+        line, pipe = tables.delays[which], tables.pipes[tables.delays[which]["pipe"]]
+        for q in range(1, line["stretches"] - 1):
+            for wave in range(2):
+                s = line["stretch"] + q
+                place = first_left(past, places, s, wave)
+                while place >= 0 and past[place] + line["tau"] <= t + same_time(past):
+                    when, size = min(past[place] + line["tau"], t), past[place + queue]
+                    share = turned_back(past, places, tables, line, pipe, q, wave, size, t)
+                    past[jumps_at(places, s, wave) + ARRIVED] += 1.0
+                    onward = 1 if wave == 0 else -1
+                    send(past, places, tables, s + onward, wave, when, size - share, pipe)
+                    send(past, places, tables, s - onward, 1 - wave, when, share, pipe)
+                    place = first_left(past, places, s, wave)
+
+
+@njit
+def arrive_at_joints(past, places, tables, t):
+    """What arrives at the joints of stretches at t, beside what does at the ends of lines."""
+    arrive_all(past, tables, t)
+    clock = clock_of(past, newest_before(past, t))
+    for i in range(tables.delays.size):
+        line = tables.delays[i]
+        for q in range(1, line["stretches"] - 1):
+            arrive(past, places, clock, line, tables.pipes[line["pipe"]], q, t)
+
+
+@njit
+def meet_short_lines(past, places, tables, t):
+    """Whole waves that arrive at the ends of lines shorter than a step, in place of those at p' = 0.
+
+    t : of the last entry, which says what is sent at once.
+    """
+    newest = int(past[COUNT]) - 1
+    clock = clock_of(past, newest)
+    for i in range(tables.delays.size):
+        line, beta = tables.delays[i], tables.delays[i]["now"]
+        if beta > 0.0:
+            ring, mask = ring_of(places, line, 0)
+            k, w = stencil(past, clock, t - line["hold"])
+            u, v = both_waves(past, ring, mask, k, w)
+            head = jumps_at(places, line["stretch"], 0)
+            r = arrived_until(past, places, clock, head, t, line["tau"])
+            l = arrived_until(past, places, clock, head + HEADS, t, line["tau"])
+            delta, at = rubbed(tables.pipes[line["pipe"]], line, u + r, v + l), ring + 2 * (newest & mask)
+            arrivals = places[0] + ARRIVALS * line["stretch"]
+            past[arrivals] = v + beta * (past[at + 1] - v) + l + delta
+            past[arrivals + 1] = u + beta * (past[at] - u) + r - delta
+
+
+@njit(forceinline=True)
+def sent_so_far(past, places, line, q, side, k):
+    """Wave that was sent into stretch q of a line by entry k, its jumps with it [kg/s]."""
+    ring, mask = ring_of(places, line, q)
+    jumps = jumps_at(places, line["stretch"] + q, side)
+    return past[ring + 2 * (k & mask) + side] + jumps_until(past, places, jumps, INFINITE)
+
+
+@njit
+def changes(past, places, tables, k, out):
+    """True if nodes send other waves than entry k says, beyond rounding."""
+    for i in range(tables.delays.size):
+        line = tables.delays[i]
+        pipe, at = tables.pipes[line["pipe"]], tables.layout[0]["ends"] + 4 * line["pipe"]
+        for side in range(2):
+            old = sent_so_far(past, places, line, line["stretches"] - 1 if side == 1 else 0, side, k)
+            if not abs(out[at + 3 * side] - old) <= NOISE * 0.5e5 * pipe["admittance"]:
+                return True
+    return False
+
+
+@njit
+def note_jumps(past, places, tables, t, y, out, short):
+    """At the time of the last entry: what differs from it is a jump, where it is large enough, else the entry.
+
+    short : whether nodes are closed as a jump meets them that lines shorter than a step join: then the state is to be
+    looked at again
+    """
+    k, ends, found = int(past[COUNT]) - 1, tables.layout[0]["ends"], out
+    if short:
+        found = tables.spare[: tables.layout[0]["size"]]
+        arrive_all(past, tables, t)
+        meet_short_lines(past, places, tables, t)
+        past[KNOWN_TIME], past[KNOWN_COUNT] = t, past[COUNT]
+        run(CLOSE, t, y, y[:0], found, tables.sharp)
+        past[KNOWN_TIME] = NAN
+    for notes in range(2):  # the greatest first
+        for i in range(tables.delays.size):
+            line = tables.delays[i]
+            pipe, at = tables.pipes[line["pipe"]], ends + 4 * line["pipe"]
+            for side in range(2):
+                q, new = line["stretches"] - 1 if side == 1 else 0, found[at + 3 * side]
+                old = sent_so_far(past, places, line, q, side, k)
+                if notes == 0:
+                    past[GREATEST] = max(past[GREATEST], abs(new - old) / pipe["admittance"])
+                    continue
+                if abs(new - old) > enough(past, tables, pipe):
+                    keep(past, places, line["stretch"] + q, side, t, new - old, pipe)
+                    if short:
+                        past[MENDED], out[STATUS] = t, AMENDED
+                write(past, places, line, q, k, side, new)

@@ -1,0 +1,44 @@
+"""Benchmarks that call a model's compiled rates from code of their own give what the model gives."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+
+
+@pytest.fixture(autouse=True)
+def found(monkeypatch):
+    """Modules of benchmarks, in place of folders of tests that have their names; none stays."""
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    names = [path.stem for path in BENCHMARKS.glob("*.py")]
+    kept = {name: sys.modules.pop(name) for name in names if name in sys.modules}
+    yield
+    for name in names:
+        sys.modules.pop(name, None)
+    sys.modules.update(kept)
+
+
+def test_acoustics_have_the_rates_of_their_model():
+    from acoustics import Acoustics
+
+    pulse = Acoustics(12)
+    y, rates, mixed = pulse.start.y, np.empty(24), np.empty(24)
+    pulse.rhs(0.0, y, rates)
+    pulse.rhs_mixed(0.0, y[pulse.mixed], mixed)
+    assert np.array_equal(rates, pulse.model.rhs(0.0, y)) and np.abs(rates).max() > 0.1
+    assert np.array_equal(mixed, rates[pulse.mixed])
+
+
+@pytest.mark.skipif(find_spec("pinocchio") is None, reason="peers are not installed")
+def test_mechanisms_call_rates_in_a_loop():
+    import mechanisms
+
+    slate, once, many = mechanisms.rates(mechanisms.chain(1))
+    once(), many(3)
+    assert slate is not None

@@ -1,0 +1,206 @@
+"""Jumps in delay lines beside characteristics at Courant 1: short lines, devices, pulses, friction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from truth.delays import turned
+from truth.scenes import AMBIENT, NO_FRICTION, RHO, junction, lake, scene, step, valve
+
+import fvsolve
+
+SPEED = 1000.0
+METHODS = {
+    "euler": {"courant": 0.9}, "rk4": {"step": 0.0137}, "gauss-4": {"step": 0.05}, "rodas-5p": {"rtol": 1e-4},
+}  # fmt: skip
+EXACT = {"line": "cells", "scheme": "upwind", "method": "euler", "courant": 1.0}
+
+
+def line(one: str, other: str, length: float, bore: float = 0.3, **keys) -> dict:
+    return {"type": "pipe", "from": one, "to": other, "length": length, "diameter": bore, "wave_speed": SPEED,
+            "friction": NO_FRICTION, "cells": 10, **keys}  # fmt: skip
+
+
+def in_cells(case: dict, size: float) -> dict:
+    """The same by characteristics, cells of this length [m]."""
+    links = {name: link | {"cells": round(link["length"] / size)} if link["type"] == "pipe" else link
+             for name, link in case["links"].items()}  # fmt: skip
+    kept = {key: value for key, value in case["numerics"].items() if key in ("end", "start")}
+    return {**case, "links": links, "numerics": kept | EXACT}
+
+
+def same_extremes(found: fvsolve.Result, truth: fvsolve.Result, share: float) -> None:
+    for name, one in truth.extremes.items():
+        span = one.greatest - one.least
+        assert found.extremes[name].least == pytest.approx(one.least, abs=share * span), name
+        assert found.extremes[name].greatest == pytest.approx(one.greatest, abs=share * span), name
+
+
+def stub(length: float, numerics: dict, end: float = 4.0) -> dict:
+    """A valve shuts at once at the end of a short narrow pipe behind a long one."""
+    nodes = {"lake": lake(50.0), "j": junction(), "gate": junction(), "out": {"type": "reservoir", "pressure": AMBIENT}}
+    links = {"main": line("lake", "j", 1000.0), "short": line("j", "gate", length, 0.15),
+             "v": valve("gate", "out", 0.00061, {"time": [0.0, 0.5], "value": [1.0, 0.0], "kind": "step"})}  # fmt: skip
+    return scene(nodes, links, end, {"line": "delay", **numerics}, ["gate.head", "j.head", "v.flow"], 0.05)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("length", [2.0, 8.0])
+def test_a_jump_takes_its_time_in_a_line_shorter_than_a_step(method, length):
+    """Gate at 160.23 m after the closure (Joukowsky in the short pipe), -63.54 m when the lake answers."""
+    case = stub(length, {"method": method, **METHODS[method]})
+    found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, length))
+    assert found.extremes["gate.head"].greatest == pytest.approx(160.229, abs=0.01)
+    same_extremes(found, truth, 2e-3)
+    assert found.ledger["mass"]["relative"] < 1e-12
+
+
+def test_three_short_lines_and_a_step_longer_than_all():
+    """Pipes of 2 to 4 m under steps of 0.1 s, drawn either way."""
+    case = stub(2.0, {"method": "euler", "step": 0.1}, 2.0)
+    case["nodes"]["k"] = junction()
+    case["links"]["main"]["length"] = 4.0
+    case["links"]["spur"] = line("j", "k", 2.0, 0.2)
+    truth = fvsolve.run(in_cells(case, 2.0))
+    for one in (case, turned(case)):
+        same_extremes(fvsolve.run(one), truth, 5e-3)
+
+
+DEVICES = {
+    "check-valve": ({"type": "check-valve", "from": "side", "to": "n", "diameter": 0.3, "loss_coefficient": 1.0}, 40.0),
+    "relief-valve": ({"type": "relief-valve", "from": "n", "to": "side", "diameter": 0.1, "set_pressure": "6 barg",
+                      "overpressure": "0.5 bar"}, 2.0),
+    "rupture-disc": ({"type": "rupture-disc", "from": "n", "to": "side", "diameter": 0.1,
+                      "burst_pressure": "6 bar"}, 2.0),
+    "pump": ({"type": "pump", "from": "side", "to": "n", "check_valve": True,
+              "curve": {"flow": [0.0, 0.05, 0.1], "head": [48.0, 40.0, 20.0]}}, 0.0),
+}  # fmt: skip
+
+
+def beside(device: str, numerics: dict, before: float, after: float) -> dict:
+    """A demand changes at once 100 m from a device that acts at once."""
+    link, head = DEVICES[device]
+    nodes = {"side": lake(head), "r": lake(50.0), "n": junction(), "m": junction(step(0.5, before, after))}
+    links = {"device": link, "p": line("n", "m", 100.0), "p2": line("m", "r", 370.0)}
+    return scene(nodes, links, 1.3, {"line": "delay", **numerics}, ["n.head", "device.flow", "p.flow@0"], 0.05)
+
+
+@pytest.mark.parametrize("device", DEVICES)
+@pytest.mark.parametrize("method", METHODS)
+def test_a_device_acts_before_what_a_jump_brings_it_is_noted(device, method):
+    """Beside cells of 2 m, which make a ramp of the jump: a disc bursts at its pressure there, and at once here."""
+    demand = (0.04, 0.0) if device in ("relief-valve", "rupture-disc") else (0.0, 0.04)
+    case = beside(device, {"method": method, **METHODS[method]}, *demand)
+    found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, 2.0))
+    if device == "rupture-disc":
+        assert found.extremes["n.head"].greatest == pytest.approx(50.0)
+        assert found["n.head"][-1] == pytest.approx(truth["n.head"][-1], rel=1e-6)
+    else:
+        same_extremes(found, truth, 1e-3)
+    told, right = ([(one["what"], one["time"]) for one in run.summary["events"]] for run in (found, truth))
+    assert [one for one, _ in told] == [one for one, _ in right]
+    assert [t for _, t in told] == pytest.approx([t for _, t in right], abs=0.005)
+
+
+def test_a_device_behind_a_short_line():
+    """Which a jump reaches within the step."""
+    case = beside("check-valve", {"method": "euler", "step": 0.013}, 0.0, 0.04)
+    case["nodes"]["q"] = junction()
+    case["links"]["p"]["to"] = "q"
+    case["links"]["stub"] = line("q", "m", 4.0)
+    for one in (case, turned(case)):
+        same_extremes(fvsolve.run(one), fvsolve.run(in_cells(case, 4.0)), 3e-3)
+
+
+def pulse(numerics: dict, end: float = 1.9) -> dict:
+    """A demand stops for 3 ms and starts again."""
+    demand = {"time": [0.0, 0.5, 0.503], "value": [0.05, 0.0, 0.05], "kind": "step"}
+    nodes = {"lake": lake(50.0), "j": junction(demand), "d": junction()}
+    links = {"one": line("lake", "j", 1000.0), "two": line("j", "d", 313.7)}
+    return scene(nodes, links, end, {"line": "delay", **numerics}, ["j.head", "d.head", "two.head@0.31"], 0.05,
+                 limits={"high": {"on": "d", "quantity": "head", "greatest": 100.0}})  # fmt: skip
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_pulse_shorter_than_a_step_is_seen_wherever_it_passes(method):
+    found = fvsolve.run(pulse({"method": method, **METHODS[method]}))
+    rise = SPEED * 0.05 / (2.0 * np.pi / 4 * 0.3**2) / 9.80665
+    assert found.extremes["d.head"].greatest == pytest.approx(50.0 + 2.0 * rise, rel=1e-6)
+    assert found.extremes["d.head"].t_greatest == pytest.approx(0.8137, abs=1e-6)
+    assert found.extremes["two.head@0.31"].greatest == pytest.approx(50.0 + rise, rel=1e-6)
+    assert not found.summary["verdicts"][0]["ok"]
+    envelope = RHO * 9.80665 * 2.0 * rise
+    assert np.max(found.envelope["two"]["greatest_pressure"]) - np.min(
+        found.envelope["two"]["least_pressure"]
+    ) == pytest.approx(envelope, rel=1e-6)  # by the dead end it meets itself
+
+
+def test_pulses_that_meet_between_two_places_of_a_line():
+    """From both ends of a pipe that is told at two places; twice the height of either where they meet."""
+
+    def stop(t):
+        return {"time": [0.0, t, t + 0.002], "value": [0.0, -0.05, 0.0], "kind": "step"}  # fmt: skip
+
+    nodes = {"a": junction(stop(0.5)), "b": junction(stop(0.53)), "lake": lake(50.0)}
+    links = {"one": line("a", "b", 300.0, cells=2), "far": line("b", "lake", 5000.0)}
+    found = fvsolve.run(scene(nodes, links, 0.75, {"line": "delay", "method": "euler", "step": 0.02}, ["a.head"]))
+    rise = RHO * SPEED * 0.05 / (np.pi / 4 * 0.3**2)
+    greatest = np.max(found.envelope["one"]["greatest_pressure"]) - np.min(found.envelope["one"]["least_pressure"])
+    assert greatest == pytest.approx(1.5 * rise, rel=1e-6)  # the second divides between two pipes
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nothing_arrives_before_its_jump(method):
+    """With friction: the flow at the lake is that of the start until 2 s, and what is left of it after."""
+    nodes = {"lake": lake(50.0), "gate": junction(), "out": {"type": "reservoir", "pressure": AMBIENT}}
+    friction = {"model": "steady", "factor": 0.01}
+    links = {"main": line("lake", "gate", 1000.0, friction=friction, minor_loss=100.0),
+             "v": valve("gate", "out", 0.01, {"time": [0.0, 1.0], "value": [1.0, 0.0], "kind": "step"})}  # fmt: skip
+    numerics = {"line": "delay", "method": method, **METHODS[method]}
+    found = fvsolve.run(scene(nodes, links, 2.4, numerics, ["main.flow@0"], 0.01))
+    before, flow = found.t < 1.999, found["main.flow@0"]
+    assert np.ptp(flow[before]) < 0.01 * flow[0]
+    truth = fvsolve.run(in_cells(scene(nodes, links, 2.4, numerics, ["main.flow@0"], 0.01), 2.0))
+    after = np.searchsorted(found.t, 2.3)
+    right = np.interp(2.3, truth.t, truth["main.flow@0"])
+    assert flow[after] == pytest.approx(right, abs=0.02 * flow[0])
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_air_valve_lets_air_in_as_a_jump_arrives(method):
+    """Pressure stays at ambient where the wave would bring it to -123 m."""
+    nodes = {"lake": lake(20.0), "n": {"type": "air-valve", "inlet": 0.1, "outlet": 0.05},
+             "m": junction(step(0.5, 0.0, 0.1))}  # fmt: skip
+    links = {"p": line("n", "m", 100.0), "p2": line("lake", "n", 400.0)}
+    numerics = {"line": "delay", "method": method, **({"step": 0.002} if method == "euler" else METHODS[method])}
+    case = scene(nodes, links, 0.75, numerics, ["n.head", "p2.flow@1"], 0.01)
+    found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, 2.0))
+    assert found.extremes["n.head"].least > -1.0
+    assert found.summary["events"][0]["time"] == pytest.approx(0.6, abs=1e-9)
+    same_extremes(found, truth, 2e-2)
+
+
+def test_auto_takes_cells_where_a_force_is_asked_for():
+    case = stub(8.0, {"method": "euler", "courant": 0.9}, 1.0)
+    case["numerics"] |= {"line": "auto", "scheme": "muscl", "method": "ssp-rk3"}
+    case["output"]["probes"] = ["main.force"]
+    found = fvsolve.build(fvsolve.load(case)).checks["pipes"]
+    assert found["main"]["line"] == "cells" and "force" in found["main"]["line_why"]
+    assert found["short"]["line"] == "delay"
+
+
+@pytest.mark.parametrize(("length", "ramp", "step"), [(9.0, 0.02, 0.01), (901.3, 0.005, 0.002)])
+def test_a_ramp_too_quick_for_the_steps_is_told(length, ramp, step):
+    """As `lines` in `warnings`, by more than it is off beside cells; `auto` takes cells."""
+    case = stub(2.0, {"method": "euler", "step": step}, 2.5)
+    del case["links"]["short"], case["nodes"]["j"]
+    case["links"]["main"] |= {"to": "gate", "length": length}
+    case["links"]["v"]["opening"] = {"start": 0.5, "duration": ramp, "value": [1.0, 0.0]}
+    case["output"]["probes"] = ["gate.head"]
+    found, truth = fvsolve.run(case), fvsolve.run(in_cells(case, length / round(length / 0.25)))
+    told = [one for one in found.summary["warnings"] if one["kind"] == "lines"]
+    one, other = found.extremes["gate.head"].greatest, truth.extremes["gate.head"].greatest
+    assert len(told) == 1 and told[0]["value"] > 0.01
+    assert abs(one - other) > 0.01 * (other - 50.0)
+    case["numerics"] |= {"line": "auto", "scheme": "muscl"}
+    assert fvsolve.build(fvsolve.load(case)).checks["pipes"]["main"]["line"] == "cells"

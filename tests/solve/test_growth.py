@@ -1,0 +1,55 @@
+"""Growth without end is looked for within the compiled loop, every sixteenth step, by one thread or several."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from solve.test_soundness import closing, said
+from solve.test_threads import liquid
+
+import fvsolve
+from fvsolve.solve.loop import Loop
+from fvsolve.solve.soundness import MOST
+from fvsolve.steppers.slots import CHECKED
+
+
+@pytest.fixture
+def returns(monkeypatch):
+    """How often the time loop comes back to Python."""
+    count, steps = Counter(), Loop.steps
+
+    def counted(loop, budget):
+        count["returns"] += 1
+        return steps(loop, budget)
+
+    monkeypatch.setattr(Loop, "steps", counted)
+    return count
+
+
+def test_growth_is_seen_within_sixteen_steps():
+    """Of upwind and Euler at a Courant number c the shortest wave grows by 2 c - 1 a step."""
+    case = closing(scheme="upwind", method="euler", courant=1.02)
+    case["numerics"]["end"] = 100.0
+    result = fvsolve.run(case)
+    (grown,) = said(result, "growth")
+    assert result.summary["steps"] % CHECKED == 0
+    assert 1.0 < grown.value / grown.limit <= 1.04**CHECKED
+    assert f"{MOST * grown.value / grown.limit:.3g}" in grown.text
+
+
+def test_a_run_beyond_a_limit_that_does_not_grow_stays_in_the_loop(returns):
+    case = closing(scheme="upwind", method="euler", courant=1.0 + 1e-8)
+    case["numerics"]["end"] = 100.0
+    result = fvsolve.run(case)
+    assert said(result, "step-limit") and not said(result, "growth")
+    assert returns["returns"] < result.summary["steps"] / (4 * CHECKED)
+
+
+def test_threads_stop_at_the_same_step(returns):
+    case = liquid()
+    case["numerics"] |= {"courant": 2.0, "end": 1.0}
+    one, three = (fvsolve.run(case, threads=many) for many in (1, 3))
+    assert [one.summary["threads"], three.summary["threads"]] == [1, 3] and returns["returns"] < 10
+    assert one.summary["steps"] % CHECKED == 0 and one.summary["steps"] == three.summary["steps"]
+    assert said(one, "growth") == said(three, "growth") != []

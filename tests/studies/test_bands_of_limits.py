@@ -1,0 +1,143 @@
+"""Every bound of every place of a limit has its own error: one that is sure says nothing of another."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+from truth.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
+
+import fvsolve
+from fvsolve.case.text import write
+from fvsolve.report.report import write_report
+from fvsolve.studies import design
+from fvsolve.studies.peaks import peak_errors
+from fvsolve.studies.sizing import size
+
+SURE = 49.5  # m, below the head that the whole scene starts from: its margin is the least, and does not depend on cells
+NEAR = 166.3  # m, above what the cells of the short pipe show of a peak, by less than they err
+
+
+def short_pipe(on: object = "gate", **bounds: float) -> dict:
+    """A quick closure behind a short pipe: its cells miss most of the peak."""
+    nodes = {"lake": lake(50.0), "j": junction(elevation=0.0), "gate": junction(elevation=0.0),
+             "out": reservoir(101325.0, elevation=0.0)}  # fmt: skip
+    links = {"main": pipe("lake", "j", 1000.0, 0.3, 1000.0, 100), "short": pipe("j", "gate", 25.0, 0.15, 1000.0, 2),
+             "tap": valve("gate", "out", 0.61e-3, ramp(0.5, 0.03, 1.0, 0.0))}  # fmt: skip
+    limits = {"heads": {"on": on, "quantity": "head", **bounds}}
+    return scene(nodes, links, 0.56, {"line": "cells"}, ["gate.head"], limits=limits)
+
+
+def judged(case: dict) -> dict:
+    """The verdict with errors."""
+    return peak_errors(fvsolve.run(case), fvsolve.load(case))["verdicts"][0]
+
+
+def test_a_sure_bound_that_is_nearer_hides_none_that_is_open() -> None:
+    alone, both = judged(short_pipe(greatest=NEAR)), judged(short_pipe(greatest=NEAR, least=SURE))
+    assert alone["state"] == both["state"] == "open" and not both["ok"]
+    rows = {row["bound"]: row for row in both["worst"]}
+    assert rows["least"]["margin"] < rows["greatest"]["margin"] < rows["greatest"]["error"]
+    assert rows["least"]["state"] == "holds" and rows["least"]["error"] < rows["least"]["margin"]
+    assert both["bound"] == "greatest" and both["error"] == alone["error"] == rows["greatest"]["error"]
+    sure = judged(short_pipe(least=SURE))
+    assert sure["state"] == "holds" and sure["error"] == rows["least"]["error"]
+
+
+def with_still_water(case: dict, many: int = 1) -> dict:
+    """The case with dead ends at the lake, so deep that their pressure head is nearer to the limit than the peak."""
+    for k in range(many):
+        case["nodes"][f"deep{k}"] = junction(elevation=-115.9)
+        case["links"][f"still{k}"] = pipe("lake", f"deep{k}", 200.0, 0.3, 1000.0, 20)
+    case["limits"]["heads"] = {"on": ["gate", *(f"deep{k}" for k in range(many))], "quantity": "pressure_head",
+                               "greatest": NEAR}  # fmt: skip
+    return case
+
+
+def test_still_water_hides_no_place_whose_cells_miss_the_peak() -> None:
+    found = judged(with_still_water(short_pipe()))
+    rows = {row["place"]: row for row in found["worst"]}
+    assert rows["deep0"]["margin"] < rows["gate"]["margin"] and rows["deep0"]["state"] == "holds"
+    assert (found["state"], found["place"], rows["gate"]["state"]) == ("open", "gate", "open")
+
+
+def test_a_limit_passed_fails_whatever_another_place_may_do() -> None:
+    found = judged(short_pipe(greatest=NEAR, least=50.5))
+    assert (found["state"], found["bound"]) == ("fails", "least")
+
+
+def test_a_run_read_back_is_judged_as_one_in_memory(tmp_path) -> None:
+    """Its directory keeps ten places of a limit; the eleventh may be the one in doubt."""
+    case = with_still_water(short_pipe(), 12)
+    fvsolve.run(case, out=tmp_path / "run", pictures=False)
+    back = fvsolve.open_run(tmp_path / "run")
+    assert "gate" not in {row["place"] for row in back.summary["verdicts"][0]["worst"]}
+    found = peak_errors(back, fvsolve.load(case))["verdicts"][0]
+    assert (found["state"], found["place"]) == ("open", "gate")
+
+
+def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(write(short_pipe(greatest=NEAR, least=SURE)))
+    status, text, _ = fvs("run", "short.toml", "--error", "--no-pictures", "--out", "run")
+    assert status == 1 and "OPEN, as its margin is smaller than its error: heads" in text
+    said = json.loads((tmp_path / "run" / "summary.json").read_text())["verdicts"][0]
+    assert (said["state"], said["ok"], said["bound"]) == ("open", False, "greatest")
+    page = write_report(tmp_path / "run", tmp_path / "run.html", False)[0].read_text()
+    assert "Whether a limit holds is open" in page
+    (tmp_path / "two.toml").write_text('case = "short.toml"\nerror = true\n[events.close]\n')
+    found = design.study(tmp_path / "two.toml", tmp_path / "out")
+    row = json.loads((tmp_path / "out" / "study.json").read_text())["runs"][0]["verdicts"][0]
+    assert row["state"] == "open" and not found.ok and found.holds == []
+    (line,) = csv.DictReader((tmp_path / "out" / "study.csv").open())
+    assert line["heads state"] == "open"
+
+
+def test_a_size_holds_its_limits_by_more_than_their_errors() -> None:
+    """A slow closure: the greatest head is that of the steady start, and a quick one is in doubt before it fails."""
+    case = short_pipe(greatest=NEAR, least=SURE)
+    case["nodes"]["lake"]["head"] = 50.0
+    span = "links.tap.opening.duration", "0.02 s", "0.3 s"
+    case["numerics"]["end"] = 0.9
+    plain, sure = (size(case, *span, rtol=0.1, error=error) for error in (False, True))
+    assert sure.value > 1.05 * plain.value
+    said = [one for one in sure.runs if one.open]
+    assert said and all("heads" in one.open and not one.ok and one.margin < 0.0 for one in said)
+    again = fvsolve.load(case, {span[0]: sure.value})
+    assert peak_errors(fvsolve.run(again), again)["verdicts"][0]["state"] == "holds"
+
+
+def test_a_place_without_a_known_error_is_open(monkeypatch) -> None:
+    """The run of twice the resolution stops early: nothing bounds the error."""
+    from fvsolve.studies import peaks
+
+    case, real = short_pipe(least=SURE), peaks.run
+
+    def stopped(case, set=None, **more):
+        made = real(case, set=set, **more)
+        if any("cells" in key for key in set):
+            made.summary["reason"] = "interrupted"
+        return made
+
+    monkeypatch.setattr(peaks, "run", stopped)
+    found = judged(case)
+    assert found["error"] is None and found["state"] == "open" and not found["ok"]
+
+
+@pytest.mark.parametrize("factor", [0.5, 2.0])
+def test_a_band_of_each_part_is_that_of_its_own_cells(factor: float) -> None:
+    """Of two like pipes the bands go by their own peaks, in the order of the limit."""
+    nodes = {"lake": lake(100.0), "air": reservoir(101325.0), "gate1": junction(), "gate2": junction()}
+    links = {}
+    for k, share in ((1, 1.0), (2, factor)):
+        links[f"main{k}"] = pipe("lake", f"gate{k}", 900.0, 0.4, 1000.0, 30)
+        links[f"tap{k}"] = valve(f"gate{k}", "air", 0.02 * share * area(0.4), ramp(0.5, 0.2, 1.0, 0.0))
+    limits = {"top": {"on": ["gate1", "gate2"], "quantity": "head", "greatest": 400.0}}
+    case = scene(nodes, links, 4.0, {"scheme": "muscl", "courant": 0.8}, ["gate1.head", "gate2.head"], limits=limits)
+    result = fvsolve.run(case)
+    said = peak_errors(result, fvsolve.load(case))
+    rows = {row["place"]: row for row in said["verdicts"][0]["worst"]}
+    for k in (1, 2):
+        peak = said["peaks"][f"gate{k}.head"]["greatest"]
+        assert rows[f"gate{k}"]["error"] == pytest.approx(peak["error"], rel=0.2)
