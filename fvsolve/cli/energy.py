@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed, methods_of, replaced, told
+from fvsolve.cli.studying import Out, cleared, folder_of, listed, methods_of, replaced, told
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Column, Sheet, text
 
@@ -94,7 +94,7 @@ def ledger(case, port, out, as_json: bool) -> None:
     with leaving(f"interrupted: no ledger, {folder} may lack files; {AGAIN}"):
         with watched(case) as progress:
             one = study(case, port=port, progress=progress)
-        write_table(one, folder / FILES[0])
+        write_table(one, cleared(folder, *FILES) / FILES[0])
         at_port = None if one.port is None else (one.port.node, one.port.course, one.port.bound)
         clock, own = time_column(case), column("", "energy", case)
         units = clock.unit, None if own.plain else (own.to_si(1.0), own.unit)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json, value_of
-from fvsolve.cli.studying import Dask, Jobs, Out, folder_of, listed, methods_of, told
+from fvsolve.cli.studying import Dask, Jobs, Out, cleared, folder_of, listed, methods_of, told
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.units import parse
@@ -78,7 +78,9 @@ def _written(found, folder: Path, head: str) -> list[Path]:
     from fvsolve.draw.failure_map import failure_map_figure
 
     rows = [{"value": found.values[row["column"]]} | row for row in found.plain()["squares"]]
-    table = Sheet([Column(key) for key in rows[0]], rows).write(folder / "map.csv")
+    table = Sheet([Column(key) for key in rows[0]], rows).write(
+        cleared(folder, "map.csv", "map.png", "map.svg") / "map.csv"
+    )
     figure = failure_map_figure(found, f"{found.case}: where methods fail", head)
     pictures = [folder / f"map.{kind}" for kind in ("png", "svg")]
     for picture in pictures:

@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, folder_of, listed, replaced
+from fvsolve.cli.studying import Out, cleared, folder_of, listed, replaced
 from fvsolve.studies.sheet import Sheet, write
 
 SHOWN = 24  # poles on the terminal; the others are in the file
@@ -59,8 +59,7 @@ def linearise(
     poles = values.poles()
     folder = folder_of(found.at.model.case, "linearise", out)
     replaced(folder, "linear.npz")
-    for name in ("A.csv", "A-sparse.csv"):  # of which one is written
-        (folder / name).unlink(missing_ok=True)
+    cleared(folder, "A.csv", "A-sparse.csv")  # of which one is written
     Sheet(POLES, poles).write(folder / "poles.csv")
     write_matrices(folder, found)
     said = found.plain() | {"poles": poles, "poles_are": values.said, "directory": str(folder)}

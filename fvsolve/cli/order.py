@@ -10,7 +10,7 @@ import typer
 
 from fvsolve.cli import terminal
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Dask, Jobs, Out, folder_of, listed, methods_of, told
+from fvsolve.cli.studying import Dask, Jobs, Out, cleared, folder_of, listed, methods_of, told
 from fvsolve.output.summary import plain
 from fvsolve.studies.accuracy.picture import NORMS, SHOWN, title, unit
 from fvsolve.studies.sheet import Column, Sheet, columns
@@ -55,7 +55,10 @@ def order(
                       methods=methods_of(method), against=against, out=points, progress=progress,
                       jobs=jobs, dask=dask)  # fmt: skip
     found = found if isinstance(found, list) else [found]
-    files = [Sheet(FILE, [*lines(found)]).write(folder / "order.csv"), *draw(folder, found)]
+    files = [
+        Sheet(FILE, [*lines(found)]).write(cleared(folder, "order.csv", "order.png", "order-*.png") / "order.csv"),
+        *draw(folder, found),
+    ]
     if as_json:
         print_json({"studies": [one.plain() for one in found], "files": [str(file) for file in files],
                     "reused": points.reused})  # fmt: skip

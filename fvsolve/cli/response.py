@@ -10,7 +10,7 @@ import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.linearise import At, Before, time_of
-from fvsolve.cli.studying import Out, folder_of, replaced
+from fvsolve.cli.studying import Out, cleared, folder_of, replaced
 from fvsolve.output.column import column
 from fvsolve.studies.sheet import write
 
@@ -39,7 +39,7 @@ def response(
     h = found.h
     columns = [found.w / (2.0 * np.pi), found.w, h.real, h.imag, np.abs(h), np.degrees(np.angle(h))]
     replaced(folder, f"{name}.npz")
-    write(folder / f"{name}.csv", header, np.column_stack(columns).tolist())
+    write(cleared(folder, f"{name}.png", f"{name}.svg") / f"{name}.csv", header, np.column_stack(columns).tolist())
     np.savez(folder / f"{name}.npz", A=found.a, B=found.b, C=found.c, D=found.d, states=np.array(found.states))
     shown = unit_in(read, found)
     draw(found, folder / name, *shown)

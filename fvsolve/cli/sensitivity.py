@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Dask, Jobs, Out, Seed, folder_of, told
+from fvsolve.cli.studying import Dask, Jobs, Out, Seed, cleared, folder_of, told
 from fvsolve.cli.sweep import ranges
 
 
@@ -33,7 +33,10 @@ def sensitivity(
         made = studies.sensitivity(
             found, ranges(vary, "--vary"), outcome, samples, seed, None, jobs, dask, folder, progress
         )
-    paths = [made.sheet.write(folder / "sensitivity.csv"), folder / "sensitivity.png"]
+    paths = [
+        made.sheet.write(cleared(folder, "sensitivity.csv", "sensitivity.png") / "sensitivity.csv"),
+        folder / "sensitivity.png",
+    ]
     made.plot(paths[1])
     if as_json:
         print_json(made.plain() | {"directory": str(folder)})

@@ -10,7 +10,7 @@ import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
 from fvsolve.cli.linearise import At, Before, time_of
-from fvsolve.cli.studying import Dask, Jobs, Out, folder_of, listed, methods_of, told
+from fvsolve.cli.studying import Dask, Jobs, Out, cleared, folder_of, listed, methods_of, told
 from fvsolve.studies.sheet import Column, Sheet, columns
 
 PICTURES = 12  # pairs beyond which no picture is drawn
@@ -66,7 +66,7 @@ def stability(
             dask=dask,
         )
     table = Sheet(FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in found.rows])
-    files = [table.write(folder / "stability.csv").name]
+    files = [table.write(cleared(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
     if len(found.rows) <= PICTURES:
         files += pictures(found, folder)
     if as_json:

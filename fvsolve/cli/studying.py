@@ -57,6 +57,13 @@ def replaced(folder: Path, name: str) -> None:
         print(f"{folder}: replaces the results of an earlier command there; --out DIR keeps them", file=sys.stderr)
 
 
+def cleared(folder: Path, *patterns: str) -> Path:
+    """The folder without the files that an earlier command of the kind wrote there: none may stand beside new ones."""
+    for path in [one for pattern in patterns for one in folder.glob(pattern)]:
+        path.unlink()
+    return folder
+
+
 def writable(folder: Path) -> Path:
     """The folder, created; raises FvsolveError where nothing can be written into it."""
     try:

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, One, app, load_case, print_json, value_of
-from fvsolve.cli.studying import Dask, Jobs, Out, Seed, folder_of, told, writable
+from fvsolve.cli.studying import Dask, Jobs, Out, Seed, cleared, folder_of, told, writable
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
@@ -81,6 +81,7 @@ def write_charts(made, outcomes: list[str], folder: Path, heads: dict[str, str])
 
     known = made.outcomes
     names = [made.outcome(name) for name in outcomes] or [one for one in known if one.startswith(("max(", "min("))]
+    cleared(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
     paths = []
     for name in names:
         plain = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")

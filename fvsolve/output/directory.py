@@ -70,7 +70,7 @@ class RunDirectory:
         """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
         for name in (ENDED, *PICTURES):
             (self.folder / name).unlink(missing_ok=True)
-        _clear_reports(self.folder)
+        clear_reports(self.folder)
         if self.restart is None:
             self._start()
             self._write_case()
@@ -201,7 +201,8 @@ def clear(folder: Path) -> None:
     clear_lines(folder)
 
 
-def _clear_reports(folder: Path) -> None:
+def clear_reports(folder: Path) -> None:
+    """Delete the page, the workbook and the pictures that were made of earlier results in `folder`."""
     for path in [*(folder / name for name in REPORTS), *folder.glob("section-*.png")]:
         path.unlink(missing_ok=True)
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from fvsolve.case import Case, load
 from fvsolve.errors import FvsolveError, RunError
+from fvsolve.output.directory import clear_reports
 from fvsolve.output.summary import plain, write_summary
 from fvsolve.run import run
 from fvsolve.studies.design_file import Design, read_design
@@ -123,6 +124,7 @@ def write_study(found: Studied) -> None:
     said = found.plain()
     for row in said["runs"]:
         row["directory"] = os.path.relpath(row["directory"], found.folder)
+    clear_reports(found.folder)
     fresh = found.folder / f"{STUDY}.tmp"
     fresh.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
     os.replace(fresh, found.folder / STUDY)

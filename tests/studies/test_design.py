@@ -77,6 +77,9 @@ def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_p
     assert again.rows == found.rows
     assert {path: path.stat().st_mtime_ns for path in stamps} == stamps  # nothing was run again
     assert design.open_study(tmp_path / "out")["title"] == "Two taps"
+    (tmp_path / "out" / "report.html").touch()  # of the runs before
+    design.study(study, tmp_path / "out")
+    assert not (tmp_path / "out" / "report.html").exists()
 
 
 @pytest.mark.slow

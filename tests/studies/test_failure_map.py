@@ -258,6 +258,19 @@ def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, monkeyp
     assert (tmp_path / "out" / "map.png").stat().st_size > 10_000 and (tmp_path / "out" / "map.svg").is_file()
 
 
+def test_no_old_picture_stands_beside_a_new_table(tmp_path, fvs, monkeypatch):
+    """Also where the new one cannot be drawn."""
+    from fvsolve.case import text
+
+    path, out = tmp_path / "scene.toml", tmp_path / "out"
+    path.write_text(text.write(closing()))
+    asked = ("map", str(path), "--scheme", "upwind", "--method", "euler", "--step", "8 ms", "--out", str(out))
+    assert fvs(*asked)[0] == 0 and (out / "map.png").is_file() and (out / "map.svg").is_file()
+    monkeypatch.setitem(sys.modules, "matplotlib.patches", None)
+    assert fvs(*asked)[0] != 0
+    assert [one.name for one in sorted(out.iterdir())] == ["map.csv", "points.jsonl"]
+
+
 def test_a_swing_of_the_scene_that_euler_amplifies_is_no_ringing():
     """A column between two tanks swings at omega; Euler makes each step sqrt(1 + (omega h)^2) times larger."""
     omega = math.sqrt(2 * 9.80665 * area(0.5) / (50.0 * 1.0))

@@ -324,7 +324,8 @@ def test_the_table_is_parquet_too_and_every_extreme_has_a_chart(line, fvs, tmp_p
     table = parquet.read_table(tmp_path / "o" / "sweep.parquet").to_pydict()
     for name in ("links.valve.area", "ok", "max(gate.pressure) [Pa]", "steps"):
         assert table[name] == [row[name] for row in said["rows"]]
-    code, _, err = fvs(
-        "sweep", tmp_path / "line.toml", "--set", "links.valve.area=0.01,0.02", *to, "--outcome", "max(x)"
-    )
+    again = ("sweep", tmp_path / "line.toml", "--set", "links.valve.area=0.01,0.03", *to)
+    assert fvs(*again, "--outcome", "final(valve.flow)")[0] == 0
+    assert [path.name for path in (tmp_path / "o" / "charts").iterdir()] == ["final-valve.flow.png"]
+    code, _, err = fvs(*again, "--outcome", "max(x)")
     assert code == 2 and 'no outcome "max(x)"; there are' in err

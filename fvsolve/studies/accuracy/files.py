@@ -24,6 +24,8 @@ def write(found: Chart, folder: Path, title: str = "", dpi: float | None = None)
     from fvsolve.draw.chart import save
 
     paths = [folder / f"chart.{ending}" for ending in ("csv", "png", "svg")]
+    for path in paths:
+        path.unlink(missing_ok=True)  # no old picture stands beside a new table
     write_csv(found, paths[0])
     made = figure(found, title)
     save(made, paths[1], dpi)
