@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from fvsolve.case.routes import Leg, alone, is_cut, joined
 from fvsolve.case.routes import legs as legs_of
+from fvsolve.run.result import not_valid
 
 MOST = 6  # sections of a run, unless it has more routes
 
@@ -39,7 +40,9 @@ class SectionWay(NamedTuple):
 
 
 def ways(result) -> list[SectionWay]:
-    """The sections of a run, its routes first, then the longest; none of a case without pipes."""
+    """The sections of a run, its routes first, then the longest; none without pipes, or where a run blew up."""
+    if not_valid(result.summary):
+        return []
     links = result.case.links
     found = [_way(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
     found = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(found)}.values())[::-1]  # each but once

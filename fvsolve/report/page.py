@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-from fvsolve.draw.style import INK
 from fvsolve.errors import visible
 from fvsolve.report import described, numerics, trust, worst
 from fvsolve.report.figures import history_figure, section_figure
@@ -33,7 +32,7 @@ def page(result, ways: list[SectionWay]) -> str:
         "invalid": not_valid(result.summary),
         "title": visible(result.summary["title"] or result.summary["case"]), "run": result.summary,
         "description": visible(result.case.description), "source": visible(result.case.source),
-        "ended": result.summary.get("ended", ""), "words": trust.words(result), "ink": INK,
+        "ended": result.summary.get("ended", ""), "words": trust.words(result),
         "limits": trust.verdicts(result), "worst": worst.of_all(result, ways) or probes,
         "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(chosen(result)),

@@ -11,6 +11,7 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.report.legs import SectionWay, ways
 from fvsolve.report.report import opened
 from fvsolve.report.section import section
+from fvsolve.run.result import not_valid
 from fvsolve.shown import kept
 from fvsolve.units import show
 
@@ -42,7 +43,8 @@ def write_pictures(
     if pairs:
         drawn["phase.png"] = phase_figure([[(n, result.units[n], result[n]) for n in pair] for pair in pairs], title)
     if not drawn:
-        raise FvsolveError(f"{directory}: the case has no pipes, so no long section; name --probes or --phase X:Y")
+        why = f"run is {text}" if (text := not_valid(result.summary)) else "case has no pipes"
+        raise FvsolveError(f"{directory}: the {why}, so no long section; name --probes or --phase X:Y")
     folder.mkdir(parents=True, exist_ok=True)
     for name, figure in drawn.items():
         kept(figure, folder / name)

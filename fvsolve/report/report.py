@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 
@@ -34,7 +36,7 @@ def write_report(directory: str | Path, out: str | Path | None = None, xlsx: boo
     if (Path(directory) / STUDY).is_file():
         return _write_study(Path(directory), path, xlsx)
     result = opened(Path(directory))
-    found = [] if result.summary["invalid_from"] is not None else ways(result)  # heads along it would be no results
+    found = ways(result)
     written(path, page(result, found))
     return [path, write_workbook(result, found, path.with_suffix(".xlsx"))] if xlsx else [path]
 
@@ -48,16 +50,20 @@ def written(path: Path, text: str) -> None:
 
 
 def _write_study(directory: Path, path: Path, xlsx: bool) -> list[Path]:
-    """The page of a study, and the workbook of its tables."""
-    from fvsolve.report.study import failing, matrix, study_page
-    from fvsolve.report.workbook import write_tables
+    """The page of a study, those of its runs to which it leads, and the workbook of its tables."""
+    from fvsolve.report.legs import ways
+    from fvsolve.report.page import page
+    from fvsolve.report.study import study_page
+    from fvsolve.report.workbook import study_tables, write_tables
     from fvsolve.studies.design import open_study
 
-    said = open_study(directory)
-    runs = [(row, opened(Path(row["directory"]))) for row in said["runs"]]
+    said, runs = open_study(directory), []
+    for row in said["runs"]:
+        own, result = Path(row["directory"]) / PAGE, opened(Path(row["directory"]))
+        written(own, page(result, ways(result)))
+        runs.append((row | {"page": quote(os.path.relpath(own, path.parent).replace(os.sep, "/"))}, result))
     written(path, study_page(said, runs))
-    tables = [one for one in (matrix(runs), failing(runs)) if one is not None]
-    return [path, write_tables(tables, path.with_suffix(".xlsx"))] if xlsx else [path]
+    return [path, write_tables(study_tables(runs), path.with_suffix(".xlsx"))] if xlsx else [path]
 
 
 def opened(directory: Path):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from fvsolve.case.text import inline
 from fvsolve.draw.plot import quantity, thinned
-from fvsolve.draw.style import INK
 from fvsolve.errors import visible
 from fvsolve.output.column import column
 from fvsolve.report import described, numerics
@@ -16,7 +16,7 @@ from fvsolve.report.legs import ways
 from fvsolve.report.page import WARNINGS, rendered
 from fvsolve.report.section import section
 from fvsolve.report.tables import ERROR, ReportTable, in_unit
-from fvsolve.report.trust import Word
+from fvsolve.report.trust import Word, open_for
 from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
 from fvsolve.units import span
 
@@ -27,7 +27,7 @@ CAPTION = "Greatest (full) and least (dashed) head over every accepted step, by 
 
 
 def study_page(said: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
-    """The report of a study; said : as study.json has it, runs : (row, `Result`) of each."""
+    """The report of a study; said : as study.json has it, runs : (row, `Result`) of each, row["page"] its report."""
     figures: dict[str, Any] = {}
     first = runs[0][1]
     events = [{"id": f"event-{k}", "name": visible(name or "All runs"), "figures": drawn(name, k, runs, figures)}
@@ -36,10 +36,10 @@ def study_page(said: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> 
         "title": visible(said["title"] or said["study"]), "said": said, "case": visible(first.summary["case"]),
         "ended": max(result.summary.get("ended", "") for _, result in runs),
         "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
-        "words": words(said, runs), "matrix": [matrix(runs)] if first.verdicts else [], "events": events,
+        "words": words(said, runs), "matrix": [matrix(runs)], "events": events,
         "failing": failing(runs), "changes": changed(said), "first": name_of(runs[0][0]),
         "model": [one for one in described.model(first) if one],
-        "told": told(runs), "versions": numerics.versions(first), "ink": INK,
+        "told": told(runs), "versions": numerics.versions(first),
     }  # fmt: skip
     return rendered("study", filled, figures)
 
@@ -55,65 +55,77 @@ def words(said: dict[str, Any], runs: list) -> list[Word]:
              for row, result in runs if result.reason != "finished"]  # fmt: skip
     found += [Word("bad", f"{name_of(row)} is not to be trusted.", one.text)
               for row, result in runs for one in result.warnings if not one.ok]  # fmt: skip
-    doubted = [name_of(row) for row, result in runs if result.marks]
-    if doubted:
-        text = "liquid below its vapour pressure, tanks dry: see the runs' own reports"
-        found.append(Word("doubt", f"In part not to be trusted: {', '.join(doubted)}.", text))
+    if doubted := [one for one in runs if one[1].marks]:
+        marks = [mark for _, result in doubted for mark in result.marks]
+        why = {mark.what: mark.text.partition(": ")[2].partition(";")[0] for mark in marks}
+        found.append(Word("doubt", "In part not to be trusted:", f"{'; '.join(why.values())}.", links(doubted)))
     if not any(result.verdicts for _, result in runs):
         return [
             *found,
             Word("none", "No limits were stated.", "The study says what happens, not whether it is allowed."),
         ]
     names = [visible(name) or "the case as it is" for name in said["holds"]]
-    unsure = [name_of(row) for row, result in runs for one in result.verdicts if one.state == OPEN]
     if names:
         found.append(Word("good", f"All limits hold in all events with {', '.join(names)}.", ""))
     else:
         found.append(Word("bad", "No protection holds all limits in all events.", ""))
-    if unsure:
-        text = "a margin is smaller than the error of the numbers, or the run is not sound"
-        found.append(Word("doubt", f"Open: {', '.join(dict.fromkeys(unsure))}.", text))
+    if failed := [one for one in runs if state_of(one[1]) == FAILS]:
+        found.append(Word("bad", "Fails:", "", links(failed)))
+    if unsure := [one for one in runs if state_of(one[1]) == OPEN]:
+        why = dict.fromkeys(open_for(result) for _, result in unsure)
+        found.append(Word("doubt", "Open:", f"{'; '.join(why)}.", links(unsure)))
     return found
 
 
+def state_of(result) -> str:
+    """The worst that becomes of the limits of a run; a run that is not ok fails. "" where nothing was asked."""
+    states = [FAILS] * (not result.ok) + [one.state for one in result.verdicts]
+    return next((one for one in (FAILS, OPEN, HOLDS) if one in states), "")
+
+
+def links(runs: list) -> tuple[tuple[str, str], ...]:
+    """The reports of runs, by their names."""
+    return tuple((name_of(row), row["page"]) for row, _ in runs)
+
+
 def matrix(runs: list) -> ReportTable:
-    """A row a run: verdict, and the margin of every limit."""
+    """A row a run, which leads to its report: verdict, and the margin of every limit."""
     names = {one.name: one.unit for _, result in runs for one in result.verdicts}
     asked = any(one.error is not None for _, result in runs for one in result.verdicts)
-    rows, bad = [], set()
-    for k, (row, result) in enumerate(runs):
+    rows = []
+    for row, result in runs:
         found = {one.name: one for one in result.verdicts}
-        states = [FAILS] * (not result.ok) + [one.state for one in result.verdicts]
-        state = next((one for one in (FAILS, OPEN) if one in states), HOLDS)
-        if state == FAILS:
-            bad.add(k)
         none = not_valid(result.summary) or None
         margins = [none if key == "margin" and value is None and name in found else value
                    for name in names for key in ("margin", *["error"] * asked)
                    for value in [getattr(found.get(name), key, None)]]  # fmt: skip
-        rows.append([row["event"] or "", row["protection"] or "", IN_WORDS[state] if states else "", *margins])
-    heads = ["event", "protection", "verdict"]
+        rows.append([name_of(row), IN_WORDS.get(state_of(result), ""), *margins])
+    heads = ["run", "verdict"]
     heads += [word for name in names for word in (f"margin of {name}", *[ERROR] * asked)]
-    units = ["", "", ""] + [span(unit) for unit in names.values() for _ in range(1 + asked)]
-    return ReportTable("Margins", heads, rows, units, frozenset(bad))
+    units = ["", ""] + [span(unit) for unit in names.values() for _ in range(1 + asked)]
+    bad = frozenset(k for k, (_, result) in enumerate(runs) if state_of(result) == FAILS)
+    return ReportTable("Runs", heads, rows, units, bad, links=[row["page"] for row, _ in runs])
 
 
 def failing(runs: list) -> ReportTable | None:
     """Every limit that fails or is open, where and when."""
     length, time = (column("", what, runs[0][1].case) for what in ("length", "time"))
+    where = [row["page"] for row, result in runs for one in result.verdicts if not one.ok]
     rows = [[name_of(row), one.name, IN_WORDS[one.state], one.value, one.limit, one.unit, one.margin, span(one.unit),
              one.place, in_unit(length, one.chainage), in_unit(time, one.time)]
             for row, result in runs for one in result.verdicts if not one.ok]  # fmt: skip
     heads = ("run", "limit", "verdict", "value", "allowed", "unit", "margin", "unit", "worst at", "chainage", "time")
     units = ("",) * 9 + (length.unit, time.unit)
-    return ReportTable("", heads, rows, units, loose=frozenset({3, 4, 6}), most=FAILED) if rows else None
+    return ReportTable("", heads, rows, units, loose=frozenset({3, 4, 6}), most=FAILED, links=where) if rows else None
 
 
 def changed(said: dict[str, Any]) -> list[ReportTable]:
-    """What events and protections set."""
+    """What events and protections set, as TOML."""
     made = []
     for group in ("events", "protections"):
-        rows = [[name, key, str(value)] for name, keys in said["changes"][group].items() for key, value in keys.items()]
+        rows = [
+            [name, key, inline(value)] for name, keys in said["changes"][group].items() for key, value in keys.items()
+        ]
         made += [ReportTable(group.capitalize(), (group[:-1], "key", "is"), rows)] if rows else []
     return made
 
@@ -121,9 +133,10 @@ def changed(said: dict[str, Any]) -> list[ReportTable]:
 def drawn(event: str | None, number: int, runs: list, figures: dict[str, Any]) -> list[dict[str, Any]]:
     """Figures of an event, the runs of all protections in each."""
     own = [(row["protection"] or "", result) for row, result in runs if row["event"] == event]
+    found = [(name, result, ways(result)) for name, result in own]
     made = []
-    for k, way in enumerate(ways(own[0][1])[:SECTIONS]):
-        several = [(name, section(result, one)) for name, result in own for one in ways(result) if one.name == way.name]
+    for k, way in enumerate(next((some for *_, some in found if some), [])[:SECTIONS]):
+        several = [(name, section(result, one)) for name, result, some in found for one in some if one.name == way.name]
         height, along = in_units(own[0][1], "greatest_head").unit, in_units(own[0][1], "distance").unit
         figures[f"section-{number}-{k}"] = study_section(several, height, along)
         made.append({"id": f"section-{number}-{k}", "name": visible(way.name), "caption": CAPTION})

@@ -28,6 +28,7 @@ class ReportTable:
 
     units : of each column, "" of words and pure numbers; bad : numbers of the rows that stand out
     loose : columns whose rows are in units of their own; more : where rows are that the page leaves out
+    links : of each row, the page that its first word leads to
     """
 
     title: str
@@ -38,6 +39,7 @@ class ReportTable:
     loose: frozenset[int] = frozenset()
     most: int = ROWS
     more: str = ""
+    links: Sequence[str] = ()
 
     @property
     def heads(self) -> list[tuple[str, str]]:

@@ -14,11 +14,12 @@ LATER = 6  # marks named behind the first
 
 
 class Word(NamedTuple):
-    """A sentence at the top of the page; `level` is "bad", "doubt" or "good"."""
+    """A sentence at the top of the page; level : "bad", "doubt" or "good"; links : (name, place) of pages."""
 
     level: str
     head: str
     text: str
+    links: tuple[tuple[str, str], ...] = ()
 
 
 def words(result) -> list[Word]:
@@ -70,17 +71,23 @@ def verdict(result) -> Word:
         return Word("bad", f"{many} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed))
     unsure = [one.name for one, how in zip(verdicts, states, strict=True) if how == OPEN]
     if unsure:
-        why = "their margins are smaller than the error of the numbers"
-        if text := not_valid(result.summary):
-            why = f"the run is {text}"
-        elif not result.ok or result.marks:
-            why = "the run is not sound" if not result.ok else "from a time on the numbers are not to be trusted"
-        elif any(one.kind == "end" for one in result.warnings):
-            why = "what is scheduled goes on after the end of the run"
         return Word("doubt", f"Whether {'limits hold' if len(unsure) > 1 else 'a limit holds'} is open.",
-                    f"{', '.join(unsure)}: {why}.")  # fmt: skip
+                    f"{', '.join(unsure)}: {open_for(result)}.")  # fmt: skip
     every = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
     return Word("good", f"{every}.", "") if sound(result) else Word("doubt", f"{every}, as far as to be trusted.", "")
+
+
+def open_for(result) -> str:
+    """Why limits of a run are open."""
+    if text := not_valid(result.summary):
+        return f"the run is {text}"
+    if not result.ok:
+        return "the run is not sound"
+    if result.marks:
+        return "from a time on the numbers are not to be trusted"
+    if any(one.kind == "end" for one in result.warnings):
+        return "what is scheduled goes on after the end of the run"
+    return "their margins are smaller than the error of the numbers"
 
 
 def verdicts(result) -> ReportTable | None:

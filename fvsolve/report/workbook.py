@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 from fvsolve.errors import FvsolveError, visible
-from fvsolve.report import described, numerics, trust, worst
+from fvsolve.report import described, numerics, study, trust, worst
 from fvsolve.report.heads import in_units
-from fvsolve.report.legs import SectionWay
+from fvsolve.report.legs import SectionWay, ways
 from fvsolve.report.libraries import workbook
 from fvsolve.report.section import Section, section
 from fvsolve.report.tables import ReportTable, is_number
@@ -22,9 +23,9 @@ ALONG = {"elevation": "elevation", "initial_head": "initial head", "least_head":
          "t_greatest": "time of the greatest"}  # fmt: skip
 
 
-def write_workbook(result, ways: list[SectionWay], path: Path) -> Path:
+def write_workbook(result, found: list[SectionWay], path: Path) -> Path:
     """Write the tables of a run, one sheet each; its path. FvsolveError where it cannot be written."""
-    return write_tables(tables(result, ways), path)
+    return write_tables(tables(result, found), path)
 
 
 def write_tables(found: list[ReportTable], path: Path) -> Path:
@@ -41,7 +42,7 @@ def write_tables(found: list[ReportTable], path: Path) -> Path:
     return path
 
 
-def tables(result, ways: list[SectionWay]) -> list[ReportTable]:
+def tables(result, sections: list[SectionWay]) -> list[ReportTable]:
     """All tables of a run, sections with every cell."""
     words = ReportTable("Summary", ("", ""), [[one.head, one.text] for one in trust.words(result)])
     notes = ReportTable(
@@ -50,13 +51,27 @@ def tables(result, ways: list[SectionWay]) -> list[ReportTable]:
     versions = numerics.versions(result)
     found = [
         words, trust.verdicts(result), *trust.worst(result),
-        worst.of_all(result, ways), *worst.by_pipe(result), worst.of_probes(result),
-        *(_along(result, section(result, way)) for way in ways), numerics.cavities(result), numerics.events(result),
+        worst.of_all(result, sections), *worst.by_pipe(result), worst.of_probes(result),
+        *(_along(result, section(result, way)) for way in sections), numerics.cavities(result), numerics.events(result),
         *described.model(result), numerics.settings(result),
         numerics.ledgers(result), trust.claims(result), numerics.comparisons(result), notes,
         ReportTable("Versions", versions.headers, versions.rows),
     ]  # fmt: skip
     return [one for one in found if one is not None and one.rows]
+
+
+def study_tables(runs: list) -> list[ReportTable]:
+    """The tables of a study, the long sections of all its runs among them; runs : (row, `Result`) of each."""
+    found = [study.matrix(runs), study.failing(runs)]
+    for row, result in runs:
+        for way in ways(result):
+            along = _along(result, section(result, way))
+            title = f"{Path(row['directory']).name} {way.name}"
+            rows = [[study.name_of(row), *cells] for cells in along.rows]
+            found.append(
+                replace(along, title=title, headers=["run", *along.headers], units=["", *along.units], rows=rows)
+            )
+    return [one for one in found if one is not None]
 
 
 def _along(result, one: Section) -> ReportTable:
