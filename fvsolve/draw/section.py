@@ -9,19 +9,20 @@ from fvsolve.draw.plot import thinned
 
 LINES = {"vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle": ":"},
          "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."}}  # fmt: skip
-LIMIT = {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))}
+LIMITS = {"greatest": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))},
+          "least": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2))}}  # fmt: skip
 LONGEST = 22  # letters over a chainage
 
 
 @style.as_it_stands
-def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=(), labels=(), title="", cap=None):
+def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), posts=(), labels=(), title=""):
     """Heads along one chainage with the pipe, lines of vapour, classes and limits; shaded where liquid parted.
 
     chainage, along["greatest_head"] ... : float64[n] in `units`; lines : name -> float64[n]; posts : chainages
-    beyond : (chainage, head, name) where a limit is passed
-    labels : (chainage, names, whether more than a joint); cap : ends of the axis of heads
+    seen : ends of the axis of heads (low, high), and the limits above and below it by name
+    beyond : (chainage, head, name) where a limit is passed; labels : (chainage, names, whether more than a joint)
     """
-    figure = style.figure(4.6)
+    figure = style.figure(9.2)
     axes = figure.subplots()
     style.dress(axes)
     for a, b in parted:
@@ -34,7 +35,7 @@ def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=()
               label="initial head")  # fmt: skip
     axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
     for name, line in lines.items():
-        axes.plot(chainage, line, label=name, **LINES.get(name.partition(" (")[0], LIMIT))
+        axes.plot(chainage, line, label=name, **(LINES.get(name) or LIMITS[name.rpartition(", ")[2]]))
     if parted:
         axes.fill_between([], [], color=style.COLOURS[3], alpha=0.3, label="vapour pressure reached")
     if beyond:
@@ -42,7 +43,13 @@ def section_figure(chainage, along, units, lines, parted=(), beyond=(), posts=()
         axes.plot(at, heads, "x", color=style.DOUBT, markersize=7, markeredgewidth=2.0, clip_on=False, zorder=5,
                   label="limit passed")  # fmt: skip
     axes.set_xlim(min([chainage[0], *posts]), max([chainage[-1], *posts]))
-    axes.set_ylim(cap)
+    axes.set_ylim(seen.low, seen.high)
+    red = style.COLOURS[6]
+    for limits, edge in ((seen.above, 1), (seen.below, 0)):
+        if limits:
+            axes.annotate("\n".join(limits), (0.97, edge), xycoords="axes fraction", xytext=(0, -22 if edge else 22),
+                          textcoords="offset points", ha="right", va="top" if edge else "bottom", fontsize=8,
+                          color=red, arrowprops={"arrowstyle": "->", "color": red, "relpos": (1, edge)})  # fmt: skip
     _places(axes, posts, labels)
     axes.set_xlabel(f"chainage [{units['distance']}]", fontsize=8.5, color=style.INK)
     axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)

@@ -16,13 +16,22 @@ from fvsolve.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.errors import visible
 from fvsolve.report.histories import HistoryPanel
 from fvsolve.report.motion import Motion
-from fvsolve.report.section import Section
+from fvsolve.report.section import VAPOUR as VAPOUR_LINE
+from fvsolve.report.section import Section, window
 
-HIGH, LOW, NOW, VAPOUR, CLASS = COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], COLOURS[6]
-LINES = {"vapour line": {"colour": VAPOUR, "width": 1.4, "dash": "dot"},
-         "class line": {"colour": CLASS, "width": 1.8, "dash": "dashdot"}}  # fmt: skip
-LIMIT = {"colour": CLASS, "width": 1.3, "dash": "longdash"}
-DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")  # lines stay apart in grey print too
+GREATEST, LEAST, NOW, VAPOUR, CLASS = COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], COLOURS[6]
+GROUND = "#ffffff"
+DASH, DOT, LONG = "9px,5px", "2px,3px", "14px,5px"
+LINES = {VAPOUR_LINE: {"colour": VAPOUR, "width": 1.4, "dash": DOT},
+         "class line": {"colour": CLASS, "width": 1.8, "dash": "9px,3px,2px,3px"}}  # fmt: skip
+LIMITS = {"greatest": {"colour": CLASS, "width": 1.3, "dash": LONG},
+          "least": {"colour": CLASS, "width": 1.3, "dash": "8px,3px,2px,3px,2px,3px"}}  # fmt: skip
+# Lines stay apart in grey print too.
+DASHES = ("solid", DASH, DOT, "9px,3px,2px,3px", LONG, "14px,3px,2px,3px")
+DARK = {INK: "#dde3ea", MUTED: "#9aa7b5", HAIR: "#37424e", GROUND: "#12171d", DOUBT: "#ff8b5e"} | dict(
+    zip(COLOURS, ("#5db4ec", "#f08a4b", "#3cc3a4", "#c08ad8", "#e0b13c", "#8fd0f5", "#e8748c", "#a9bf6a"), strict=True)
+)  # of a screen that is dark; paper is light
+TALL, LOW = 920, 260  # heights of sections and histories [px]
 TOOLS = 22  # pixels of the bar of tools, below which names stand
 LONGEST = 22  # letters over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
@@ -33,13 +42,12 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str, b
     k = one.picked(bins)
     x, lines = numbers(one.chainage[k], "f4"), {name: numbers(values[k], "f4") for name, values in one.along.items()}
     data = [
-        _line("greatest head", x, lines["greatest_head"], HIGH, width=2),
-        _line("least head", x, lines["least_head"], LOW, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
-        _line("initial head", x, lines["initial_head"], INK, width=1.2, dash="dash"),
+        _line("greatest head", x, lines["greatest_head"], GREATEST, width=2),
+        _line("least head", x, lines["least_head"], LEAST, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
+        _line("initial head", x, lines["initial_head"], INK, width=1.2, dash=DASH),
         _line("pipe", x, lines["elevation"], MUTED, width=3.5),
     ]
-    for name, line in one.lines.items():
-        data.append(_line(one.told(name), x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
+    data += _limits(one, x, k)
     if one.parted:
         data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
                      "marker": {"symbol": "square", "size": 11, "color": VAPOUR, "opacity": 0.35}})  # fmt: skip
@@ -51,13 +59,8 @@ def section_figure(one: Section, moving: Motion | None, unit: str, along: str, b
     shapes = [_span(a, b, VAPOUR, 0.18) for a, b in one.parted]
     if moving is not None:
         data.append(_line("head now", numbers(moving.chainage, "f4"), numbers(moving.heads[0], "f4"), NOW, width=2.6))
-    shapes += [_post(device.chainage) for device in one.devices]
-    layout = _layout(f"head [{unit}]", f"chainage [{along}]", 460)
-    names = _names(one)
-    above = TOOLS + 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
-    layout |= {"shapes": shapes, "annotations": names, "margin": {"l": 62, "r": 14, "t": above, "b": 50}}
-    layout["xaxis"]["range"] = list(one.ends)
-    _cap(layout, one)
+    layout = _along([one], unit, along)
+    layout["shapes"] = [*shapes, *layout["shapes"]]
     made: dict[str, Any] = {"data": data, "layout": layout}
     if moving is not None:
         made["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
@@ -71,22 +74,14 @@ def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> 
     k = first.picked()
     x = numbers(first.chainage[k], "f4")
     data = [_line("pipe", x, numbers(first.along["elevation"][k], "f4"), MUTED, width=3.5)]
-    for name, line in first.lines.items():
-        data.append(_line(first.told(name), x, numbers(line[k], "f4"), **LINES.get(name, LIMIT)))
+    data += _limits(first, x, k)
     for n, (name, one) in enumerate(several):
         colour, k = COLOURS[n % len(COLOURS)], one.picked()
         x, group = numbers(one.chainage[k], "f4"), {"legendgroup": f"run {n}"}
         high, low = (numbers(one.along[key][k], "f4") for key in ("greatest_head", "least_head"))
         data.append(_line(name or "the case", x, high, colour, width=2, **group))
-        data.append(_line("", x, low, colour, width=2, dash="dash", showlegend=False, **group))
-    names = _names(first)
-    above = TOOLS + 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
-    layout = _layout(f"head [{unit}]", f"chainage [{along}]", 440)
-    layout |= {"annotations": names, "shapes": [_post(device.chainage) for device in first.devices],
-               "margin": {"l": 62, "r": 14, "t": above, "b": 50}}  # fmt: skip
-    layout["xaxis"]["range"] = list(first.ends)
-    _cap(layout, *(section for _, section in several))
-    return {"data": data, "layout": layout}
+        data.append(_line("", x, low, colour, width=2, dash=DASH, showlegend=False, **group))
+    return {"data": data, "layout": _along([first, *(one for _, one in several if one is not first)], unit, along)}
 
 
 def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
@@ -101,12 +96,7 @@ def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> 
         if line.measured:
             trace |= {"mode": "markers", "name": f"{trace['name']}, measured", "marker": {"size": 4, "color": colour}}
         data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
-    layout = _layout(
-        f"{panel.quantity.replace('_', ' ')} [{panel.unit}]",
-        f"time [{time_unit}]",
-        280 + 7 * max(len(panel.lines) - 4, 0),
-    )
-    layout["legend"] |= {"y": 1.01, "yanchor": "bottom"}
+    layout = _layout(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", f"time [{time_unit}]", LOW)
     ends = [line.t[[0, -1]] for line in panel.lines if len(line.t)]
     if ends:
         layout["xaxis"]["range"] = [float(min(a for a, _ in ends)), float(max(b for _, b in ends))]
@@ -137,12 +127,12 @@ def _layout(y: str, x: str, height: int) -> dict[str, Any]:
             "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power", "minexponent": 6,
             "separatethousands": True}  # fmt: skip
     return {
-        "height": height, "margin": {"l": 62, "r": 14, "t": 12, "b": 50},
-        "paper_bgcolor": "#fff", "plot_bgcolor": "#fff",
+        "height": height, "margin": {"l": 62, "r": 14, "t": TOOLS + 6, "b": 50},
+        "paper_bgcolor": GROUND, "plot_bgcolor": GROUND,
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
         "font": {"family": FONT, "size": 12, "color": INK}, "separators": ".\u202f", "hovermode": "x unified",
-        "hoverlabel": {"namelength": -1, "font": {"size": 11}}, "dragmode": "zoom", "showlegend": True,
-        "legend": {"orientation": "h", "traceorder": "normal",
-                   "x": 0, "y": -0.2, "yref": "paper", "yanchor": "top", "font": {"size": 11.5}},
+        "hoverlabel": {"namelength": -1, "font": {"size": 11, "color": INK}, "bgcolor": GROUND, "bordercolor": HAIR},
+        "dragmode": "zoom", "showlegend": False,
         "xaxis": axis | {"title": {"text": as_it_stands(x), "standoff": 8}},
         "yaxis": axis | {"title": {"text": as_it_stands(y), "standoff": 8}},
     }  # fmt: skip
@@ -158,11 +148,31 @@ def _post(x: float) -> dict[str, Any]:
             "line": {"color": HAIR, "width": 1}, "layer": "below"}  # fmt: skip
 
 
-def _cap(layout: dict[str, Any], *sections: Section) -> None:
-    """End the axis of heads below lines far above them; a double click shows all."""
-    caps = [one.cap() for one in sections]
-    if caps and None not in caps:
-        layout["yaxis"] |= {"range": [min(low for low, _ in caps), max(high for _, high in caps)]}
+def _limits(one: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
+    """The vapour line and those of limits, upper and lower ones with dashes of their own."""
+    return [_line(name, x, numbers(line[k], "f4"), **(LINES.get(name) or LIMITS[name.rpartition(", ")[2]]))
+            for name, line in one.lines.items()]  # fmt: skip
+
+
+def _along(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
+    """The layout of sections along the chainage of the first."""
+    first, seen = sections[0], window(sections, unit)
+    layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", TALL), _names(first)
+    layout["margin"]["t"] = TOOLS + 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
+    layout["shapes"] = [_post(device.chainage) for device in first.devices]
+    layout["annotations"] = [*names, *_beyond(seen.above, 1), *_beyond(seen.below, 0)]
+    layout["xaxis"]["range"] = list(first.ends)
+    layout["yaxis"]["range"] = [seen.low, seen.high]
+    return layout
+
+
+def _beyond(limits: list[str], edge: int) -> list[dict[str, Any]]:
+    """An arrow to the upper (1) or lower (0) edge with the limits beyond it; a double click shows them."""
+    text, away = "<br>".join(map(as_it_stands, limits)), 7 * len(limits) + 6  # pixels from the edge
+    arrow = {"xref": "paper", "yref": "paper", "x": 0.97, "y": edge, "ax": 0, "ay": away if edge else -away,
+             "showarrow": True, "arrowhead": 2, "arrowwidth": 1.2, "arrowcolor": CLASS, "xanchor": "right",
+             "yanchor": "middle", "text": text, "bgcolor": GROUND, "font": {"size": 11, "color": CLASS}}  # fmt: skip
+    return [arrow] if limits else []
 
 
 def _names(one: Section) -> list[dict[str, Any]]:

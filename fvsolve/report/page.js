@@ -2,23 +2,67 @@
 (() => {
   const figures = JSON.parse(document.getElementById("figures").textContent);
   const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
-  const histories = Object.keys(figures).filter((id) => id.startsWith("history-"));
+  const ids = Object.keys(figures), histories = ids.filter((id) => id.startsWith("history-"));
   const chart = (id) => document.getElementById(id);
 
   // Where fingers scroll, a chart is zoomed by its buttons; on a narrow page names that would cover each other give way.
   const touched = matchMedia("(pointer: coarse)").matches;
   if (touched) config.displayModeBar = true;
-  for (const [id, one] of Object.entries(figures)) {
-    if (touched) one.layout.dragmode = false;
-    if (!one.layout.annotations) continue;
-    const apart = 24 / (chart(id).clientWidth - 76) * (one.layout.xaxis.range[1] - one.layout.xaxis.range[0]);
+  for (const [id, { layout }] of Object.entries(figures)) {
+    if (touched) layout.dragmode = false;
+    if (!layout.annotations) continue;
+    const apart = 24 / (chart(id).clientWidth - 76) * (layout.xaxis.range[1] - layout.xaxis.range[0]);
     const kept = [];
-    for (const name of one.layout.annotations)
-      if (kept.every((other) => Math.abs(other.x - name.x) >= apart)) kept.push(name);
-    one.layout.annotations = kept;
+    for (const name of layout.annotations)
+      if (name.showarrow || kept.every((other) => other.showarrow || Math.abs(other.x - name.x) >= apart)) kept.push(name);
+    layout.annotations = kept;
   }
 
-  const drawn = Object.entries(figures).map(([id, one]) => Plotly.newPlot(chart(id), one.data, one.layout, config));
+  // The legend stands over its chart, where it covers no line however wide the page is.
+  const swatch = ({ mode, line, marker }) => mode === "markers"
+    ? `<b style="color:${marker.line?.color ?? marker.color}">${{ square: "\u25a0", "x-thin": "\u00d7" }[marker.symbol] ?? "\u2022"}</b>`
+    : `<svg width="30" height="8"><line x2="30" y1="4" y2="4" stroke="${line.color}" stroke-width="${line.width}"`
+      + ` stroke-dasharray="${line.dash === "solid" ? "" : line.dash.replaceAll("px", "")}"/></svg>`;
+  const legend = (id) => {
+    const box = chart(id).previousElementSibling, traces = chart(id).data;
+    box.replaceChildren(...traces.flatMap((trace) => {
+      if (trace.showlegend === false || trace.visible === false) return [];
+      const button = document.createElement("button"), seen = trace.visible !== "legendonly";
+      button.type = "button";
+      button.setAttribute("aria-pressed", seen);
+      button.innerHTML = swatch(trace) + trace.name;  // no markup: text of the case was escaped for Plotly
+      button.onclick = () => {
+        const own = (one) => one === trace || (trace.legendgroup && one.legendgroup === trace.legendgroup);
+        Plotly.restyle(chart(id), { visible: seen ? "legendonly" : true }, [...traces.keys()].filter((k) => own(traces[k])));
+        legend(id);
+      };
+      return [button];
+    }));
+  };
+
+  const light = JSON.parse(document.documentElement.dataset.dark);
+  const dark = Object.fromEntries(Object.entries(light).map(([one, other]) => [other, one]));
+  const screen = matchMedia("(prefers-color-scheme: dark)");
+  const paint = (node, colours) => {
+    for (const [key, value] of Object.entries(node))
+      if (typeof value === "string" && /color$/.test(key)) node[key] = colours[value] ?? value;
+      else if (value && typeof value === "object" && !ArrayBuffer.isView(value)) paint(value, colours);
+  };
+  const repaint = (is_dark) => {
+    for (const id of ids) {
+      for (const part of [chart(id).data, chart(id).layout]) paint(part, is_dark ? light : dark);
+      Plotly.redraw(chart(id));
+      legend(id);
+    }
+  };
+  if (screen.matches) for (const one of Object.values(figures)) paint(one, light);
+
+  const drawn = ids.map((id) => {
+    chart(id).insertAdjacentHTML("beforebegin", '<div class="legend"></div>');
+    return Plotly.newPlot(chart(id), figures[id].data, figures[id].layout, config);
+  });
+  ids.forEach(legend);
+  screen.addEventListener("change", () => repaint(screen.matches));
 
   // One time axis for all histories: what is zoomed in one is zoomed in all.
   let following = false;
@@ -63,23 +107,56 @@
     show(0);
   }
 
-  // Paper has its own sizes; the moving line stays on the screen.
-  const PAPER = 680, TALL = { section: 0.85, history: 0.77 };
-  const heights = Object.fromEntries(Object.entries(figures).map(([id, one]) => [id, one.layout.height]));
+  // Paper is light and has its own sizes [px]; the moving line stays on the screen. A section fills what is left of its
+  // page, or begins the next one where that is too little: no page stays half empty.
+  const WIDE = 680, PAGE = 985, LEAST = 250, MOST = 720, HISTORY = 200, TOOLS = 22;
+  const main = document.querySelector("main"), box = (node) => node.getBoundingClientRect();
+  const paper = [...document.styleSheets].flatMap((one) => [...one.cssRules]).find((rule) => rule.conditionText === "print");
+  const heights = Object.fromEntries(ids.map((id) => [id, figures[id].layout.height]));
+  const tops = Object.fromEntries(ids.map((id) => [id, figures[id].layout.margin.t]));
   const moving = (id, seen) => {
     if (figures[id].moving) Plotly.restyle(chart(id), { visible: seen }, [figures[id].moving.trace]);
+    legend(id);
+  };
+  const filled = () => {
+    let page = box(main).top, spare = 0;
+    for (const id of ids.map(chart).sort((a, b) => box(a).top - box(b).top)) {
+      const figure = id.closest("figure"), before = figure.previousElementSibling;
+      const first = before?.matches("figure") ? figure : figure.closest("section").querySelector("h2");
+      id.style.height = "0";
+      if (box(first).top - page > PAGE) {  // tables before it went over the end of a page, where rows are not cut
+        page += PAGE * Math.floor((box(first).top - page) / PAGE);
+        spare = 60;
+      }
+      const rest = box(figure).bottom - box(first).top, is_section = id.id.startsWith("section-");
+      let room = PAGE - rest - spare - (box(first).top - page);
+      if (room < (is_section ? LEAST : HISTORY)) {
+        first.style.breakBefore = "page";
+        [page, spare, room] = [box(first).top - 30, 0, PAGE - rest - 30];
+      }
+      id.style.height = `${is_section ? Math.min(room, MOST) : HISTORY}px`;
+    }
   };
   addEventListener("beforeprint", () => {
-    for (const id of Object.keys(figures)) {
-      moving(id, false);
-      Plotly.relayout(chart(id), { width: PAPER, height: TALL[id.split("-")[0]] * heights[id], autosize: false });
+    if (screen.matches) repaint(false);
+    for (const id of ids) moving(id, false);
+    paper.media.mediaText = "all";
+    main.style.width = `${WIDE}px`;
+    filled();
+    for (const id of ids) {
+      const height = parseFloat(chart(id).style.height);
+      Plotly.relayout(chart(id), { width: WIDE, height, autosize: false, "margin.t": tops[id] - TOOLS });
     }
+    paper.media.mediaText = "print";
   });
   addEventListener("afterprint", () => {
-    for (const id of Object.keys(figures)) {
+    main.style.width = "";
+    for (const node of document.querySelectorAll("h2, figure, .chart")) node.style.breakBefore = node.style.height = "";
+    for (const id of ids) {
       moving(id, true);
-      Plotly.relayout(chart(id), { width: null, height: heights[id], autosize: true });
+      Plotly.relayout(chart(id), { width: null, height: heights[id], autosize: true, "margin.t": tops[id] });
     }
+    if (screen.matches) repaint(true);
   });
   Promise.all(drawn).then(() => { document.documentElement.dataset.drawn = drawn.length; });
 })();

@@ -8,7 +8,7 @@ from typing import Any
 
 from fvsolve.errors import visible
 from fvsolve.report import described, numerics, trust, worst
-from fvsolve.report.figures import history_figure, section_figure
+from fvsolve.report.figures import DARK, history_figure, section_figure
 from fvsolve.report.heads import in_units
 from fvsolve.report.histories import chosen, panels
 from fvsolve.report.legs import SectionWay
@@ -20,6 +20,7 @@ from fvsolve.run.result import not_valid
 
 HERE = Path(__file__).parent
 SHARED = 900  # bins of all sections together
+PAPER_TITLE = 100  # letters over each page of paper
 WARNINGS = 40  # on the page; all are in summary.json
 
 
@@ -52,8 +53,20 @@ def rendered(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> str:
     files = {"table": "table.html.j2", "page": f"{name}.html.j2", "css": "page.css", "js": "page.js"}
     texts = {key: (HERE / file).read_text(encoding="utf-8") for key, file in files.items()}
     return template(texts["table"] + texts["page"]).render(
-        filled, css=texts["css"], script=texts["js"], library=charts(), figures=embedded(figures)
+        filled,
+        css=texts["css"],
+        script=texts["js"],
+        library=charts(),
+        figures=embedded(figures),
+        dark=json.dumps(DARK),
+        paper=quoted(filled["title"]),
     )
+
+
+def quoted(text: str) -> str:
+    """Text as a string of CSS, which nothing within can end."""
+    text = text if len(text) <= PAPER_TITLE else f"{text[: PAPER_TITLE - 1]}\u2026"
+    return '"' + "".join(one if one.isascii() and one.isalnum() else f"\\{ord(one):x} " for one in text) + '"'
 
 
 def embedded(data: Any) -> str:

@@ -8,9 +8,10 @@ from pathlib import Path
 from fvsolve.draw.plot import history_figure
 from fvsolve.draw.section import phase_figure, section_figure
 from fvsolve.errors import FvsolveError, did_you_mean, listing
+from fvsolve.report.heads import in_units
 from fvsolve.report.legs import SectionWay, ways
 from fvsolve.report.report import opened
-from fvsolve.report.section import section
+from fvsolve.report.section import section, window
 from fvsolve.run.result import not_valid
 from fvsolve.shown import kept
 from fvsolve.units import show
@@ -95,6 +96,6 @@ def _section_figure(result, way: SectionWay):
     k, title = one.picked(), "\n".join(filter(None, [result.summary["title"], way.name]))
     return section_figure(
         one.chainage[k], {name: values[k] for name, values in one.along.items()}, result.summary["envelope_units"],
-        {one.told(name): line[k] for name, line in one.lines.items()}, one.parted, one.beyond,
-        [device.chainage for device in one.devices], one.labels(), title, one.cap(),
+        {name: line[k] for name, line in one.lines.items()}, window([one], in_units(result, "greatest_head").unit),
+        one.parted, one.beyond, [device.chainage for device in one.devices], one.labels(), title,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,9 +18,11 @@ from fvsolve.run.verdicts import NEAR, Chainages
 
 ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
          "t_least", "t_greatest")  # fmt: skip
-HEADS = ("elevation", "initial_head", "least_head", "greatest_head")
+HEADS = ("initial_head", "least_head", "greatest_head")
+VAPOUR = "vapour line"
 APART = 0.035  # of the length: names nearer to each other than this would cover each other
-HIGH = 2.0  # times what heads and pipe span, how far above them a line is still shown
+NEAREST = 0.5  # of the range of heads: limits further away than this are named at the edge of a picture
+EDGE, NAME = 0.05, 0.07  # of the axis of heads: free at its ends, and for each limit that is named there
 BINS = 150  # of a long line at most: of each the greatest and the least head and elevation stand, and where
 
 
@@ -67,23 +70,6 @@ class Section:
         kept = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
         return np.unique([0, *kept, n - 1])
 
-    def cap(self) -> tuple[float, float] | None:
-        """Ends of the axis of heads where a line, such as that of a class, lies so far above them that it would flatten
-        them; None as a rule."""
-        values = np.concatenate([self.along[name] for name in HEADS] + [*self.lines.values()])
-        heads = values[: len(HEADS) * len(self.chainage)]
-        low, high = float(np.nanmin(heads)), float(np.nanmax(heads))
-        far = high + HIGH * max(high - low, 1.0)
-        if not any(lowest_of(line) > far for line in self.lines.values()):
-            return None
-        margin = 0.05 * max(high - low, 1.0)
-        return float(np.nanmin(values)) - margin, high + 2.0 * margin
-
-    def told(self, name: str) -> str:
-        """A line's name, and from where on it runs if that is above the picture."""
-        cap, lowest = self.cap(), lowest_of(self.lines[name])
-        return name if cap is None or not lowest > cap[1] else f"{name} (above, from {lowest:.4g})"
-
     def labels(self) -> list[tuple[float, str, bool]]:
         """Chainages with names, and whether more than a joint stands there; none would cover another.
 
@@ -102,9 +88,41 @@ class Section:
         return [(chainage, ", ".join(names), stands) for chainage, names, stands in shown]
 
 
-def lowest_of(line: np.ndarray) -> float:
-    """The least value of a line, nan of one that is nowhere."""
-    return float(np.nanmin(line)) if np.isfinite(line).any() else np.nan
+class Window(NamedTuple):
+    """Ends of the axis of heads, and the limits that lie beyond each, with where they begin."""
+
+    low: float
+    high: float
+    above: list[str]
+    below: list[str]
+
+
+def window(sections: Sequence[Section], unit: str) -> Window:
+    """What a picture of sections shows: heads, profile and vapour line, and limits that are near, so that a class far
+    away flattens nothing."""
+    heads = ends_of([one.along[name] for one in sections for name in HEADS]) or (0.0, 1.0)
+    shown = [one.along["elevation"] for one in sections]
+    shown += [line for one in sections for name, line in one.lines.items() if name == VAPOUR]
+    followed = ends_of([*map(np.array, heads), *shown]) or heads
+    reach, (low, high), above, below = NEAREST * (heads[1] - heads[0]), followed, [], []
+    for name in dict.fromkeys(name for one in sections for name in one.lines if name != VAPOUR):
+        line = ends_of([one.lines[name] for one in sections if name in one.lines])
+        if line and line[0] > followed[1] + reach:
+            above.append(f"{name}: from {line[0]:.4g} {unit}")
+        elif line and line[1] < followed[0] - reach:
+            below.append(f"{name}: from {line[1]:.4g} {unit}")
+        elif line:
+            low = min(low, max(line[0], followed[0] - reach))
+            high = max(high, min(line[1], followed[1] + reach))
+    span = high - low or 1.0
+    return Window(low - (EDGE + NAME * len(below)) * span, high + (EDGE + NAME * len(above)) * span, above, below)
+
+
+def ends_of(lines: list[np.ndarray]) -> tuple[float, float] | None:
+    """Least and greatest of all values; None of lines that are nowhere."""
+    values = np.concatenate([np.ravel(line) for line in lines] or [np.empty(0)])
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if values.size else None
 
 
 def section(result, way: SectionWay) -> Section:
@@ -116,7 +134,7 @@ def section(result, way: SectionWay) -> Section:
     lines, boils = {}, result.summary["fluid"]["vapor_pressure"]
     if boils is not None:  # at that pressure itself a gas would fill all, so a law with cavities has no head there
         left = 1.0 + NEAR * result.case.law.cavitates
-        lines["vapour line"] = head_of(result, boils * left, along["elevation"])
+        lines[VAPOUR] = head_of(result, boils * left, along["elevation"])
     lines |= limit_lines(result, pipe, along["elevation"])
     parted = _parted(result, along["least_pressure"], chainage, way)
     beyond = _beyond(result, way, chainage, along)

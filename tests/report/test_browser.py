@@ -1,14 +1,18 @@
 """The page in a real browser: nothing is fetched, nothing complains, figures are there, the head line moves."""
 
+import re
+
 import pytest
-from truth import browser
+from truth import browser, paper
 from truth.scenes import junction, lake, pipe, ramp, scene, valve
 
 import fvsolve
-from fvsolve.report.figures import as_it_stands
+from fvsolve.draw.style import COLOURS
+from fvsolve.report.figures import DARK, as_it_stands
 from fvsolve.report.report import write_report
 
 TITLE = "</script><b>A & B</b> costs $5 and $6"
+HIGH = "far <b>above</b> & $5"  # a limit that no head comes near
 PARTS = ("#section-0", "#history-0", "#history-1")
 
 
@@ -18,7 +22,10 @@ def report(tmp_path_factory):
     nodes = {"top": lake("45 m"), "gate": junction(), "outfall": lake("0 m")}
     links = {"main": pipe("top", "gate", 900.0, 0.3, 1200.0, 40),
              "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 0.05, 1.0, 0.0))}  # fmt: skip
-    case = scene(nodes, links, 3.0, {}, ["gate.head", "main.head@0.5", "valve.flow"], title=TITLE)
+    probes = ["gate.head", *(f"main.head@{k / 10}" for k in range(1, 10)), "valve.flow"]
+    limits = {HIGH: {"on": "main", "quantity": "head", "greatest": 5e3},
+              "low": {"on": "main", "quantity": "head", "least": -20.0}}  # fmt: skip
+    case = scene(nodes, links, 3.0, {}, probes, title=TITLE, limits=limits)
     case["output"] |= {"fields": 6, "units": {"flow": "l/s"}}
     fvsolve.run(case, out=folder, pictures=False)
     return write_report(folder)[0]
@@ -48,11 +55,13 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     assert page.title() == TITLE and page.inner_text("h1") == TITLE
     for id in PARTS:
         assert page.locator(f"{id} .scatterlayer path.js-line").count() >= 1
-    names = page.locator("#section-0 .legendtext").all_text_contents()
+    names = legend(page, "#section-0").all_text_contents()
     assert {"greatest head", "least head", "initial head", "pipe", "vapour line", "head now"} <= set(names)
-    assert set(page.locator("#section-0 .annotation-text").all_text_contents()) == {"top (r", "valve"} - {"top (r"} | {
-        "top"
-    }
+    assert f"{HIGH}, greatest" in names
+    beyond = f"{HIGH}, greatest: from 5000 m"
+    assert set(page.locator("#section-0 .annotation-text").all_text_contents()) == {"top", "valve", beyond}
+    legend(page, "#section-0").get_by_text("vapour line").click()
+    assert page.evaluate("document.querySelector('#section-0').data.map(one => one.visible)").count("legendonly") == 1
     before = heads(page)
     page.click(".player button")
     until(page, "Number(document.querySelector('.player input').value) >= 2")
@@ -62,15 +71,15 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     page.evaluate("Plotly.relayout('history-0', {'xaxis.range[0]': 0.4, 'xaxis.range[1]': 1.2})")
     until(page, "document.querySelector('#history-1').layout.xaxis.range[1] == 1.2")
     name = "a <b>bold</b> & $x$ &lt; </script>"
-    page.evaluate("name => Plotly.restyle('history-1', {name: name}, [0])", as_it_stands(name))
-    page.evaluate("Plotly.relayout('history-1', {showlegend: true})")
-    assert page.locator("#history-1 .legendtext").all_text_contents() == [name]
+    page.evaluate("name => Plotly.relayout('history-1', {'xaxis.title.text': name})", as_it_stands(name))
+    assert page.locator("#history-1 .xtitle").all_text_contents() == [name]
     assert said == [] and asked == [report.as_uri()]
 
 
 def test_a_phone_reads_it_without_scrolling_aside(report, chromium):
     page, said, _ = browser.opened(chromium, report, 390, 844, has_touch=True, is_mobile=True)
     assert page.evaluate("document.documentElement.scrollWidth") == 390 and said == []
+    legends_are_clear(page)
     boxes = [page.locator(id).bounding_box() for id in PARTS]
     assert all(box["x"] >= 0 and box["x"] + box["width"] <= 390 and box["height"] >= 250 for box in boxes)
 
@@ -82,5 +91,77 @@ def test_paper_holds_whole_figures(report, chromium):
     page.set_viewport_size({"width": 680, "height": 990})
     widths = [page.locator(f"{id} .main-svg").first.bounding_box()["width"] for id in PARTS]
     assert widths == [680.0] * 3 and not page.locator(".player").is_visible()
+    legends_are_clear(page)
     page.evaluate("dispatchEvent(new Event('afterprint'))")
-    assert page.pdf(prefer_css_page_size=True).startswith(b"%PDF") and said == []
+    assert page.locator("#section-0 .main-svg").first.bounding_box()["height"] == 920.0 and said == []
+
+
+@pytest.mark.parametrize("words", [0, 30, 60, 90])
+def test_no_page_of_paper_but_the_last_is_half_empty_and_each_has_title_and_number(report, chromium, words):
+    """However much stands before the figures."""
+    page, _, _ = browser.opened(chromium, report, 1280)
+    if int(chromium.version.partition(".")[0]) < 131:
+        pytest.skip("this Chromium writes nothing on the margins of pages")
+    page.evaluate("n => document.querySelector('#verdict').append(...Array(n).fill('word '.repeat(12)))", words)
+    found = paper.pages(page.pdf(prefer_css_page_size=True))
+    assert len(found) > 3
+    for number, one in enumerate(found, 1):
+        over, under = ("".join(text for y, text in one if low < y < high) for low, high in ((0, 18), (281, 297)))
+        assert (over, under) == (TITLE, f"{number} / {len(found)}")
+    ends = [max(y for y, _ in one if 18.0 < y < 281.0) for one in found]
+    assert all((end - 18.0) / 263.0 > 0.5 for end in ends[:-1]), ends
+
+
+def test_a_dark_screen_has_a_dark_page_and_paper_stays_light(report, chromium):
+    page, said, _ = browser.opened(chromium, report, 1000, color_scheme="dark")
+    assert colours(page) == dict.fromkeys(("body", "paper", "legend"), "dark")
+    ground = "document.querySelector('#section-0').layout.paper_bgcolor"
+    page.emulate_media(color_scheme="light")
+    until(page, f"{ground} == '#ffffff'")
+    assert colours(page) == dict.fromkeys(("body", "paper", "legend"), "light")
+    page.emulate_media(color_scheme="dark")
+    until(page, f"{ground} != '#ffffff'")
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    assert colours(page) == dict.fromkeys(("body", "paper", "legend"), "light")
+    page.emulate_media(media="screen")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert colours(page)["paper"] == "dark" and said == []
+
+
+def colours(page) -> dict[str, str]:
+    """Whether grounds and the first line of a legend are dark or light; that line is lighter on a dark ground."""
+    asked = """() => ({body: getComputedStyle(document.body).backgroundColor,
+        paper: getComputedStyle(document.querySelector('#section-0 .main-svg')).backgroundColor,
+        legend: document.querySelector('.legend line').getAttribute('stroke')})"""
+    found = page.evaluate(asked)
+    values = {name: sum(numbers(text)) / 3 for name, text in found.items()}
+    said = {name: "dark" if value < 128 else "light" for name, value in values.items()}
+    return said | {"legend": "dark" if found["legend"] == DARK[COLOURS[0]] else "light"}
+
+
+def numbers(colour: str) -> list[int]:
+    """Red, green and blue of `rgb(18, 23, 29)` or `#12171d`."""
+    if colour.startswith("#"):
+        return [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+    return [int(one) for one in re.findall(r"\d+", colour)[:3]]
+
+
+def legend(page, id: str):
+    """The names over a chart."""
+    return page.locator(f".legend:has(+ {id}) button")
+
+
+def legends_are_clear(page) -> None:
+    """No legend covers any of a chart: curves, axes, names of parts."""
+    boxes = page.evaluate("""() => [...document.querySelectorAll('.chart')].map(chart => {
+        const box = (one) => { const { top, bottom } = one.getBoundingClientRect(); return [top, bottom]; };
+        return { legend: box(chart.previousElementSibling), chart: box(chart),
+                 inside: chart.querySelectorAll('.legend').length,
+                 curves: [...chart.querySelectorAll('.nsewdrag, .annotation, .xtick text, .ytick text')].map(box) };
+    })""")
+    assert boxes
+    for one in boxes:
+        (top, bottom), (begin, end) = one["legend"], one["chart"]
+        assert bottom > top and bottom <= begin + 0.5 and one["inside"] == 0, one
+        assert all(begin - 0.5 <= a and b <= end + 0.5 for a, b in one["curves"]), one

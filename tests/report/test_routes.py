@@ -1,13 +1,17 @@
 """A route with a profile and limits in a report: one chainage, through a valve, and what is planted there is shown."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from truth.scenes import GRAVITY, RHO, junction, lake, pipe, scene, step, valve
 
 import fvsolve
+from fvsolve.draw.section import LIMITS, LINES
+from fvsolve.report.figures import section_figure
 from fvsolve.report.legs import ways
 from fvsolve.report.motion import motions
-from fvsolve.report.section import section
+from fvsolve.report.section import section, window
 
 CHAINAGE, ELEVATION = [0.0, 130.0, 300.0, 500.0], [0.0, 42.0, 5.0, 20.0]
 SHUT = 0.3
@@ -71,6 +75,38 @@ def test_limits_are_lines_and_what_passes_one_is_marked_where_it_is_worst(main):
     assert not verdict.ok and (verdict.chainage, verdict.name) in [(at, name) for at, _, name in one.beyond]
     for at, head, name in one.beyond:
         assert name == "class" and head > np.interp(at, one.chainage, one.lines["class, greatest"])
+
+
+def test_the_axis_follows_heads_profile_and_vapour_line_and_names_limits_far_from_them(main):
+    """Limits within half the range of heads are shown; others are named with an arrow and flatten nothing."""
+    one = section(main, ways(main)[0])
+    heads = np.concatenate([one.along[name] for name in ("initial_head", "least_head", "greatest_head")])
+    followed = np.concatenate([heads, one.along["elevation"], one.lines["vapour line"]])
+    top, bottom, reach = followed.max(), followed.min(), 0.5 * np.ptp(heads)
+    flat = {name: np.full_like(one.chainage, at) for name, at in (
+        ("near, greatest", top + 0.9 * reach), ("far, greatest", top + 1.1 * reach),
+        ("deep, least", bottom - 1.1 * reach))}  # fmt: skip
+    planted = replace(one, lines={"vapour line": one.lines["vapour line"]} | flat)
+    figure = section_figure(planted, None, "m", "m", 150)
+    low, high = figure["layout"]["yaxis"]["range"]
+    assert low < bottom and high > top + 0.9 * reach and high - low < 1.3 * (top + 0.9 * reach - bottom)
+    arrows = [note for note in figure["layout"]["annotations"] if note["showarrow"]]
+    assert [(note["text"].partition(",")[0], note["y"], note["ay"] > 0) for note in arrows] == [
+        ("far", 1, True), ("deep", 0, False)]  # fmt: skip
+    assert f"{top + 1.1 * reach:.4g} m" in arrows[0]["text"]
+    calm = replace(planted, lines={"vapour line": one.lines["vapour line"], "far, greatest": flat["far, greatest"]})
+    assert window([calm], "m").high < top + 0.13 * (top - bottom)
+
+
+def test_upper_and_lower_limits_and_the_class_have_dashes_of_their_own(main):
+    one = section(main, ways(main)[0])
+    names = ("vapour line", "class line", "a, greatest", "a, least")
+    planted = replace(one, lines=dict.fromkeys(names, one.along["elevation"]))
+    figure = section_figure(planted, None, "m", "m", 150)
+    dashes = {line["name"]: line["line"]["dash"] for line in figure["data"] if "line" in line}
+    assert len({dashes[name] for name in (*names, "initial head", "pipe")}) == 6
+    drawn = [look["linestyle"] for look in (*LINES.values(), *LIMITS.values())]
+    assert len(drawn) == len(set(drawn)) == 4
 
 
 def test_the_moving_line_has_the_cells_of_a_frame_and_not_the_points_of_the_profile(main):
