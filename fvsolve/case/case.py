@@ -63,7 +63,6 @@ class Case(Shown):
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
     lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # of those whose water is masses on its body
     read: dict[tuple, tuple] = field(default_factory=dict, repr=False)  # place -> (what stands there, the same read)
-    told: list[Any] = field(default_factory=list, repr=False)  # of what was placed, as `placing` has it
     found: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses where their forces balance
 
     picture = "fvsolve.draw.objects:case_figure"
@@ -173,7 +172,7 @@ class Case(Shown):
     @cached_property
     def notes(self) -> list[Notice]:
         """What it says beyond what practice knows, and beyond the end of the run."""
-        return [*(one.notice(self) for one in self.told), *ranges.notices(self), *horizon.notices(self)]
+        return [*ranges.notices(self), *horizon.notices(self)]
 
     @cached_property
     def elevations_stated(self) -> bool:

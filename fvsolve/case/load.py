@@ -24,7 +24,7 @@ from fvsolve.case.routes import Route, broken, legs, spread
 from fvsolve.case.routes import misfits as route_misfits
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.doors import TABLE, door
-from fvsolve.errors import CaseError, Fault, FluidError, Notice, did_you_mean, listing
+from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
 from fvsolve.parts.body.part import Body, BodyPoint
@@ -146,7 +146,8 @@ class _Reader:
             for name in NAMING[:-1]:
                 self.group(name)
             self.stop()  # what is named there is not known
-        whole, told = self.raw.table, self.cut(properties, numerics)
+        whole = self.raw.table
+        self.cut(properties, numerics)
         carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
         parts["nodes"] = heights.lent(**parts)
@@ -226,7 +227,6 @@ class _Reader:
             copies=dict(self.setting.files),
             raw=whole,
             folder=self.raw.folder,
-            told=told,
             meshes=meshes,
             lumped=self.lumped,
             read=self.read,
@@ -249,12 +249,12 @@ class _Reader:
         self.stop()
         return made
 
-    def cut(self, properties: Any, numerics: Numerics | None) -> list[Notice]:
-        """Cut pipes at what is placed on them by chainage; what is to be told of it."""
+    def cut(self, properties: Any, numerics: Numerics | None) -> None:
+        """Cut pipes at what is placed on them by chainage."""
         table = placing.bent(self.raw.table)
         tables = (table.get("nodes"), table.get("links"), table.get("routes", {}))
         if not all(isinstance(one, dict) for one in tables) or not placing.placed(table):
-            return []
+            return
         for group, name, part in placing.placed(table):
             self.kind(group, name, part)
         self.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
@@ -270,18 +270,14 @@ class _Reader:
                     pipes[name] = self.part(Pipe, {key: one for key, one in given.items() if key != "pieces"})
                 except ValueError as error:
                     self.misfit(("links", name), error)
-        line = (numerics or self.in_order("numerics", Numerics)).line
-        exact = {name for name, pipe in pipes.items() if (pipe.line or line) == "delay"}
         if None in (properties, numerics):
             counts = {name: pipe.cells or 1 for name, pipe in pipes.items()}
-            exact |= {name for name, pipe in pipes.items() if pipe.cells is None}
         else:
             counts = default_cells(pipes, properties, numerics.cell_time)
-        made = placing.cut(table, pipes, counts, exact, astray, self.fault)
+        made = placing.cut(table, pipes, counts, astray, self.fault)
         self.raw, self.pieces = replace(self.raw, table=made.table), made.pieces
         self.lost, self.uncut, self.joined = made.lost, made.wholes, made.known
         self.origin |= made.origin
-        return made.told
 
     def kept(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
         """What a place was read as in the case before, if the very same stands there; else what `make` reads.

@@ -15,12 +15,12 @@ import numpy as np
 
 from fvsolve import units
 from fvsolve.case.raw import dotted
-from fvsolve.errors import Notice, did_you_mean, listing
+from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.units import show
 
 WHERE = ("on", "at")
-TIE = 1e-6  # of a cell, within which two faces are as near
+TIE = 1e-6  # of a cell: a piece drawn the other way has as many
 OWN = ("length", "cells", "minor_loss", "fittings", "profile", "from", "to", "pieces", "bends")  # keys of each piece
 Say = Callable[[tuple, str], None]
 
@@ -53,26 +53,9 @@ class Placed:
         return (f"{self.name}-in", f"{self.name}-out") if self.inline else (f"{self.name}-at", f"{self.name}-at")
 
 
-@dataclass(frozen=True)
-class Moved:
-    """A part that stands elsewhere than asked, by so much, at a chainage of a pipe [m]."""
-
-    group: str
-    name: str
-    by: float
-    chainage: float
-    pipe: str
-
-    def notice(self, case: Any) -> Notice:
-        """What is to be known of it."""
-        by, at = case.amount(abs(self.by), "length"), case.amount(self.chainage, "length", 10)
-        text = f"{self.name}: moved by {by} to chainage {at} of {self.pipe}, where two of its cells meet"
-        return Notice("cells", f"{self.group}.{self.name}", text, "at", self.by)
-
-
 @dataclass
 class Cutting:
-    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made, who moved.
+    """A case's table with its pipes cut: `pieces` by the name of the whole, `origin` of what was made.
 
     lost : (group, name) of what cannot be read, as it, its pipe or what stands on that is at fault; wholes : pipes
     that are not cut for that; known : whether it is known what joins what
@@ -82,7 +65,6 @@ class Cutting:
     named: frozenset[str]  # links of the file
     pieces: dict[str, list[str]] = field(default_factory=dict)
     origin: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
-    told: list[Moved] = field(default_factory=list)
     lost: set[tuple[str, str]] = field(default_factory=set)
     wholes: dict[str, Pipe] = field(default_factory=dict)
     known: bool = True
@@ -181,14 +163,11 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
             yield (*key, "from"), "it is on a pipe, which is where it starts from; leave from, or on and at, out"
 
 
-def cut(
-    table: dict[str, Any], wholes: dict[str, Pipe], cells: dict[str, int], exact: set[str], odd: set, say: Say
-) -> Cutting:
+def cut(table: dict[str, Any], wholes: dict[str, Pipe], cells: dict[str, int], odd: set, say: Say) -> Cutting:
     """The table with pipes cut at what is placed on them.
 
-    wholes : pipes as they are read, those without faults; cells : of each; exact : those that are cut where it is said,
-    between no cells; odd : (group, name) of what says wrongly where it stands; say : takes the keys and the text of a
-    fault
+    wholes : pipes as they are read, those without faults; cells : of each; odd : (group, name) of what says wrongly
+    where it stands; say : takes the keys and the text of a fault
     """
     made = Cutting({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
                    frozenset(table["links"]))  # fmt: skip
@@ -218,9 +197,8 @@ def cut(
             made.table["links"][name] = links.get(name, part)
             continue
         on_it, whole = by_pipe[name], wholes.get(name)
-        fits = whole is not None and has_room(name, on_it, cells[name], name in exact, say)
-        if fits and name not in lost and are_apart(on_it, say):
-            cut_one(made, name, part, whole, on_it, cells[name], name in exact, say)
+        if whole is not None and name not in lost and are_apart(on_it, say):
+            cut_one(made, name, part, whole, on_it, cells[name], say)
         else:
             made.wholes |= {} if whole is None else {name: whole}
             lose(made, name, part, on_it, say)
@@ -265,14 +243,6 @@ def read_distance(one: Placed, on: str | None, pipe: Pipe | None, say: Say) -> b
     return True
 
 
-def has_room(name: str, parts: list[Placed], cells: int, exact: bool, say: Say) -> bool:
-    """Whether a pipe has cells enough for what stands on it."""
-    if exact or cells > len(parts):
-        return True
-    say(("links", name, "cells"), f"{cells} cells for {len(parts)} parts on it; wanted {len(parts) + 1} at least")
-    return False
-
-
 def are_apart(parts: list[Placed], say: Say) -> bool:
     """Put parts into the order in which they stand; False where two stand at the same place."""
     parts.sort(key=lambda one: one.distance)
@@ -282,22 +252,15 @@ def are_apart(parts: list[Placed], say: Say) -> bool:
     return not alike
 
 
-def cut_one(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, exact: bool, say: Say):
-    """Put the pieces of one pipe and what they need into the table; parts : in their order along it."""
-    asked = np.array([one.distance for one in parts])
-    if exact:
-        cuts = asked
-        edges = np.concatenate([[0.0], cuts, [whole.length]])
-        counts = np.maximum(1, np.round(np.diff(edges) / whole.length * cells)).astype(int)
-    else:
-        faces = between(asked / whole.length * cells, cells)
-        cuts = faces / cells * whole.length
-        edges, counts = np.concatenate([[0.0], cuts, [whole.length]]), np.diff(np.concatenate([[0], faces, [cells]]))
+def cut_one(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, say: Say) -> None:
+    """Put the pieces of one pipe and what they need into the table; parts : in their order along it.
+
+    Cells of a piece are as near in size to those of the whole as one at least can be.
+    """
+    edges = np.array([0.0, *(one.distance for one in parts), whole.length])
+    counts = np.maximum(1, np.floor(np.diff(edges) / whole.length * cells + 0.5 + TIE).astype(int))
     names = made.pieces[name] = [f"{name}-{k + 1}" for k in range(len(parts) + 1)]
     begin = 0.0 if whole.profile is None else float(whole.profile.chainage[0])
-    for one, at in zip(parts, cuts.tolist(), strict=True):
-        if abs(at - one.distance) > 1e-9 * whole.length:
-            made.told.append(Moved(one.group, one.name, at - one.distance, begin + at, name))
     taken(made, name, given, parts, names, say)
     lay(made, name, given, whole, parts, edges, counts.tolist())
     made.table["routes"][name] = {"pipes": names, "start": begin}
@@ -323,20 +286,6 @@ def taken(made: Cutting, name: str, given: dict, parts: list[Placed], names: lis
     for one in own:
         if one not in names:
             say(("links", name, "pieces", one), f"no piece of {name} has that name; they are {listing(names)}")
-
-
-def between(places: np.ndarray, cells: int) -> np.ndarray:
-    """Numbers of the faces between cells that are nearest to places in cells, rising : int[n].
-
-    What lies in the middle of a cell goes towards the middle of the pipe, so that it does from either end.
-    """
-    inward = np.where(places < 0.5 * cells, TIE, -TIE)
-    faces = np.round(places + inward).astype(int)
-    for k in range(faces.size):
-        faces[k] = max(faces[k], faces[k - 1] + 1 if k else 1)
-    for k in reversed(range(faces.size)):
-        faces[k] = min(faces[k], faces[k + 1] - 1 if k + 1 < faces.size else cells - 1)
-    return faces
 
 
 def lay(made: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], edges: np.ndarray, counts: list[int]):

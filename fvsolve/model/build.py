@@ -27,6 +27,7 @@ from fvsolve.model.probes import lower_probes
 from fvsolve.model.profile import start_profile
 from fvsolve.model.ranges import flow_notices
 from fvsolve.model.resized import resized
+from fvsolve.model.resolution import too_few_cells
 from fvsolve.model.rides import lower_rides
 from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
 from fvsolve.model.schemes import scheme_settings
@@ -262,7 +263,7 @@ def model_of(draft: Draft) -> Model:
         (t, jump) for t, jump in draft.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
     )
     of_basins = [one for basin in draft.basins for one in basin.notices(basin.of(start))]
-    draft.warnings += [*of_basins, *coarse_for_cavities(draft), *flow_notices(draft)]
+    draft.warnings += [*of_basins, *coarse_for_cavities(draft), *flow_notices(draft), *too_few_cells(draft)]
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
         draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,

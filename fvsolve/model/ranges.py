@@ -1,4 +1,4 @@
-"""What is odd of the flow that a run starts from, and of cells too few for their scheme. Knows numbers of pipes."""
+"""What is odd of the flow that a run starts from. Knows numbers of pipes."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import Notice, listing
-from fvsolve.schemes import SCHEMES
 
 QUICKEST = 60.0  # of pipe flow [m/s]: penstocks keep below 10, jets of 180 m of head reach it
 LAMINAR, AT_REST = 2000.0, 1.0  # Reynolds numbers below which a flow is laminar, and none at all
 WIDE, WATERY = 0.05, (950.0, 1050.0)  # pipes [m] and liquids [kg/m3] in which flow is turbulent: mains, not oil drives
-SHORT = 0.1  # of the longest travel time: pipes that may have fewer
 
 
 def flow_notices(draft: Any) -> list[Notice]:
-    """Notices of velocity, of laminar water, of cells; one each for all pipes, at the worst of them."""
+    """Notices of velocity and of laminar water; one each for all pipes, at the worst of them."""
     moving = _moving(draft)
-    return [*_quick(draft, *moving), *_laminar(draft, *moving), *(_coarse(draft) if draft.pipe_names else ())]
+    return [*_quick(draft, *moving), *_laminar(draft, *moving)]
 
 
 def _moving(draft: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
@@ -54,19 +52,6 @@ def _laminar(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -
             f"pipes this wide; are {draft.case.amount(abs(flow[worst]) / fluid.density, 'flow')} and a viscosity of "
             f"{fluid.viscosity:.4g} Pa s right?")  # fmt: skip
     return [Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)]
-
-
-def _coarse(draft: Any) -> list[Notice]:
-    scheme, cells = draft.case.numerics.scheme, draft.pipe_table["cells"]
-    travel = cells * draft.pipe_table["dx"] / draft.pipe_table["speed"]
-    fewest = SCHEMES[scheme].reach.behind if SCHEMES[scheme].shorter else 0  # that a scheme of five needs to be one
-    few = (cells < fewest) & (travel > SHORT * travel.max())
-    if not few.any():
-        return []
-    worst = int(np.argmax(np.where(few, travel, 0.0)))
-    text = (f"{_all(draft.pipe_names, few)}: fewer than {fewest} cells, where {scheme} has no room and is of first "
-            f'order; {fewest} cells at least, or scheme = "upwind"')  # fmt: skip
-    return [Notice("range", f"links.{draft.pipe_names[worst]}", text, "cells", float(cells[worst]), float(fewest))]
 
 
 def _all(names: list[str], chosen: np.ndarray) -> str:

@@ -22,7 +22,7 @@ ODD: dict[tuple, Any] = {  # path of a key -> what cannot stand there
     ("fluid", "densty"): 3,
     ("nodes", "end", "area"): "3 kg",
     ("nodes", "top", "at"): "9 km",
-    ("links", "main", "cells"): 3,
+    ("links", "main", "pieces"): 3,
     ("links", "hole", "coefficent"): 1,
     ("links", "half", "on"): "mian",
     ("links", "pump", "efficiency"): 80,

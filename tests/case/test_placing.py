@@ -112,18 +112,49 @@ def test_keys_of_the_whole_and_of_its_pieces_can_be_set() -> None:
     assert [row["ok"] for row in found.rows] == [True, True]
 
 
-def test_no_stub_sets_the_step_and_it_is_said() -> None:
+STANDS = {"half": 1003.0, "top": 1020.0, "hole": 2951.0, "safe": 3997.5}  # none where cells of the whole meet
+RESTATED = {
+    "as it is": {},
+    "by cell_time": {"cells": None},
+    "no profile": {"profile": None},
+    "a delay line": {"line": "delay"},
+    "a few cells": {"cells": 3},
+}
+
+
+@pytest.mark.parametrize("unit", ["m", "km", "ft"])
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize("change", RESTATED.values(), ids=RESTATED)
+def test_every_part_stands_where_it_was_put(change: dict, turned: bool, unit: str) -> None:
+    """However the pipe is drawn and cut into cells, each piece has the length between its parts."""
+    case = placed(turned)
+    main = case["links"]["main"] = {
+        key: one for key, one in (case["links"]["main"] | change).items() if one is not None
+    }
+    case["numerics"]["cell_time"] = 0.05
+    begin, per = 1000.0 if "profile" in main else 0.0, {"m": 1.0, "km": 1e3, "ft": 0.3048}[unit]
+    for name, at in STANDS.items():
+        along = at - 1000.0
+        along = begin + (LENGTH - along if turned else along)
+        case["nodes" if name == "top" else "links"][name]["at"] = f"{along / per:.12g} {unit}"
+    if "profile" not in main:
+        for node in case["nodes"].values():
+            node.pop("elevation", None)
+    made = fvsolve.load(case)
+    found = [made.links[f"main-{k}"] for k in range(1, 6)][:: -1 if turned else 1]
+    assert [one.length for one in found] == pytest.approx([3.0, 17.0, 1931.0, 1046.5, 2.5], abs=1e-6)
+    size = LENGTH / main.get("cells", LENGTH / 50.0)
+    assert [one.cells for one in found] == [max(1, int(one.length / size + 0.5)) for one in found]
+    assert not [note for note in made.notes if note.key == "at"]
+
+
+def test_steps_are_hardly_shorter_where_parts_stand_between_cells() -> None:
+    """Pieces longer than a few cells have cells of nearly their size."""
     near = placed()
-    near["links"]["half"]["at"] = 1000.5  # half a metre behind the lake
-    near["links"]["hole"]["at"] = 2951.0
-    case = fvsolve.load(near)
-    assert min(link.length / link.cells for link in case.links.values() if link.kind == "pipe") >= 49.999
-    told = {one.place: one for one in case.notes if one.kind == "cells"}
-    assert told["links.half"].value == pytest.approx(49.5) and told["links.hole"].value == pytest.approx(-1.0)
-    assert "moved by 49.5 m to chainage 1050 m" in told["links.half"].text
-    line_of = fvsolve.load(near, {"numerics.line": "delay"})
-    assert line_of.links["main-1"].length == pytest.approx(0.5)
-    assert not [one for one in line_of.notes if one.kind == "cells"]
+    near["links"]["half"]["at"], near["links"]["hole"]["at"], near["links"]["safe"]["at"] = 1523.0, 2951.0, 3489.0
+    found = [link for link in fvsolve.load(near).links.values() if link.kind == "pipe"]
+    assert min(one.length / one.cells for one in found) > 0.93 * LENGTH / CELLS
+    assert sum(one.cells for one in found) == pytest.approx(CELLS, abs=2)
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -169,7 +200,6 @@ def test_probes_count_along_the_whole_pipe() -> None:
         (("half", "at", None), "links.half: at is missing, where along main it stands"),
         (("half", "from", "lake"), "links.half.from: it is on a pipe, which is where it starts from"),
         (("hole", "at", 1500.0), "links.half.at: hole stands there; join it to that, or place it elsewhere"),
-        (("main", "cells", 4), "links.main.cells: 4 cells for 4 parts on it; wanted 5 at least"),
         (("main", "diameter", -1.0), "links.main.diameter: -1.0 is out of range"),
         (("main", "friction", {"model": "steady"}), "links.main.friction"),
     ],
