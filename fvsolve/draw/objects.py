@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from fvsolve.draw import style
+from fvsolve.draw.sweep import map_figure
 from fvsolve.units import convert
 
 NAMED = 40  # nodes up to which names are written
@@ -92,8 +93,10 @@ def state_figure(state):
 
 @style.as_it_stands
 def sweep_figure(sweep):
-    """Greatest values of the first probes over the first key that varies, or over the runs."""
+    """Extremes of the first probes over the key that varies, as maps over two, or over the runs."""
     names = [name for name in sweep.columns if name.startswith(("max(", "min("))][:PANELS]
+    if len(sweep.keys) == 2 and names:
+        return map_figure(sweep, names, {key: key for key in sweep.keys})
     key, rows = sweep.keys[0], sweep.rows
     numbers = all(isinstance(row[key], (int, float)) for row in rows) and len(sweep.keys) == 1
     x = [float(row[key]) for row in rows] if numbers else list(range(len(rows)))

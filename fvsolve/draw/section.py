@@ -53,7 +53,7 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
     _places(axes, posts, labels)
     axes.set_xlabel(f"chainage [{units['distance']}]", fontsize=8.5, color=style.INK)
     axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)
-    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=8, labelcolor=style.INK)
+    figure.legend(loc="outside lower center", ncols=4, handlelength=3, frameon=False, fontsize=8, labelcolor=style.INK)
     style.title(figure, title)
     return figure
 

@@ -8,12 +8,16 @@ from collections.abc import Mapping
 from fvsolve.draw import style
 
 PANELS = 6  # keys that are drawn
-WORDS = 12  # values that are none of numbers, up to which each is named
+WORDS = 12  # values that are named along an axis
+NUMBERS = 100  # squares of a map that say their value
+BROAD = 26  # letters of a line of a key
 
 
 @style.as_it_stands
 def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
-    """One column of a `Sweep` over each key that varied, under its head; runs without it, and not ok, apart."""
+    """One column of a `Sweep` over each key that varied, under its head, a map over two; runs that are not ok apart."""
+    if len(sweep.keys) == 2:
+        return map_figure(sweep, [name], heads)
     keys = list(sweep.keys)[:PANELS]
     across = min(len(keys), 3)
     figure = style.figure(0.8 + 2.4 * -(-len(keys) // across))
@@ -49,25 +53,86 @@ def places(values: list) -> tuple[list[float], list[str]]:
 
 
 @style.as_it_stands
+def map_figure(sweep, names, heads: Mapping[str, str]):
+    """Columns of a `Sweep` over two keys, each a map: squares of a grid, or dots; runs that are not ok are crossed."""
+    across = min(len(names), 2)
+    down = -(-len(names) // across)
+    figure = style.figure(0.6 + (4.4 if across == 1 else 3.2) * down)
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    for axes, name in zip(panels, names, strict=False):
+        _map(axes, sweep, name)
+        axes.set_xlabel(heads[sweep.keys[0]], fontsize=8.5, color=style.INK)
+        axes.set_ylabel(heads[sweep.keys[1]], fontsize=8.5, color=style.INK)
+    for axes in panels[len(names) :]:
+        axes.set_axis_off()
+    return figure
+
+
+def _map(axes, sweep, name: str) -> None:
+    import numpy as np
+
+    values = [[row[key] for row in sweep.rows] for key in sweep.keys]
+    found = np.array([math.nan if row.get(name) is None else float(row[name]) for row in sweep.rows])
+    wrong = np.array([not row["ok"] for row in sweep.rows])
+    steps = [sorted(set(places(one)[0])) for one in values]
+    x, y = (np.array(places(one)[0]) for one in values)
+    style.dress(axes)
+    if len(steps[0]) * len(steps[1]) == len(set(zip(x, y, strict=True))) == len(found):
+        x, y = (np.searchsorted(step, at) for step, at in zip(steps, (x, y), strict=True))
+        table = np.full((len(steps[1]), len(steps[0])), math.nan)
+        table[y, x] = found
+        seen = axes.pcolormesh(table, cmap="viridis")
+        x, y = x + 0.5, y + 0.5
+        for axis, one, step in zip((axes.xaxis, axes.yaxis), values, steps, strict=True):
+            said = places(one)[1] or ["" if isinstance(one[0], str) else f"{at:.4g}" for at in step]
+            every = -(-len(said) // WORDS)
+            axis.set_ticks(np.arange(0, len(said), every) + 0.5, said[::every])
+        if len(found) <= NUMBERS:
+            for a, b, value, shade in zip(x, y, found, seen.norm(found), strict=True):
+                if math.isfinite(value):
+                    axes.text(a, b, f"{value:.4g}", ha="center", va="center", fontsize=7.5,
+                              color="white" if shade < 0.6 else style.INK)  # fmt: skip
+    else:
+        seen = axes.scatter(x, y, c=found, s=36, cmap="viridis")
+        axes.margins(0.05)
+        for axis, one in zip((axes.xaxis, axes.yaxis), values, strict=True):
+            if words := places(one)[1]:
+                axis.set_ticks(range(len(words)), words)
+    axes.plot(x[wrong], y[wrong], linestyle="", marker="x", markersize=9, color=style.DOUBT)
+    bar = axes.figure.colorbar(seen, ax=axes)
+    bar.set_label(name + (", crossed where not ok" if wrong.any() else ""), fontsize=8.5, color=style.INK)
+    bar.ax.tick_params(labelsize=8, labelcolor=style.INK)
+
+
+@style.as_it_stands
 def sensitivity_figure(found):
     """Shares of the variance by key with their intervals, beside sizes and spreads of effects."""
-    figure = style.figure(0.9 + 0.3 * max(len(found.keys), 4))
-    left, right = figure.subplots(1, 2, width_ratios=(1.3, 1.0))
-    for shift, name, colour in ((-0.2, "S1", style.COLOURS[0]), (0.2, "ST", style.COLOURS[1])):
-        at = [k + shift for k in range(len(found.keys))]
-        left.barh(at, getattr(found, name), xerr=getattr(found, f"{name}_conf"), height=0.36, color=colour, label=name,
-                  error_kw={"ecolor": style.MUTED, "elinewidth": 0.8})  # fmt: skip
-    style.dress(left)
-    left.set_yticks(range(len(found.keys)), found.keys, fontsize=8)
-    left.invert_yaxis()
-    left.set_xlabel("share of the variance", fontsize=8.5, color=style.INK)
-    left.legend(frameon=False, fontsize=8)
-    right.plot(found.mu_star, found.sigma, linestyle="", marker="o", color=style.COLOURS[2])
-    style.dress(right)
-    right.margins(0.15)
-    for key, x, y in zip(found.keys, found.mu_star, found.sigma, strict=True):
-        right.annotate(key.rpartition(".")[2], (x, y), xytext=(4, 4), textcoords="offset points", fontsize=7)
-    right.set_xlabel("mean size of effects", fontsize=8.5, color=style.INK)
-    right.set_ylabel("their spread", fontsize=8.5, color=style.INK)
+    figure = style.figure(1.1 + 0.5 * max(len(found.keys), 3))
+    panels = figure.subplots(1, 2, sharey=True)
+    unit = found.outcome.rpartition(" ")[2] if found.outcome.endswith("]") else ""
+    effects = f"effect of a move over the whole range {unit}".strip()
+    shown = (("share of the variance", (("S1", "S1, alone"), ("ST", "ST, with others"))),
+             (effects, (("mu_star", "mean size"), ("sigma", "spread"))))  # fmt: skip
+    for axes, (label, bars) in zip(panels, shown, strict=True):
+        style.dress(axes)
+        for shift, (name, said), colour in zip((-0.2, 0.2), bars, style.COLOURS, strict=False):
+            at = [k + shift for k in range(len(found.keys))]
+            axes.barh(at, getattr(found, name), xerr=getattr(found, f"{name}_conf", None), height=0.36, color=colour,
+                      label=said, error_kw={"ecolor": style.MUTED, "elinewidth": 0.8})  # fmt: skip
+        axes.locator_params(axis="x", nbins=5)
+        axes.ticklabel_format(axis="x", scilimits=(-3, 4))
+        axes.xaxis.get_offset_text().set(fontsize=8, color=style.MUTED)
+        axes.set_xlabel(label, fontsize=8.5, color=style.INK)
+        axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)
+    panels[0].set_yticks(range(len(found.keys)), [parted(key) for key in found.keys], fontsize=8)
+    panels[0].invert_yaxis()
     style.title(figure, found.outcome)
     return figure
+
+
+def parted(key: str) -> str:
+    """A long key on several lines, each but the last ended by a dot."""
+    lines = [""]
+    for piece in key.replace(".", ".\n").split("\n"):
+        lines = [*lines, piece] if len(lines[-1] + piece) > BROAD and lines[-1] else [*lines[:-1], lines[-1] + piece]
+    return "\n".join(lines)

@@ -11,6 +11,7 @@ from truth.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies import sensitivity
+from fvsolve.studies.sensitivity import Sensitivity
 
 pytest.importorskip("SALib", reason="SALib is an extra")
 A, B = 7.0, 0.1
@@ -67,6 +68,26 @@ def test_of_joukowskys_rise_speed_and_opening_have_the_shares_that_a_product_has
     assert found.ST == approx([(one + terms[2]) / sum(terms) for one in terms[:2]], abs=0.03)
     rise = 0.61 * math.sqrt(2 * (3e6 - 101325.0) * 1000.0) / (math.pi / 4 * 0.3**2)  # of speed times area
     assert found.mu_star == approx([rise * 0.0015 * 400.0, rise * 1100.0 * 0.001], rel=0.1)
+
+
+def test_no_label_of_its_picture_covers_another_or_leaves_it():
+    """Of long keys that end alike, with numbers of six digits."""
+    from fvsolve.draw.sweep import sensitivity_figure
+
+    keys = tuple(f"links.a-rather-long-name-{k}.opening.duration" for k in range(4))
+    shares, effects = [0.1] * 4, [3e5, 2.96e5, 6e4, 4e3]
+    found = Sensitivity(keys, "max(gate.pressure) [Pa]", 1, *[shares] * 4, *[effects] * 4)
+    figure = sensitivity_figure(found)
+    figure.canvas.draw()
+    left, right = figure.axes
+    texts = [axes.xaxis.label for axes in (left, right)] + left.get_yticklabels() + right.texts
+    for axes in (left, right):
+        low, high = axes.get_xlim()
+        texts += [one for one in axes.get_xticklabels() if low <= one.get_position()[0] <= high]
+    assert [one.get_text().replace("\n", "") for one in left.get_yticklabels()] == [*keys]
+    boxes = [one.get_window_extent() for one in texts if one.get_text()]
+    assert not [1 for k, one in enumerate(boxes) for other in boxes[:k] if one.overlaps(other)]
+    assert all(box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0 for box in boxes)
 
 
 def test_the_command_says_it_and_finds_its_runs_again(line, fvs, tmp_path):

@@ -17,9 +17,10 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.cli.app import value_of
 from fvsolve.cli.sweep import split
+from fvsolve.draw.sweep import outcome_figure
 from fvsolve.errors import CaseError, FvsolveError, RunError
 from fvsolve.studies import sweep
-from fvsolve.studies.sweep import pasted
+from fvsolve.studies.sweep import Sweep, pasted
 
 
 @pytest.fixture
@@ -309,6 +310,42 @@ def test_a_file_that_a_value_names_is_part_of_what_is_reused(line, tmp_path, mon
     assert sweep(line, vary, out=tmp_path / "o").reused == 2
     (tmp_path / "b.csv").write_text("t [s],opening [-]\n0,1\n0.3,0\n")
     assert sweep(line, vary, out=tmp_path / "o").reused == 1
+
+
+def mapped(rows: list[dict]):
+    """The picture of a sweep over two keys, and its axes."""
+    made = Sweep(("a.b", "c.d"), [{"ok": True, "reason": "finished"} | row for row in rows], 0)
+    figure = outcome_figure(made, "max(x) [m]", {"a.b": "a.b [s]", "c.d": "c.d"})
+    figure.canvas.draw()
+    return figure.axes
+
+
+def test_a_sweep_over_two_keys_is_a_map():
+    """A grid is squares with their values, the first key across and the second up; what failed is crossed and empty."""
+    rows = [{"a.b": a, "c.d": c, "max(x) [m]": 10.0 * k + j}
+            for k, a in enumerate((0.1, 0.5, 3.0)) for j, c in enumerate(("low", "high"))]  # fmt: skip
+    rows[-1] |= {"ok": False, "max(x) [m]": None}
+    axes, bar = mapped(rows[::-1])
+    table = axes.collections[0].get_array().reshape(2, 3)
+    assert [one.get_text() for one in axes.get_xticklabels()] == ["0.1", "0.5", "3"]
+    assert [one.get_text() for one in axes.get_yticklabels()] == ["high", "low"]  # as they first come
+    assert table[0].tolist() == [1.0, 11.0, None] and table[1].tolist() == [0.0, 10.0, 20.0]
+    assert {one.get_text() for one in axes.texts} == {"0", "1", "10", "11", "20"}
+    assert axes.lines[0].get_xydata().tolist() == [[2.5, 0.5]] and bar.get_ylabel().startswith("max(x) [m], crossed")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("a.b [s]", "c.d")
+
+
+def test_points_over_two_keys_are_dots_where_they_lie():
+    points = [(0.1, 5.0), (0.2, 3.0), (0.4, 4.0)]
+    axes, _ = mapped([{"a.b": a, "c.d": c, "max(x) [m]": a * c} for a, c in points])
+    assert axes.collections[0].get_offsets().tolist() == [list(one) for one in points]
+    assert axes.collections[0].get_array().tolist() == [a * c for a, c in points]
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_map_of_runs_that_all_failed_is_crosses():
+    axes, _ = mapped([{"a.b": a, "c.d": c, "ok": False} for a in (1, 2) for c in (1, 2)])
+    assert len(axes.lines[0].get_xydata()) == 4 and not axes.texts
 
 
 def test_the_table_is_parquet_too_and_every_extreme_has_a_chart(line, fvs, tmp_path):
