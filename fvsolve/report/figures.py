@@ -171,7 +171,8 @@ def _beyond(limits: list[str], edge: int) -> list[dict[str, Any]]:
     text, away = "<br>".join(map(as_it_stands, limits)), 7 * len(limits) + 6  # pixels from the edge
     arrow = {"xref": "paper", "yref": "paper", "x": 0.97, "y": edge, "ax": 0, "ay": away if edge else -away,
              "showarrow": True, "arrowhead": 2, "arrowwidth": 1.2, "arrowcolor": CLASS, "xanchor": "right",
-             "yanchor": "middle", "text": text, "bgcolor": GROUND, "font": {"size": 11, "color": CLASS}}  # fmt: skip
+             "yanchor": "middle", "borderpad": 4, "bgcolor": GROUND, "text": text,
+             "font": {"size": 11, "color": CLASS}}  # fmt: skip
     return [arrow] if limits else []
 
 

@@ -107,11 +107,12 @@
     show(0);
   }
 
-  // Paper is light and has its own sizes [px]; the moving line stays on the screen. A section fills what is left of its
-  // page, or begins the next one where that is too little: no page stays half empty.
-  const WIDE = 680, PAGE = 985, LEAST = 250, MOST = 720, HISTORY = 200, TOOLS = 22;
+  // Paper is light and has its own sizes [px]; the moving line stays on the screen, and what can follow the figures does.
+  // A section fills what is left of its page, or begins the next one where that is too little: no page stays half empty.
+  const WIDE = 680, PAGE = 985, LEAST = 250, GOOD = 420, WELL = 0.6, MOST = 720, HISTORY = 200, TOOLS = 22;
   const main = document.querySelector("main"), box = (node) => node.getBoundingClientRect();
   const paper = [...document.styleSheets].flatMap((one) => [...one.cssRules]).find((rule) => rule.conditionText === "print");
+  const later = document.getElementById("later");
   const heights = Object.fromEntries(ids.map((id) => [id, figures[id].layout.height]));
   const tops = Object.fromEntries(ids.map((id) => [id, figures[id].layout.margin.t]));
   const moving = (id, seen) => {
@@ -129,8 +130,9 @@
         spare = 60;
       }
       const rest = box(figure).bottom - box(first).top, is_section = id.id.startsWith("section-");
-      let room = PAGE - rest - spare - (box(first).top - page);
-      if (room < (is_section ? LEAST : HISTORY)) {
+      const used = box(first).top - page, least = !is_section ? HISTORY : used > WELL * PAGE ? GOOD : LEAST;
+      let room = PAGE - rest - spare - used;
+      if (room < least) {
         first.style.breakBefore = "page";
         [page, spare, room] = [box(first).top - 30, 0, PAGE - rest - 30];
       }
@@ -142,6 +144,7 @@
     for (const id of ids) moving(id, false);
     paper.media.mediaText = "all";
     main.style.width = `${WIDE}px`;
+    document.getElementById("model").before(later);
     filled();
     for (const id of ids) {
       const height = parseFloat(chart(id).style.height);
@@ -151,6 +154,7 @@
   });
   addEventListener("afterprint", () => {
     main.style.width = "";
+    document.getElementById("verdict").append(later);
     for (const node of document.querySelectorAll("h2, figure, .chart")) node.style.breakBefore = node.style.height = "";
     for (const id of ids) {
       moving(id, true);

@@ -91,6 +91,7 @@ def test_paper_holds_whole_figures(report, chromium):
     page.set_viewport_size({"width": 680, "height": 990})
     widths = [page.locator(f"{id} .main-svg").first.bounding_box()["width"] for id in PARTS]
     assert widths == [680.0] * 3 and not page.locator(".player").is_visible()
+    assert page.locator("#section-0 .nsewdrag").bounding_box()["height"] > 300
     legends_are_clear(page)
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     assert page.locator("#section-0 .main-svg").first.bounding_box()["height"] == 920.0 and said == []
