@@ -4,6 +4,7 @@
   const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
   const ids = Object.keys(figures), histories = ids.filter((id) => id.startsWith("history-"));
   const chart = (id) => document.getElementById(id);
+  const WIDE = 680;  // pixels of paper
 
   // Where fingers scroll, a chart is zoomed by its buttons; on a narrow page names that would cover each other give way.
   const touched = matchMedia("(pointer: coarse)").matches;
@@ -11,10 +12,11 @@
   for (const [id, { layout }] of Object.entries(figures)) {
     if (touched) layout.dragmode = false;
     if (!layout.annotations) continue;
-    const apart = 24 / (chart(id).clientWidth - 76) * (layout.xaxis.range[1] - layout.xaxis.range[0]);
-    const kept = [];
+    const pixel = (layout.xaxis.range[1] - layout.xaxis.range[0]) / (Math.min(chart(id).clientWidth, WIDE) - 76);
+    const begin = ({ x, xanchor, text }) => x - (xanchor === "right" ? 4.3 * pixel * text.length : 0);
+    const kept = layout.annotations.filter((name) => name.showarrow);
     for (const name of layout.annotations)
-      if (name.showarrow || kept.every((other) => other.showarrow || Math.abs(other.x - name.x) >= apart)) kept.push(name);
+      if (!name.showarrow && kept.every((one) => one.showarrow || Math.abs(begin(one) - begin(name)) >= 24 * pixel)) kept.push(name);
     layout.annotations = kept;
   }
 
@@ -109,7 +111,7 @@
 
   // Paper is light and has its own sizes [px]; the moving line stays on the screen, and what can follow the figures does.
   // A section fills what is left of its page, or begins the next one where that is too little: no page stays half empty.
-  const WIDE = 680, PAGE = 985, LEAST = 250, GOOD = 420, WELL = 0.6, MOST = 720, HISTORY = 200, TOOLS = 22;
+  const PAGE = 985, LEAST = 250, GOOD = 420, WELL = 0.6, MOST = 720, HISTORY = 200, TOOLS = 22;
   const main = document.querySelector("main"), box = (node) => node.getBoundingClientRect();
   const paper = [...document.styleSheets].flatMap((one) => [...one.cssRules]).find((rule) => rule.conditionText === "print");
   const later = document.getElementById("later");

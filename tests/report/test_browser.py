@@ -1,6 +1,7 @@
 """The page in a real browser: nothing is fetched, nothing complains, figures are there, the head line moves."""
 
 import re
+from itertools import pairwise
 
 import pytest
 from truth import browser, paper
@@ -95,6 +96,25 @@ def test_paper_holds_whole_figures(report, chromium):
     legends_are_clear(page)
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     assert page.locator("#section-0 .main-svg").first.bounding_box()["height"] == 920.0 and said == []
+
+
+@pytest.mark.parametrize("width", [390, 1000])
+def test_no_name_over_a_section_covers_another(chromium, tmp_path, width):
+    """Of places that come closer and closer towards the end, where names stand before their places; on paper too."""
+    names = [f"place-{k}" for k in range(13)]
+    nodes = {name: junction() for name in names} | {names[0]: lake("45 m"), names[-1]: lake("40 m")}
+    links = {f"pipe-{k}": pipe(a, b, 20.0 + 480.0 * 0.7**k, 0.3, 1000.0, 2) for k, (a, b) in enumerate(pairwise(names))}
+    case = scene(nodes, links, 0.1, {}, [], routes={"line": {"pipes": [*links]}})
+    fvsolve.run(case, out=tmp_path / "run", pictures=False)
+    page, _, _ = browser.opened(chromium, write_report(tmp_path / "run")[0], width)
+    for printed in (False, True):
+        if printed:
+            page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        begins = sorted(
+            page.evaluate("""() => [...document.querySelectorAll('#section-0 .annotation-text')].map(
+            (one) => one.getBoundingClientRect().left)""")
+        )
+        assert len(begins) > 3 and min(b - a for a, b in pairwise(begins)) > 14, begins
 
 
 @pytest.mark.parametrize("words", [0, 30, 60, 90])
