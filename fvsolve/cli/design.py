@@ -35,7 +35,7 @@ def study(
 
 def _show(found) -> None:
     from fvsolve.cli import terminal
-    from fvsolve.cli.report import open_as, when, where_and_when
+    from fvsolve.cli.report import REASONS_SHOWN, open_as, when, where_and_when
     from fvsolve.run.result import FAILS, OPEN
     from fvsolve.studies.design import name_of
     from fvsolve.units import span
@@ -66,6 +66,8 @@ def _show(found) -> None:
                 text = f"{name_of(row)}: {one.name}: {value} {one.unit} ({where_and_when(one._asdict(), row)})"
                 why = "" if one.state == FAILS else f": open, as {open_as(one, row)}"
                 terminal.line(console, text + why, "red" if one.state == FAILS else "yellow")
+        for text in row.get("resolution", {"reasons": []})["reasons"][:REASONS_SHOWN]:
+            terminal.line(console, f"{name_of(row)}: error of {text}", "yellow")
     names = [name or "the case as it is" for name in found.holds]
     if found.limited:
         told = f"all limits hold in all events: {', '.join(names)}"

@@ -46,6 +46,7 @@ PATCH = {
 }  # fmt: skip
 PLACES_SHOWN = 3
 EVENTS_SHOWN = 12
+REASONS_SHOWN = 10  # the rest stands in summary.json
 
 
 def result(one) -> None:
@@ -74,8 +75,8 @@ def result(one) -> None:
     _notices(console, said["warnings"])
     if "resolution" in said:
         _line(console, said["resolution"]["words"])
-        for text in said["resolution"]["reasons"]:
-            _line(console, text)
+        for text in said["resolution"]["reasons"][:REASONS_SHOWN]:
+            _line(console, f"error of {text}", "yellow")
     end = "" if "at t = " in said["reason"] else f" at t = {told(said['t'])}"
     _line(console, f"{said['reason']}{end}; {_cost(said)}", None if one.ok else "bold red")
 

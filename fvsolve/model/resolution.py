@@ -103,14 +103,8 @@ def _beside_answers(draft: Any, cells: np.ndarray) -> list[Notice]:
     """Pipes and pieces so short that a check valve or a vessel beside them gets no wave of theirs."""
     if not (cells < ANSWER).any():
         return []
-    case, beside = draft.case, {}
-    for name, node in case.nodes.items():
-        if node.kind == "accumulator":
-            beside.setdefault(name, []).append(name)
-    for name, link in case.links.items():
-        for node in link.ports.values() if link.kind == "check-valve" else ():
-            beside.setdefault(node, []).append(name)
-    near = [[one for end in _ends(case, name) for one in beside.get(end, ())] for name in draft.pipe_names]
+    case, beside = draft.case, answering(draft.case)
+    near = [beside.get(name, []) for name in draft.pipe_names]
     few = (cells < ANSWER) & np.array([bool(one) for one in near])
     if not few.any():
         return []
@@ -119,6 +113,16 @@ def _beside_answers(draft: Any, cells: np.ndarray) -> list[Notice]:
     text = (f"{_where(case, name)}: {_cells(cells[worst])}, too few for its waves to reach {listing(near[worst], 3)}; "
             f"expected {_remedy(case, name)}{_others(draft, few, worst)}{cost}")  # fmt: skip
     return [Notice("cells", f"links.{name}", text, "cells", float(cells[worst]), float(ANSWER))]
+
+
+def answering(case: Any) -> dict[str, list[str]]:
+    """Pipe -> check valves and vessels at its ends."""
+    beside: dict[str, list[str]] = {name: [name] for name, node in case.nodes.items() if node.kind == "accumulator"}
+    for name, link in case.links.items():
+        for node in link.ports.values() if link.kind == "check-valve" else ():
+            beside.setdefault(node, []).append(name)
+    pipes = [name for name, link in case.links.items() if link.kind == "pipe"]
+    return {name: [one for end in _ends(case, name) for one in beside.get(end, ())] for name in pipes}
 
 
 def _dear(draft: Any, cells: np.ndarray) -> list[Notice]:

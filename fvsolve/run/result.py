@@ -74,7 +74,7 @@ class LimitVerdict(NamedTuple):
     state : `holds`; `fails` where it is passed; `open` where a run cannot tell, or the error of a place is more than
     its margin; ok : whether it holds; margin : how far from the limit, negative beyond it
     bound : "least" or "greatest"; until : when the run ended
-    error : how far `value` may be off, None where nobody asked
+    error : how far `value` may be off, None where nobody asked; reason : why it is wide or not known
     worst : the same of the worst places, a row for each bound of each part
     """
 
@@ -93,6 +93,7 @@ class LimitVerdict(NamedTuple):
     quantity: str
     until: float
     error: float | None
+    reason: str | None
     worst: list[dict]
 
     @property

@@ -174,7 +174,8 @@ def row_of(one: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict
         "place": part.part, "chainage": chainage.of(part, at, extent.on) if known else None,
         "elevation": finite(part.elevation[at]), "time": finite(one.time) if known else None, "bound": one.bound,
         "value": finite(shown.from_si(one.value)), "limit": finite(shown.from_si(one.limit)),
-        "margin": finite(shown.span_from_si(one.margin)), "unit": shown.unit, "error": None, "state": one.state,
+        "margin": finite(shown.span_from_si(one.margin)), "unit": shown.unit, "error": None, "reason": None,
+        "state": one.state,
     }  # fmt: skip
 
 

@@ -103,7 +103,7 @@ class DesignRun:
             peak_errors(result, case)
             write_summary(place / "summary.json", result.summary)
         said = result.summary
-        kept = ("ok", "reason", "t", "invalid_from", "verdicts", "extremes", "peaks", "marks", "events",
+        kept = ("ok", "reason", "t", "invalid_from", "verdicts", "extremes", "peaks", "resolution", "marks", "events",
                 "expectations", "time_unit", "envelope_units", "warnings")  # fmt: skip
         return {key: task[key] for key in ("event", "protection", "directory")} | {
             key: plain(said[key]) for key in kept if key in said

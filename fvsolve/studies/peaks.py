@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import load
-from fvsolve.errors import CaseError
+from fvsolve.errors import CaseError, listing
 from fvsolve.run import Result, run
 from fvsolve.run.result import HOLDS, OPEN
 from fvsolve.run.verdicts import BESIDE, MAGNITUDES, Beside, verdict
 from fvsolve.studies.extrema import greatest_error
 from fvsolve.studies.levels import finer, kept
-from fvsolve.studies.unresolved import Parts, reasons, unknown_parts
+from fvsolve.studies.unresolved import NAMED, WIDE, Unresolved, parted
 
 LEVELS = (0.5, 1.0, 2.0)
 LEAST = 5e-6  # of a value: what iterations, rows between steps, and swings that have all but died leave
@@ -35,25 +35,34 @@ PLACES, MOST_PLACES = 12, 400  # of a part under a bound, and of all limits, who
 def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
     """Add to the summary of a run how far its peaks and verdicts may be off, from more runs of its case.
 
-    `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order}; `error` is None where another run did
-    not come to its end, `order` None where there is none to believe. Expectations get their `error`, and so does every
+    `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order, reason}; `error` is None where another
+    run did not come to its end or a pipe is too short, `order` None where there is none to believe, `reason` why an
+    error is not known or wide. Expectations get their `error`, and so does every
     bound of every place of a limit: a limit is open where a margin is smaller than its error. `resolution` says how.
     """
     own = result if result.places is not None else run(case, set=QUIET, pictures=False)
-    runs, unknown = levels(own, case, progress), unknown_parts(case)
-    said = result.summary
-    said["peaks"] = peaks(result, runs)
-    for probe in case.probes:
-        if (probe.part, probe.name) in unknown:
-            for side in SIDES:
-                said["peaks"][probe.text][side] |= {"error": None, "order": None}
-    said["verdicts"] = [verdict([judged(runs, k, j, row, unknown) for j, row in enumerate(rows)])
+    runs = levels(own, case, progress)
+    said, unresolved = result.summary, Unresolved(case, runs)
+    said["peaks"] = peaks(result, runs, unresolved)
+    said["verdicts"] = [verdict([judged(runs, k, j, row, unresolved) for j, row in enumerate(rows)])
                         for k, rows in enumerate(own.places)]  # fmt: skip
     for k, claim in enumerate(said["expectations"]):
         claim["error"] = of_claim(runs, case.expect[claim["text"]], k, said["peaks"])
     said["resolution"] = {"levels": sorted(runs), "kept": kept(case), "words": words(runs, case),
-                          "reasons": reasons(case, runs)}  # fmt: skip
+                          "reasons": reasons(said)}  # fmt: skip
     return said
+
+
+def reasons(said: dict[str, Any]) -> list[str]:
+    """Why errors of peaks and limits are not known or wide, each once with what it is of."""
+    found: dict[str, dict[str, None]] = {}
+    for probe, peak in said["peaks"].items():
+        for side in SIDES:
+            found.setdefault(peak[side]["reason"], {})[probe] = None
+    for one in said["verdicts"]:
+        for row in one["worst"]:
+            found.setdefault(row["reason"], {})[f"{one['name']} at {row['place']}"] = None
+    return [f"{listing(list(of), NAMED)}: {text}" for text, of in found.items() if text is not None]
 
 
 def levels(own: Result, case: Any, progress: Callable[[str], None] | None) -> dict[float, Result]:
@@ -98,9 +107,10 @@ def says(case: Any, texts: list[str]) -> bool:
     return True
 
 
-def peaks(result: Result, runs: dict[float, Result]) -> dict[str, Any]:
+def peaks(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
     """`peaks` of a summary."""
     said, largest, made = result.summary, {"rad": 1.0}, {}
+    parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
     for one in said["extremes"].values():
         largest[one["unit"]] = max([largest.get(one["unit"], 0.0), *(abs(one[side] or 0.0) for side in SIDES)])
     for name, one in said["extremes"].items():
@@ -108,11 +118,16 @@ def peaks(result: Result, runs: dict[float, Result]) -> dict[str, Any]:
         for side, sign in SIGNS.items():
             missed = 0.0 if said["cells"] else between_rows(result, name, side)
             triple = values(runs, lambda run, n=name, s=side: run.summary["extremes"][n][s], sign)
-            error = bounded(runs, triple, [signals(runs, name, lambda v, sign=sign: sign * v)])
+            unknown = parts[name] in unresolved.unknown
+            error = None if unknown else bounded(runs, triple, [signals(runs, name, lambda v, sign=sign: sign * v)])
+            span = (one["greatest"] or 0.0) - (one["least"] or 0.0)
             if error is not None:
-                error += 2.0 * (missed + ROUNDING * largest[one["unit"]]) + LEAST * abs(one[side])
-                error += abs(sign * one[side] - triple[1])
-            made[name][side] = {"value": one[side], "error": error, "order": order(triple, parted(runs))}
+                least = 2.0 * (missed + ROUNDING * largest[one["unit"]]) + LEAST * abs(one[side])
+                error += least + abs(sign * one[side] - triple[1])
+                span += 2.0 * least / WIDE  # what rounding leaves of a constant is not wide
+            made[name][side] = {
+                "value": one[side], "error": error, "order": None if unknown else order(triple, parted(runs)),
+                "reason": unresolved.reason(parts[name], triple, error, span, one["unit"])}  # fmt: skip
     return made
 
 
@@ -137,7 +152,7 @@ def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray]
     return [(one.seconds, rising(one[probe])) for one in done if probe in one.units]
 
 
-def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unknown: Parts) -> dict[str, Any]:
+def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
     """A row of a limit with its error: one that holds is open where its margin is smaller or nothing is known."""
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
     triple = values(runs, lambda one: one.places[limit][k]["margin"], -1.0)
@@ -146,11 +161,13 @@ def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], u
         allowed = float(row[BESIDE].limits[at])
         places.append(signals(runs, probe, lambda v, a=allowed: sign * ((np.abs(v) if magnitude else v) - a)))
     part = (row[BESIDE].probes[0].split(".")[0], row["place"])
-    error = None if part in unknown else bounded(runs, triple, places)
+    error = None if part in unresolved.unknown else bounded(runs, triple, places)
+    span = max((float(np.ptp(one[-2][1])) for one in places if usable(one)), default=math.inf)
     if error is not None:
         error += LEAST * abs(row["value"] or 0.0)
     doubtful = row["state"] == HOLDS and (error is None or not row["margin"] >= error)
-    return row | {"error": error, "state": OPEN if doubtful else row["state"]}
+    reason = unresolved.reason(part, triple, error, span + 2.0 * LEAST / WIDE * abs(row["value"] or 0.0), row["unit"])
+    return row | {"error": error, "reason": reason, "state": OPEN if doubtful else row["state"]}
 
 
 def of_claim(runs: dict[float, Result], expect: Any, k: int, found: dict[str, Any]) -> float | None:
@@ -161,11 +178,6 @@ def of_claim(runs: dict[float, Result], expect: Any, k: int, found: dict[str, An
     triple = values(runs, lambda one: one.summary["expectations"][k]["found"])
     error = bounded(runs, triple)
     return None if error is None else error + LEAST * abs(triple[1])
-
-
-def parted(runs: dict[float, Result]) -> bool:
-    """True if liquid parted in one of them."""
-    return any(one.summary["cavities"] for one in runs.values())
 
 
 def values(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:

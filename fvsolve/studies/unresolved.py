@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from fvsolve.errors import listing
+from fvsolve.model.resolution import ANSWER, answering
 from fvsolve.parts.schedule import Schedule
-from fvsolve.studies.accuracy.cells import counts, in_cells, scaled
+from fvsolve.studies.accuracy.cells import counts, from_files, in_cells, scaled
 
-Parts = set[tuple[str, str]]  # group and name
+Part = tuple[str, str]  # group and name
 FEW = 4  # cells that differ at half and twice the resolution
 NAMED = 3  # of what is listed
+WIDE = 0.05  # of the span of a signal: errors from which on their reason is said
+SMALL = 0.1  # of an error: differences that are not what makes it
 
 
 def uncut(case: Any) -> list[str]:
@@ -56,32 +60,83 @@ def pulse(value: Any) -> float:
     return min((float(value.time[b + 1] - value.time[a]) for a, b in turns), default=np.inf)
 
 
-def unknown_parts(case: Any) -> Parts:
-    """Parts whose peaks are not known: all under a brief pulse, else pipes that are too short and the nodes at their
-    ends."""
-    if brief_pulses(case):
-        return {(group, name) for group in ("nodes", "links") for name in getattr(case, group)}
-    found: Parts = set()
-    for name in (*uncut(case), *passed_at_once(case)):
+class Unresolved:
+    """Why peaks of a case are not known or their errors wide, each with its remedy.
+
+    unknown : part -> why its peaks are not known; shared : what makes the errors of all peaks wide
+    """
+
+    def __init__(self, case: Any, runs: dict[float, Any]) -> None:
+        self.case, self.runs = case, runs
+        self.unknown = unknown_parts(case)
+        liquid = ["liquid parts, so no order is believed; give more cells"] if parted(runs) else []
+        self.shared = [*liquid, *differing(runs), *few_beside_answers(case)]
+
+    def reason(self, part: tuple[str, str], triple: Sequence[float | None], error: float | None, span: float,
+               unit: str) -> str | None:  # fmt: skip
+        """Why the error of a peak is not known, or more than a share of the span of its signal; None if it is neither.
+
+        triple : the peak at half, one and twice the resolution, in its unit
+        """
+        if error is None:
+            return self.unknown.get(part) or stopped(self.case, self.runs)
+        if error <= WIDE * span:
+            return None
+        return "; ".join(self.shared) or differences(triple, error, unit, self.case)
+
+
+def unknown_parts(case: Any) -> dict[Part, str]:
+    """Part -> why its peaks are not known: all under a brief pulse, else pipes that are too short and the nodes at
+    their ends."""
+    found: dict[Part, str] = {}
+    if pulses := brief_pulses(case):
+        text = f"{listing(pulses, NAMED)} goes to and fro before a wave has passed a cell; give pipes more cells"
+        found = {(group, name): text for group in ("nodes", "links") for name in getattr(case, group)}
+    texts = {name: f"{name} is shorter than a cell of {other}; give links.{other}.cells = {cells}"
+             for name, (other, cells) in passed_at_once(case).items()}  # fmt: skip
+    texts |= {name: f"the one cell of {name} cannot be halved; give links.{name}.cells = {FEW}" for name in uncut(case)}
+    for name, text in texts.items():
         link = case.links[name]
-        found |= {("links", name), ("nodes", link.from_), ("nodes", link.to)}
+        for part in (("links", name), ("nodes", link.from_), ("nodes", link.to)):
+            found.setdefault(part, text)
     return found
 
 
-def reasons(case: Any, runs: dict[float, Any]) -> list[str]:
-    """Why errors are not known or wide, each with its remedy."""
-    found = []
-    if pulses := brief_pulses(case):
-        found.append(f"{listing(pulses, NAMED)}: goes to and fro before a wave has passed a cell, so peaks are not "
-                     "known; give pipes more cells")  # fmt: skip
-    if pipes := uncut(case):
-        keys = [f"links.{name}.cells" for name in pipes]
-        found.append(f"one cell cannot be halved, so peaks there are not known; give {listing(keys, NAMED)} = {FEW} "
-                     "or more")  # fmt: skip
-    for name, (other, cells) in [*passed_at_once(case).items()][:NAMED]:
-        found.append(f"{name} is shorter than a cell of {other}, so peaks there are not known; give "
-                     f"links.{other}.cells = {cells}")  # fmt: skip
-    return found + differing(runs)
+def stopped(case: Any, runs: dict[float, Any]) -> str:
+    """Why other resolutions say nothing of a peak."""
+    ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
+    if len(runs) == 1:
+        ended = [f"cells of {listing(from_files(case), NAMED)} come from a file; give one with finer cells"]
+    return "; ".join(ended) or "at another resolution it is no number; give more cells or shorter steps"
+
+
+def differences(triple: Sequence[float | None], error: float, unit: str, case: Any) -> str:
+    """How peaks at three resolutions differ, where their error is wide."""
+    remedy = "more cells" if counts(case) else "shorter steps"
+    known = [one for one in triple if one is not None]
+    steps = np.diff(known)
+    if np.abs(steps).max() < SMALL * error:
+        return f"another peak of the signal, or one that moves, may come to exceed it; give {remedy}"
+    found = " and ".join(f"{abs(one):.2g}" for one in steps)
+    if len(steps) == 1:
+        return f"a difference of {found} {unit} between the only two resolutions; give {remedy}"
+    falls = steps[0] * steps[1] > 0.0 and abs(steps[1]) < 0.6 * abs(steps[0])
+    order = "fall, but are large" if falls else "show no order yet"
+    return f"differences of {found} {unit} between resolutions {order}; give {remedy}"
+
+
+def parted(runs: dict[float, Any]) -> bool:
+    """True if liquid parted in a run."""
+    return any(run.summary["cavities"] for run in runs.values())
+
+
+def few_beside_answers(case: Any) -> list[str]:
+    """Pipes of few cells beside what answers to their waves."""
+    pipes, beside = in_cells(case), answering(case)
+    found = [f"{name} has {pipe.cells} cell{'' if pipe.cells == 1 else 's'} beside {listing(beside[name], NAMED)}; "
+             f"give links.{name}.cells = {ANSWER}"
+             for name, pipe in pipes.items() if pipe.cells < ANSWER and beside[name]]  # fmt: skip
+    return found[:NAMED]
 
 
 def differing(runs: dict[float, Any]) -> list[str]:

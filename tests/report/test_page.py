@@ -25,7 +25,7 @@ WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- 
 
 VERDICT = {"name": "class", "ok": False, "place": "main", "chainage": 480.0, "elevation": 0.0, "time": 1.25,
            "bound": "greatest", "state": "fails", "value": 13.5, "limit": 10.0, "margin": -3.5, "unit": "bar",
-           "quantity": "gauge_pressure", "until": 3.0, "error": None, "worst": []}  # fmt: skip
+           "quantity": "gauge_pressure", "until": 3.0, "error": None, "reason": None, "worst": []}  # fmt: skip
 
 
 class Read(HTMLParser):

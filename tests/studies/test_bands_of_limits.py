@@ -94,6 +94,21 @@ def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> 
     assert line["heads state"] == "open"
 
 
+def test_a_study_says_why_errors_are_not_known_and_what_helps(fvs, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    case = short_pipe(greatest=NEAR)
+    case["links"]["short"]["cells"] = 1
+    (tmp_path / "short.toml").write_text(write(case))
+    (tmp_path / "two.toml").write_text('case = "short.toml"\nerror = true\n[events.close]\n')
+    _, text, _ = fvs("study", "two.toml", "--out", "out")
+    assert "close: error of gate.head, heads at gate: " in text and "links.short.cells = 4" in text
+    row = json.loads((tmp_path / "out" / "study.json").read_text())["runs"][0]
+    assert "links.short.cells = 4" in row["verdicts"][0]["reason"] and row["verdicts"][0]["state"] == "open"
+    assert row["peaks"]["gate.head"]["greatest"]["reason"] in row["resolution"]["reasons"][0]
+    page = write_report(tmp_path / "out" / "close", tmp_path / "close.html", False)[0].read_text()
+    assert "links.short.cells = 4" in page
+
+
 def test_a_size_holds_its_limits_by_more_than_their_errors() -> None:
     """A slow closure: the greatest head is that of the steady start, and a quick one is in doubt before it fails."""
     case = short_pipe(greatest=NEAR, least=SURE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from model.test_resolution import station
 from truth.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
@@ -130,7 +131,42 @@ def test_a_pipe_shorter_than_a_cell_beside_it_is_not_known() -> None:
     case["links"]["main"]["cells"], case["links"]["short"]["cells"] = 500, 4
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
     peak = said["peaks"]["gate.head"]["least"]
-    assert abs(peak["value"] + 63.54) <= peak["error"] and not said["resolution"]["reasons"]
+    assert abs(peak["value"] + 63.54) <= peak["error"] and "differences of" in peak["reason"]
+    assert not any("shorter than a cell" in text for text in said["resolution"]["reasons"])
+
+
+def slamming(at: float) -> dict:
+    """A pump trips; a check valve slams before a vessel that stands so far along the main."""
+    case = station(at)
+    case["nodes"]["header"] = junction(elevation=0.0)
+    del case["links"]["flap"]["area"]
+    case["links"]["flap"] |= {"diameter": 0.4, "loss_coefficient": 1.5,
+                              "deceleration": {"rate": [0, 5, 15], "reverse_velocity": [0, 0.3, 1.0]}}  # fmt: skip
+    case["numerics"]["end"] = 4.0
+    case["output"]["probes"] = ["out.pressure", "main.pressure@0.5", "flap.flow"]
+    return case | {"limits": {"high": {"on": "main", "quantity": "pressure", "greatest": 8.5e5}}}
+
+
+def test_every_peak_whose_error_is_wide_or_not_known_says_why() -> None:
+    case = slamming(20.0)
+    said = peak_errors(fvsolve.run(case), fvsolve.load(case))
+    found = said["peaks"]
+    assert found["out.pressure"]["greatest"]["error"] is None
+    assert "links.main-1.cells = 4" in found["out.pressure"]["greatest"]["reason"]
+    wide = found["flap.flow"]["least"]
+    assert wide["error"] > 0.05 * (found["flap.flow"]["greatest"]["value"] - wide["value"])
+    assert "flap (2, 2, " in wide["reason"] and "main-1 has 1 cell beside flap, vessel" in wide["reason"]
+    assert found["main.pressure@0.5"]["greatest"]["reason"] is None
+    row = said["verdicts"][0]
+    assert row["state"] == "open" and row["reason"] == next(one["reason"] for one in row["worst"])
+    assert any("high at main-1" in text for text in said["resolution"]["reasons"])
+
+
+def test_wide_errors_of_few_cells_name_the_differences_that_make_them() -> None:
+    case = stub(6, ramp(0.5, 0.02, 1.0, 0.0), beside=600)
+    said = peak_errors(fvsolve.run(case), fvsolve.load(case))["peaks"]["gate.head"]
+    assert any("m between resolutions" in (said[side]["reason"] or "") and "more cells" in said[side]["reason"]
+               for side in ("least", "greatest"))  # fmt: skip
 
 
 def test_a_pulse_that_no_cell_shows_is_not_known() -> None:
