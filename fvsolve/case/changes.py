@@ -47,7 +47,7 @@ def classed(case: Case, keys: tuple[Any, ...]) -> str:
     """The class of a key as this case has it."""
     found, links = declared(case.raw, keys).changes, [link_said(case.raw, name) for name in case.raw.get("links", {})]
     if keys[0] == "links" and keys[2:3] == ("length",) and keys[1] in pieces_of(case.raw):
-        return SHAPE  # what stands along it by chainage cuts it between other cells
+        return SHAPE  # its pieces by chainage get other cells
     if found == COUNTED:
         found = SHAPE if any(one["type"] == "pipe" and "cells" not in one for one in links) else PROFILE
     unsteady = any(one.get("friction", {}).get("model") == "unsteady" for one in links)
