@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
+from fvsolve.basins.lower_pattern import all_of
 from fvsolve.model.sparsity import Couplings
 from fvsolve.model.sparsity_scalars import scalar_pairs
 
@@ -17,3 +18,12 @@ def sparsity(model) -> csc_array:
     return csc_array(
         coo_array((np.ones(rows.size, dtype=bool), (rows, states)), shape=(n + model.ledgers, n)), dtype=bool
     )
+
+
+def lumped(model) -> np.ndarray:
+    """States of lumped parts, int64[q]: their pressures are hundreds of bars; restrictions bend over few pascals."""
+    if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
+        return np.zeros(0, dtype=np.int64)
+    pipes = model.tables.pipes[model.tables.pipes["delay"] < 0]
+    cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes] + [all_of(basin) for basin in model.basins]
+    return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells]))

@@ -254,10 +254,10 @@ class Model(Shown):
     @cached_property
     def structure(self):
         """Pattern of the Jacobian and the linear algebra that fits it, or that `numerics.linear_algebra` names."""
-        from fvsolve.model.dependence import sparsity
+        from fvsolve.model.dependence import lumped, sparsity
         from fvsolve.steppers.structure import Structure
 
-        return Structure(sparsity(self), self.case.numerics.linear_algebra)
+        return Structure(sparsity(self), self.case.numerics.linear_algebra, lumped(self))
 
     def new_out(self) -> np.ndarray:
         """An array for what the rhs writes beside dydt."""

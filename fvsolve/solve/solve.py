@@ -390,7 +390,7 @@ class Run:
         name = self.model.case.numerics.method
         if name != automatic.AUTO:
             return [{"time": self.start, "method": name, "why": "as numerics.method says"}]
-        return automatic.account(self.start, self.changes, self.loop.orders[slots.PRICE])
+        return automatic.account(self.start, self.changes, *self.loop.orders[[slots.PRICE, slots.SIZE]])
 
     def close(self, reason: str, saved: bool = True) -> Summary:
         model, loop = self.model, self.loop

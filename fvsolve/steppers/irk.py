@@ -30,6 +30,7 @@ from fvsolve.steppers.newton import (
     find_worst,
     renew,
     smoothed_error,
+    spectral_radius,
     verdict,
 )
 from fvsolve.steppers.slots import (
@@ -45,12 +46,14 @@ from fvsolve.steppers.slots import (
     MADE,
     NEWTON,
     NEWTON_FAILED,
+    RADIUS,
     SEEN,
     SHIFT,
     SIZE,
     STEPS,
     STORE,
     TOLERANCE,
+    WATCH,
 )
 from fvsolve.steppers.step import combine, copy, error_norm, small
 from fvsolve.steppers.structure import SIZE as STATES
@@ -311,6 +314,8 @@ def attempt(
                 rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
                 vectors[s + RATE],
             )  # fmt: skip
+            if orders[WATCH] != 0.0:
+                memory[RADIUS] = spectral_radius(shape, work, nnz, scale, vectors[s + INCREMENT])
         why = FAILED
         if work[SHIFT] != 1.0 / h:
             known, work[SHIFT] = work[SHIFT] == -1.0 / h, 0.0

@@ -6,12 +6,10 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
 from fvsolve.jit import inner, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
-from fvsolve.steppers.newton import BASE, INCREMENT, MOVED, RATE, renew
+from fvsolve.steppers.newton import BASE, INCREMENT, MOVED, RATE, renew, spectral_radius
 from fvsolve.steppers.slots import (
     CALLS,
     CONTROL,
@@ -49,23 +47,6 @@ def slope_in_time(rhs, handle, t, h, y, k, supply, where, out, memory, work, vec
         slope[e] = (slope[e] - k[0, e]) * per
     for m in range(ledgers):
         work[work.size - ledgers + m] = (out[where + m] - supply[0, m]) * per
-
-
-@inner
-def spectral_radius(shape, work, nnz, scale, v):
-    """Largest |eigenvalue| of the Jacobian, about, by five turns of the power method."""
-    n, product, before, now = v.size, work[HEADER + nnz :], 0.0, 0.0
-    for e in range(n):
-        v[e] = scale[e] if e % 2 == 0 else -scale[e]
-    for _ in range(5):
-        multiply(shape, work[HEADER : HEADER + nnz], v, product)
-        total = 0.0
-        for e in range(n):
-            total += (product[e] / scale[e]) * (product[e] / scale[e])
-        before, now = now, sqrt(total)
-        for e in range(n):
-            v[e] = product[e] / now if now > 0.0 else 0.0
-    return sqrt(before * now)  # of a pair, whose single quotients swing
 
 
 @inner

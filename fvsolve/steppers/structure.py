@@ -19,8 +19,9 @@ from fvsolve.steppers.signatures import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COM
 
 # The header: lengths, then offsets into the same array.
 SIZE, LEDGERS, COLORS = 0, 1, 2  # states n, ledger rows m, colours
-STARTS, ROWS, COLOR_STARTS, COLOR_COLUMNS, OWN = 3, 4, 5, 6, 7  # pattern by columns; columns by colour; the kind's own
-HEADER = 8
+STARTS, ROWS, COLOR_STARTS, COLOR_COLUMNS = 3, 4, 5, 6  # pattern by columns; columns by colour
+FINE, OWN = 7, 8  # by columns, 1 where the increment is fine; the kind's own
+HEADER = 9
 
 KINDS = ("dense", "banded", "sparse")
 SMALL = 16  # states up to which dense factors are as quick as any (0.2 to 0.6 us), with nothing to set up
@@ -33,10 +34,12 @@ class Structure:
 
     pattern : bool[n + m, n], sparse by columns: n states, then m ledger rows that are no part of the factorisation
     kind : "dense", "banded" or "sparse"; chosen by n and the pattern where None. Raises FvsolveError for another.
+    fine : numbers of the states whose increments in differences are fine
     """
 
     pattern: Any
     kind: str | None = None
+    fine: Any = ()
 
     def __post_init__(self) -> None:
         from scipy.sparse import csc_array
@@ -98,7 +101,7 @@ class Structure:
         counts = np.bincount(self.colors, minlength=self.color_count)
         color_starts = np.concatenate(([0], np.cumsum(counts)))
         parts = [self.pattern.indptr, self.pattern.indices, color_starts, np.argsort(self.colors, kind="stable")]
-        parts.append(self._own[0])
+        parts += [np.isin(np.arange(self.n), self.fine), self._own[0]]
         offsets = HEADER + np.cumsum([0] + [part.size for part in parts[:-1]])
         header = [self.n, self.m, self.color_count, *offsets]
         return np.concatenate([np.asarray(part, dtype=np.int64) for part in (header, *parts)])

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from truth.folders import CASES
@@ -73,11 +74,25 @@ def thimble(**numerics) -> dict:
     return scene(nodes, links, 2.0, numerics, ["pot.pressure", "tub.pressure"], 0.05)
 
 
-def test_it_ends_where_a_single_method_does():
-    auto, fixed = (fvsolve.run(thimble(method=name, rtol=1e-8)) for name in ("auto", "rodas-5p"))
-    assert auto.ok and [row["method"] for row in auto.summary["methods"]][:2] == ["dormand-prince", "rodas-5p"]
+@pytest.mark.parametrize("rtol, implicit", [(1e-6, "rodas-5p"), (1e-8, "radau-iia-5")])
+def test_it_ends_where_a_single_method_does(rtol, implicit):
+    auto, fixed = (fvsolve.run(thimble(method=name, rtol=rtol)) for name in ("auto", "rodas-5p"))
+    assert auto.ok and [row["method"] for row in auto.summary["methods"]][:2] == ["dormand-prince", implicit]
     for name in ("pot.pressure", "tub.pressure"):
-        assert auto[name] == pytest.approx(fixed[name], rel=1e-6)
+        assert auto[name] == pytest.approx(fixed[name], rel=max(1e-6, 10 * rtol))
+
+
+@pytest.mark.parametrize("end", [0.6, 2.5])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+def test_a_servo_arm_takes_about_the_steps_of_radau(end, rtol):
+    """Its hoses carry next to nothing for seconds, where their law bends over few pascals of 150 bar."""
+    arm, found = Path(__file__).parents[1] / "truth" / "servo-arm.toml", {}
+    for name in ("auto", "radau-iia-5"):
+        keys = {"numerics.method": name, "numerics.rtol": rtol, "numerics.end": end}
+        found[name] = fvsolve.run(arm, set=keys)
+    auto, radau = (one.summary for one in found.values())
+    assert auto["rhs"] + 500 < 2.0 * (radau["rhs"] + 500)
+    assert found["auto"]["arm.angle"] == pytest.approx(found["radau-iia-5"]["arm.angle"], rel=30 * rtol)
 
 
 def test_auto_goes_by_the_error_even_where_there_are_cells():

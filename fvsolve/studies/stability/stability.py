@@ -39,8 +39,8 @@ from fvsolve.studies.stability.row import StabilityRow, read
 from fvsolve.studies.stability.system import predicted, system
 
 AUTOMATIC = (
-    f"auto begins with {automatic.EXPLICIT}, of which its row is; a run goes on with {automatic.IMPLICIT} where that "
-    "is cheaper, which its row does not say"
+    f"auto begins with {automatic.EXPLICIT}, of which its row is; a run goes on with {automatic.IMPLICIT} or "
+    f"{automatic.TIGHT} where that is cheaper, which its row does not say"
 )
 VISIBLE = 1e-3  # of a small deviation: what limited schemes are tried with, above what WENO takes for round-off
 LONGER = 10  # times as many steps, for Euler with a limiter
