@@ -22,6 +22,7 @@ from truth.scenes import (
     valve,
 )
 
+from fvsolve.steppers import METHODS
 from fvsolve.studies.energy.energy import energy
 
 FRICTION = {"model": "steady", "factor": 0.02}
@@ -146,3 +147,15 @@ def test_at_a_head_of_water_power_is_rho_g_h_q():
     found = energy(case)
     q = 0.01 * math.sqrt(2 * GRAVITY * 50.0)
     assert found.supplied["lake"][-1] == pytest.approx(RHO * GRAVITY * 50.0 * q, rel=1e-6)
+
+
+@pytest.mark.parametrize("method", [*(one.name for one in METHODS.values() if one.adaptive), "auto"])
+@pytest.mark.parametrize("end", [150.0, 400.0])
+def test_what_a_draining_tank_loses_is_what_it_had(method, end):
+    """Its level is a parabola in time, which a method of order two steps exactly; the power in the drain is none."""
+    nodes, links = {"up": tank(2.0, 10.0), "out": reservoir(AMBIENT)}, {"drain": valve("up", "out", 0.01)}
+    found = energy(scene(nodes, links, end, {"method": method, "rtol": 1e-6}, ["up.level"]))
+    speed = 0.01 / 2.0 * math.sqrt(2.0 * GRAVITY)  # of its surface over the root of its level
+    left = max(0.0, math.sqrt(10.0) - 0.5 * speed * end) ** 2
+    lost = RHO * GRAVITY * 2.0 * (10.0**2 - left**2) / 2.0
+    assert found.dissipated["drain"][-1] == pytest.approx(lost, rel=1e-2)

@@ -12,6 +12,8 @@ from fvsolve.solve.solve import Run
 from fvsolve.steppers import automatic, slots
 
 ROWS = 1000  # of the table, about
+SHARE = 1e-3  # of all that is dissipated: what its quadrature may err by in a step, where steps go by a tolerance
+LEAST, MOST = 0.1, 8.0  # factors on the step for that
 SOUND = (
     slots.CHUNK,
     slots.DONE,
@@ -28,7 +30,8 @@ class Booked(Loop):
         """Book from here on; on_step() is called after every accepted step."""
         self.accounts, self.on_step = accounts, on_step
         self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # the lines, then what Newton leaves
-        self.supplied, self.rates = accounts.of("supplied"), accounts.of("rate")
+        self.supplied, self.rates, self.lost = (accounts.of(what) for what in ("supplied", "rate", "dissipated"))
+        self.longest = float(self.orders[slots.STEP_MAX])
         self.dydt, self.beside = np.zeros(self.model.y_size), self.model.new_out()
         self.orders[slots.LEAPS] = 0.0  # a leap leaves no stages behind
 
@@ -66,9 +69,24 @@ class Booked(Loop):
         if stepper.method.kind == "linear":
             total[:-1] = b @ self.linearly_implicit(t, y, h, a, c, k)
             return h * total
-        for i in np.flatnonzero(b):
-            total += b[i] * self.stage(t + c[i] * h, y + h * (a[i] @ k), k[i], supplies[i])
+        s = b.size
+        error = stepper.coefficients[s * s + 2 * s : s * s + 3 * s]  # weights of the error estimate
+        error = error * (self.orders[slots.CONTROL] == slots.TOLERANCE and stepper.method.kind != "full")
+        off = np.zeros_like(total)
+        for i in np.flatnonzero((b != 0.0) | (error != 0.0)):
+            power = self.stage(t + c[i] * h, y + h * (a[i] @ k), k[i], supplies[i])
+            total += b[i] * power
+            off += error[i] * power
+        self.limit_next(h, h * np.abs(off[self.lost]).sum(), np.abs((self.total + h * total)[self.lost]).sum())
         return h * total
+
+    def limit_next(self, h: float, off: float, lost: float) -> None:
+        """Bound the next step where the quadrature of what is dissipated was `off` in this one, of `lost` so far [J].
+
+        States that are parabolas in time have no error of order two, but their powers do.
+        """
+        grow = min(MOST, 0.9 * (SHARE * lost / off) ** (1.0 / self.orders[slots.ORDER])) if off > 0.0 else MOST
+        self.orders[slots.STEP_MAX] = min(self.longest, h * max(LEAST, grow))
 
     def jumped(self, t: float, y: np.ndarray) -> np.ndarray:
         """What the weights of the step from (t, y) miss of what jumps in delay lines change within it [J].
