@@ -45,13 +45,18 @@ class Halves:
         self.kept = np.zeros(4 + 5 * self.which.size)
         self.error, self.astray, self.sums, self.least, self.greatest = self.kept[4:].reshape(5, -1)
         self.least[:] = self.greatest[:] = model.start[self.which]
-        self.kept[3], self.stepper = 1.0, None
+        self.kept[3], self.stepper, self.dear = 1.0, None, not method.explicit
         if self.which.size:
             steps = (numerics.end - numerics.start) / self.step
             self.every = max(1.0, steps // DEAR)
             if method.explicit:
                 self.every = max(1.0, steps // LOOKS, min(SELDOM, steps // FEWEST))
             self.kept[1], self.small = self.every, spreads(model, LEAST)[self.which]
+
+    def begin(self, steps: float) -> None:
+        """Look at the first step of a segment, within which a store may fill: implicit methods bear it, right or not."""
+        if self.which.size and self.dear:
+            self.kept[1] = steps + 1.0
 
     def room(self, steps: float) -> float:
         """Steps that may be taken before the next look."""

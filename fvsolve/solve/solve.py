@@ -264,6 +264,7 @@ class Run:
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
         self.stop_columns()
+        self.soundness.halves.begin(self.loop.memory[slots.STEPS])
         if jumped:
             self.row(self.loop.t, end)
         self.loop.begin(end, end if jump else NO_LIMIT)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truth.scenes import scene
+from truth.scenes import chamber, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.limits.grid import advection_limit
@@ -268,3 +268,17 @@ def test_events_that_crowd_within_a_millionth_of_a_run_are_bounded_under_error_c
             goes_on = loop.switch(loop.armed.copy())
             assert goes_on or k == count - 1
         assert goes_on is not crowds
+
+
+@pytest.mark.parametrize("opens", [0.0, 2.0])
+@pytest.mark.parametrize("step", [0.05, 1.0])
+def test_a_store_that_fills_within_a_linearised_step_is_reported(step, opens):
+    """It creeps to where it would be at once: the first step after each kink is looked at."""
+    nodes = {"pump": reservoir(8e6), "pot": chamber(1e-4, 1e6)}
+    opening = {"time": [0.0, opens], "value": [0.0, 1.0], "kind": "step"} if opens else 1.0
+    case = scene(nodes, {"in": valve("pump", "pot", 1e-5, opening)}, opens + 200 * step,
+                 {"method": "rodas-5p", "step": step}, ["pot.pressure"])  # fmt: skip
+    found = {one.kind: one for one in fvsolve.run(case).warnings}
+    assert "pot.mass" in found["step-error"].place and found["step-error"].value > 0.005
+    case["numerics"]["method"] = "radau-iia-5"
+    assert "step-error" not in {one.kind for one in fvsolve.run(case).warnings}

@@ -57,9 +57,9 @@ def test_steps_that_are_said_to_be_safe_are_right(truth):
     assert swing("rodas-5p", 2e-4)[:, at] == pytest.approx(truth[:, at], rel=1e-5)
 
 
-@pytest.mark.parametrize("method, step", [("rk4", 2e-4), ("rodas-5p", 1.4e-3)])
+@pytest.mark.parametrize("method, step", [("rk4", 2e-4), ("rodas-5p", 4e-2)])
 def test_steps_that_fail_are_found(arm, truth, method, step):
-    """Explicit ones on the way; linearly implicit ones where the arm stops, and pressures are 60 bar off."""
+    """Explicit ones on the way; linearly implicit ones where the arm stops, and pressures are 18 bar off."""
     assert runs(arm, method).fails(step)
     if method == "rodas-5p":
         assert np.abs(swing(method, step) - truth)[1].max() > 10.0
