@@ -123,7 +123,7 @@ def peaks(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> 
             span = (one["greatest"] or 0.0) - (one["least"] or 0.0)
             if error is not None:
                 least = 2.0 * (missed + ROUNDING * largest[one["unit"]]) + LEAST * abs(one[side])
-                error += least + abs(sign * one[side] - triple[1])
+                error += least + abs(sign * one[side] - triple[1]) + unresolved.tolerance * span
                 span += 2.0 * least / WIDE  # what rounding leaves of a constant is not wide
             made[name][side] = {
                 "value": one[side], "error": error, "order": None if unknown else order(triple, parted(runs)),
@@ -164,7 +164,7 @@ def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], u
     error = None if part in unresolved.unknown else bounded(runs, triple, places)
     span = max((float(np.ptp(one[-2][1])) for one in places if usable(one)), default=math.inf)
     if error is not None:
-        error += LEAST * abs(row["value"] or 0.0)
+        error += LEAST * abs(row["value"] or 0.0) + unresolved.tolerance * (span if math.isfinite(span) else 0.0)
     doubtful = row["state"] == HOLDS and (error is None or not row["margin"] >= error)
     reason = unresolved.reason(part, triple, error, span + 2.0 * LEAST / WIDE * abs(row["value"] or 0.0), row["unit"])
     return row | {"error": error, "reason": reason, "state": OPEN if doubtful else row["state"]}

@@ -13,8 +13,10 @@ from fvsolve.errors import listing
 from fvsolve.model.resolution import ANSWER, answering
 from fvsolve.parts.schedule import Schedule
 from fvsolve.studies.accuracy.cells import counts, from_files, in_cells, scaled
+from fvsolve.studies.lines import lines
 
 Part = tuple[str, str]  # group and name
+MANY_STEPS = 20.0  # tolerances of one step, which those between the jumps of delay lines add up to
 FEW = 4  # cells that differ at half and twice the resolution
 NAMED = 3  # of what is listed
 WIDE = 0.05  # of the span of a signal: errors from which on their reason is said
@@ -63,12 +65,14 @@ def pulse(value: Any) -> float:
 class Unresolved:
     """Why peaks of a case are not known or their errors wide, each with its remedy.
 
-    unknown : part -> why its peaks are not known; shared : what makes the errors of all peaks wide
+    unknown : part -> why its peaks are not known; shared : what makes the errors of all peaks wide; tolerance : of the
+    span of a signal, what the steps of delay lines add up to under error control
     """
 
     def __init__(self, case: Any, runs: dict[float, Any]) -> None:
         self.case, self.runs = case, runs
         self.unknown = unknown_parts(case)
+        self.tolerance = MANY_STEPS * (case.numerics.rtol or 0.0) if lines(case) else 0.0
         liquid = ["liquid parts, so no order is believed; give more cells"] if parted(runs) else []
         self.shared = [*liquid, *differing(runs), *few_beside_answers(case)]
 

@@ -448,3 +448,25 @@ def test_before_a_valve_that_shuts_it_comes_to_rest(name, twice, turned, law):
         assert result.ok and len(result.summary["events"]) <= 6, result.reason
         assert abs(result["one.flow"][-1]) < 1e-12
         assert not result["tap.flow"][result.t > 0.2 + 1e-9].any()
+
+
+@pytest.mark.parametrize("beside", ["tank", "reservoir"])
+def test_liquid_that_does_not_part_shuts_it_when_the_law_without_cavities_does(beside):
+    """`cavitation = true` changes no instant of a check valve beside a tank, at one and the same scheme."""
+    ground = {"elevation": 0.0}
+    ends = {"tank": {"type": "tank", "area": 0.5, "level": 15.0}, "reservoir": {"type": "reservoir", "head": 15.0}}
+    nodes = {"lake": {"type": "reservoir", "head": 20.0, **ground}, "a": junction(**ground), "j": junction(**ground)}
+    nodes["far"] = ends[beside] | ground
+    times = [0.5, 0.6, 1.1, 1.2, 1.6, 1.7, 3.0, 3.3, 4.0, 4.1]
+    opening = {"time": times, "value": [1.0, 0.05, 0.05, 1.0, 1.0, 0.1, 0.1, 0.8, 0.8, 0.0]}
+    disc = {"type": "check-valve", "from": "j", "to": "far", "diameter": 0.3, "loss_coefficient": 1.0}
+    links = {"tap": valve("lake", "a", 0.001, opening), "check": disc,
+             "main": pipe("a", "j", 200.0, 0.3, 1200.0, 160, friction=FRICTION)}  # fmt: skip
+    numerics, found = {"scheme": "muscl", "method": "ssp-rk2", "courant": 0.5}, []
+    for fluid in ({"law": "log"}, {"law": "mixture", "cavitation": True}):
+        result = fvsolve.run(scene(nodes, links, 2.6, numerics, ["check.flow"], 0.05, fluid={**WATER, **fluid}))
+        assert result.ok and not result.summary["cavities"]
+        found.append([(one["what"], one["time"]) for one in result.summary["events"]])
+    without, among = found
+    assert [what for what, _ in without] == [what for what, _ in among] and len(without) >= 8
+    assert [t for _, t in among] == pytest.approx([t for _, t in without], abs=200.0 / 1200.0 / 160.0)

@@ -20,6 +20,7 @@ from fvsolve.kernels.delay.history import (
     MANY,
     MENDED,
     QUEUE,
+    SWING,
     arrived_until,
     both_waves,
     clock_of,
@@ -53,8 +54,9 @@ def shorter_lines(tables):
 
 @njit(forceinline=True)
 def enough(past, tables, pipe):
-    """The least jump of a wave that is kept as one [kg/s]."""
-    return max(tables.settings[0]["jumps"] * past[GREATEST], NOISE * 0.5e5) * pipe["admittance"]
+    """Least jump of a wave that is kept as a jump, a share of the greatest jump and of the greatest wave [kg/s]."""
+    least = tables.settings[0]["jumps"] * max(past[GREATEST], past[SWING])
+    return max(least, NOISE * 0.5e5) * pipe["admittance"]
 
 
 @njit

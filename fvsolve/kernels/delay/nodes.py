@@ -21,7 +21,6 @@ from fvsolve.kernels.delay.history import (
     MANY,
     NEXT,
     QUEUE,
-    SWING,
     jumps_at,
     queue_at,
     same_time,
@@ -59,8 +58,7 @@ def ends_step(past, tables, line, pipe, q, wave, size):
     the step has been taken.
     """
     acts = line["acts"]
-    least = max(enough(past, tables, pipe), tables.settings[0]["jumps"] * past[SWING] * pipe["admittance"])
-    if acts == 0 or abs(size) <= COARSE * least:
+    if acts == 0 or abs(size) <= COARSE * enough(past, tables, pipe):
         return False
     first, last = q == 0 and acts % 2 == 1, q + 1 == line["stretches"] and acts >= 2
     return (first and (wave == 1 or rubs(pipe))) or (last and (wave == 0 or rubs(pipe)))
