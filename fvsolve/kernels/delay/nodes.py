@@ -14,13 +14,16 @@ from fvsolve.kernels.delay.history import (
     ARRIVED,
     COUNT,
     FIRST,
+    GREATEST,
     HELD,
     INFINITE,
     KNOWN_COUNT,
     KNOWN_TIME,
+    LIVE,
     MANY,
     NEXT,
     QUEUE,
+    SWING,
     jumps_at,
     queue_at,
     same_time,
@@ -35,6 +38,7 @@ from fvsolve.kernels.records import ALONE, JUNCTION
 
 NAN = float("nan")
 COARSE = 4.0  # of the least jump that is kept: so `numerics.accuracy` of the greatest jump, and of the greatest wave
+MANY_JUMPS = 1e6  # on their way at once: of so many only the greatest wave ends a step, of fewer a share of it
 
 
 @njit(forceinline=True)
@@ -58,7 +62,10 @@ def ends_step(past, tables, line, pipe, q, wave, size):
     the step has been taken.
     """
     acts = line["acts"]
-    if acts == 0 or abs(size) <= COARSE * enough(past, tables, pipe):
+    if acts == 0:
+        return False
+    among_many = past[LIVE] / MANY_JUMPS * max(past[GREATEST], past[SWING]) * pipe["admittance"]
+    if abs(size) <= max(COARSE * enough(past, tables, pipe), among_many):
         return False
     first, last = q == 0 and acts % 2 == 1, q + 1 == line["stretches"] and acts >= 2
     return (first and (wave == 1 or rubs(pipe))) or (last and (wave == 0 or rubs(pipe)))
