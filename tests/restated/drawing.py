@@ -15,6 +15,8 @@ from truth.scenes import WATER, chamber, inflow, junction, lake, pipe, ramp, res
 def drawn(examples: int):
     """Settings of a claim: the same few scenes every time, or as many others as are asked for.
 
+    Hypothesis draws numbers that stand in the modules that are loaded, so other code may give other scenes.
+
     What fails is made small, and printed with a line that reproduces it.
     """
     asked = os.environ.get("FVSOLVE_EXAMPLES")

@@ -18,6 +18,14 @@ from restated.test_networks import EXPERIMENTAL, near
 
 pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)
 SMALL = 1e-9  # accuracy: jumps are kept down to a quarter of it
+# Of jumps that arrive at a valve at once rounding decides which changes its flow by how much, and so what of a step is
+# a jump. Ends of steps agree to 1e-12; rows between them differed by 2.3e-8 where lengths and speeds are round numbers.
+BETWEEN_STEPS = 1e-7
+
+
+def nearly(case: dict) -> float:
+    """How far rows of two sayings may be apart."""
+    return max(10.0 * near(case), BETWEEN_STEPS)
 
 
 def followed(case: dict, line: str) -> dict:
@@ -83,7 +91,7 @@ def test_other_rows(case):
 def test_other_order(case, data):
     nodes = data.draw(st.permutations(list(case["nodes"])))
     links = data.draw(st.permutations(list(case["links"])))
-    same(told_lines(case), told_lines(sayings.reordered(case, nodes, links)), 10 * near(case))
+    same(told_lines(case), told_lines(sayings.reordered(case, nodes, links)), nearly(case))
 
 
 @drawn(4)
@@ -98,16 +106,16 @@ def test_links_drawn_from_the_other_end(case, data):
     def name(probe):
         return sayings.from_other_end(probe, case, chosen)
 
-    same(told_lines(case), told_lines(sayings.swapped(case, chosen)), 10 * near(case), name=name, change=sign)
+    same(told_lines(case), told_lines(sayings.swapped(case, chosen)), nearly(case), name=name, change=sign)
 
 
 @drawn(3)
 @given(case=given_steps(), height=st.sampled_from([16.0, 1000.0]))
 def test_everything_higher(case, height):
-    same(told_lines(case), told_lines(sayings.raised(case, height)), 10 * near(case))
+    same(told_lines(case), told_lines(sayings.raised(case, height)), nearly(case))
 
 
 @drawn(3)
 @given(case=given_steps())
 def test_other_units(case):
-    same(told_lines(case), told_lines(sayings.in_other_units(case)), 10 * near(case))
+    same(told_lines(case), told_lines(sayings.in_other_units(case)), nearly(case))
