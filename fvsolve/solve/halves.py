@@ -54,7 +54,7 @@ class Halves:
             self.kept[1], self.small = self.every, spreads(model, LEAST)[self.which]
 
     def begin(self, steps: float) -> None:
-        """Look at the first step of a segment, within which a store may fill: implicit methods bear it, right or not."""
+        """Look at the first step of a segment, within which a store may fill: implicit methods pass it anyway."""
         if self.which.size and self.dear:
             self.kept[1] = steps + 1.0
 
