@@ -73,7 +73,7 @@ SETTINGS = np.dtype(
         ("gas_power", "f8"),  # 1 / (gas exponent)
         ("weights", "i8"),  # offset in `floats` of the method's b, its c follow, and how many these are
         ("stages", "i8"),
-        ("jumps", "f8"),  # share of the greatest jump from which on a jump in a delay line is kept as one
+        ("jumps", "f8"),  # share of the greatest wave from which on a jump in a delay line is kept as one
         ("saturation", "f8"),  # gas pressure at which all of it is dissolved; infinite for none [Pa]
     ],
     align=True,
