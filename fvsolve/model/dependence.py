@@ -26,4 +26,5 @@ def lumped(model) -> np.ndarray:
         return np.zeros(0, dtype=np.int64)
     pipes = model.tables.pipes[model.tables.pipes["delay"] < 0]
     cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes] + [all_of(basin) for basin in model.basins]
-    return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells]))
+    walls = [[at for at, _, _ in basin.stretches] for basin in model.basins]  # every cell's volume follows these
+    return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells, *walls]))
