@@ -17,6 +17,7 @@ from fvsolve.studies.lines import lines
 
 Part = tuple[str, str]  # group and name
 MANY_STEPS = 20.0  # tolerances of one step, which those between the jumps of delay lines add up to
+SMOOTHED = 0.05  # of numerics.accuracy: what jumps below a quarter of it come to, which lines smooth over a step
 FEW = 4  # cells that differ at half and twice the resolution
 NAMED = 3  # of what is listed
 WIDE = 0.05  # of the span of a signal: errors from which on their reason is said
@@ -72,7 +73,9 @@ class Unresolved:
     def __init__(self, case: Any, runs: dict[float, Any]) -> None:
         self.case, self.runs = case, runs
         self.unknown = unknown_parts(case)
-        self.tolerance = MANY_STEPS * (case.numerics.rtol or 0.0) if lines(case) else 0.0
+        self.tolerance = 0.0
+        if case.numerics.rtol is not None and lines(case):
+            self.tolerance = max(MANY_STEPS * case.numerics.rtol, SMOOTHED * case.numerics.accuracy)
         liquid = ["liquid parts, so no order is believed; give more cells"] if parted(runs) else []
         self.shared = [*liquid, *differing(runs), *few_beside_answers(case)]
 

@@ -42,3 +42,16 @@ def test_mechanisms_call_rates_in_a_loop():
     slate, once, many = mechanisms.rates(mechanisms.chain(1))
     once(), many(3)
     assert slate is not None
+
+
+def test_bands_of_delay_lines_hold_what_eight_times_the_resolution_gives():
+    """Every control of steps is among these networks; bands were zero where `courant` was given (`line_bands.py`)."""
+    import line_bands
+
+    found, controls = [], set()
+    for k in (0, 1, 2, 3, 5, 6):
+        scene = line_bands.network(np.random.default_rng([1, k]))
+        controls |= {"courant", "step", "rtol"} & scene["numerics"].keys()
+        found += line_bands.bands(scene)
+    assert controls == {"courant", "step", "rtol"}
+    assert len(found) > 60 and all(off <= band for _, band, off in found)
