@@ -5,8 +5,11 @@ A maximum of values c, m, f has the differences a = m - c and b = f - m, and r =
 b differ in sign; times 2.15, and once more by up to 2 where differences grow. Of all maxima those of the middle
 resolution with their rests bound the greatest: one that is lower may come to exceed it. What else it may be off by:
 a fifth of the differences of all maxima on average; and the differences between the signals at the two times of the
-greatest, up to 16 times its own, as a crest that moves has not come to its height. The numbers are those that hold
-for random mains (benchmarks/peak_bands.py --random) at the least median.
+greatest, up to 16 times its own, as a crest that moves has not come to its height.
+
+The ratio of the mean differences of whole signals says how far they have converged: where it is small, half of that
+bound is enough; and the rest of the greatest by this ratio, where its own is less by chance, is the least bound. The
+numbers are those that hold for random mains (benchmarks/peak_bands.py --random) at the least median.
 """
 
 from __future__ import annotations
@@ -21,6 +24,8 @@ GROWTH = 2.0  # at most, of differences that grow
 BESIDE = 0.6  # of that safety, of places that are not the greatest
 SHARE = 0.2  # of the mean difference of all maxima
 MOVED = 16.0  # differences of the greatest, at most, that these and those of signals where it stands count
+CONVERGED, TRUSTED = (0.35, 0.75), (0.5, 1.0)  # ratios of mean differences of signals -> share of the bound
+FIRM = 1.6  # of the rest by that ratio
 RISE = 0.002  # of the range of a signal: what parts two maxima
 
 Signal = tuple[np.ndarray, np.ndarray]  # times and values
@@ -42,7 +47,9 @@ def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], 
     (cuts, _), (middle, fine), most = found[k], places[k][-2:], float(np.max(np.abs(np.diff(own))))
     moved = apart(middle, fine) if segment(cuts, middle) == segment(cuts, fine) else 0.0
     mean = SHARE * float(np.mean(np.max(np.abs(np.diff(rows[k + 1], axis=1)), axis=1, initial=0.0)))
-    return max(error, min(max(moved, mean), MOVED * most))
+    ratio = ratio_of_signals(places[k])
+    error *= float(np.interp(ratio, CONVERGED, TRUSTED))
+    return max(error, min(max(moved, mean), MOVED * most), FIRM * rest_by(ratio, own[0]))
 
 
 def three(maxima: np.ndarray) -> np.ndarray:
@@ -96,6 +103,23 @@ def rests(triples: np.ndarray, believed: bool = True) -> np.ndarray:
     r = np.clip(ratio, QUICK, SLOW) if believed else np.full(len(a), SLOW)
     rest = SAFETY * np.maximum(b, a * r) / (1.0 - np.where(sways, SLOW, r))
     return rest * np.where(sways, 1.0, np.clip(ratio, 1.0, GROWTH))
+
+
+def rest_by(ratio: float, values: np.ndarray) -> float:
+    """What all finer resolutions may add to the second of three values, by its own ratio of differences or this one."""
+    a, b = np.abs(np.diff(values)).tolist()
+    r = min(max(b / a if a > 0.0 else 0.0, ratio, QUICK), SLOW)
+    return max(b, a * r) / (1.0 - r)
+
+
+def ratio_of_signals(signals: Sequence[Signal]) -> float:
+    """Mean difference of the two finest signals over that of the two coarsest, SLOW where there are but two."""
+    if len(signals) < 3:
+        return SLOW
+    t = signals[-1][0]
+    coarse, middle, fine = (np.interp(t, *one) for one in signals)
+    before = float(np.mean(np.abs(middle - coarse)))
+    return float(np.mean(np.abs(fine - middle))) / before if before > 0.0 else SLOW
 
 
 def apart(middle: Signal, fine: Signal) -> float:
