@@ -24,6 +24,7 @@ KNOWN_TIME, KNOWN_COUNT = 12, 13  # of the arrivals that are kept
 MENDED = 14  # time of the last state that was put right [s]
 NEXT = 15  # when a jump arrives next where something acts at once [s]: before it has arrived no reading counts it
 HELD = 16  # 1 while only jumps that have been passed on are counted
+MOST_LIVE = 18  # the most jumps that were on their way at once
 SWING = 17  # the greatest wave so far, as a deviation from the profile [Pa]
 INFINITE = 1e300  # time [s]
 ZEROS = 8  # entries before the first, of the profile
@@ -277,6 +278,7 @@ def push_jump(past, places, at, t, size):
     past[here], past[here + queue] = t, size
     past[at + MANY] = many + 1.0
     past[LIVE] += 1.0
+    past[MOST_LIVE] = max(past[MOST_LIVE], past[LIVE])
     add_up(past, places, at, i)
     return True
 

@@ -19,8 +19,8 @@ from fvsolve.kernels.delay.history import (
     INFINITE,
     KNOWN_COUNT,
     KNOWN_TIME,
-    LIVE,
     MANY,
+    MOST_LIVE,
     NEXT,
     QUEUE,
     SWING,
@@ -59,12 +59,12 @@ def ends_step(past, tables, line, pipe, q, wave, size):
     """True if a jump of a wave of stretch q, or what friction turns back of it, ends a step as it arrives.
 
     So it does where something acts at once. A small one, which could as well be smoothed, lets such a device act when
-    the step has been taken.
+    the step has been taken. The bound never falls in a run: a jump that was to be passed on within a step would stay.
     """
     acts = line["acts"]
     if acts == 0:
         return False
-    among_many = past[LIVE] / MANY_JUMPS * max(past[GREATEST], past[SWING]) * pipe["admittance"]
+    among_many = past[MOST_LIVE] / MANY_JUMPS * max(past[GREATEST], past[SWING]) * pipe["admittance"]
     if abs(size) <= max(COARSE * enough(past, tables, pipe), among_many):
         return False
     first, last = q == 0 and acts % 2 == 1, q + 1 == line["stretches"] and acts >= 2
