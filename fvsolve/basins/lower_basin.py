@@ -144,7 +144,7 @@ class BasinRows:
         return []
 
     def watches(self, y: np.ndarray) -> list[Any]:
-        """What watches a run from deviations y: each can `look` at (t, state), has `kept` numbers, makes `notices`."""
+        """Watches of a run from deviations y: each can `look` at (t, state), has `kept` numbers, makes `notices`."""
         return []
 
     # ----------------------------------------------------------------------------------------------------------

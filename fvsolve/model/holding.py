@@ -51,7 +51,7 @@ def holding_pressures(draft, start) -> dict[int, float]:
 
 
 class Balance:
-    """What is left of forces on joints, then on masses that can move, under given pushes."""
+    """Rest of the forces on joints, then on masses that can move, under given pushes."""
 
     def __init__(self, draft, t: float) -> None:
         self.draft, self.free = draft, np.flatnonzero(draft.mass_table["y"] >= 0)

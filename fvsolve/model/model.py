@@ -243,7 +243,7 @@ class Model(Shown):
 
     @property
     def damped(self) -> bool:
-        """Whether stages of explicit steps are divided by friction, see `steppers.semi_implicit`."""
+        """True if stages of explicit steps are divided by friction, see `steppers.semi_implicit`."""
         return bool(self.tables.basins["damped"].any())
 
     @property

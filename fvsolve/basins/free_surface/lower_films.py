@@ -103,11 +103,11 @@ def watches(basin, y: np.ndarray) -> list[FilmWatch]:
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
-    """What there is to know of films at deviations y."""
+    """Notices of films at deviations y."""
     return [notice(basin, found) for look, notice in kinds(basin) if (found := look(basin, y))[0] > WRONG]
 
 
 def kinds(basin) -> list[tuple]:
-    """What films of a basin can be: how it is found, and what is said of it."""
+    """Kinds of films at a wrong speed in a basin: (function that finds the worst, function that makes its notice)."""
     found = [(too_slow, film)] if basin.scheme == "upwind" else []
     return [*found, (too_fast, friction)] if basin.capped else found
