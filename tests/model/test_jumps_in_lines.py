@@ -149,6 +149,25 @@ def test_pulses_that_meet_between_two_places_of_a_line():
     assert greatest == pytest.approx(1.5 * rise, rel=1e-6)  # the second divides between two pipes
 
 
+def test_a_small_jump_leaves_its_line_though_fewer_jumps_are_on_their_way_than_before():
+    """Forty jumps reach the lake within the step before; the small one, 6e-5 of their sum, reaches a shut disc alone.
+
+    The bound of jumps that end a step is proportional to the number on their way: it must not fall in between.
+    """
+    at, many = np.concatenate([[0.0], 0.5 + 1e-4 * np.arange(40)]), 0.05 * np.linspace(1.0, 0.0, 41)
+    small = 6e-5 * 0.05
+    nodes = {"lake": lake(50.0), "side": lake(2.0), "n": junction(), "m": junction(step(0.5, 0.0, -2.0 * small)),
+             "busy": junction({"time": at.tolist(), "value": many.tolist(), "kind": "step"})}  # fmt: skip
+    links = {"disc": DEVICES["rupture-disc"][0], "p": line("n", "m", 1030.0), "p2": line("m", "lake", 5000.0),
+             "main": line("lake", "busy", 1000.0)}  # fmt: skip
+    numerics = {"line": "delay", "method": "euler", "step": 0.05, "accuracy": 1e-9}
+    found = fvsolve.run(scene(nodes, links, 2.7, numerics, ["n.head", "m.head"], 0.01))
+    rise, start = SPEED * small / (np.pi / 4 * 0.3**2) / 9.80665, found["n.head"][0]
+    for name, first, before in (("n.head", 1.53, 0.0), ("m.head", 2.56, 1.0)):
+        for t, share in ((first - 0.015, before), (first + 0.015, 2.0), (first + 0.1, 2.0)):
+            assert np.interp(t, found.t, found[name]) - start == pytest.approx(share * rise, abs=1e-6 * rise), (name, t)
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_nothing_arrives_before_its_jump(method):
     """With friction: the flow at the lake is that of the start until 2 s, and what is left of it after."""
