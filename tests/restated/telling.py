@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from hypothesis import reject
 
 import fvsolve
 from fvsolve.model.checks import dear
@@ -24,17 +25,23 @@ class Told:
 REFUSALS = ("above every source", "no steady state")
 # Of a kind, what a step errs by: rounding may decide which steps of Newton are taken in parts, as runs say.
 IN_PARTS = 1e-3
+SCENES = {"built": 0, "dear": 0}
+FAIR, FIRST = 0.25, 2  # share of dear scenes, beside the first ones, above which a claim fails (0 of 550 were dear)
 
 
 def told(source, **more) -> Told:
     """Run a scene, which may be refused in the words of `REFUSALS`; any other error is one.
 
     One whose explicit steps follow something far quicker than waves is not run: that may take hours, as `check` says.
+    Hypothesis draws another in its place; a scene that is not drawn fails, and so does a claim if many are dear.
     """
     try:
         model = fvsolve.build(fvsolve.load(source)) if isinstance(source, dict) else source
+        SCENES["built"] += 1
         if isinstance(model, fvsolve.Model) and dear(model, None, ""):
-            return Told("too dear", np.empty(0), {})
+            SCENES["dear"] += 1
+            assert SCENES["dear"] <= FIRST + FAIR * SCENES["built"], SCENES
+            reject()
         result = fvsolve.run(source, **more)
     except fvsolve.CaseError as error:
         if not all(any(words in str(fault) for words in REFUSALS) for fault in error.faults):
