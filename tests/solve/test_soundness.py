@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truth.scenes import chamber, reservoir, scene, valve
+from truth.scenes import chamber, lake, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.limits.grid import advection_limit
@@ -280,5 +280,18 @@ def test_a_store_that_fills_within_a_linearised_step_is_reported(step, opens):
                  {"method": "rodas-5p", "step": step}, ["pot.pressure"])  # fmt: skip
     found = {one.kind: one for one in fvsolve.run(case).warnings}
     assert "pot.mass" in found["step-error"].place and found["step-error"].value > 0.005
+    case["numerics"]["method"] = "radau-iia-5"
+    assert "step-error" not in {one.kind for one in fvsolve.run(case).warnings}
+
+
+@pytest.mark.parametrize("level, area", [(2.0, 1e-4), (11.0, 3e-4), (11.9, 1e-3), (12.08, 2e-4), (60.0, 3e-5)])
+def test_a_tank_that_fills_within_a_few_linearised_steps_is_reported(level, area):
+    """It stays up to 1.1 m beside the level of the lake, 12 m: wherever that is over 0.5 % of its range."""
+    case = scene({"lake": lake(12.0), "pot": tank(area, level)}, {"in": valve("lake", "pot", 1e-3)}, 10.0,
+                 {"method": "rodas-5p", "step": 0.05}, ["pot.level"])  # fmt: skip
+    found = fvsolve.run(case)
+    wrong = np.mean(np.abs(found["pot.level"][-50:] - 12.0)) / np.ptp(found["pot.level"])
+    (told,) = [one for one in found.warnings if one.kind == "step-error"]
+    assert told.place == "pot.mass" and wrong > 0.005 and told.value > 0.5 * wrong
     case["numerics"]["method"] = "radau-iia-5"
     assert "step-error" not in {one.kind for one in fvsolve.run(case).warnings}
