@@ -199,7 +199,7 @@ def view(
     field: Annotated[str | None, typer.Option(help="pressure, head, velocity, flow, depth, a scalar, ...")] = None,
     contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="lines of equal values")] = 0,
     animate: Annotated[Path | None, typer.Option(metavar="FILE", help="all frames, as .gif or .mp4")] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="default RUN/FIELD.png")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="default RUN/view-FIELD.png")] = None,
 ) -> None:
     """Draw a field at a time, or all times, off screen, with PyVista."""
     from fvsolve.run import open_run

@@ -25,6 +25,7 @@ ENDED = "summary.json"
 PICTURES = ("history.png", "envelope.png")
 # Of `fvsolve report` and `plot`: another run's must not stand beside this one's numbers.
 REPORTS = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
+DRAWN = ("section-*.png", "view-*.png", "view-*.gif")  # the last two of `fvsolve view`
 
 
 class RunDirectory:
@@ -203,7 +204,8 @@ def clear(folder: Path) -> None:
 
 def clear_reports(folder: Path) -> None:
     """Delete the page, the workbook and the pictures that were made of earlier results in `folder`."""
-    for path in [*(folder / name for name in REPORTS), *folder.glob("section-*.png")]:
+    drawn = [path for name in DRAWN for path in folder.glob(name)]
+    for path in [*(folder / name for name in REPORTS), *drawn]:
         path.unlink(missing_ok=True)
 
 

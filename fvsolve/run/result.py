@@ -343,7 +343,7 @@ class Result(Shown):
             bodies = any(node.kind == "body" for node in self.case.nodes.values())
             field = "pressure" if pipes or not basins else next(iter(basins[0].own.fields), "pressure")
             field = "speed" if bodies and not pipes and not basins else field
-        out = Path(path) if path else self.directory / f"{field}{suffix}"
+        out = Path(path) if path else self.directory / f"view-{field}{suffix}"
         frames = self._frames() if times else []
         found = [(t, [file for at, file in frames if at == t]) for t in times]
         view(scene_of(self.case, self.summary["title"], field, found, contours), out)

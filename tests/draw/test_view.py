@@ -61,13 +61,15 @@ def test_lumped_parts_are_drawn_without_a_field(fvs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fvs("run", "two-tanks", "--no-pictures")
     code, out, err = fvs("view", "runs/two-tanks")
-    assert (code, err) == (0, "") and Path(out.strip()).name == "parts.png"
+    assert (code, err) == (0, "") and Path(out.strip()).name == "view-parts.png"
     assert Path(out.strip()).read_bytes().startswith(b"\x89PNG")
     case = fvsolve.load("two-tanks")
     said = {part.name: part.kinds[0] for part in scene_of(case, "", "parts", [], 0).parts}
     assert said == {name: part.kind for name, part in {**case.nodes, **case.links}.items()}
     code, _, err = fvs("view", "runs/two-tanks", "--field", "head")
     assert code == 2 and "no frames to draw" in err
+    fvs("run", "two-tanks", "--no-pictures", "--force")
+    assert not list(tmp_path.rglob("*.png"))  # of the run before
 
 
 def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(fvs, tmp_path, monkeypatch):
