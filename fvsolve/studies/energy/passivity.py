@@ -19,7 +19,7 @@ from fvsolve.doors import CALL, NAMES, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.output.summary import plain
 from fvsolve.schemes import SCHEMES
-from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT
+from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT, TIGHT_BELOW
 from fvsolve.studies.outcome import names
 
 CELLS = 20  # of the pipe
@@ -116,7 +116,8 @@ def checked(given, known: list[str], what: str) -> list[str]:
         if name not in known:
             if name == AUTO:
                 raise FvsolveError(
-                    f'method "{AUTO}" is none of its own: it changes between {EXPLICIT} and {IMPLICIT}; give these'
+                    f'method "{AUTO}" is not a single method: it changes between {EXPLICIT} and {IMPLICIT}, '
+                    f"below rtol {TIGHT_BELOW:g} {TIGHT}; give these"
                 )
             raise FvsolveError(f'no {what} named "{name}"{did_you_mean(name, known)}; {what}s are {", ".join(known)}')
     return given or list(known)
