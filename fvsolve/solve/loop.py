@@ -73,8 +73,6 @@ class Loop:
         for control, key in ((slots.COURANT, "courant"), (slots.FIXED_STEP, "step"), (slots.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[slots.CONTROL], self.orders[slots.SIZE] = control, getattr(numerics, key)
-        if self.orders[slots.CONTROL] != slots.TOLERANCE:  # given steps do not hang on rows
-            self.orders[slots.LANDS] = 0.0
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
         if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest

@@ -84,11 +84,11 @@ def next_step(orders, memory, out_rate, k, scale):
 
 @njit(forceinline=True)
 def landing(orders, memory, due, h):
-    """Time at which a step of h is to end early, for a row due within it; infinity for none [s]."""
-    if orders[LANDS] == 0.0 or due >= memory[T] + h * (1.0 - 1e-9) or too_short(orders, memory, due - memory[T]):
+    """Time at which a step by error control is to end early, for a row due within it; infinity for none [s]."""
+    if orders[LANDS] == 0.0 or orders[CONTROL] != TOLERANCE:  # given steps do not depend on rows
         return HUGE
-    if orders[CONTROL] != TOLERANCE and memory[LEFT] == 0.0:  # in parts that end where it would have
-        memory[LEFT] = h
+    if due >= memory[T] + h * (1.0 - 1e-9) or too_short(orders, memory, due - memory[T]):
+        return HUGE
     return due
 
 

@@ -117,7 +117,7 @@ def try_stages(
             if factor(shape, work[HEADER:], shift, store) != 0:
                 return FAILED
             work[SHIFT] = shift
-        if work[KNOWN] == 1.0:
+        if work[KNOWN] > 0.0:
             predict(b, c, c[i] * h / memory[LAST], k[0], vectors, k[i])
         else:
             for j in range(y.size):

@@ -324,7 +324,7 @@ def attempt(
             if made > 0:
                 work[SHIFT] = 1.0 / h
         if work[SHIFT] != 0.0:
-            if work[KNOWN] == 1.0 and (q < 5 or h <= 2.0 * memory[LAST]):  # high powers of a long step mislead
+            if work[KNOWN] > 0.0 and (q < 5 or h <= 2.0 * memory[LAST]):  # high powers of a long step mislead
                 predict(coefficients, h, memory[LAST], s, work[work.size - q * q :], vectors)
             else:
                 for i in range(q):

@@ -140,7 +140,7 @@ def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, join, handle,
     coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale,
     out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work, vectors, store,
-    store_complex, largest,
+    store_complex, spare, spare_flat, spare_complex, largest,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -153,13 +153,12 @@ def march(
     ledger : float64[5 m], sums of out[where:] (`ledger.py`); stored : int64[q],
     states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
     within_at, within_by : what rows are held to, see `rows.keep_within`; work, vectors, store, store_complex : what an
-    implicit step keeps; largest : float64[n], what no state may exceed, looked at every CHECKED steps, or empty.
+    implicit step keeps; spare, spare_flat, spare_complex : room for `rows.step_apart`;
+    largest : float64[n], what no state may exceed, looked at every CHECKED steps, or empty.
     """
     s, reuse, met, t_new = k.shape[0], False, False, 0.0  # met: g_new is of the end of the step behind
     formed = orders[KIND] == EXPLICIT and shape.size > 0
     b, bend = weights_of(coefficients, s), bend_of(coefficients, s)
-    if orders[CONTROL] != TOLERANCE:  # a given step may be far longer than what its start tells of
-        bend = bend[:0]
     steep = orders[KIND] == NEWTON_SOLVED and dense.shape[0] == 0  # slopes at ends: f magnifies what Newton left,
     for j in range(s):  # the last stage does not, where it is the end
         steep = steep and row_of(coefficients, s, s - 1)[j] == b[j]
@@ -203,17 +202,17 @@ def march(
             if out[STATUS] != 0.0:
                 return BAD_STATUS
             if memory[UNBOOKED] > 0.0:
-                known = steep and work[KNOWN] == 1.0
+                known = steep and work[KNOWN] > 0.0
                 book(memory[UNBOOKED], b, supply, dense, steep, known, out[where:], ledger)
                 memory[UNBOOKED] = 0.0
-            for m in range(supply.shape[1]):
-                supply[0, m] = out[where + m]
         if flags[PHASE] == EMIT:
             if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
+                f_end = k[s - 1] if steep else k[0]
                 why = emit(
-                    rhs, observe, handle, spans, orders, memory, times, flags, memory[T] - memory[LAST], y[old],
-                    f_old, y[now], k[s - 1] if steep else k[0], k, dense, bend, out_row, y_out, rows, within_at,
-                    within_by,
+                    attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients,
+                    shape, spans, sums, orders, memory, times, flags, memory[T] - memory[LAST], y, now, old, f_old,
+                    f_end, k, supply, where, dense, bend, scale, out_row, y_out, rows, within_at, within_by, work,
+                    spare, spare_flat, spare_complex,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -233,6 +232,8 @@ def march(
                     work[HAS], work[SEEN] = 0.0, -1.0
                 continue
             flags[PHASE] = READY
+        for m in range(supply.shape[1]):
+            supply[0, m] = out[where + m]
         if too_short(orders, memory, orders[END] - memory[T]):  # what is left of the segment is rounding
             memory[T] = orders[END]
             return DONE
@@ -327,7 +328,7 @@ def march(
         if largest.size > 0 and memory[STEPS] % CHECKED == 0.0 and exceeded(join, handle, spans, sums, y[new], largest):
             orders[BUDGET] = EXCEEDED
         if next_due(orders, memory, times) <= memory[T]:
-            known = orders[KIND] == NEWTON_SOLVED and work[KNOWN] == 1.0
+            known = orders[KIND] == NEWTON_SOLVED and work[KNOWN] > 0.0
             for m in range(spans.shape[0]):
                 begin, end = spans[m, BEGIN], spans[m, STOP]
                 if bend.size > 0:
@@ -345,7 +346,8 @@ def march(
 def march_at(
     calls, handle, coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where,
     ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work,
-    vectors, store, store_complex, largest,
+    vectors, store, store_complex, spare,
+    spare_flat, spare_complex, largest,
 ):  # fmt: skip
     """`march` with the functions at these addresses, in its order."""
     return march(
@@ -353,7 +355,8 @@ def march_at(
         rhs_at(calls[5]), factor_at(calls[6]), solve_at(calls[7]), factor_complex_at(calls[8]),
         solve_complex_at(calls[9]), join_at(calls[10]), handle, coefficients, shape, spans, sums, dense, orders,
         memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
-        stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex, largest,
+        stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex,
+        spare, spare_flat, spare_complex, largest,
     )  # fmt: skip
 
 
@@ -375,7 +378,7 @@ def compiled():
     """The loop as Python calls it: its functions as `addresses` gives them, then all else that `march` takes."""
     if not COMPILING:
         return lambda functions, *others: march(*functions, *others)
-    return compiled_as(march_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvzv")
+    return compiled_as(march_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvzwvzv")
 
 
 def compiled_attempt():

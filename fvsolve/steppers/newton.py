@@ -76,7 +76,8 @@ def begin(k, y, scale, orders, memory, work, vectors):
         last[i], first[i] = first[i], k[0, i]
     for j in range(1, s):
         copy(k[j], vectors[j])
-    work[KNOWN] = 1.0 if work[SEEN] == memory[STEPS] - 1.0 and memory[LAST] > 0.0 else 0.0
+    goes_on = work[SEEN] == memory[STEPS] - 1.0 and memory[LAST] > 0.0
+    work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if goes_on else 0.0
     if work[RATIO] > STALE:
         work[HAS] = 0.0
     work[SEEN], work[RATIO] = memory[STEPS], 0.0

@@ -36,7 +36,7 @@ def integrate(
     rtol : relative tolerance of methods with an error estimate (default 1e-6); atol : absolute one, a number or
     float64[n], default rtol; step : fixed step [s], for every method
     counts : a dict to be filled with the numbers of steps, rejections, rhs, jacobians, factorisations, newton, ...
-    Times are met by dense output; where its order lies below that of the method, by stepping onto them.
+    Times are met by dense output; else by steps that end there (`rtol`) or separate steps to them (`step`).
     Raises FvsolveError for two step settings, a method without an error estimate and no step, times out of order,
     and where the solution does not stay finite or Newton fails.
     """

@@ -16,6 +16,8 @@ from fvsolve.steppers.slots import (
     FACTORS,
     HAS,
     HEADER,
+    KNOWN,
+    LAST,
     NEWTON_FAILED,
     RADIUS,
     SEEN,
@@ -83,6 +85,9 @@ def attempt(
             vectors[s + RATE],
         )  # fmt: skip
         slope_in_time(rhs, handle, t, h, y[now], k, supply, where, out, memory, work, vectors)
+        if work[SEEN] != memory[STEPS]:
+            goes_on = work[SEEN] == memory[STEPS] - 1.0 and memory[LAST] > 0.0
+            work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if goes_on else 0.0
         work[SEEN] = memory[STEPS]
         if orders[WATCH] != 0.0:
             memory[RADIUS] = spectral_radius(shape, work, nnz, scale, vectors[s + INCREMENT])

@@ -1,23 +1,39 @@
-"""Rows and fields: when the next is due, and what is written of those a step has passed. Knows no step and no model."""
+"""Rows and fields: when the next is due, and what is written of those a step has passed. Knows no model."""
 
 from fvsolve.jit import njit
 from fvsolve.steppers.slots import (
+    ALWAYS_APART,
+    APART,
+    CALLS,
+    CONTROL,
+    DAMPED,
     DONE,
     EVERY,
     FIELD,
     FIELD_COUNT,
     FIELD_EVERY,
+    HAS,
+    KNOWN,
+    NEVER_APART,
+    NEWTON_FAILED,
     NEXT_FIELD,
     NEXT_OUTPUT,
+    RADIUS,
     ROWS,
     ROWS_FULL,
+    SEEN,
     START,
     STOP_AT,
+    STORE,
+    SURE,
+    TOLERANCE,
+    WORST,
     T,
 )
-from fvsolve.steppers.step import BEGIN, HUGE, STOP, interpolate
+from fvsolve.steppers.step import BEGIN, HUGE, STOP, copy, interpolate
 
 BASE, GAIN, LEAST, MOST = range(4)
+AT_END = 1e-9  # of a step: a row so near its end is read there
 LITTLE = 1e-9  # of what there are shares of, too little to tell them by
 
 
@@ -73,13 +89,50 @@ def keep_within(at, by, y_old, y, out):
         out[place[0]] = min(found, high * total) if high < HUGE else found
 
 
+@njit(forceinline=True)
+def comes_apart(orders, work):
+    """Whether rows within the step behind come from steps of their own, see `slots.APART`."""
+    if orders[CONTROL] == TOLERANCE or orders[APART] == NEVER_APART:
+        return False
+    return orders[APART] == ALWAYS_APART or work[KNOWN] < 2.0
+
+
+@njit
+def step_apart(
+    attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y,
+    old, new, supply, where, out, scale, orders, memory, work, spare, spare_flat, spare_complex,
+):  # fmt: skip
+    """y[new] at t + h by a step of the method from y[old], as from a start; True where it could be solved.
+
+    It works on arrays of its own, so that the steps of a run do not depend on its rows; what it costs is counted.
+    spare : float64[s + vectors, n]; spare_flat : float64[work + store]; supply[0] is left changed
+    """
+    s, worst, radius = supply.shape[0], memory[WORST], memory[RADIUS]
+    if work.size > 0:  # no Jacobian, no stages to go on from
+        spare_flat[:STORE] = 0.0
+        spare_flat[HAS], spare_flat[SEEN], spare_flat[DAMPED], spare_flat[SURE] = 0.0, -1.0, -1.0, 1.0
+        spare_flat[STORE] = work[STORE]
+    rhs(t, y[old], spare[0], out, handle)
+    memory[CALLS] += 1.0
+    for m in range(supply.shape[1]):
+        supply[0, m] = out[where + m]
+    e = attempt(
+        rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, old,
+        new, spare[:s], supply, where, out, scale, orders, memory, spare_flat[: work.size], spare[s:],
+        spare_flat[work.size :], spare_complex,
+    )  # fmt: skip
+    memory[WORST], memory[RADIUS] = worst, radius
+    return e != NEWTON_FAILED
+
+
 @njit
 def emit(
-    rhs, observe, handle, spans, orders, memory, times, flags, t_old, y_old, f_old, y, f, k, dense, bend, out, y_out,
-    rows, within_at, within_by,
+    attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums,
+    orders, memory, times, flags, t_old, y, now, old, f_old, f, k, supply, where, dense, bend, scale, out, y_out, rows,
+    within_at, within_by, work, spare, spare_flat, spare_complex,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
-    t, h = memory[T], memory[T] - t_old
+    t, h, apart = memory[T], memory[T] - t_old, comes_apart(orders, work)
     while True:
         row = row_due(orders, memory, times)
         field = output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT])
@@ -88,10 +141,24 @@ def emit(
             return DONE
         if row <= due and flags[ROWS] == rows.shape[0]:
             return ROWS_FULL
+        solved, new = False, 3 - now - old
+        if apart and due < t - AT_END * h:
+            solved = step_apart(
+                attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans,
+                sums, t_old, due - t_old, y, old, new, supply, where, out, scale, orders, memory, work, spare,
+                spare_flat, spare_complex,
+            )  # fmt: skip
         for m in range(spans.shape[0]):
             begin, end = spans[m, BEGIN], spans[m, STOP]
-            interpolate(begin, end, (due - t_old) / h, h, y_old, f_old, y, f, k, dense, bend, y_out)
-        keep_within(within_at, within_by, y_old, y, y_out)
+            if solved:
+                copy(y[new, begin:end], y_out[begin:end])
+            elif apart:
+                theta = (due - t_old) / h
+                for i in range(begin, end):
+                    y_out[i] = y[old, i] + theta * (y[now, i] - y[old, i])
+            else:
+                interpolate(begin, end, (due - t_old) / h, h, y[old], f_old, y[now], f, k, dense, bend, y_out)
+        keep_within(within_at, within_by, y[old], y[now], y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
             rows[flags[ROWS], 0] = due

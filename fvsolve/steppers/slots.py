@@ -14,9 +14,12 @@ COUNTS = {
 # What a call is told.
 START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)
 # Power of h of the error estimate; whether the last stage is the next first; the kind of step; whether stiffness is
-# watched, and then the price of an implicit step in explicit ones; whether steps end where a row is due.
-ORDER, FSAL, KIND, WATCH, PRICE, LANDS = range(11, 17)
-ORDERS = 17
+# watched, and then the price of an implicit step in explicit ones; where rows come from, by error control and else.
+ORDER, FSAL, KIND, WATCH, PRICE, LANDS, APART = range(11, 18)
+ORDERS = 18
+# Values of APART: rows within a given step come from its polynomial; from steps of their own in the first two steps
+# behind a start; from steps of their own.
+NEVER_APART, APART_AT_FIRST, ALWAYS_APART = 0, 1, 2
 CHECKED = 16.0  # steps between two looks for growth
 EXCEEDED = -1.0  # in orders[BUDGET]: a state has grown, come back
 EXPLICIT, NEWTON_SOLVED, LINEARLY_IMPLICIT = 0, 1, 2  # values of KIND
@@ -35,8 +38,8 @@ NOT_FINITE = 3  # a value of out[STATUS]
 STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
 NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved with this step
 
-# The header of `work`: whether there is a Jacobian, the step it was made at, whether the last step's stages are known,
-# the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run has to
+# The header of `work`: whether there is a Jacobian, the step it was made at, how many steps before are known (2: or
+# more), the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run has to
 # factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the last step
 # that was damped, the size of a factor.
 HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, DAMPED, STORE = range(9)

@@ -51,6 +51,7 @@ class Stepper:
         self.k, self.supply = np.zeros((s, n)), np.zeros((s, ledgers))
         self.shape, self.work, self.vectors = self.nobody, self.none, np.zeros((0, n))
         self.store, self.store_complex, self.kept = self.none, np.zeros(0, dtype=complex), 0
+        self.spare = np.zeros((0, n)), self.none, self.store_complex
         if self.damped:
             self.attempt, self.store = attempt_of("damped"), np.zeros(2 * n)
         elif method.explicit:
@@ -61,6 +62,7 @@ class Stepper:
             self.solve_by(structure, s, n, ledgers)
         self.orders[slots.ORDER] = method.control_order
         self.orders[slots.LANDS] = self.dense_order + 1 < method.order  # else rows are as good as ends of steps
+        self.orders[slots.APART] = self.apart
         self.orders[slots.FSAL] = method.explicit and method.first_same_as_last
         self.orders[slots.KIND] = KINDS[method.kind][1]
         self.flags[slots.PHASE], self.flags[slots.BEHIND] = slots.FRESH, 0
@@ -92,6 +94,23 @@ class Stepper:
         """Order of what stands between steps: of the method's polynomial, else of the cubic through both ends."""
         more = self.method.kind == "full" and bent(self.method).size > 0
         return min(self.dense.shape[1] + more, self.method.order) if self.dense.size else 3
+
+    @property
+    def apart(self) -> int:
+        """Where rows within given steps come from: a value of `slots.APART`.
+
+        A polynomial whose order is too low, or that contains f(t, y) of a stiff problem, which magnifies what y is off
+        the slow solution by, is not read. Slopes of the last stage do not magnify it, but at a start only f is known.
+        """
+        method = self.method
+        if self.dense.shape[1] == 1:  # a straight line
+            return slots.NEVER_APART
+        if self.dense_order + 1 < method.order:
+            return slots.ALWAYS_APART
+        if method.explicit:
+            return slots.NEVER_APART
+        solved = method.kind == "linear" or method.stiffly_accurate and not (self.dense.size and method.c[0] == 0.0)
+        return slots.APART_AT_FIRST if solved else slots.ALWAYS_APART
 
     def forget(self) -> None:
         """Remember nothing over a kink but what has been counted."""
@@ -141,12 +160,15 @@ class Stepper:
 
     def call(self, leap, observe, record, events, rhs, handle, where: int, armed: np.ndarray) -> int:
         """March on; returns one of the codes of `steppers.orders`."""
+        if self.orders[slots.APART] and self.orders[slots.CONTROL] != slots.TOLERANCE and not self.spare[0].size:
+            flat = np.zeros(self.work.size + self.store.size)
+            self.spare = np.zeros((len(self.k) + len(self.vectors), self.scale.size)), flat, self.store_complex.copy()
         return self.march(
             addresses((self.attempt, leap, observe, record, events, rhs, *self.algebra, self.join)), handle,
             self.coefficients, self.shape, self.spans, self.sums, self.dense, self.orders, self.memory, self.times,
             self.flags, self.y, self.k, self.f_old, self.supply, where, self.ledger, self.scale, self.out,
             self.out_row, self.values, self.g, self.g_new, armed, self.stored, self.carry, self.y_out, self.rows,
-            *self.within, self.work, self.vectors, self.store, self.store_complex, self.largest,
+            *self.within, self.work, self.vectors, self.store, self.store_complex, *self.spare, self.largest,
         )  # fmt: skip
 
 
