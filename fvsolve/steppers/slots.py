@@ -39,8 +39,8 @@ STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
 NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved with this step
 
 # The header of `work`: whether there is a Jacobian, the step it was made at, how many steps before are known (2: or
-# more), the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run has to
-# factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the last step
+# more), the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run
+# has to factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the last step
 # that was damped, the size of a factor.
 HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, DAMPED, STORE = range(9)
 HEADER = 9
