@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.basins.free_surface import faces, grid, lower_films
+from fvsolve.basins.free_surface import faces, grid, lower_dispersion, lower_films
 from fvsolve.basins.free_surface.friction import FASTEST
-from fvsolve.basins.free_surface.lower_dispersion import Watch, deep, notices
 from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
@@ -204,10 +203,10 @@ class FreeSurfaceRows(BasinRows):
         return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
 
     def notices(self, y: np.ndarray) -> list[Notice]:
-        return [*notices(self, y), *deep(self), *lower_films.notices(self, y)]
+        return [*lower_dispersion.notices(self, y), *lower_dispersion.deep(self), *lower_films.notices(self, y)]
 
     def watches(self, y: np.ndarray) -> list[Any]:
-        return [*([] if notices(self, y) else [Watch(self)]), *lower_films.watches(self, y)]
+        return [*lower_dispersion.watches(self, y), *lower_films.watches(self, y)]
 
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)

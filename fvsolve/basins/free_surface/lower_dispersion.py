@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fvsolve.basins.free_surface.watch import Watch
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import Notice
 
@@ -20,33 +21,36 @@ SEEN, MATTERS = 1e-6, 1e-3  # of the depth, root mean square of a surface: given
 
 
 class SurfaceWaves(NamedTuple):
-    """Of a surface: wavenumber [1/m], mean depth of wet cells [m], root mean square of the surface over that depth."""
+    """Of a surface: share by which real waves run slower, wavenumber [1/m], mean depth of wet cells [m]."""
 
+    wrong: float
     k: float
     depth: float
-    size: float
-
-    @property
-    def wrong(self) -> float:
-        """Share by which real waves run slower than shallow water has them."""
-        kh = self.k * self.depth
-        return 1.0 - math.sqrt(math.tanh(kh) / kh)
 
 
-def waves(basin, y: np.ndarray) -> SurfaceWaves | None:
-    """The waves of a basin at deviations y; None without any."""
+NONE = SurfaceWaves(0.0, math.nan, math.nan)
+
+
+def waves(basin, y: np.ndarray, seen: float = SEEN) -> SurfaceWaves:
+    """Waves of a basin at deviations y; `NONE` where the root mean square of the surface is below a share of depth."""
     depth, area = basin.depth + y[0], basin.mesh.area
     wet = depth > 0.0
     if not wet.any():
-        return None
+        return NONE
     mean, reached = float(np.average(depth[wet], weights=area[wet])), wet | (basin.depth > 0.0)
     surface = np.where(reached, y[0] - np.average(y[0][reached], weights=area[reached]), 0.0)
     with np.errstate(over="ignore"):  # of a run that blows up
         square = float(np.average(surface**2, weights=area))
-    if not SEEN * mean < math.sqrt(square) < math.inf:
-        return None
+    if not seen * mean < math.sqrt(square) < math.inf:
+        return NONE
     inverse = on_grid(basin, surface) if is_even(basin) else on_mesh(basin, surface)
-    return SurfaceWaves(math.sqrt(square / inverse), mean, math.sqrt(square) / mean)
+    k = math.sqrt(square / inverse)
+    return SurfaceWaves(1.0 - math.sqrt(math.tanh(k * mean) / (k * mean)), k, mean)
+
+
+def waves_in_run(basin, y: np.ndarray) -> SurfaceWaves:
+    """Waves of a basin that come about in a run."""
+    return waves(basin, y, MATTERS)
 
 
 def is_even(basin) -> bool:
@@ -84,24 +88,26 @@ def on_mesh(basin, surface: np.ndarray) -> float:
     return float(own @ psi / mesh.area.sum())
 
 
-def said(basin, found: SurfaceWaves) -> str:
-    """What a reader has to know."""
-    long, deep = (basin.case.amount(one, "length", 3) for one in (2.0 * math.pi / found.k, found.depth))
-    return (
-        f"{basin.name}: waves about {long} long in {deep} of water (k h = "
-        f"{found.k * found.depth:.2g}): real ones run {100.0 * found.wrong:.2g} % slower than shallow water has them"
+def notice(basin, found: tuple[float, float, float], when: str = "") -> Notice:
+    """Notice that waves are too short, with the time; found : as `SurfaceWaves`."""
+    wrong, k, depth = found
+    long, deep = (basin.case.amount(one, "length", 3) for one in (2.0 * math.pi / k, depth))
+    text = (
+        f"{basin.name}: waves about {long} long in {deep} of water (k h = {k * depth:.2g}): real ones run "
+        f"{100.0 * wrong:.2g} % slower than shallow water has them{when and ','}{when}"
     )
-
-
-def notice(basin, found: SurfaceWaves, when: str = "") -> Notice:
-    """That they are too short, and when."""
-    return Notice("dispersion", f"nodes.{basin.name}", said(basin, found) + when, None, float(found.wrong), WRONG)
+    return Notice("dispersion", f"nodes.{basin.name}", text, None, wrong, WRONG)
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
-    """That waves of a basin are too short at deviations y, where they are."""
+    """Notice that waves of a basin are too short at deviations y."""
     found = waves(basin, y)
-    return [notice(basin, found)] if found is not None and found.wrong > WRONG else []
+    return [notice(basin, found)] if found.wrong > WRONG else []
+
+
+def watches(basin, y: np.ndarray) -> list[Watch]:
+    """Watch of a run for waves that are too short; none where those at deviations y are."""
+    return [] if notices(basin, y) else [Watch(basin, waves_in_run, notice, WRONG)]
 
 
 def deep(basin) -> list[Notice]:
@@ -114,25 +120,3 @@ def deep(basin) -> list[Notice]:
         'sloshing = "modes" has it right while waves are small'
     )
     return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * found.fast, WRONG)]
-
-
-class Watch:
-    """The shortest waves of a run that matter, of one basin.
-
-    kept : float64[4]  when they were seen, and what they were; nan where none were
-    """
-
-    def __init__(self, basin) -> None:
-        self.basin, self.kept = basin, np.full(4, np.nan)
-
-    def look(self, t: float, y: np.ndarray) -> None:
-        """At a model's state."""
-        one = waves(self.basin, self.basin.of(y))
-        if one is not None and one.size > MATTERS and not one.wrong <= SurfaceWaves(*self.kept[1:]).wrong:
-            self.kept[:] = t, *one
-
-    def notices(self) -> list[Notice]:
-        """That they are too short, where they are."""
-        t, *found = self.kept.tolist()
-        one = SurfaceWaves(*found)
-        return [notice(self.basin, one, f", at {self.basin.case.amount(t, 'time')}")] if one.wrong > WRONG else []

@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from fvsolve.basins.free_surface.friction import FASTEST
-from fvsolve.basins.free_surface.rows import THIN
+from fvsolve.basins.free_surface.friction import FASTEST, add_friction
+from fvsolve.basins.free_surface.watch import Watch
 from fvsolve.errors import Notice
+from fvsolve.kernels.records import DARCY, MANNING
 
 DRY = 1e-4  # depth [m] below which water counts for nothing here
 WRONG = 0.005  # share of the speed from which a word is due
@@ -43,12 +44,9 @@ def too_fast(basin, y: np.ndarray) -> tuple[float, float, float]:
     flow = np.where(depth > DRY, np.hypot(y[1], y[2]) * basin.mesh.area, 0.0)
     if not flow.any():
         return 0.0, math.nan, math.nan
-    wet = np.maximum(depth, THIN)
-    speed = np.hypot(y[1], y[2]) / wet
-    if part.manning is not None:
-        rate = basin.case.gravity * part.manning**2 * speed / wet ** (4.0 / 3.0)
-    else:
-        rate = 0.125 * part.factor * speed / wet
+    law, value = (DARCY, part.factor) if part.manning is None else (MANNING, part.manning)
+    rate, none, gravity = np.zeros(depth.size), np.zeros(depth.size), basin.case.gravity
+    add_friction(law, gravity, np.array([value]), depth, none, y[1], y[2], none - 1.0, none, rate, none)
     error = np.sqrt(1.0 + rate / FASTEST) - 1.0
     return tuple(float(np.average(one, weights=flow)) for one in (error, depth, rate))
 
@@ -75,31 +73,9 @@ def friction(basin, found: tuple[float, float, float], when: str = "") -> Notice
     return Notice("friction", f"nodes.{basin.name}", text, "method", found[0], WRONG)
 
 
-class FilmWatch:
-    """The worst films of a run, of one basin.
-
-    kept : float64[4]  when these were seen, and what they were; nan where none were
-    """
-
-    def __init__(self, basin, y: np.ndarray, by, notice) -> None:
-        self.basin, self.by, self.notice, self.kept = basin, by, notice, np.full(4, np.nan)
-        self.least = max(WRONG, WORSE * by(basin, y)[0])
-
-    def look(self, t: float, y: np.ndarray) -> None:
-        """At a model's state."""
-        found = self.by(self.basin, self.basin.of(y))
-        if found[0] > self.least and not found[0] <= self.kept[1]:
-            self.kept[:] = t, *found
-
-    def notices(self) -> list[Notice]:
-        """Notices of films at the wrong speed."""
-        t, *found = self.kept.tolist()
-        return [self.notice(self.basin, found, f" at {self.basin.case.amount(t, 'time')}")] if t == t else []
-
-
-def watches(basin, y: np.ndarray) -> list[FilmWatch]:
+def watches(basin, y: np.ndarray) -> list[Watch]:
     """Watches of a run for films that are worse than at the deviations y."""
-    return [FilmWatch(basin, y, look, notice) for look, notice in kinds(basin)]
+    return [Watch(basin, look, notice, max(WRONG, WORSE * look(basin, y)[0])) for look, notice in kinds(basin)]
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
