@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.basins.free_surface.watch import Watch
+from fvsolve.basins.free_surface.lower_watch import Watch
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import Notice
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.basins.free_surface.friction import FASTEST, add_friction
-from fvsolve.basins.free_surface.watch import Watch
+from fvsolve.basins.free_surface.lower_watch import Watch
 from fvsolve.errors import Notice
 from fvsolve.kernels.records import DARCY, MANNING
 

@@ -10,8 +10,9 @@ from fvsolve.errors import Notice
 class Watch:
     """The worst error of a kind in a run of a basin.
 
-    by(basin, y) : its size and two facts about it; notice(basin, found, when) : its notice; least : size that counts
-    kept : float64[4]  time and what was found then; nan where no error counts
+    by(basin, y) : its size and two facts about it; notice(basin, found, when) : its notice
+    least : size up to which no notice is due
+    kept : float64[4]  time and what was found then; nan before any error
     """
 
     def __init__(self, basin, by, notice, least: float) -> None:
@@ -20,10 +21,12 @@ class Watch:
     def look(self, t: float, y: np.ndarray) -> None:
         """At a model's state."""
         found = self.by(self.basin, self.basin.of(y))
-        if found[0] > self.least and not found[0] <= self.kept[1]:
+        if found[0] > 0.0 and not found[0] <= self.kept[1]:
             self.kept[:] = t, *found
 
     def notices(self) -> list[Notice]:
         """Notices of the worst error."""
         t, *found = self.kept.tolist()
-        return [self.notice(self.basin, found, f" at {self.basin.case.amount(t, 'time')}")] if t == t else []
+        if not found[0] > self.least:
+            return []
+        return [self.notice(self.basin, found, f" at {self.basin.case.amount(t, 'time')}")]
