@@ -41,7 +41,7 @@ class Found:
 
     @property
     def share(self) -> float:
-        """What is left of forces, as a share of what makes them up."""
+        """Greatest unbalanced force, as a share of the forces that make it up."""
         return float(np.max(np.abs(self.force) / np.where(self.scale > 0.0, self.scale, 1.0), initial=0.0))
 
     @property

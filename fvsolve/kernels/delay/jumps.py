@@ -84,7 +84,7 @@ def first_left(past, places, s, wave):
 
 @njit
 def turned_back(past, places, tables, line, pipe, q, wave, size, t):
-    """What friction in the middle of stretch q turns back of a jump of a wave that has not been passed on [kg/s]."""
+    """Part of a jump, not yet passed on, that friction in the middle of stretch q reflects [kg/s]."""
     if not rubs(pipe):
         return 0.0
     ring, mask = ring_of(places, line, q)
@@ -120,7 +120,7 @@ def pass_at_joints(past, places, tables, t):
 
 @njit
 def arrive_at_joints(past, places, tables, t):
-    """What arrives at the joints of stretches at t, beside what does at the ends of lines."""
+    """Compute the waves that arrive at t at the joints of stretches and at the ends of lines, into past."""
     arrive_all(past, tables, t)
     clock = clock_of(past, newest_before(past, t))
     for i in range(tables.delays.size):

@@ -84,7 +84,9 @@ def mend_columns(past, tables, y, i, change, missed):
 
 @njit
 def mend_behind(past, tables, y, spare, out, missed):
-    """The same where nodes were closed by valves: stores behind these, fed by the lines before them, and columns.
+    """Give stores behind valves, and rigid columns, what a jump at nodes closed by valves has brought them.
+
+    What stores get is taken from the lines that feed them.
 
     spare, out : before and behind the jump
     """
