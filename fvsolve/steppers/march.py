@@ -140,7 +140,7 @@ def march(
     attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, join, handle,
     coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale,
     out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work, vectors, store,
-    store_complex, spare, spare_flat, spare_complex, largest,
+    store_complex, spare, spare_supply, spare_flat, spare_complex, largest,
 ):  # fmt: skip
     """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
 
@@ -153,7 +153,7 @@ def march(
     ledger : float64[5 m], sums of out[where:] (`ledger.py`); stored : int64[q],
     states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
     within_at, within_by : what rows are held to, see `rows.keep_within`; work, vectors, store, store_complex : what an
-    implicit step keeps; spare, spare_flat, spare_complex : room for `rows.step_apart`;
+    implicit step keeps; spare, spare_supply, spare_flat, spare_complex : room for `rows.step_apart`;
     largest : float64[n], what no state may exceed, looked at every CHECKED steps, or empty.
     """
     s, reuse, met, t_new = k.shape[0], False, False, 0.0  # met: g_new is of the end of the step behind
@@ -211,8 +211,8 @@ def march(
                 why = emit(
                     attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients,
                     shape, spans, sums, orders, memory, times, flags, memory[T] - memory[LAST], y, now, old, f_old,
-                    f_end, k, supply, where, dense, bend, scale, out_row, y_out, rows, within_at, within_by, work,
-                    spare, spare_flat, spare_complex,
+                    f_end, k, where, dense, bend, scale, out_row, y_out, rows, within_at, within_by, work,
+                    spare, spare_supply, spare_flat, spare_complex,
                 )  # fmt: skip
                 if why != DONE:
                     return why
@@ -347,7 +347,7 @@ def march_at(
     calls, handle, coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where,
     ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work,
     vectors, store, store_complex, spare,
-    spare_flat, spare_complex, largest,
+    spare_supply, spare_flat, spare_complex, largest,
 ):  # fmt: skip
     """`march` with the functions at these addresses, in its order."""
     return march(
@@ -356,7 +356,7 @@ def march_at(
         solve_complex_at(calls[9]), join_at(calls[10]), handle, coefficients, shape, spans, sums, dense, orders,
         memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
         stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex,
-        spare, spare_flat, spare_complex, largest,
+        spare, spare_supply, spare_flat, spare_complex, largest,
     )  # fmt: skip
 
 
@@ -378,7 +378,7 @@ def compiled():
     """The loop as Python calls it: its functions as `addresses` gives them, then all else that `march` takes."""
     if not COMPILING:
         return lambda functions, *others: march(*functions, *others)
-    return compiled_as(march_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvzwvzv")
+    return compiled_as(march_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvzwwvzv")
 
 
 def compiled_attempt():

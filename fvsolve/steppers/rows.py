@@ -105,7 +105,7 @@ def step_apart(
     """y[new] at t + h by a step of the method from y[old], as from a start; True where it could be solved.
 
     It works on arrays of its own, so that the steps of a run do not depend on its rows; what it costs is counted.
-    spare : float64[s + vectors, n]; spare_flat : float64[work + store]; supply[0] is left changed
+    supply : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + store]
     """
     s, worst, radius = supply.shape[0], memory[WORST], memory[RADIUS]
     if work.size > 0:  # no Jacobian, no stages to go on from
@@ -128,8 +128,8 @@ def step_apart(
 @njit
 def emit(
     attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums,
-    orders, memory, times, flags, t_old, y, now, old, f_old, f, k, supply, where, dense, bend, scale, out, y_out, rows,
-    within_at, within_by, work, spare, spare_flat, spare_complex,
+    orders, memory, times, flags, t_old, y, now, old, f_old, f, k, where, dense, bend, scale, out, y_out, rows,
+    within_at, within_by, work, spare, spare_supply, spare_flat, spare_complex,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
     t, h, apart = memory[T], memory[T] - t_old, comes_apart(orders, work)
@@ -145,7 +145,7 @@ def emit(
         if apart and due < t - AT_END * h:
             solved = step_apart(
                 attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans,
-                sums, t_old, due - t_old, y, old, new, supply, where, out, scale, orders, memory, work, spare,
+                sums, t_old, due - t_old, y, old, new, spare_supply, where, out, scale, orders, memory, work, spare,
                 spare_flat, spare_complex,
             )  # fmt: skip
         for m in range(spans.shape[0]):

@@ -51,7 +51,7 @@ class Stepper:
         self.k, self.supply = np.zeros((s, n)), np.zeros((s, ledgers))
         self.shape, self.work, self.vectors = self.nobody, self.none, np.zeros((0, n))
         self.store, self.store_complex, self.kept = self.none, np.zeros(0, dtype=complex), 0
-        self.spare = np.zeros((0, n)), self.none, self.store_complex
+        self.spare = np.zeros((0, n)), self.supply, self.none, self.store_complex
         if self.damped:
             self.attempt, self.store = attempt_of("damped"), np.zeros(2 * n)
         elif method.explicit:
@@ -162,7 +162,8 @@ class Stepper:
         """March on; returns one of the codes of `steppers.orders`."""
         if self.orders[slots.APART] and self.orders[slots.CONTROL] != slots.TOLERANCE and not self.spare[0].size:
             flat = np.zeros(self.work.size + self.store.size)
-            self.spare = np.zeros((len(self.k) + len(self.vectors), self.scale.size)), flat, self.store_complex.copy()
+            spare = np.zeros((len(self.k) + len(self.vectors), self.scale.size))
+            self.spare = spare, np.zeros_like(self.supply), flat, self.store_complex.copy()
         return self.march(
             addresses((self.attempt, leap, observe, record, events, rhs, *self.algebra, self.join)), handle,
             self.coefficients, self.shape, self.spans, self.sums, self.dense, self.orders, self.memory, self.times,
