@@ -10,7 +10,9 @@ from fvsolve.jit import COMPILING, njit
 from fvsolve.kernels.sums import BAD, LOOK, MODE, OFF
 from fvsolve.steppers.coefficients import bend_of, error_of, row_of, weights_of
 from fvsolve.steppers.control import (
+    APPROACH,
     HUGE,
+    approaches,
     arriving_step,
     closing_step,
     end_of,
@@ -259,7 +261,9 @@ def march(
         while not leaping:
             rest = orders[END] - memory[T]
             last = h >= rest * (1.0 - 1e-9)
-            if last:
+            if last and approaches(orders, memory, rest):
+                h, last = APPROACH * rest, False
+            elif last:
                 h = rest
             if too_short(orders, memory, h) and (not last or failed == NEWTON_STUCK):
                 return failed
