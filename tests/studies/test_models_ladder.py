@@ -41,7 +41,8 @@ def named(found, name: str, law: str = "linear"):
 
 def test_slow_changes_need_a_column_alone_and_quick_ones_the_line():
     slow, quick = ladder(shutting(20.0, end=25.0), target=0.01), ladder(shutting(0.0, cells=80), target=0.01)
-    assert slow.cheapest.states <= 8 and named(slow, "rigid column").error < 0.01  # the quickest of the small ones
+    assert named(slow, "rigid column").states == 1 and named(slow, "rigid column").error < 0.01
+    assert slow.cheapest.states < named(slow, "full line").states / 2  # which small one is a matter of milliseconds
     assert quick.cheapest.name in ("full line", "delay lines") and named(quick, "rigid column").error > 0.1
     assert slow.change_time == pytest.approx(20.0) and quick.change_time == 0.0
     assert slow.travel_time == pytest.approx(LENGTH / SPEED)
