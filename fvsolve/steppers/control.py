@@ -36,7 +36,7 @@ BOUNDARY = 3.0  # of h times the spectral radius: `dormand-prince` bears 3.3 on 
 HELD = 2.5  # held by stability it swings from 1 to 3.5, held by accuracy it hardly moves
 CALM = 0.4  # what a step that is not held takes off the count
 CLOSED = 0.15  # share of an opening that may shut in a given step; of x ~ (time left)^(1/3) that is half the time left
-APPROACH = 0.95  # of what is left before a break, in the step before the last
+APPROACH = 0.95  # of the rest of a segment that the step before the last one takes
 HUGE = 1e308  # for a time that never comes [s]
 DEAD_BAND = 1.2  # an implicit step that may grow by less keeps its length, and with it its factors
 
@@ -85,9 +85,10 @@ def next_step(orders, memory, out_rate, k, scale):
 
 @njit(forceinline=True)
 def approaches(orders, memory, rest):
-    """Whether a step by error control is to end shortly before a break, so that a short one looks at what lies there.
+    """True where a step by error control ends at APPROACH of the rest of its segment, and a short one follows.
 
-    Where a valve shuts, its flow is laminar at the last: a layer that lay between the stages of one long step.
+    Where a valve shuts at a break, its flow is laminar for a moment before. All stages of a long step lie before that.
+    rest : time that is left of the segment [s]
     """
     if orders[CONTROL] != TOLERANCE or rest <= 2.0 * (1.0 - APPROACH) * memory[STEP]:
         return False

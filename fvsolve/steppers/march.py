@@ -350,8 +350,7 @@ def march(
 def march_at(
     calls, handle, coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where,
     ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work,
-    vectors, store, store_complex, spare,
-    spare_supply, spare_flat, spare_complex, largest,
+    vectors, store, store_complex, spare, spare_supply, spare_flat, spare_complex, largest,
 ):  # fmt: skip
     """`march` with the functions at these addresses, in its order."""
     return march(

@@ -104,7 +104,8 @@ def step_apart(
 ):  # fmt: skip
     """y[new] at t + h by a step of the method from y[old], as from a start; True where it could be solved.
 
-    It works on arrays of its own, so that the steps of a run do not depend on its rows; what it costs is counted.
+    It works on arrays of its own, so that neither the steps of a run nor the stages that `energy` reads depend on its
+    rows; what it costs is counted.
     supply : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + store]
     """
     s, worst, radius = supply.shape[0], memory[WORST], memory[RADIUS]
