@@ -1,1 +1,1 @@
-"""Compiled functions of floats, arrays and codes. Knows no strings, no classes and no files."""
+"""Compiled functions of floats, arrays and integer codes."""

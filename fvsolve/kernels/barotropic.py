@@ -1,8 +1,8 @@
-"""Pipes under the density laws log and table: the full momentum flux. Knows the tables; closes no node.
+"""Rates and probes of pipes under the density laws log and table, with the full momentum flux.
 
-m_t + M_x = 0, M_t + (M^2 / m)_x + A p_x = -drag - m g slope. Waves r = (c m' + M') / 2, l = (c m' - M') / 2 are
-reconstructed from their own sides; the flux is that of the state both make at a face (a linearised Riemann
-solution with the reference wave speed c), less the profile's.
+m_t + M_x = 0, M_t + (M^2 / m)_x + A p_x = -drag - m g slope. The waves r = (c m' + M') / 2, l = (c m' - M') / 2 are
+each reconstructed from the side they come from. The flux at a face is that of the state which both waves form there
+(a linearised Riemann solution with the reference wave speed c), minus the flux of the profile.
 """
 
 from fvsolve.jit import njit
@@ -38,14 +38,14 @@ def momentum_flux(st, floats, pipe, m, flow):
 
 @njit
 def wall_force(pipe, reference, m, flow):
-    """Friction per length [kg/s2] of a flow in a pipe that holds m [kg/m]."""
-    pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
-    return pull * (reference / m)
+    """Friction force per length [kg/s2] of a mass flow in a pipe with m [kg/m] mass per length."""
+    friction = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+    return friction * (reference / m)
 
 
 @njit
 def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
-    """d/dt of both waves of one pipe; returns its greatest |v| + c over a cell [1/s]."""
+    """Write d/dt of both waves of a pipe; return the pipe's greatest rate (|v| + c) / dx [1/s]."""
     n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
     fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
     both_faces(st, pipe, r, l, ends[0], ends[1], ends[2], ends[3], scratch, fr, fl)
@@ -64,9 +64,9 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
             m0 = profile[cell + k]
             dm_cell, m_flow = (r[k] + l[k]) / c, flow + (r[k] - l[k])
             a, b = GAUSS * (dflow - left_flow), GAUSS * (dm - left_mass)
-            pull = wall_force(pipe, reference, m0 + dm_cell + b, m_flow + a)
-            pull += wall_force(pipe, reference, m0 + dm_cell - b, m_flow - a)
-            force = -weight * dm_cell - (0.5 * pull - pipe["drag"] * (reference / m0))
+            friction = wall_force(pipe, reference, m0 + dm_cell + b, m_flow + a)
+            friction += wall_force(pipe, reference, m0 + dm_cell - b, m_flow - a)
+            force = -weight * dm_cell - (0.5 * friction - pipe["drag"] * (reference / m0))
             mass_rate = -(dflow - left_flow) / dx
             flow_rate = -(flux - left_flux) / dx + force
             dr[k] = 0.5 * (c * mass_rate + flow_rate)
@@ -81,7 +81,7 @@ def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 
 @njit
 def rates_barotropic(t, y, dydt, out, handle):
-    """d/dt of the waves in the cells of all pipes, where rates are asked for, and their greatest rate."""
+    """Write d/dt of the waves in all pipe cells, unless `dydt` is empty; raise out[RATE] to their greatest rate."""
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     for i in range(pipes.size if dydt.size > 0 else 0):
@@ -94,9 +94,9 @@ def rates_barotropic(t, y, dydt, out, handle):
 
 
 @njit
-def pipe_place(probe, which, y, out, tables):
-    """(mass per length, mass flow) of a pipe at the place of a probe."""
-    pipe, at = tables.pipes[which], tables.layout[0]["ends"] + 4 * which
+def pipe_place(probe, index, y, out, tables):
+    """(mass per length [kg/m], mass flow [kg/s]) at the position of a probe in pipe `index`."""
+    pipe, at = tables.pipes[index], tables.layout[0]["ends"] + 4 * index
     r, l = out[at], out[at + 1]
     if probe["side"] > 0:
         r, l = out[at + 2], out[at + 3]
@@ -111,7 +111,7 @@ def pipe_place(probe, which, y, out, tables):
 
 @njit
 def as_asked(st, floats, probe, p):
-    """A pressure as absolute or gauge pressure, or as head, h(p) - h(ambient) over g above the elevation."""
+    """Absolute or gauge pressure [Pa] of a probe, or its head (h(p) - h(ambient)) / g plus elevation [m]."""
     if probe["head"] == 1:
         return (enthalpy(st, floats, p) - enthalpy(st, floats, st["ambient"])) / st["gravity"] + probe["offset"]
     return p + probe["offset"]
@@ -119,7 +119,7 @@ def as_asked(st, floats, probe, p):
 
 @njit
 def valve_volume_flow(st, floats, tables, out, k):
-    """Flow of a valve [m3/s] at the density upstream."""
+    """Volume flow of a valve [m3/s] at the upstream density."""
     layout, nodes, valve = tables.layout[0], tables.nodes, tables.valves[k]
     flow = out[layout["valve"] + k]
     up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
@@ -128,7 +128,7 @@ def valve_volume_flow(st, floats, tables, out, k):
 
 @njit
 def observe_barotropic(t, y, out, handle, values):
-    """Values of every probe; flows in m3/s at the density of the place, or upstream of a valve."""
+    """Write the values of all probes; volume flows [m3/s] use the local density, of a valve the upstream one."""
     tables = open_tables(handle)
     st, floats, layout, nodes = tables.settings[0], tables.floats, tables.layout[0], tables.nodes
     probes = tables.probes

@@ -1,4 +1,4 @@
-"""Rigid columns under the laws log and table. Knows columns and the valves at their ends; solves no node."""
+"""Rigid columns under the laws log and table: driving pressures, node pressures and rates of flow."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import drive, mean_density
@@ -14,7 +14,7 @@ from fvsolve.kernels.rigid import body_drive, gate_area, join_given, number_rigi
 
 @njit
 def drive_change(tables, out, k):
-    """What drives column k more than in the profile [Pa]."""
+    """Driving pressure of column k minus its value in the profile [Pa]."""
     st, nodes, column = tables.settings[0], tables.nodes, tables.columns[k]
     i, j, at = column["from_node"], column["to_node"], tables.layout[0]["pressure"]
     p_i, p_j = nodes[i]["pressure"] + out[at + i], nodes[j]["pressure"] + out[at + j]
@@ -26,7 +26,10 @@ def drive_change(tables, out, k):
 
 @njit
 def add_rates(t, y, tables, out, n):
-    """Add to the right side d/dt of what columns that nothing leads bring into each of n rigid nodes [kg/s2]."""
+    """Add to `right` the rates of flow [kg/s2] that columns bring into each of n column junctions.
+
+    Columns controlled by valves are left out; the right side of pinned junctions is zero.
+    """
     rows, _, _, right, pinned, _ = rigid_space(tables, n)
     for k in range(tables.columns.size):
         a, b = int(rows[tables.columns[k]["from_node"]]), int(rows[tables.columns[k]["to_node"]])
@@ -42,11 +45,11 @@ def add_rates(t, y, tables, out, n):
 
 @njit
 def hold_rigid_barotropic(t, y, tables, out):
-    """`hold_rigid` by iteration: what drives a column is all but linear in the pressures at its ends."""
+    """Pressures of column junctions by iteration: driving pressures are nearly linear in the end pressures."""
     n = number_rigid(tables, out)
     if n == 0:
         return
-    pressure, moved = tables.layout[0]["pressure"], 1e300
+    pressure, change = tables.layout[0]["pressure"], 1e300
     add_led(t, y, tables, out, n)
     join_given(tables, out, n)
     rows, _, _, right, pinned, _ = rigid_space(tables, n)
@@ -57,20 +60,23 @@ def hold_rigid_barotropic(t, y, tables, out):
         join_given(tables, out, n)
         add_rates(t, y, tables, out, n)
         settle_rigid(tables, out, n)
-        before, moved = moved, 0.0
+        last_change, change = change, 0.0
         for i in range(rows.size):
             if rows[i] >= 0.0:
                 step = right[int(rows[i])]
                 out[pressure + i] += step
-                moved = max(moved, abs(step) / (1e5 + abs(out[pressure + i])))
-        if settled(moved, before):
+                change = max(change, abs(step) / (1e5 + abs(out[pressure + i])))
+        if settled(change, last_change):
             return
     out[STATUS] = NOT_CONVERGED
 
 
 @njit
 def hold_columns_barotropic(t, y, dydt, out, handle):
-    """Give rigid nodes their pressures, and the led end of a column its far end's enthalpy less height and inertia."""
+    """Set the pressures of column junctions and of the valve-controlled ends of columns.
+
+    The enthalpy at a controlled end is that of the far end, less the height difference, the body force and inertia.
+    """
     tables = open_tables(handle)
     st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
     pressure = tables.layout[0]["pressure"]
@@ -79,33 +85,38 @@ def hold_columns_barotropic(t, y, dydt, out, handle):
         column, end = tables.columns[k], led_end(tables, out, k)
         if end == 0:
             continue
-        i, x = column["from_node"], column["to_node"]
+        i, controlled = column["from_node"], column["to_node"]
         if end == -1:
-            i, x = x, i
-        rise = st["gravity"] * (nodes[x]["elevation"] - nodes[i]["elevation"]) - end * body_drive(tables, out, column)
+            i, controlled = controlled, i
+        rise = st["gravity"] * (nodes[controlled]["elevation"] - nodes[i]["elevation"]) - end * body_drive(
+            tables, out, column
+        )
         h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
-        out[pressure + x] = pressure_of_enthalpy(st, floats, h - rise) - nodes[x]["pressure"]
-        if lone_lead(tables, x) >= 0:
-            drive_with_lift(t, y, tables, out, k, x, lone_lead(tables, x))
-        elif gate_area(tables, out, x)[0] > 0.0:
+        out[pressure + controlled] = pressure_of_enthalpy(st, floats, h - rise) - nodes[controlled]["pressure"]
+        if lone_lead(tables, controlled) >= 0:
+            drive_with_lift(t, y, tables, out, k, controlled, lone_lead(tables, controlled))
+        elif gate_area(tables, out, controlled)[0] > 0.0:
             rate = led_flow(t, y, tables, out, k, end, True)[1]
-            out[pressure + x] -= column["length"] / column["area"] * rate
+            out[pressure + controlled] -= column["length"] / column["area"] * rate
 
 
 @njit
-def drive_with_lift(t, y, tables, out, k, x, which):
-    """Take off the standing pressure of node x what moves column k and the valve that leads it."""
-    valve, pressure = tables.valves[which], tables.layout[0]["pressure"]
-    still, ahead = head_drop(tables, out, which)[1], valve["from_node"] == x
+def drive_with_lift(t, y, tables, out, k, x, index):
+    """Change p' of node x from that of a stationary column to that with column and valve in motion.
+
+    index : the seating valve that controls column k
+    """
+    valve, pressure = tables.valves[index], tables.layout[0]["pressure"]
+    still, ahead = head_drop(tables, out, index)[1], valve["from_node"] == x
     other = out[pressure + (valve["to_node"] if ahead else valve["from_node"])]
     inertia = tables.columns[k]["length"] / tables.columns[k]["area"]
-    drop = led_by_lift(t, y, tables, out, k, which, out[pressure + x], inertia, other, still)[0]
+    drop = led_by_lift(t, y, tables, out, k, index, out[pressure + x], inertia, other, still)[0]
     out[pressure + x] += drop - still if ahead else still - drop
 
 
 @njit
 def column_rates_barotropic(t, y, dydt, out, handle):
-    """d/dt of the flow in rigid columns: (A / L) (change of what drives them) - drag'."""
+    """d/dt of the flow in rigid columns: (A / L) (change of the driving pressure) - (drag - drag of the profile)."""
     tables = open_tables(handle)
     for k in range(tables.columns.size if dydt.size > 0 else 0):
         at = tables.columns[k]["y"]

@@ -1,7 +1,7 @@
-"""Nodes under the laws log and table: stagnation enthalpy is conserved, flows carry the upstream density.
+"""Nodes under the laws log and table: stagnation enthalpy is conserved, flows have the upstream density.
 
-From what the cells say of a pipe end a simple wave leads to the end's own state, in which h(p_end) + v^2 / 2 =
-h(p_node); but a jet into a tank, chamber or reservoir loses its v^2 / 2. Knows ends and nodes; knows no cells.
+A simple wave leads from the state extrapolated from the cells to the state at the pipe end, where
+h(p_end) + v^2 / 2 = h(p_node). A jet into a tank, chamber or reservoir loses its v^2 / 2.
 """
 
 import numpy as np
@@ -49,7 +49,8 @@ from fvsolve.kernels.schedules import schedule_value
 from fvsolve.kernels.tanks import tank_level
 from fvsolve.kernels.valves import flow_at_drop, transition_of
 
-NEARLY = 0.01  # of what a node lacks, what flows of valves may yet be off their laws
+# Errors of valve flows against their laws up to this fraction of the node's imbalance cannot reverse a Newton step.
+NEARLY = 0.01
 
 
 @njit
@@ -60,7 +61,7 @@ def head_pressure(st, floats, head):
 
 @njit
 def store_barotropic(t, y, dydt, out, handle):
-    """Deviations [Pa] of given pressures, tanks and chambers."""
+    """Write the pressure deviations [Pa] of fixed nodes, tanks and chambers, and the stiffness of softened chambers."""
     tables = open_tables(handle)
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     for i in range(nodes.size):
@@ -84,10 +85,12 @@ def store_barotropic(t, y, dydt, out, handle):
 
 @njit
 def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
-    """(flow into the node, its slope over p_node, mass per length) of a pipe end, by Newton on its pressure.
+    """(flow into the node [kg/s], its slope over p_node, mass per length [kg/m]) of a pipe end, by Newton.
 
-    m_inside, into_inside : what the cells say of the end [kg/m, kg/s]; a simple wave leads from there to the
-    end's own state, v + integral of dp / (rho c) constant. still : the node is a vessel at rest.
+    m_inside, into_inside : mass per length and flow towards the node, extrapolated from the cells [kg/m, kg/s]
+    still : True if the node is a vessel at rest, not a junction
+
+    A simple wave leads from there to the state at the end: v + integral of dp / (rho c) is constant.
     """
     p_inside = pressure_of_mass(st, floats, pipe, m_inside)
     v_inside = into_inside / m_inside
@@ -113,9 +116,10 @@ def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
 
 @njit
 def ends_into_nodes(out, tables, slope, final):
-    """Change of flow from pipes into every node at the present pressures, in out[net], and its slope.
+    """Write the change of flow from pipes into every node at the present pressures to out[net], its slope to `slope`.
 
-    out[ends] holds what the cells say of both waves at each end; `final` puts the ends' own waves in their place.
+    On entry out[ends] holds both waves extrapolated from the cells at each end; `final` replaces them with the waves of
+    the solved end states.
     """
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     pipes, profile = tables.pipes, tables.profile
@@ -146,7 +150,7 @@ def ends_into_nodes(out, tables, slope, final):
 
 @njit
 def offer_barotropic(t, y, dydt, out, handle):
-    """What the cells say of both waves at both ends of every pipe, into out[ends]."""
+    """Extrapolate both waves from the cells to both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
     st, layout, pipes, work = tables.settings[0], tables.layout[0], tables.pipes, tables.scratch
     for i in range(pipes.size):
@@ -154,15 +158,15 @@ def offer_barotropic(t, y, dydt, out, handle):
         n, o = pipe["cells"], pipe["y"]
         family = family_of(st, n)
         for side in range(2):
-            for which in range(2):
-                wave = y[o + n * which : o + n * (which + 1)]
-                value = end_value(wave, side, family, st["degree"], st["limiter"], pipe["noise"], work)
-                out[layout["ends"] + 4 * i + 2 * side + which] = value
+            for wave in range(2):
+                cells = y[o + n * wave : o + n * (wave + 1)]
+                value = end_value(cells, side, family, st["degree"], st["limiter"], pipe["noise"], work)
+                out[layout["ends"] + 4 * i + 2 * side + wave] = value
 
 
 @njit
 def mean_density(st, floats, p_i, p_j):
-    """dp / dh between two pressures [kg/m3]."""
+    """Mean density dp / dh between two pressures [kg/m3]."""
     dp = p_i - p_j
     if abs(dp) > 1e-3:
         return dp / (enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j))
@@ -171,7 +175,7 @@ def mean_density(st, floats, p_i, p_j):
 
 @njit
 def drive(st, floats, p_i, z_i, p_j, z_j):
-    """(rho_mean (dh + g dz), upstream density): the pressure that drives a link, p_i - p_j on one level."""
+    """(driving pressure of a link, rho_mean (dh + g dz), upstream density) [Pa, kg/m3]; p_i - p_j for ends on one level."""
     dp = p_i - p_j
     if z_i != z_j:
         dh = enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j)
@@ -181,7 +185,7 @@ def drive(st, floats, p_i, z_i, p_j, z_j):
 
 @njit
 def valve_drive(tables, out, k):
-    """(pressure that drives valve k [Pa], density upstream over that of reference)."""
+    """(driving pressure of valve k [Pa], upstream density over reference density)."""
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
@@ -193,7 +197,7 @@ def valve_drive(tables, out, k):
 
 @njit
 def valve_target(tables, out, k, g):
-    """(M |M| that a valve asks for by the root, or the flow where that has a laminar part; its G now)."""
+    """(M |M| of a valve by the square-root law, or its flow if the law has a laminar part; its conductance now)."""
     valve = tables.valves[k]
     drop, denser = valve_drive(tables, out, k)
     dense = g * denser
@@ -205,8 +209,8 @@ def valve_target(tables, out, k, g):
 
 
 @njit
-def balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right):
-    """`assemble` with the slopes of the pipe ends."""
+def balances(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right):
+    """Newton system of a cluster's nodes, as in `node_clusters.assemble`, but with the slopes of the pipe ends."""
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     integers, n = tables.integers, c.size
     matrix[:] = 0.0
@@ -215,50 +219,51 @@ def balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matri
         right[r] = out[layout["net"] + i] + c[r]
         matrix[n * r + r] = -slope[i]
     for e in range(g.size):
-        which = integers[cluster["first_valve"] + e]
-        i, j = inner_row(nodes, valves[which]["from_node"]), inner_row(nodes, valves[which]["to_node"])
+        k = integers[cluster["first_valve"] + e]
+        i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
         a[e], s[e], lift[e] = -m[e], 0.0, 0.0
         if g[e] > 0.0:
-            drop, denser = valve_drive(tables, out, which)
-            a[e], s[e] = restriction_step(tables, out, which, g[e], m[e], drop, denser, wide)
-            lift[e] = restriction_lift(tables, out, which, g[e], drop, denser, wide)
+            drop, denser = valve_drive(tables, out, k)
+            a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], drop, denser, wide)
+            lift[e] = restriction_lift(tables, out, k, g[e], drop, denser, wide)
         put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     for r in range(n):
-        if held[r] == 0.0:
+        if connected[r] == 0.0:
             right[r], matrix[n * r + r] = 0.0, 1.0
 
 
 @njit
-def newton_step(cluster, out, tables, g, m, c, held, slope, wide, work):
-    """One Newton step of a cluster; returns its greatest change, relative, and whether it points to the root.
+def newton_step(cluster, out, tables, g, m, c, connected, slope, wide, work):
+    """Make a Newton step of a cluster; return its greatest relative change and whether it points to the root.
 
-    It does where flows of valves, by now so near to those of their laws that Newton's error is of second order, cannot
-    turn what nodes lack. wide: as of `restriction_step`.
+    It points to the root if the errors of valve flows against their laws are so small (below the fraction FLOW_ERROR)
+    that the second-order error of Newton cannot reverse the imbalance of a node.
+    wide : see `restriction_step`
     """
     n, k = c.size, g.size
     matrix, right = work[: n * n], work[n * n : n * n + n]
     at = n * n + n
     a, s, lift = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : at + 3 * k]
-    balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right)
-    left = largest(right)
-    side = solve_dense(matrix, right, n)
-    if side <= 0.0 and not wide and let_fall(cluster, tables, g, m):
-        balances(cluster, out, tables, g, m, c, held, slope, wide, a, s, lift, matrix, right)
-        left = largest(right)
-        side = solve_dense(matrix, right, n)
-    if side == 0.0:
+    balances(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right)
+    imbalance = largest(right)
+    sign = solve_dense(matrix, right, n)
+    if sign <= 0.0 and not wide and let_fall(cluster, tables, g, m):
+        balances(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right)
+        imbalance = largest(right)
+        sign = solve_dense(matrix, right, n)
+    if sign == 0.0:
         out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"]]
         return 0.0, True
-    off = 0.0
+    flow_error = 0.0
     for e in range(k):
-        off += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
+        flow_error += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
     shorten(tables.settings[0]["beta"], a, right)
-    return move(cluster, tables, out, m, a, s, lift, right), off <= NEARLY * left
+    return move(cluster, tables, out, m, a, s, lift, right), flow_error <= NEARLY * imbalance
 
 
 @njit(forceinline=True)
 def largest(a):
-    """The greatest magnitude."""
+    """Greatest magnitude of the entries."""
     most = 0.0
     for i in range(a.size):
         most = max(most, abs(a[i]))
@@ -267,20 +272,23 @@ def largest(a):
 
 @njit
 def shorten(most, a, right):
-    """Make a Newton step rise by no more than `most` [Pa], over which density grows by e: far above it is infinite."""
-    longest = 0.0
+    """Limit a Newton step to a pressure rise of `most` [Pa], over which density grows by a factor e."""
+    greatest = 0.0
     for r in range(right.size):
-        longest = max(longest, right[r])
-    if longest > most:
+        greatest = max(greatest, right[r])
+    if greatest > most:
         for r in range(right.size):
-            right[r] *= most / longest
+            right[r] *= most / greatest
         for e in range(a.size):
-            a[e] *= most / longest
+            a[e] *= most / greatest
 
 
 @njit
 def given_flows(t, y, out, tables):
-    """Pressures of vessels, demands, and flows of valves that lie between known pressures."""
+    """Write demands, inflows of junctions, and flows of valves between known pressures.
+
+    The pressures of junctions are reset to those of the profile.
+    """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION:
@@ -297,7 +305,7 @@ def given_flows(t, y, out, tables):
 
 @njit
 def is_quiet(cluster, tables, out):
-    """Whether pipe ends bring the nodes of a cluster exactly what they did in the profile."""
+    """True if pipe ends bring exactly the flow of the profile into every node of a cluster."""
     for i in range(cluster["nodes"]):
         node = tables.integers[cluster["first_node"] + i]
         if out[tables.layout[0]["net"] + node] != 0.0:
@@ -307,7 +315,7 @@ def is_quiet(cluster, tables, out):
 
 @njit
 def node_space(tables):
-    """Scratch of all clusters: (slope, c, held, group of nodes, conductance and flow of valves, the rest)."""
+    """Work arrays of all clusters: (slope, c, connected, group of nodes; conductance, flow of valves; rest)."""
     n, v, work = tables.nodes.size, tables.valves.size, tables.scratch
     g, m, rest = work[4 * n : 4 * n + v], work[4 * n + v : 4 * n + 2 * v], work[4 * n + 2 * v :]
     return (
@@ -323,95 +331,100 @@ def node_space(tables):
 
 @njit
 def cluster_space(tables):
-    """How far each cluster is: (whether it is done, its last change and the one before it, wide, sure).
+    """State of the iteration of each cluster: (done, last change, change before it, wide, sure).
 
-    sure : whether its last step points to the root; it may point away while flows of valves have yet to turn
+    sure : 1 if the last step points to the root; it may point away until the flows of valves have reversed
     """
-    n, v, many = tables.nodes.size, tables.valves.size, tables.clusters.size
+    n, v, n_clusters = tables.nodes.size, tables.valves.size, tables.clusters.size
     work = tables.scratch[4 * n + 2 * v :]
     return (
-        work[:many],
-        work[many : 2 * many],
-        work[2 * many : 3 * many],
-        work[3 * many : 4 * many],
-        work[4 * many : 5 * many],
+        work[:n_clusters],
+        work[n_clusters : 2 * n_clusters],
+        work[2 * n_clusters : 3 * n_clusters],
+        work[3 * n_clusters : 4 * n_clusters],
+        work[4 * n_clusters : 5 * n_clusters],
     )
 
 
 @njit
 def begin_clusters(out, tables, space):
-    """Flows and openings of all clusters before Newton's first step; done: as in the profile, but for pipe ends."""
-    clusters, (_, c, held, _, g, m, _), (done, moved, _, wide, _) = tables.clusters, space, cluster_space(tables)
+    """Set valve flows and openings of all clusters before the first Newton step.
+
+    A cluster counts as done if all is as in the profile; pipe ends are checked later.
+    """
+    clusters, (_, c, connected, _, g, m, _), (done, change, _, wide, _) = tables.clusters, space, cluster_space(tables)
     a, b = 0, 0
-    for which in range(clusters.size):
-        cluster = clusters[which]
+    for k in range(clusters.size):
+        cluster = clusters[k]
         i, j = a + cluster["nodes"], b + cluster["valves"]
         unchanged = prepare(cluster, tables, out, g[b:j], m[b:j])
-        done[which] = 1.0 if whole_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
-        moved[which], wide[which] = 1e300, 1.0
-        find_held(cluster, tables, g[b:j], held[a:i])
-        shut_out(cluster, tables, g[b:j], m[b:j], held[a:i])
+        done[k] = 1.0 if whole_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
+        change[k], wide[k] = 1e300, 1.0
+        find_held(cluster, tables, g[b:j], connected[a:i])
+        shut_out(cluster, tables, g[b:j], m[b:j], connected[a:i])
         a, b = i, j
 
 
 @njit
 def step_clusters(sweep, out, tables, space):
-    """A Newton step of every cluster that something reaches and that is not done."""
-    clusters, (slope, c, held, _, g, m, rest), (done, moved, past, wide, sure) = (
+    """Make a Newton step in every cluster that is disturbed and not done."""
+    clusters, (slope, c, connected, _, g, m, rest), (done, change, last_change, wide, sure) = (
         tables.clusters, space, cluster_space(tables),
     )  # fmt: skip
     a, b = 0, 0
-    for which in range(clusters.size):
-        cluster = clusters[which]
+    for k in range(clusters.size):
+        cluster = clusters[k]
         i, j = a + cluster["nodes"], b + cluster["valves"]
-        if sweep == 1 and done[which] == 1.0:
+        if sweep == 1 and done[k] == 1.0:
             if is_quiet(cluster, tables, out):
-                moved[which] = 0.0
+                change[k] = 0.0
             else:
-                done[which] = 0.0
-        if done[which] == 0.0:
-            past[which] = moved[which]
+                done[k] = 0.0
+        if done[k] == 0.0:
+            last_change[k] = change[k]
             step, near = newton_step(
-                cluster, out, tables, g[b:j], m[b:j], c[a:i], held[a:i], slope, wide[which] == 1.0, rest
+                cluster, out, tables, g[b:j], m[b:j], c[a:i], connected[a:i], slope, wide[k] == 1.0, rest
             )
-            moved[which] = max(0.0, step)  # one that is no number ends here: the rates say it
-            sure[which] = 1.0 if near else 0.0
+            change[k] = max(0.0, step)  # 0 for NaN: the iteration ends, the rates show the fault
+            sure[k] = 1.0 if near else 0.0
         a, b = i, j
 
 
 @njit
 def settle_clusters(out, tables, space):
-    """Which clusters are done, each by its own last change; returns whether one goes on."""
-    clusters, m, (done, moved, past, wide, _), b, on = tables.clusters, space[5], cluster_space(tables), 0, False
-    for which in range(clusters.size):
-        j = b + clusters[which]["valves"]
-        if done[which] == 0.0 and settled(moved[which], past[which]):
-            if wide[which] == 1.0 and any_back(clusters[which], tables, m[b:j]):
-                moved[which], wide[which] = 1e300, 0.0
+    """Mark converged clusters as done, each by its own last change; return True if any cluster is not done."""
+    clusters, m, (done, change, last_change, wide, _), b, active = (
+        tables.clusters, space[5], cluster_space(tables), 0, False,
+    )  # fmt: skip
+    for k in range(clusters.size):
+        j = b + clusters[k]["valves"]
+        if done[k] == 0.0 and settled(change[k], last_change[k]):
+            if wide[k] == 1.0 and any_back(clusters[k], tables, m[b:j]):
+                change[k], wide[k] = 1e300, 0.0
             else:
-                done[which] = 1.0
-        on = on or done[which] == 0.0
+                done[k] = 1.0
+        active = active or done[k] == 0.0
         b = j
-    return on
+    return active
 
 
 @njit
 def finish_clusters(out, tables, space):
-    """Write the flows of all clusters' valves."""
-    clusters, (_, c, held, group, g, m, _), moved = tables.clusters, space, cluster_space(tables)[1]
+    """Write the flows of the valves of all clusters."""
+    clusters, (_, c, connected, group, g, m, _), change = tables.clusters, space, cluster_space(tables)[1]
     a, b = 0, 0
-    for which in range(clusters.size):
-        i, j = a + clusters[which]["nodes"], b + clusters[which]["valves"]
-        finish(clusters[which], tables, out, g[b:j], m[b:j], c[a:i], held[a:i], group[a:i], moved[which])
+    for k in range(clusters.size):
+        i, j = a + clusters[k]["nodes"], b + clusters[k]["valves"]
+        finish(clusters[k], tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], group[a:i], change[k])
         a, b = i, j
 
 
 @njit
 def close_barotropic(t, y, dydt, out, handle):
-    """Pressure deviation of every node, flow of every valve and both waves at every pipe end, by Newton.
+    """Solve all nodes by Newton: pressures of nodes, flows of valves, both waves at every pipe end.
 
-    All clusters that are not done take a step, then all pipe ends are evaluated again. Each stops by itself, so that
-    none depends on what is elsewhere; one that nothing reaches stays as it is.
+    In each sweep all clusters that are not done take a step, then all pipe ends are evaluated again. Each cluster stops
+    by its own change, so its result does not depend on other clusters. An undisturbed cluster is left as it is.
     """
     tables = open_tables(handle)
     space = node_space(tables)

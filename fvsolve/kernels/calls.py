@@ -1,8 +1,8 @@
-"""Calls of compiled functions by their addresses, so that each is compiled once and a scene is a list of them.
+"""Calls of compiled functions by address: each function is compiled once, and a model is a list of functions.
 
-Numba compiles whatever a function calls into it again; an address ends that. All pieces of a job take the same
-arguments: `t, y, dydt, out, handle` and, where they read a state, the vector that they fill. The law of a part is
-functions named as `HOOKS`, each taking its own. What they raise is lost.
+Numba compiles every function again that a function calls; a call by address avoids this. All functions of a job have
+the same arguments: `t, y, dydt, out, handle`, and where they read a state also the vector that they fill. The law of
+a part is a set of functions named as in `HOOKS`, each with its own arguments. Exceptions raised in them are lost.
 """
 
 from __future__ import annotations
@@ -16,34 +16,38 @@ from fvsolve.jit import COMPILING, Intrinsic, declared, njit, plain_kinds
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import AMENDED, STATUS, table_types
 
-# Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, is what event functions want to have run.
-# SEE makes of a state what the pieces of all but RHS see of it, where that is something else (`basins.walls`). DAMP
-# divides rates of a stage by what is quick in them (`steppers.semi_implicit`).
+# Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, must run before event functions.
+# SEE derives from a state the values that the functions of all jobs but RHS read, where these are not the state itself
+# (`basins.walls`). DAMP divides the rates of a stage by 1 + h r, r their fast part (`steppers.semi_implicit`).
 RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, SEE, DAMP, JOBS = range(10)
-RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # arguments of pieces
+RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # argument types of the functions of jobs
 ARGUMENTS = dict.fromkeys((RHS, CLOSE, SEE, DAMP), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
-HOOKS = {  # of the law of a part: arguments, and what it returns
+HOOKS = {  # functions of the law of a part: types of arguments and of the result
     "set": (
         "tVVTD",
         "",
-    ),  # t, y, out, tables, device: conductances, speeds, pressures of vessels, by (t, y) and flags
-    "move": ("tVVVTD", ""),  # t, y, dydt, out, tables, device: rates of what it holds where dydt.size > 0; out[RATE]
-    "events": ("tVVTDV", ""),  # t, y, out, tables, device, g: its event functions, from closed nodes
-    "value": ("tVVTDi", "t"),  # t, y, out, tables, device, which: its quantity of that number
-    "outside": ("VTD", "i"),  # out, tables, device: 1 where its law is not to be trusted, or PASSING
-    "power": ("tVVVTD", "ttt"),  # t, y, dydt, out, tables, device: supplied, rate of what it stores, dissipated [W]
-    "stored": ("VTD", "t"),  # y, tables, device: what it stores, since the profile [J]
-    "step": ("VTittttb", "tt"),  # out, tables, k, g, m, drop, denser, wide: Newton's, see `kernels.restrictions`
+    ),  # t, y, out, tables, device: writes conductances, speeds, pressures of vessels, from (t, y) and flags
+    "move": ("tVVVTD", ""),  # t, y, dydt, out, tables, device: rates of its states if dydt.size > 0; out[RATE]
+    "events": ("tVVTDV", ""),  # t, y, out, tables, device, g: its event functions, from solved nodes
+    "value": ("tVVTDi", "t"),  # t, y, out, tables, device, quantity: value of its quantity of that number
+    "outside": ("VTD", "i"),  # out, tables, device: 1 outside the range of validity of its law, or TEMPORARY
+    "power": ("tVVVTD", "ttt"),  # t, y, dydt, out, tables, device: power supplied, stored, dissipated [W]
+    "stored": ("VTD", "t"),  # y, tables, device: stored energy, change since the profile [J]
+    "step": ("VTittttb", "tt"),  # out, tables, k, g, m, drop, denser, wide: Newton step, see `kernels.restrictions`
     "slope": ("VTitt", "t"),  # out, tables, k, g, drop: d flow / d drop [kg/s/Pa]
-    "lift": ("VTitttb", "t"),  # out, tables, k, g, drop, denser, wide: d flow / d pressure before it, beside the drop's
-    "bends": ("TitV", ""),  # tables, k, drop, g: event functions of a restriction, by the drop alone
-    "lead": ("tVTDtttb", "tt"),  # t, y, tables, device, p' before, p' behind, drop, ahead: as `kernels.led` asks
+    "lift": ("VTitttb", "t"),  # out, tables, k, g, drop, denser, wide: d flow / d upstream pressure at constant drop
+    "bends": ("TitV", ""),  # tables, k, drop, g: event functions of a restriction, from the drop alone
+    "lead": ("tVTDtttb", "tt"),  # t, y, tables, device, p' upstream, p' downstream, drop, ahead: see
+    # `kernels.column_valve_control.seating_drop`
 }
 
 
 def argument_types(letters: str) -> tuple:
-    """Numba's types of times (t), rows of numbers (v) and handles (h); of V and H as calls by address pass these."""
+    """Numba types for letters of arguments.
+
+    t : number, v : vector, h : handle; V, H : vector and handle in calls by address; T : tables; D : a device; i, b
+    """
     kinds = _kinds()
     return tuple(kinds[letter] for letter in letters)
 
@@ -60,47 +64,53 @@ def _kinds() -> dict:
 
 
 def compile_as(function, letters: str):
-    """The function compiled for arguments of these kinds and no others, itself where JIT is off."""
+    """Compile a function for arguments of these types only; return it unchanged where JIT is off."""
     return declared(function, letters, argument_types)
 
 
 def addressed(function, letters: str):
-    """A function, compiled, as tables hold it: its address, or itself where JIT is off.
+    """Address of a compiled function for the tables; the function itself where JIT is off.
 
-    Its machine code stays there as long as the function does.
+    The machine code stays in place as long as the function exists.
     """
     return function.address(letters, argument_types) if COMPILING else function
 
 
 def hook_of(law, name: str):
-    """The function of a law at a hook, None where it has none; FvsolveError where it takes other arguments."""
-    function, wanted = getattr(law, name, None), len(HOOKS[name][0])
-    if function is None or function.__code__.co_argcount == wanted:
+    """Function of a law for a hook, None if the law has none; raises FvsolveError for a wrong number of arguments."""
+    function, expected = getattr(law, name, None), len(HOOKS[name][0])
+    if function is None or function.__code__.co_argcount == expected:
         return function
-    said = f"{law.__name__}.{name} takes {function.__code__.co_argcount} arguments"
-    raise FvsolveError(f"{said}; wanted {wanted}, as kernels.calls.HOOKS says, or another name")
+    error = f"{law.__name__}.{name} has {function.__code__.co_argcount} arguments"
+    raise FvsolveError(f"{error}. Expected {expected} (see kernels.calls.HOOKS), or another name")
 
 
 def empty_calls(rows: int, columns: int) -> np.ndarray:
-    """Room for addresses."""
+    """Empty table for function addresses."""
     return np.zeros((rows, columns), dtype=np.int64 if COMPILING else object)
 
 
 if COMPILING:
 
     def call(letters: str, returned: str = ""):
-        """(signature, generator) of a call whose first argument is the address."""
+        """(signature, generator) of a call whose first argument is the address of the function."""
         from numba.core import types
 
         kinds = argument_types(letters)
-        found = argument_types(returned)
-        result = types.none if not found else found[0] if len(found) == 1 else types.Tuple(found)
+        returned_types = argument_types(returned)
+        result = (
+            types.none
+            if not returned_types
+            else returned_types[0]
+            if len(returned_types) == 1
+            else types.Tuple(returned_types)
+        )
 
         def generate(context, builder, kind, args):
             shape = context.call_conv.get_function_type(result, kinds)
             pointer = builder.inttoptr(args[0], shape.as_pointer())
             _, value = context.call_conv.call_function(builder, pointer, result, kinds, args[1:])
-            return value if found else context.get_dummy_value()
+            return value if returned_types else context.get_dummy_value()
 
         return result(types.int64, *kinds), generate
 
@@ -135,7 +145,7 @@ if COMPILING:
         return call(*HOOKS["events"])
 
     @Intrinsic
-    def call_value(typingctx, address, t, y, out, tables, device, which):
+    def call_value(typingctx, address, t, y, out, tables, device, quantity):
         """Call the hook at an address."""
         return call(*HOOKS["value"])
 
@@ -191,9 +201,9 @@ else:
 
 @njit(forceinline=True)
 def see(t, y, seen, out, handle):
-    """Let `seen` be what the pieces see of a state, in scenes where that is something else.
+    """Write to `seen` the values that functions read in place of the state, in models where they differ.
 
-    seen : that of the tables, or none of it where rates come next, whose kernels need less
+    seen : the array of the tables, or an empty part of it before rates, whose functions need less
     """
     tables, k = open_tables(handle), 0
     while tables.calls[SEE, k] != 0:
@@ -203,7 +213,7 @@ def see(t, y, seen, out, handle):
 
 @njit(forceinline=True)
 def run(job, t, y, dydt, out, handle):
-    """Every piece of a job that takes part in the right-hand side."""
+    """Call every function of a job with the arguments of the right-hand side."""
     calls, k = open_tables(handle).calls, 0
     while calls[job, k] != 0:
         call_rates(calls[job, k], t, y, dydt, out, handle)
@@ -212,9 +222,9 @@ def run(job, t, y, dydt, out, handle):
 
 @njit
 def rhs_in_turn(t, y, dydt, out, handle):
-    """Every piece of the right-hand side; they see states as these are, see `basins.stretch`.
+    """Call every function of the right-hand side; they read the states themselves, see `basins.stretch`.
 
-    Rates are found, asked for or not, where `out` hangs on them.
+    If `dydt` is empty and `out` depends on rates, the rates are computed in `work`.
     """
     tables = open_tables(handle)
     see(t, y, y[:0], out, handle)
@@ -226,14 +236,14 @@ def rhs_in_turn(t, y, dydt, out, handle):
 
 @njit
 def damp_in_turn(h, y, rates, quick, handle):
-    """Every piece that divides rates of a stage y by 1 + h r; quick : h r of the states that it divides."""
+    """Call every function that divides rates of a stage y by 1 + h r; quick : h r of the states that it divides."""
     see(0.0, y, open_tables(handle).seen, quick, handle)
     run(DAMP, h, y, rates, quick, handle)
 
 
 @njit
 def observe_in_turn(t, y, out, handle, values):
-    """Every piece that reads probes."""
+    """Call every function that writes probe values."""
     tables, k = open_tables(handle), 0
     see(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
@@ -244,7 +254,10 @@ def observe_in_turn(t, y, out, handle, values):
 
 @njit
 def record_in_turn(t, y, out, handle, values):
-    """Every piece that notes an accepted state, after the probes are read."""
+    """Write probe values, then call every function that records an accepted state.
+
+    Stops if a function has set the status AMENDED.
+    """
     tables, k = open_tables(handle), 0
     observe_in_turn(t, y, out, handle, values)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
@@ -257,13 +270,13 @@ def record_in_turn(t, y, out, handle, values):
 
 @njit
 def close_in_turn(t, y, out, handle, g):
-    """Close the nodes for the event functions that follow."""
+    """Solve the nodes before event functions are evaluated."""
     run(CLOSE, t, y, y[:0], out, handle)
 
 
 @njit
 def events_in_turn(t, y, handle, g):
-    """Every piece of the event functions."""
+    """Call every function that writes event functions."""
     tables, k = open_tables(handle), 0
     calls, out = tables.calls, tables.spare
     see(t, y, tables.seen, out, handle)
@@ -275,7 +288,7 @@ def events_in_turn(t, y, handle, g):
 
 @njit
 def power_in_turn(t, y, dydt, out, handle, power):
-    """Every piece that fills `power`."""
+    """Call every function that fills `power`."""
     tables, k = open_tables(handle), 0
     see(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
@@ -286,7 +299,7 @@ def power_in_turn(t, y, dydt, out, handle, power):
 
 @njit
 def stored_in_turn(t, y, dydt, out, handle, stored):
-    """Every piece that fills `stored`."""
+    """Call every function that fills `stored`."""
     tables, k = open_tables(handle), 0
     see(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
