@@ -175,7 +175,7 @@ def mean_density(st, floats, p_i, p_j):
 
 @njit
 def drive(st, floats, p_i, z_i, p_j, z_j):
-    """(driving pressure of a link, rho_mean (dh + g dz), upstream density) [Pa, kg/m3]; p_i - p_j for ends on one level."""
+    """Driving pressure of a link, rho_mean (dh + g dz) [Pa], and upstream density [kg/m3]: p_i - p_j on one level."""
     dp = p_i - p_j
     if z_i != z_j:
         dh = enthalpy(st, floats, p_i) - enthalpy(st, floats, p_j)

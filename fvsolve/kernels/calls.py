@@ -32,21 +32,25 @@ HOOKS = {  # functions of the law of a part: types of arguments and of the resul
     "events": ("tVVTDV", ""),  # t, y, out, tables, device, g: its event functions, from solved nodes
     "value": ("tVVTDi", "t"),  # t, y, out, tables, device, quantity: value of its quantity of that number
     "outside": ("VTD", "i"),  # out, tables, device: 1 outside the range of validity of its law, or TEMPORARY
-    "power": ("tVVVTD", "ttt"),  # t, y, dydt, out, tables, device: power supplied, stored, dissipated [W]
+    "power": (
+        "tVVVTD",
+        "ttt",
+    ),  # t, y, dydt, out, tables, device: power supplied, rate of stored energy, dissipation [W]
     "stored": ("VTD", "t"),  # y, tables, device: stored energy, change since the profile [J]
     "step": ("VTittttb", "tt"),  # out, tables, k, g, m, drop, denser, wide: Newton step, see `kernels.restrictions`
     "slope": ("VTitt", "t"),  # out, tables, k, g, drop: d flow / d drop [kg/s/Pa]
     "lift": ("VTitttb", "t"),  # out, tables, k, g, drop, denser, wide: d flow / d upstream pressure at constant drop
     "bends": ("TitV", ""),  # tables, k, drop, g: event functions of a restriction, from the drop alone
-    "lead": ("tVTDtttb", "tt"),  # t, y, tables, device, p' upstream, p' downstream, drop, ahead: see
-    # `kernels.column_valve_control.seating_drop`
+    # t, y, tables, device, p' upstream, p' downstream, drop, ahead: dx/dt of the lift and its slope over the drop
+    "lead": ("tVTDtttb", "tt"),
 }
 
 
 def argument_types(letters: str) -> tuple:
-    """Numba types for letters of arguments.
+    """Numba types of arguments, a letter for each.
 
-    t : number, v : vector, h : handle; V, H : vector and handle in calls by address; T : tables; D : a device; i, b
+    t : number; v : vector; h : handle; V, H : vector and handle in calls by address
+    T : tables; D : record of a device; i : integer; b : boolean
     """
     kinds = _kinds()
     return tuple(kinds[letter] for letter in letters)
@@ -97,20 +101,14 @@ if COMPILING:
         from numba.core import types
 
         kinds = argument_types(letters)
-        returned_types = argument_types(returned)
-        result = (
-            types.none
-            if not returned_types
-            else returned_types[0]
-            if len(returned_types) == 1
-            else types.Tuple(returned_types)
-        )
+        results = argument_types(returned)
+        result = types.none if not results else results[0] if len(results) == 1 else types.Tuple(results)
 
         def generate(context, builder, kind, args):
             shape = context.call_conv.get_function_type(result, kinds)
             pointer = builder.inttoptr(args[0], shape.as_pointer())
             _, value = context.call_conv.call_function(builder, pointer, result, kinds, args[1:])
-            return value if returned_types else context.get_dummy_value()
+            return value if results else context.get_dummy_value()
 
         return result(types.int64, *kinds), generate
 
