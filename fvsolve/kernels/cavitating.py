@@ -1,8 +1,8 @@
-"""Pipes under the density law mixture, where cavities open and close. Knows the tables; closes no node.
+"""Rates and probes of pipes under the density law mixture, where cavities open and close.
 
 m_t + M_x = 0, M_t + (M^2 / m + F)_x = -drag - m g slope, F the integral of A dp. Pressure and velocity are
-reconstructed from both sides of a face, the flux is that of the Riemann problem there (`riemann.py`), less the
-profile's; so a front moves at its own speed, be it sound's in the liquid or a cavity's edge a thousand times slower.
+reconstructed from both sides of a face. The flux is that of the Riemann problem there (`riemann.py`), minus the flux of
+the profile. So each front moves at its own speed: sound in the liquid, or the edge of a cavity a thousand times slower.
 """
 
 from fvsolve.jit import njit
@@ -15,13 +15,14 @@ from fvsolve.kernels.reconstruction import value_muscl
 from fvsolve.kernels.records import RATE, UPWIND
 from fvsolve.kernels.riemann import face_flux
 
-SPARSE = 0.99  # of a pipe's content at the reference: what holds less has gas in it
-DRY = 1e-8  # of a pipe's content at the reference: what a cell holds below it gets no velocity of its own
+# Fractions of the content of a pipe at the reference pressure:
+SPARSE = 0.99  # a cell with less contains gas
+DRY = 1e-8  # below it the velocity of a cell goes to zero with its content
 
 
 @njit
 def cell_state(st, floats, profile, pipe, i, r, l):
-    """(pressure, velocity) of cell i, and (pressure, velocity) of its profile [Pa, m/s]."""
+    """(pressure, velocity) of cell i, then (pressure, velocity) of its profile [Pa, m/s]."""
     m0, flow = profile[pipe["center"] + i], pipe["flow"]
     m, dry = m0 + (r[i] + l[i]) / pipe["speed"], DRY * st["rho"] * pipe["area"]
     p0, v0 = pressure_of_mass(st, floats, pipe, m0), flow / m0
@@ -33,7 +34,10 @@ def cell_state(st, floats, profile, pipe, i, r, l):
 
 @njit(forceinline=True)
 def continue_beyond(a, n):
-    """A value beyond each end of n, by the difference next but one: a limiter takes the lesser of the two."""
+    """Extrapolate values of n cells by a cell at each end, with the next but one difference.
+
+    A limiter takes the smaller of the two differences.
+    """
     near, far = min(2, n), min(3, n)
     a[0] = a[1] - (a[far] - a[near] if n > 2 else a[near] - a[1])
     a[n + 1] = a[n] + (a[n + 1 - near] - a[n + 1 - far] if n > 2 else a[n] - a[n + 1 - near])
@@ -41,7 +45,7 @@ def continue_beyond(a, n):
 
 @njit
 def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
-    """Pressure and velocity of cells from `first` on, as deviations from the profile too, and one beyond each end."""
+    """Write pressures and velocities of cells from `first` on, their deviations, and a cell beyond each end."""
     n = p.size - 2
     for i in range(n):
         p[i + 1], v[i + 1], p0, v0 = cell_state(st, floats, profile, pipe, first + i, r, l)
@@ -52,7 +56,7 @@ def fill_cells(st, floats, profile, pipe, first, r, l, p, v, dp, dv):
 
 @njit(forceinline=True)
 def face_value(st, a, k, ahead):
-    """Value of the array at the face after cell k (ahead 1) or before it (-1)."""
+    """Value of an array at the face after cell k (ahead = 1) or before it (ahead = -1)."""
     if st["scheme"] == UPWIND:
         return a[k]
     return value_muscl(st["limiter"], a[k - ahead], a[k], a[k + ahead])
@@ -60,41 +64,42 @@ def face_value(st, a, k, ahead):
 
 @njit
 def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
-    """(pressure, velocity, whether they are the profile's) at face i from cell k - 1 beside it.
+    """(pressure, velocity, True if both are those of the profile) at face i, reconstructed from cell k - 1.
 
-    The profile carries the deviation, but not where it would lead the gas far from its pressure in the cell, nor at an
-    end of the pipe, where a cavity lies at the face and no liquid whose weight or friction could squeeze it. And a face
-    has not more than twice what a cell with gas holds, lest more should leave it than there is.
+    The profile is added to the deviation, with two exceptions: where this would bring the gas pressure below half of
+    that in the cell, and at an end of the pipe, where a cavity lies at the face and no liquid whose weight or friction
+    could compress it. A face has at most twice the content of a cell with gas, so that no more flows out than there is.
+    k : number of the cell in p, v, dp, dv, which start with the cell beyond the end
     """
-    found, change = face_value(st, dp, k, ahead), face_value(st, dv, k, ahead)
-    still = found == 0.0 and change == 0.0
+    dp_face, dv_face = face_value(st, dp, k, ahead), face_value(st, dv, k, ahead)
+    undisturbed = dp_face == 0.0 and dv_face == 0.0
     m0 = profile[pipe["face"] + i]
-    q, gas = pressure_of_mass(st, floats, pipe, m0) + found, 0.5 * (p[k] - st["floor"])
-    held = mass_of_pressure(st, floats, pipe, p[k])[0]
-    sparse = held < SPARSE * st["rho"] * pipe["area"]
-    if q - st["floor"] < gas or (sparse and (i == 0 or i == pipe["cells"])):
+    q, gas = pressure_of_mass(st, floats, pipe, m0) + dp_face, 0.5 * (p[k] - st["floor"])
+    content = mass_of_pressure(st, floats, pipe, p[k])[0]
+    has_gas = content < SPARSE * st["rho"] * pipe["area"]
+    if q - st["floor"] < gas or (has_gas and (i == 0 or i == pipe["cells"])):
         q = max(face_value(st, p, k, ahead), st["floor"] + gas)
-    if sparse:
-        q = min(q, pressure_of_mass(st, floats, pipe, 2.0 * held))
-    return q, pipe["flow"] / m0 + change, still
+    if has_gas:
+        q = min(q, pressure_of_mass(st, floats, pipe, 2.0 * content))
+    return q, pipe["flow"] / m0 + dv_face, undisturbed
 
 
 @njit
 def end_states(st, floats, profile, pipe, r, l, ends, scratch):
-    """What the cells of a pipe say of both ends, pressure and velocity [Pa, m/s], into ends[4]."""
+    """Extrapolate pressure and velocity [Pa, m/s] from the cells to both ends of a pipe, into ends[4]."""
     n = r.size
-    few = min(n, 3)
-    p, v, dp, dv = scratch[: few + 2], scratch[5 : few + 7], scratch[10 : few + 12], scratch[15 : few + 17]
+    n_near = min(n, 3)
+    p, v, dp, dv = scratch[: n_near + 2], scratch[5 : n_near + 7], scratch[10 : n_near + 12], scratch[15 : n_near + 17]
     for side in range(2):
-        fill_cells(st, floats, profile, pipe, (n - few) * side, r, l, p, v, dp, dv)
-        k, ahead = (few, 1) if side == 1 else (1, -1)
-        found = face_state(st, floats, profile, pipe, n * side, k, ahead, p, v, dp, dv)
-        ends[2 * side], ends[2 * side + 1] = found[0], found[1]
+        fill_cells(st, floats, profile, pipe, (n - n_near) * side, r, l, p, v, dp, dv)
+        k, ahead = (n_near, 1) if side == 1 else (1, -1)
+        state = face_state(st, floats, profile, pipe, n * side, k, ahead, p, v, dp, dv)
+        ends[2 * side], ends[2 * side + 1] = state[0], state[1]
 
 
 @njit
 def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
-    """d/dt of both waves of one pipe; returns its greatest |v| + c over a cell [1/s]."""
+    """Write d/dt of both waves of a pipe; return the pipe's greatest rate (|v| + c) / dx [1/s]."""
     n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
     p, v = scratch[: n + 2], scratch[n + 2 : 2 * n + 4]
     dp, dv = scratch[2 * n + 4 : 3 * n + 6], scratch[3 * n + 6 : 4 * n + 8]
@@ -115,8 +120,8 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
             k = i - 1
             m0 = profile[pipe["center"] + k]
             dm = (r[k] + l[k]) / c
-            pull = wall_force(pipe, reference, max(m0 + dm, DRY * reference), flow + (r[k] - l[k]))
-            force = -weight * dm - (pull - pipe["drag"] * (reference / m0))
+            friction = wall_force(pipe, reference, max(m0 + dm, DRY * reference), flow + (r[k] - l[k]))
+            force = -weight * dm - (friction - pipe["drag"] * (reference / m0))
             mass_rate, flow_rate = -(dflow - left_flow) / dx, -(flux - left_flux) / dx + force
             dr[k], dl[k] = 0.5 * (c * mass_rate + flow_rate), 0.5 * (c * mass_rate - flow_rate)
             highest, quickest = max(highest, p[i]), max(quickest, abs(v[i]))
@@ -128,7 +133,7 @@ def pipe_rates_cavitating(st, floats, profile, pipe, r, l, ends, scratch, dr, dl
 
 @njit
 def end_flux(st, floats, profile, pipe, i, r, l):
-    """Deviations of mass flow and momentum flux at the end face i from the two waves there."""
+    """Deviations of mass flow and momentum flux at end face i, from both waves there."""
     if r == 0.0 and l == 0.0:
         return 0.0, 0.0
     m, total = profile[pipe["face"] + i] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
@@ -138,7 +143,7 @@ def end_flux(st, floats, profile, pipe, i, r, l):
 
 @njit
 def offer_cavitating(t, y, dydt, out, handle):
-    """What the cells say of the states at both ends of every pipe, into out[ends]."""
+    """Extrapolate pressure and velocity from the cells to both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     floats, profile, scratch = tables.floats, tables.profile, tables.scratch
@@ -149,7 +154,7 @@ def offer_cavitating(t, y, dydt, out, handle):
 
 @njit
 def rates_cavitating(t, y, dydt, out, handle):
-    """d/dt of the waves in the cells of all pipes, where rates are asked for, and their greatest rate."""
+    """Write d/dt of the waves in all pipe cells, unless `dydt` is empty; raise out[RATE] to their greatest rate."""
     tables = open_tables(handle)
     st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     for i in range(pipes.size if dydt.size > 0 else 0):
@@ -163,7 +168,10 @@ def rates_cavitating(t, y, dydt, out, handle):
 
 @njit
 def note_cavity(t, pipe, r, l, at, tables):
-    """First place (share of the length), greatest volume [m3] and its time of cavities, into marks from `at`."""
+    """Record the cavities of a pipe in marks[at : at + 3].
+
+    These are: place of the first cavity (fraction of the length), greatest volume [m3] and its time.
+    """
     st, floats, profile, marks = tables.settings[0], tables.floats, tables.profile, tables.marks
     volume, first = 0.0, -1
     for i in range(r.size):
@@ -182,7 +190,7 @@ def note_cavity(t, pipe, r, l, at, tables):
 
 @njit
 def record_cavities(t, y, out, handle, values):
-    """Cavities of all pipes after an accepted step."""
+    """Record the cavities of all pipes after an accepted step."""
     tables = open_tables(handle)
     pipes, at = tables.pipes, tables.marks.size - 3 * tables.pipes.size
     for i in range(pipes.size):

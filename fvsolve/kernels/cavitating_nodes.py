@@ -1,7 +1,7 @@
-"""Nodes where a pipe end may hold a cavity: the law `mixture`. Knows ends and nodes; knows no cells.
+"""Nodes under the density law mixture, where a pipe end may hold a cavity.
 
-As in `barotropic_nodes.py`, but the wave from the cells to the end's own state is the jump of `riemann.py`, an end
-that lets go more than the speed of sound hears nothing of its node, and no pressure passes the law's floor.
+Differences from `barotropic_nodes.py`: the wave from the cells to the state at the end is the jump of `riemann.py`; a
+node has no effect on an end where the flow out of the pipe is supersonic; no pressure falls below the floor of the law.
 """
 
 from fvsolve.jit import njit
@@ -21,18 +21,20 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import JUNCTION, NOT_CONVERGED, STATUS, WHERE
 from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
 
-ROUNDING = 1e-12  # of a node's pressure: the least that its gas has
-LEFT = 1e-7  # of what a pressure as high as that of the node brings: the most that rounding leaves of a balance
-NARROW = 1e-9  # of a pressure: bounds that are nearer to each other, and Newton wants beyond, have lost the root
-LONG = 30  # sweeps after which Newton is helped along
+ROUNDING = 1e-12  # least gas pressure of a node, relative to its pressure
+LEFT = 1e-7  # greatest imbalance by rounding, relative to the flow that the whole pressure of the node drives
+NARROW = 1e-9  # relative width of bounds: if they are narrower and Newton steps out of them, they have lost the root
+LONG = 30  # sweeps after which Newton steps are replaced by bisection or halved
 
 
 @njit
 def end_side(st, floats, pipe, inside, v_in, p_node, still):
-    """(side of an end, its velocity, slope of that over p_node): h(p) + v^2 / 2 = h(p_node), v towards the node.
+    """(state of an end, its velocity, slope of the velocity over p_node): h(p) + v^2 / 2 = h(p_node).
 
-    An end that runs into its node at more than half the speed of sound, or into a vessel at rest, has the node's
-    pressure: its v^2 / 2 is lost.
+    v_in, v : velocities towards the node
+
+    The pressure of the end is that of the node, and v^2 / 2 is lost, if the flow runs into the node at more than half
+    the speed of sound, or into a vessel at rest (`still`).
     """
     floor, target, side = st["floor"], enthalpy(st, floats, p_node), side_at(st, floats, pipe, p_node)
     change, rise = jump(st, floats, pipe, inside, side)
@@ -61,7 +63,7 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
 def end_of_state(st, floats, pipe, p_in, v_in, p_node, still):
     """(flow into the node [kg/s], its slope over p_node, mass per length [kg/m]) of a pipe end.
 
-    p_in, v_in : what the cells say of the end, velocity towards the node.
+    p_in, v_in : pressure and velocity towards the node, extrapolated from the cells
     """
     inside = side_at(st, floats, pipe, p_in)
     side, v, slope = end_side(st, floats, pipe, inside, v_in, p_node, still)
@@ -73,17 +75,17 @@ def end_of_state(st, floats, pipe, p_in, v_in, p_node, still):
 
 @njit
 def end_flow_cavitating(st, floats, pipe, m_inside, into_inside, p_node, still):
-    """`end_of_state` from what the cells say as mass per length and mass flow."""
+    """`end_flow_of_state` from mass per length and mass flow extrapolated from the cells."""
     p = pressure_of_mass(st, floats, pipe, m_inside)
     return end_of_state(st, floats, pipe, p, into_inside / m_inside, p_node, still)
 
 
 @njit
 def cavitating_ends(out, tables, slope, final):
-    """Change of flow from pipes into every node at the present pressures, in out[net], and its slope.
+    """Write the change of flow from pipes into every node at the present pressures to out[net], its slope to `slope`.
 
-    out[ends] holds pressure and velocity [Pa, m/s] that the cells say of each end; `final` puts the ends' own waves
-    in their place.
+    On entry out[ends] holds pressure and velocity [Pa, m/s] extrapolated from the cells at each end; `final` replaces
+    them with the waves of the solved end states.
     """
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     pipes = tables.pipes
@@ -111,53 +113,56 @@ def cavitating_ends(out, tables, slope, final):
 
 @njit
 def hold_back(sweep, out, tables, before, low, high):
-    """Keep Newton's step of every node inside what is known of its root; note how far each cluster moved, relative.
+    """Keep the Newton step of every node within the bounds of its root; write the relative change of each cluster.
 
-    A node alone in its cluster takes in less the higher its pressure is, so each step that is sure of its direction
-    bounds its root on one side; after a while the bounds are halved. Others keep above the floor, and then take half
-    steps.
+    The inflow of a node that is alone in its cluster falls as its pressure rises. So each step with a sure direction
+    bounds the root on one side; after LONG sweeps the interval is halved. Other nodes are kept above the floor, and
+    take half steps after LONG sweeps.
     """
     st, nodes, clusters = tables.settings[0], tables.nodes, tables.clusters
-    pressure, floor, (done, moved, _, _, sure) = tables.layout[0]["pressure"], st["floor"], cluster_space(tables)
-    for which in range(clusters.size):
-        if done[which] == 1.0 or clusters[which]["nodes"] == 0:
+    pressure, floor, (done, change, _, _, sure) = tables.layout[0]["pressure"], st["floor"], cluster_space(tables)
+    for c in range(clusters.size):
+        if done[c] == 1.0 or clusters[c]["nodes"] == 0:
             continue
-        moved[which] = 0.0
-        for k in range(clusters[which]["nodes"]):
-            i = tables.integers[clusters[which]["first_node"] + k]
+        change[c] = 0.0
+        for k in range(clusters[c]["nodes"]):
+            i = tables.integers[clusters[c]["first_node"] + k]
             base = nodes[i]["pressure"]
             p, q, least = base + before[i], base + out[pressure + i], floor + ROUNDING * (1e5 + base)
-            if clusters[which]["nodes"] > 1:
+            if clusters[c]["nodes"] > 1:
                 q = max(p + 0.5 * (q - p) if sweep > LONG else q, floor + FALL * (p - floor), least)
             elif q != p:
-                if sure[which] == 1.0 or sweep > LONG:
+                if sure[c] == 1.0 or sweep > LONG:
                     low[i], high[i] = (p, high[i]) if q > p else (low[i], p)
-                if sweep <= LONG and high[i] - low[i] <= NARROW * (BAR + p):  # one was wrong, or there is a kink
+                if sweep <= LONG and high[i] - low[i] <= NARROW * (BAR + p):  # a bound was wrong, or there is a kink
                     low[i], high[i] = floor, UNBOUNDED
-                if sweep > LONG or not low[i] < q < high[i]:  # a kink can lead Newton to and fro
-                    under, above = (p, high[i]) if q > p else (low[i], p)
-                    q = max(between(floor, under, above, p), least)
+                if sweep > LONG or not low[i] < q < high[i]:  # at a kink Newton can alternate between two points
+                    lower, upper = (p, high[i]) if q > p else (low[i], p)
+                    q = max(between(floor, lower, upper, p), least)
             out[pressure + i] = q - base
-            moved[which] = max(moved[which], abs(q - p) / (1e5 + abs(p)))
+            change[c] = max(change[c], abs(q - p) / (1e5 + abs(p)))
 
 
 @njit
 def unbind(tables, low, high, first):
-    """Forget the bounds of clusters that begin: at the first sweep, and where the wide look at lifts is over."""
-    clusters, (_, moved, _, _, _) = tables.clusters, cluster_space(tables)
-    for which in range(clusters.size):
-        if first or moved[which] == 1e300:
-            for k in range(clusters[which]["nodes"]):
-                i = tables.integers[clusters[which]["first_node"] + k]
+    """Reset the bounds of clusters that begin.
+
+    They begin at the first sweep, and again when the search with lifted valves held wide open has ended.
+    """
+    clusters, (_, change, _, _, _) = tables.clusters, cluster_space(tables)
+    for c in range(clusters.size):
+        if first or change[c] == 1e300:
+            for k in range(clusters[c]["nodes"]):
+                i = tables.integers[clusters[c]["first_node"] + k]
                 low[i], high[i] = tables.settings[0]["floor"], UNBOUNDED
 
 
 @njit
 def close_cavitating(t, y, dydt, out, handle):
-    """`close_barotropic` above the law's floor; a cluster is done when none of its pressures changes."""
+    """`solve_nodes_barotropic` with pressures above the floor; a cluster is done when its pressures do not change."""
     tables = open_tables(handle)
     space, n, work = node_space(tables), tables.nodes.size, tables.scratch
-    pressure, last = tables.layout[0]["pressure"], space[3]
+    pressure, last_pressure = tables.layout[0]["pressure"], space[3]
     low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
@@ -165,9 +170,9 @@ def close_cavitating(t, y, dydt, out, handle):
         unbind(tables, low, high, sweep == 1)
         cavitating_ends(out, tables, space[0], False)
         for i in range(n):
-            last[i] = out[pressure + i]
+            last_pressure[i] = out[pressure + i]
         step_clusters(sweep, out, tables, space)
-        hold_back(sweep, out, tables, last, low, high)
+        hold_back(sweep, out, tables, last_pressure, low, high)
         if not settle_clusters(out, tables, space):
             break
     finish_clusters(out, tables, space)
@@ -176,34 +181,34 @@ def close_cavitating(t, y, dydt, out, handle):
 
 @njit
 def balance_junctions(t, y, dydt, out, handle):
-    """What Newton has left at junctions goes to their pipe ends, by what these hold: rounding, but mass is kept.
+    """Distribute the imbalance of junctions to their pipe ends, in proportion to their content: mass is conserved.
 
-    More than that at a junction full of liquid is a failure. Where a cavity lies, more may be asked for than comes, as
-    nothing flows to a place quicker than sound.
+    An imbalance above rounding is a failure at a junction full of liquid. Where a cavity lies, the demand may exceed
+    the inflow, because no flow towards a place can be faster than sound.
     """
     tables = open_tables(handle)
     layout, nodes, pipes, profile = tables.layout[0], tables.nodes, tables.pipes, tables.profile
-    left, held, some = tables.scratch[: nodes.size], tables.scratch[nodes.size : 2 * nodes.size], False
+    imbalance, content, unbalanced = tables.scratch[: nodes.size], tables.scratch[nodes.size : 2 * nodes.size], False
     floor = tables.settings[0]["floor"]
     for i in range(nodes.size):
-        left[i], held[i] = 0.0, 0.0
+        imbalance[i], content[i] = 0.0, 0.0
         if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
-            left[i] = out[layout["net"] + i] + (out[layout["supply"] + i] + nodes[i]["demand"])
-            out[layout["net"] + i] -= left[i]
-            some = some or left[i] != 0.0
+            imbalance[i] = out[layout["net"] + i] + (out[layout["supply"] + i] + nodes[i]["demand"])
+            out[layout["net"] + i] -= imbalance[i]
+            unbalanced = unbalanced or imbalance[i] != 0.0
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
-            if p - floor > BAR and abs(left[i]) > LEFT * nodes[i]["admittance"] * (BAR + abs(p)):
+            if p - floor > BAR and abs(imbalance[i]) > LEFT * nodes[i]["admittance"] * (BAR + abs(p)):
                 out[STATUS], out[WHERE] = NOT_CONVERGED, i
-    for turn in range(2 if some else 0):
+    for sweep in range(2 if unbalanced else 0):
         for k in range(pipes.size):
             for side in range(2):
                 i = pipes[k]["to_node"] if side == 1 else pipes[k]["from_node"]
                 at = layout["ends"] + 4 * k + 2 * side
                 m = profile[pipes[k]["face"] + side * pipes[k]["cells"]]
                 m += (out[at] + out[at + 1]) / pipes[k]["speed"]
-                if turn == 0:
-                    held[i] += m
-                elif left[i] != 0.0:
-                    change = (0.5 - side) * left[i] * (m / held[i])
+                if sweep == 0:
+                    content[i] += m
+                elif imbalance[i] != 0.0:
+                    change = (0.5 - side) * imbalance[i] * (m / content[i])
                     out[at] += change
                     out[at + 1] -= change

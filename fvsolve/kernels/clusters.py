@@ -1,8 +1,8 @@
-"""Nodes without storage that several valves join: Newton on pressures and flows together. Linear density law.
+"""Clusters of nodes without storage that several valves join: Newton on pressures and flows together, linear law.
 
-Valve: M |M| = G (dp0 + p_i' - p_j'); node: c_i - Y_i p_i' = flow that leaves it through valves (the gradient
-method of Todini and Pilati 1988). Flows are whole, not deviations: far from the profile, where a valve all but
-shuts, a deviation would keep nothing but its rounding. Where nothing has changed, nothing is solved.
+Valve: M |M| = G (dp0 + p_i' - p_j'); node: c_i - Y_i p_i' = flow that leaves it through valves (gradient method of
+Todini and Pilati 1988). The unknown flows are total flows, not deviations: far from the profile, where a valve is
+nearly closed, a deviation would lose all but its rounding. A cluster in which nothing has changed is not solved.
 """
 
 from math import sqrt
@@ -14,13 +14,13 @@ from fvsolve.kernels.records import NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
 from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step, runs_back
 
 BAR = 1e5
-ROUNDING = 1e-15  # of pressures, relative; and of a flow, of that at 1 Pa
-UNSETTLED = 1e-5  # change of flow, relative, at which Newton has failed and has not only met rounding
+ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
+UNSETTLED = 1e-5  # relative change of flow above which Newton has failed; smaller changes may be rounding
 
 
 @njit
 def solve_dense(a, b, n):
-    """b <- a^-1 b by elimination with partial pivoting; returns the sign of det a, 0 where singular. Overwrites both.
+    """b <- a^-1 b by elimination with partial pivoting; return the sign of det a, 0 if singular. Overwrites a and b.
 
     a : float64[n * n]  row by row
     """
@@ -52,19 +52,19 @@ def solve_dense(a, b, n):
 
 
 @njit(forceinline=True)
-def settled(moved, before):
-    """Whether Newton's last relative change is rounding: below 1e-14, or small and no longer falling."""
-    return moved <= 1e-14 or (moved <= 1e-9 and moved >= 0.5 * before)
+def settled(change, last_change):
+    """True if the last relative change of Newton is rounding: below 1e-14, or below 1e-9 and no longer falling."""
+    return change <= 1e-14 or (change <= 1e-9 and change >= 0.5 * last_change)
 
 
 @njit
 def whole_inflows(cluster, tables, out, c):
-    """c: flow into every node of a cluster from all but its valves at p' = 0; True where nothing has changed."""
+    """c <- flow into each node of a cluster from all links but its valves, at p' = 0; True if nothing has changed."""
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
-    integers, quiet = tables.integers, True
+    integers, unchanged = tables.integers, True
     for i in range(c.size):
         node = integers[cluster["first_node"] + i]
-        quiet = quiet and out[layout["net"] + node] == 0.0
+        unchanged = unchanged and out[layout["net"] + node] == 0.0
         c[i] = out[layout["supply"] + node]  # exact where only valves and columns join
         if nodes[node]["admittance"] > 0.0:
             c[i] = out[layout["net"] + node]
@@ -82,12 +82,12 @@ def whole_inflows(cluster, tables, out, c):
             c[i] += valve["flow"]
         if j >= 0 and nodes[valve["to_node"]]["admittance"] > 0.0:
             c[j] -= valve["flow"]
-    return quiet
+    return unchanged
 
 
 @njit
 def inner_of(cluster, tables, i):
-    """Row of node i where it belongs to this cluster, else -1."""
+    """Row of node i in this cluster, -1 if it does not belong to it."""
     row = inner_row(tables.nodes, i)
     if row < 0 or row >= cluster["nodes"] or tables.integers[cluster["first_node"] + row] != i:
         return -1
@@ -96,7 +96,10 @@ def inner_of(cluster, tables, i):
 
 @njit
 def put_valve(i, j, m, a, s, lift, n, matrix, right):
-    """Add a valve from row i to row j (-1: a known pressure) to the balances; lift: dM / dp_i beside the drop's."""
+    """Add a valve from row i to row j (-1: known pressure) to the balances of its nodes.
+
+    lift : dM / dp_i at constant drop
+    """
     if i >= 0:
         right[i] -= m + a
         matrix[n * i + i] += s + lift
@@ -109,8 +112,8 @@ def put_valve(i, j, m, a, s, lift, n, matrix, right):
 
 
 @njit
-def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wide):
-    """Linear system for the change of the pressures, with the valves' changes put in."""
+def assemble(cluster, tables, out, g, m, c, connected, a, s, lift, matrix, right, wide):
+    """Linear system for the change of the pressures, with the changes of valve flows eliminated."""
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     integers, n = tables.integers, c.size
     for i in range(matrix.size):
@@ -131,13 +134,13 @@ def assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wid
         put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     put_couples(cluster, tables, out, n, matrix, right)
     for i in range(n):
-        if held[i] == 0.0:
+        if connected[i] == 0.0:
             right[i], matrix[n * i + i] = 0.0, 1.0
 
 
 @njit
 def put_couples(cluster, tables, out, n, matrix, right):
-    """Add what flows between the ends of short delay lines at once."""
+    """Add the instantaneous flow between the ends of short delay lines."""
     layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
     for k in range(cluster["couples"]):
         line = tables.delays[integers[cluster["first_couple"] + k]]
@@ -149,12 +152,12 @@ def put_couples(cluster, tables, out, n, matrix, right):
 
 @njit
 def move(cluster, tables, out, m, a, s, lift, right):
-    """Put a Newton step in; returns its greatest change, relative, of flows and of pressures together.
+    """Apply a Newton step; return the greatest relative change of flows and pressures.
 
-    What the rounding of pressures does to a flow is no change, and no flow counts as less than that at 1 Pa.
+    A change of flow by the rounding of pressures does not count. Flows are compared with at least the flow at 1 Pa.
     """
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
-    integers, scale, vague, moved, most = tables.integers, 1e-300, 0.0, 0.0, 0.0
+    integers, scale, rounded, change, most = tables.integers, 1e-300, 0.0, 0.0, 0.0
     for i in range(right.size):
         node = integers[cluster["first_node"] + i]
         out[layout["pressure"] + node] += right[i]
@@ -162,24 +165,27 @@ def move(cluster, tables, out, m, a, s, lift, right):
     for e in range(m.size):
         valve = valves[integers[cluster["first_valve"] + e]]
         i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
-        before = right[i] if i >= 0 else 0.0
-        step = a[e] + s[e] * (before - (right[j] if j >= 0 else 0.0)) + lift[e] * before
+        rise = right[i] if i >= 0 else 0.0
+        step = a[e] + s[e] * (rise - (right[j] if j >= 0 else 0.0)) + lift[e] * rise
         m[e] += step
         scale = max(scale, abs(m[e]), sqrt(valve["conductance"]))
         p = nodes[valve["from_node"]]["pressure"] + out[layout["pressure"] + valve["from_node"]]
         rounding = s[e] * ROUNDING * (BAR + abs(p))
-        moved, vague = max(moved, max(abs(step), abs(a[e])) - rounding), max(vague, rounding)
-    relative = moved / scale
-    if relative > UNSETTLED and moved <= vague:  # it may be rounding, so no failure; but it goes on
+        change, rounded = max(change, max(abs(step), abs(a[e])) - rounding), max(rounded, rounding)
+    relative = change / scale
+    if relative > UNSETTLED and change <= rounded:  # perhaps rounding: no failure, but iterate further
         relative = UNSETTLED
     return max(relative, most)
 
 
 @njit
 def prepare(cluster, tables, out, g, m):
-    """Conductances and first flows of a cluster's valves; True where none has changed and no pressure beside it."""
+    """Set conductances and start flows of the valves of a cluster, and p' = 0 in its nodes.
+
+    True if no conductance, no speed and no pressure at the valves has changed.
+    """
     layout, valves = tables.layout[0], tables.valves
-    integers, quiet = tables.integers, True
+    integers, unchanged = tables.integers, True
     for i in range(cluster["nodes"]):
         out[layout["pressure"] + integers[cluster["first_node"] + i]] = 0.0
     for e in range(g.size):
@@ -187,54 +193,59 @@ def prepare(cluster, tables, out, g, m):
         valve = valves[k]
         g[e], m[e] = conductance(tables, out, k), valve["flow"]
         if valve["hooks"] < 0 and 0.0 < g[e] < valve["open"]:
-            m[e] *= sqrt(g[e] / valve["open"])  # at the profile's drop: all but shut, its flow would ask for any
-        quiet = quiet and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
+            m[e] *= sqrt(
+                g[e] / valve["open"]
+            )  # flow at the drop of the profile; the flow of the profile would need a huge drop
+        unchanged = unchanged and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
         for i in (valve["from_node"], valve["to_node"]):
-            quiet = quiet and out[layout["pressure"] + i] == 0.0
+            unchanged = unchanged and out[layout["pressure"] + i] == 0.0
     for k in range(cluster["couples"]):
         pipe = tables.pipes[tables.delays[integers[cluster["first_couple"] + k]]["pipe"]]
         for i in (pipe["from_node"], pipe["to_node"]):
-            quiet = quiet and out[layout["pressure"] + i] == 0.0
-    return quiet
+            unchanged = unchanged and out[layout["pressure"] + i] == 0.0
+    return unchanged
 
 
 @njit
-def close_cluster(out, tables, which):
-    """Pressures of one cluster's nodes and flows of its valves; it starts from the profile, so the rhs stays pure."""
-    integers, cluster = tables.integers, tables.clusters[which]
+def close_cluster(out, tables, index):
+    """Solve the pressures of a cluster and the flows of its valves.
+
+    The iteration starts from the profile, so the result depends on (t, y) alone.
+    """
+    integers, cluster = tables.integers, tables.clusters[index]
     n, k, work = cluster["nodes"], cluster["valves"], tables.scratch
     at = n * n + 4 * n
     matrix, right, c = work[: n * n], work[n * n : n * n + n], work[n * n + n : n * n + 2 * n]
-    held, group = work[n * n + 2 * n : n * n + 3 * n], work[n * n + 3 * n : at]
+    connected, group = work[n * n + 2 * n : n * n + 3 * n], work[n * n + 3 * n : at]
     g, m = work[at : at + k], work[at + k : at + 2 * k]
     a, s, lift = work[at + 2 * k : at + 3 * k], work[at + 3 * k : at + 4 * k], work[at + 4 * k : at + 5 * k]
     unchanged = prepare(cluster, tables, out, g, m)
-    quiet = whole_inflows(cluster, tables, out, c) and unchanged
-    find_held(cluster, tables, g, held)
-    shut_out(cluster, tables, g, m, held)
-    moved, wide = 1e300, True
+    undisturbed = whole_inflows(cluster, tables, out, c) and unchanged
+    find_held(cluster, tables, g, connected)
+    shut_out(cluster, tables, g, m, connected)
+    change, wide = 1e300, True
     for _ in range(100):
-        if quiet:
-            moved = 0.0
+        if undisturbed:
+            change = 0.0
             break
-        assemble(cluster, tables, out, g, m, c, held, a, s, lift, matrix, right, wide)
-        side = solve_dense(matrix, right, n)
-        if side <= 0.0 and not wide and let_fall(cluster, tables, g, m):
+        assemble(cluster, tables, out, g, m, c, connected, a, s, lift, matrix, right, wide)
+        sign = solve_dense(matrix, right, n)
+        if sign <= 0.0 and not wide and let_fall(cluster, tables, g, m):
             continue
-        if side == 0.0:
+        if sign == 0.0:
             out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
             return
-        before, moved = moved, move(cluster, tables, out, m, a, s, lift, right)
-        if settled(moved, before):
+        last_change, change = change, move(cluster, tables, out, m, a, s, lift, right)
+        if settled(change, last_change):
             if not (wide and any_back(cluster, tables, m)):
                 break
-            moved, wide = 1e300, False
-    finish(cluster, tables, out, g, m, c, held, group, moved)
+            change, wide = 1e300, False
+    finish(cluster, tables, out, g, m, c, connected, group, change)
 
 
 @njit
 def any_back(cluster, tables, m):
-    """Whether a valve of a cluster that the pressure before it lifts carries its flow backwards."""
+    """True if a valve that is lifted by its upstream pressure carries backflow."""
     for e in range(m.size):
         if runs_back(tables, tables.integers[cluster["first_valve"] + e], m[e]):
             return True
@@ -243,37 +254,40 @@ def any_back(cluster, tables, m):
 
 @njit
 def let_fall(cluster, tables, g, m):
-    """Shut what would stay lifted by its own backward flow and cannot; whether there is any. Newton, coming down, has
-    met a system that is no longer positive: lower lifts would lack even more."""
-    some = False
+    """Close lifted valves that carry backflow and cannot stay open; True if there are any.
+
+    Newton, which starts from wide open valves, has reached a matrix with a negative determinant: at smaller lifts the
+    imbalance would be even greater.
+    """
+    closed = False
     for e in range(m.size):
         if g[e] > 0.0 and runs_back(tables, tables.integers[cluster["first_valve"] + e], m[e]):
-            g[e], some = 0.0, True
-    return some
+            g[e], closed = 0.0, True
+    return closed
 
 
 @njit
-def shut_out(cluster, tables, g, m, held):
-    """Nothing flows through valves that touch a node which is not held; open ones are marked by -1."""
+def shut_out(cluster, tables, g, m, connected):
+    """Set the flow of valves at nodes that are not connected to zero; conductance -1 marks open valves."""
     for e in range(g.size):
-        if not is_held(cluster, tables, e, held):
+        if not is_held(cluster, tables, e, connected):
             m[e] = 0.0
             g[e] = -1.0 if g[e] > 0.0 else 0.0
 
 
 @njit
-def is_held(cluster, tables, e, held):
-    """Whether valve e of a cluster lies between held nodes or known pressures."""
+def is_held(cluster, tables, e, connected):
+    """True if valve e of a cluster lies between connected nodes or known pressures."""
     valve = tables.valves[tables.integers[cluster["first_valve"] + e]]
     i, j = inner_row(tables.nodes, valve["from_node"]), inner_row(tables.nodes, valve["to_node"])
-    return (i < 0 or held[i] > 0.0) and (j < 0 or held[j] > 0.0)
+    return (i < 0 or connected[i] > 0.0) and (j < 0 or connected[j] > 0.0)
 
 
 @njit
-def finish(cluster, tables, out, g, m, c, held, group, moved):
-    """Write the flows; give nodes that only shut valves reach their pressures; status where it failed.
+def finish(cluster, tables, out, g, m, c, connected, group, change):
+    """Write the flows of a cluster, the pressures of isolated nodes, and the status if Newton has failed.
 
-    What Newton's rounding leaves of a flow into a dead end is none: which way it points says nothing of the pressures.
+    Flows that are rounding (dead ends) become zero: their sign does not depend on the pressures.
     """
     scale = 1e-300
     for e in range(m.size):
@@ -282,19 +296,19 @@ def finish(cluster, tables, out, g, m, c, held, group, moved):
             m[e] = 0.0
         out[tables.layout[0]["valve"] + k] = m[e]
         scale = max(scale, abs(tables.valves[k]["flow"]), sqrt(tables.valves[k]["conductance"]))
-    if moved > UNSETTLED:
+    if change > UNSETTLED:
         out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"]]
-    for i in range(held.size):
-        if held[i] == 0.0:
-            float_shut(cluster, tables, out, g, held, group)
-            check_unserved(cluster, tables, out, c, held, group, scale)
+    for i in range(connected.size):
+        if connected[i] == 0.0:
+            float_shut(cluster, tables, out, g, connected, group)
+            check_unserved(cluster, tables, out, c, connected, group, scale)
             return
 
 
 @njit
 def close_clusters(t, y, dydt, out, handle):
-    """Pressures of the nodes of all clusters and flows of their valves."""
+    """Solve pressures of the nodes of all clusters and flows of their valves."""
     tables = open_tables(handle)
-    for which in range(tables.clusters.size):
-        if tables.clusters[which]["inverse"] < 0:
-            close_cluster(out, tables, which)
+    for k in range(tables.clusters.size):
+        if tables.clusters[k]["inverse"] < 0:
+            close_cluster(out, tables, k)

@@ -1,4 +1,4 @@
-"""Rigid columns: one flow each, led by valves (`led`) or by one another (`rigid`). Solves no other node."""
+"""Rigid columns: a flow each, which valves (`column_valve_control`) or junctions (`column_junctions`) may control."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -20,7 +20,7 @@ from fvsolve.kernels.rigid import (
 
 @njit
 def column_inflows(t, y, dydt, out, handle):
-    """Add what rigid columns carry more than in the profile to out[net]; their flows go to out[column]."""
+    """Write the flows of rigid columns to out[column]; add their changes since the profile to out[net]."""
     tables = open_tables(handle)
     layout, columns = tables.layout[0], tables.columns
     lead_columns(tables, out)
@@ -37,7 +37,7 @@ def column_inflows(t, y, dydt, out, handle):
 
 @njit
 def add_led(t, y, tables, out, n):
-    """given <- d/dt of what led columns bring into each of n rigid nodes [kg/s2]."""
+    """given <- rates of flow [kg/s2] that valve-controlled columns bring into each of n column junctions."""
     rows, _, _, _, _, given = rigid_space(tables, n)
     given[:] = 0.0
     for k in range(tables.columns.size):
@@ -50,7 +50,7 @@ def add_led(t, y, tables, out, n):
 
 @njit
 def hold_rigid(t, y, tables, out):
-    """Give rigid nodes the pressures at which what flows into each keeps adding up to zero."""
+    """Set the pressures of column junctions, at which the sum of flows into each stays zero."""
     n = number_rigid(tables, out)
     if n == 0:
         return
@@ -66,9 +66,10 @@ def hold_rigid(t, y, tables, out):
 
 @njit
 def hold_columns(t, y, dydt, out, handle):
-    """Give rigid nodes their pressures, and the led end of a column that at which it does as its valves have it.
+    """Set the pressures of column junctions and of valve-controlled ends of columns.
 
-    One that stands has that of its far end and the weight between; a flow over next to no area would say nothing of it.
+    At the controlled end of a stationary column it is the pressure of the far end plus the weight between them. A flow
+    through a vanishing area would not determine it.
     """
     tables = open_tables(handle)
     pressure = tables.layout[0]["pressure"]
@@ -76,8 +77,8 @@ def hold_columns(t, y, dydt, out, handle):
     for k in range(tables.columns.size):
         end = led_end(tables, out, k)
         if end != 0:
-            x = tables.columns[k]["to_node"] if end == 1 else tables.columns[k]["from_node"]
-            out[pressure + x] = led_flow(t, y, tables, out, k, end, True)[2]
+            controlled = tables.columns[k]["to_node"] if end == 1 else tables.columns[k]["from_node"]
+            out[pressure + controlled] = led_flow(t, y, tables, out, k, end, True)[2]
 
 
 @njit
@@ -94,23 +95,24 @@ def column_rates(t, y, dydt, out, handle):
 
 @njit
 def column_rate(t, y, tables, out, k, change):
-    """d/dt of one column's flow, (A / L) (change of what drives it) - drag'; one that stands or is led, by its valves.
+    """d/dt of the flow of a column: (A / L) (change of driving pressure) - (drag - drag of the profile).
 
-    Where one leads it from its seat, the pressure beside that tells.
+    The rate of a stationary or valve-controlled column follows from its valves. If a valve controls it from its seat,
+    the node pressure beside the valve contains this and the general formula holds.
     """
     column, end = tables.columns[k], led_end(tables, out, k)
-    x = column["to_node"] if end == 1 else column["from_node"]
-    if end != 0 and (lone_lead(tables, x) < 0 or gate_area(tables, out, x)[0] == 0.0):
+    node = column["to_node"] if end == 1 else column["from_node"]
+    if end != 0 and (lone_lead(tables, node) < 0 or gate_area(tables, out, node)[0] == 0.0):
         return end * led_rate(t, y, tables, out, k, end)
-    pull = column_drag(column, out[tables.layout[0]["column"] + k])
-    return column["area"] / column["length"] * (change + column["offset"]) - (pull - column["drag"])
+    friction = column_drag(column, out[tables.layout[0]["column"] + k])
+    return column["area"] / column["length"] * (change + column["offset"]) - (friction - column["drag"])
 
 
 @njit
 def quickest_column(t, y, dydt, out, handle):
-    """Greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM, into out[RATE].
+    """Raise out[RATE] to the greatest rate [1/s] at which valves alone brake a column, (A / L) dp / dM.
 
-    Discs, which come after, say in out[CLOSING] how they close on one.
+    Clears out[CLOSING]; discs, which are evaluated later, write there how fast they close on a column.
     """
     tables = open_tables(handle)
     out[CLOSING] = 0.0
@@ -121,9 +123,9 @@ def quickest_column(t, y, dydt, out, handle):
             i = column["to_node"] if side == 1 else column["from_node"]
             slope = 0.0
             for e in range(nodes[i]["gate_count"]):
-                which = tables.integers[nodes[i]["gates"] + e]
-                drop = valves[which]["drop"] + out[layout["pressure"] + valves[which]["from_node"]]
-                drop -= out[layout["pressure"] + valves[which]["to_node"]]
-                slope += restriction_slope(tables, out, which, drop)
+                valve = tables.integers[nodes[i]["gates"] + e]
+                drop = valves[valve]["drop"] + out[layout["pressure"] + valves[valve]["from_node"]]
+                drop -= out[layout["pressure"] + valves[valve]["to_node"]]
+                slope += restriction_slope(tables, out, valve, drop)
             if slope > 0.0 and led_end(tables, out, k) == 0:
                 out[RATE] = max(out[RATE], column["area"] / column["length"] / slope)
