@@ -1,4 +1,4 @@
-"""What all devices of a scene do, each by the hooks of its law. Knows the tables; knows no law."""
+"""Loops over all devices of a model that call the hooks of their laws."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.accounts import OF_DEVICE, device_rows, device_stores
@@ -18,12 +18,12 @@ from fvsolve.kernels.records import DEVICE_VALUE
 SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(
     len(HOOKS)
 )  # columns of `hooks`
-PASSING = 2  # of a law's `outside`: to be known, but it passes with the shutting of a check valve
+PASSING = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
 
 
 @njit
 def set_devices(t, y, dydt, out, handle):
-    """Conductances, speeds, pressures and stiffness that devices set before nodes are closed."""
+    """Conductances, speeds, pressures and stiffness set by devices before the nodes are solved."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
         device = tables.devices[k]
@@ -34,7 +34,7 @@ def set_devices(t, y, dydt, out, handle):
 
 @njit
 def move_devices(t, y, dydt, out, handle):
-    """d/dt of what devices hold, where rates are asked for, and their greatest rates into out[RATE]."""
+    """d/dt of the states of devices, unless `dydt` is empty; raise out[RATE] to their greatest rates."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
         device = tables.devices[k]
@@ -45,7 +45,7 @@ def move_devices(t, y, dydt, out, handle):
 
 @njit
 def device_events(t, y, out, handle, g):
-    """Event functions of devices, from a state whose nodes are closed."""
+    """Event functions of devices, from a state with solved nodes."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
         device = tables.devices[k]
@@ -56,7 +56,7 @@ def device_events(t, y, out, handle, g):
 
 @njit
 def observe_devices(t, y, out, handle, values):
-    """Values of the probes that read devices."""
+    """Values of the probes of devices."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):
@@ -69,7 +69,10 @@ def observe_devices(t, y, out, handle, values):
 
 @njit
 def record_devices(t, y, out, handle, values):
-    """The first time that each device works where its law is not to be trusted, and where that passes by itself."""
+    """First time at which each device leaves the range of validity of its law.
+
+    Temporary violations are recorded apart from others.
+    """
     tables = open_tables(handle)
     marks, devices = tables.marks, tables.devices
     first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size + tables.pistons.size
@@ -83,7 +86,7 @@ def record_devices(t, y, out, handle, values):
 
 @njit
 def power_devices(t, y, dydt, out, handle, power):
-    """Rows of devices [W]: supplied, rate of what is stored, dissipated."""
+    """Rows of devices in `power` [W]: power supplied, rate of stored energy, dissipation."""
     tables = open_tables(handle)
     devices, at = tables.devices, device_rows(tables, power)
     for k in range(devices.size):
@@ -96,7 +99,7 @@ def power_devices(t, y, dydt, out, handle, power):
 
 @njit
 def stored_devices(t, y, dydt, out, handle, stored):
-    """Rows of devices, the last of `stored`, changes since the profile [J]."""
+    """Rows of devices in `stored`: changes since the profile [J]."""
     tables = open_tables(handle)
     devices, first = tables.devices, device_stores(tables, stored)
     for k in range(devices.size):

@@ -1,4 +1,4 @@
-"""Which of two rules holds, as a pair of event functions. Knows flags; knows no law."""
+"""Pair of complementary event functions for a switch between two rules."""
 
 from fvsolve.jit import njit
 
@@ -7,9 +7,9 @@ LEAST = 1e-300
 
 @njit(forceinline=True)
 def either(tables, g, at, left):
-    """g[at], g[at + 1] <- left, -left, of which just one is below zero: at zero itself it is the other rule's turn.
+    """g[at], g[at + 1] <- left, -left, of which exactly one is below zero; at zero the other rule is due.
 
-    left : what is left of the rule that holds, below zero while armed[at]; it must leave zero where the rule changes.
+    left : distance to the end of the present rule, below zero while armed[at]; it must leave zero when the rule changes
     """
     if left == 0.0:
         left = LEAST if tables.armed[at] > 0.0 else -LEAST

@@ -1,8 +1,8 @@
-"""Pipe ends: the wave that goes out, and the cells a scheme imagines beyond an end. Knows polynomials.
+"""Closures at pipe ends: the value of the outgoing wave there, and ghost cells beyond an end.
 
-A wave leaves through one end and enters through the other. Where it leaves, a polynomial through the last
-cells gives its value at the end; where it enters, the node's value is the datum of the polynomial. (From
-cells alone the closure is slightly unstable; with the datum no growing mode is known: tests/limits/test_ends.py.)
+A wave leaves through one end and enters through the other. Where it leaves, a polynomial through the last cells gives
+its value at the end. Where it enters, the value from the node is the datum of the polynomial. (A closure from cells
+alone is slightly unstable; with the datum no growing mode is known: tests/limits/test_ends.py.)
 """
 
 from fractions import Fraction
@@ -13,12 +13,12 @@ from fvsolve.jit import njit
 from fvsolve.kernels.reconstruction import value_muscl, value_weno5
 from fvsolve.kernels.records import LINEAR, SHORT, UPWIND, WENO5
 
-GREATEST = 4  # degree of the steepest polynomial
+GREATEST = 4  # greatest degree of a polynomial
 GHOSTS = 3
 
 
 def solve_fractions(matrix, right):
-    """Rows of right * matrix^-1, in fractions."""
+    """Rows of right * matrix^-1, computed in fractions."""
     n = len(matrix)
     rows = [list(row) + [Fraction(int(i == j)) for j in range(n)] for i, row in enumerate(matrix)]
     for i in range(n):
@@ -38,7 +38,7 @@ def averages(cell, degree):
 
 
 def end_weights():
-    """Weights of the value at an end and of three cells beyond it, by degree; nearest cell first."""
+    """Weights of the value at an end and of three ghost cells beyond it, by degree; nearest cell first."""
     value = np.zeros((GREATEST + 1, GREATEST + 1))
     leaving = np.zeros((GREATEST + 1, GHOSTS, GREATEST + 1))
     entering = np.zeros((GREATEST + 1, GHOSTS, GREATEST + 1))
@@ -57,17 +57,18 @@ END_VALUE, END_LEAVING, END_ENTERING = end_weights()
 
 
 def difference_rows(weights, degree):
-    """What a linear scheme makes of F[i] - F[i+1]: (inside [6], enter [3, 6], leave [2, 5]), see `records.SETTINGS`.
+    """Weights of a linear scheme in F[i] - F[i+1]: (inside [6], enter [3, 6], leave [2, 5]), see `dtypes.SETTINGS`.
 
-    weights : of cells i-2 .. i+2 ... of the wave's own side first, in the value at face i; polynomials of `degree`
+    weights : of cells i-2 .. i+2 and on, from the side that the wave comes from, in the value at face i
+    degree : of the polynomials at the ends
     """
     inside = np.append(weights, 0.0) - np.append(0.0, weights)
     unit = np.eye(6)
     beyond = np.pad(END_ENTERING[degree], ((0, 0), (0, 1)))
-    near = [*beyond[::-1], *unit[1:]]  # cells -3 .. 4 from where a wave enters, in datum and cells 0 .. 4
+    near = [*beyond[::-1], *unit[1:]]  # cells -3 .. 4 at the end where a wave enters, as sums of datum and cells 0 .. 4
     face = [unit[0], *(sum(w * near[j + m] for m, w in enumerate(weights)) for j in range(1, 4))]
     enter = np.array([face[j] - face[j + 1] for j in range(3)])
-    near = [*END_LEAVING[degree][::-1], *unit[:5, :5]]  # the same from where it leaves
+    near = [*END_LEAVING[degree][::-1], *unit[:5, :5]]  # cells at the end where it leaves, as sums of five cells
     face = [END_VALUE[degree], *(sum(w * near[j + 5 - m] for m, w in enumerate(weights)) for j in range(1, 3))]
     leave = np.array([face[j + 1] - face[j] for j in range(2)])
     return inside, enter, leave
@@ -75,7 +76,7 @@ def difference_rows(weights, degree):
 
 @njit
 def edge_cells(c, right, edge):
-    """The five cells nearest to the left (0) or right (1) end, nearest first; the last one repeated if fewer."""
+    """Values of the five cells nearest to the left (0) or right (1) end, nearest first; the last cell is repeated."""
     n = c.size
     for k in range(5):
         m = min(k, n - 1)
@@ -84,20 +85,20 @@ def edge_cells(c, right, edge):
 
 @njit
 def end_degree(degree, n):
-    """Degree that n cells bear: below five cells the fifth-order closure would grow, the third-order one not."""
+    """Degree of the polynomial for n cells: below five cells fifth order would be unstable, third order is not."""
     return min(min(degree, 2) if n < 5 else degree, n - 1)
 
 
 @njit
 def roughness(d1, d2, d3, d4, small):
-    """From 0, smooth, to 1, a jump: high undivided differences against low ones."""
+    """Smoothness indicator from 0, smooth, to 1, a jump: high undivided differences over low ones."""
     ratio = 4.0 * (d3 * d3 + d4 * d4) / (d1 * d1 + d2 * d2 + small)
     return ratio * ratio / (1.0 + ratio * ratio)
 
 
 @njit
 def leaving_cells(edge, n, family, degree, limiter, small, ghosts):
-    """Three cells beyond an end that the wave leaves by, nearest first, from the five `edge` cells of n."""
+    """Three ghost cells beyond an end where the wave leaves, nearest first, from the five `edge` cells of n."""
     if family == UPWIND or family == LINEAR or family == SHORT:
         d = end_degree(degree, n)
         for g in range(3):
@@ -124,7 +125,7 @@ def leaving_cells(edge, n, family, degree, limiter, small, ghosts):
 
 @njit
 def entering_cells(edge, n, family, degree, datum, small, ghosts):
-    """Three cells beyond an end that the wave enters by with the value `datum`, nearest first."""
+    """Three ghost cells beyond an end where the wave enters with the value `datum`, nearest first."""
     if family == UPWIND or family == LINEAR or family == SHORT:
         d = min(min(degree, 2) if n < 5 else degree, n)
         for g in range(3):
@@ -148,7 +149,7 @@ def entering_cells(edge, n, family, degree, datum, small, ghosts):
 
 @njit
 def end_value(c, right, family, degree, limiter, small, scratch):
-    """Value at the left (0) or right (1) end of the wave that leaves by it."""
+    """Value at the left (0) or right (1) end of the wave that leaves there."""
     n, edge, ghosts = c.size, scratch[:5], scratch[5:8]
     edge_cells(c, right, edge)
     if family == UPWIND or family == LINEAR or family == SHORT:

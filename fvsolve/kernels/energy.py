@@ -1,15 +1,20 @@
-"""Power and stored energy of every part under the linear law. Knows the tables; adds nothing up over time.
+"""Power and stored energy of every part under the linear law.
 
-P = p - p_ambient + rho g z, z from the datum in the settings; a mass flow M at a port carries the power P M / rho. A
+P = p - p_ambient + rho g z, z above the datum of the settings. A mass flow M at a port carries the power P M / rho. A
 pipe stores A P^2 / (2 rho c^2) + M^2 / (2 rho A) per length, a chamber V p^2 / (2 beta), a tank its mass times g z, a
-rigid column M^2 L / (2 rho A), and what friction takes is M drag / (rho A) per length. Squares are averaged over a cell
-from the values at three Gauss points of a polynomial of the scheme's degree through neighbouring cells. Stored energies
-are changes since the profile, a cross term and a square: no small difference of large numbers.
+rigid column M^2 L / (2 rho A). Friction dissipates M drag / (rho A) per length. Squares are averaged over a cell from
+the values at three Gauss points of a polynomial of the scheme's degree through neighbouring cells. Stored energies are
+changes since the profile, a cross term and a square: no small difference of large numbers.
 
-Rows of `power` [W], table by table: NODE supply, rate of storage; PIPE in, friction, jets, rate, creep, what the law
-leaves of it; VALVE loss; COLUMN in, friction, rate; MASS rate; BRACE what it takes up (a spring, a damper) or gives
-(a force); STOP rate, loss; PISTON leak, friction, what the linear law makes where a volume moves. Rows of `stored` [J]:
-node; pipe kinetic, elastic and height (a delay line: forward, backward wave); column; mass; brace; stop.
+Rows of `power` [W], table by table:
+NODE : supply, rate of storage
+PIPE : inflow of power, friction, jets, rate of storage, creep, residual of the linear law
+VALVE : loss; COLUMN : inflow of power, friction, rate of storage; MASS : rate of storage
+BRACE : power absorbed by a spring or damper, or supplied by a force; STOP : rate of storage, loss
+PISTON : leak, friction, residual of the linear law where a volume changes
+
+Rows of `stored` [J]: node; pipe kinetic, elastic with height (delay line: forward, backward wave); column; mass;
+brace; stop.
 """
 
 import numpy as np
@@ -24,21 +29,21 @@ from fvsolve.kernels.records import CHAMBER, MUSCL, SHORT, TANK, UPWIND, WENO5
 from fvsolve.kernels.rigid import column_drag
 from fvsolve.kernels.tanks import tank_level
 
-NODE, PIPE, VALVE, COLUMN, MASS, BRACE, STOP, PISTON = 2, 6, 1, 3, 1, 1, 2, 3  # rows of `power` a part
-CREEP = 4  # of those of a pipe
-WIDEST = 5
+NODE, PIPE, VALVE, COLUMN, MASS, BRACE, STOP, PISTON = 2, 6, 1, 3, 1, 1, 2, 3  # rows of `power` for each part
+CREEP = 4  # the row of creep among the rows of a pipe
+WIDEST = 5  # cells of the widest polynomial
 
 
 def point_weights():
-    """Weights of w cells in the value at each Gauss point of cell i of them : float64[w, i, point, cell]."""
-    found = np.zeros((WIDEST + 1, WIDEST, 3, WIDEST))
+    """Weights of w cells in the value at each Gauss point of their cell i : float64[w, i, point, cell]."""
+    weights = np.zeros((WIDEST + 1, WIDEST, 3, WIDEST))
     for w in range(1, WIDEST + 1):
         for i in range(w):
             edges = np.arange(w + 1) - i - 0.5
             powers = np.arange(w)
             means = (edges[1:, None] ** (powers + 1) - edges[:-1, None] ** (powers + 1)) / (powers + 1)
-            found[w, i, :, :w] = np.linalg.solve(means.T, (PLACES[:, None] ** powers).T).T
-    return found
+            weights[w, i, :, :w] = np.linalg.solve(means.T, (PLACES[:, None] ** powers).T).T
+    return weights
 
 
 POINTS = point_weights()
@@ -46,7 +51,7 @@ POINTS = point_weights()
 
 @njit
 def width_of(settings, n):
-    """Cells of the polynomial by which squares are averaged: one below order three, else as many as the order."""
+    """Number of cells of the polynomial for averages of squares: 1 below order three, else the order of the scheme."""
     family, width = family_of(settings, n), 1
     if family == WENO5:
         width = WIDEST
@@ -59,7 +64,7 @@ def width_of(settings, n):
 
 @njit(forceinline=True)
 def at_point(c, width, i, point):
-    """Value at a Gauss point of cell i of the polynomial through `width` cells about it."""
+    """Value at a Gauss point of cell i, from the polynomial through `width` cells around it."""
     first = min(max(i - width // 2, 0), c.size - width)
     total = 0.0
     for k in range(width):
@@ -88,7 +93,7 @@ def height_pressure(st, node):
 
 @njit
 def pipe_power(st, pipe, start, r, l, dr, dl, rows):
-    """Friction, and the rate of what is stored, of one pipe; start : P of the profile at its `from` end [Pa]."""
+    """Write friction and rate of stored energy of a pipe; start : P of the profile at its `from` end [Pa]."""
     n, width, per = r.size, width_of(st, r.size), 1.0 / (st["rho"] * pipe["area"])
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
     friction, rate = 0.0, 0.0
@@ -98,15 +103,15 @@ def pipe_power(st, pipe, start, r, l, dr, dl, rows):
             da, db = at_point(dr, width, i, g), at_point(dl, width, i, g)
             total = flow + (a - b)
             p = pipe["admittance"] * (start - fall * (i + 0.5 + PLACES[g]) * pipe["dx"])
-            pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], total)
-            friction += SHARES[g] * (total * pull)
+            force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], total)
+            friction += SHARES[g] * (total * force)
             rate += SHARES[g] * ((p * (da + db) + flow * (da - db)) + 2.0 * (a * da + b * db))
     rows[1], rows[2], rows[3] = per * pipe["dx"] * friction, 0.0, per * pipe["dx"] * rate
 
 
 @njit
 def pipe_energy(st, pipe, start, r, l, rows):
-    """Change of kinetic and of elastic energy (with that of height) of one pipe since the profile."""
+    """Write the changes of kinetic and of elastic energy (with energy of height) of a pipe since the profile."""
     n, width, per = r.size, width_of(st, r.size), 0.5 / (st["rho"] * pipe["area"])
     fall, flow = pipe["drag"] / pipe["area"], pipe["flow"]
     kinetic, elastic = 0.0, 0.0
@@ -121,7 +126,7 @@ def pipe_energy(st, pipe, start, r, l, rows):
 
 @njit
 def power_linear(t, y, dydt, out, handle, power):
-    """Fill `power` from a state, its rates and what the rhs wrote beside them."""
+    """Fill `power` from a state, its rates and the values in `out`."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     valves, columns, per = tables.valves, tables.columns, 1.0 / tables.settings[0]["rho"]
@@ -166,7 +171,7 @@ def power_linear(t, y, dydt, out, handle, power):
 
 @njit
 def power_masses(t, y, dydt, out, tables, power, at):
-    """Rows of masses, braces and stops from row `at` on; returns the row behind them."""
+    """Write the rows of masses, braces and stops from row `at` on; return the row after them."""
     layout, masses, braces, stops = tables.layout[0], tables.masses, tables.braces, tables.stops
     armed = tables.armed
     for i in range(masses.size):
@@ -199,7 +204,7 @@ def power_masses(t, y, dydt, out, tables, power, at):
 
 @njit(forceinline=True)
 def moving_side(tables, piston, side):
-    """(node, area with the sign of what a travel adds to its volume, mass swept a travel) of one side."""
+    """(node, area signed by the change of volume with travel, swept mass per travel) of a side of a piston."""
     if side == 1:
         return piston["b"], -piston["area_b"], piston["sweep_b"]
     return piston["a"], piston["area_a"], piston["sweep_a"]
@@ -207,7 +212,7 @@ def moving_side(tables, piston, side):
 
 @njit
 def power_pistons(y, dydt, out, tables, power, at):
-    """Rows of pistons, and of storage in their chambers: V p^2 / (2 beta) and the height of the mass."""
+    """Write the rows of pistons and the storage of their chambers: V p^2 / (2 beta), and height of the mass."""
     st, layout, nodes, pistons = tables.settings[0], tables.layout[0], tables.nodes, tables.pistons
     per = 1.0 / st["rho"]
     for k in range(pistons.size):
@@ -275,7 +280,7 @@ def stored_linear(t, y, dydt, out, handle, stored):
 
 @njit
 def tank_energy(st, floats, node, rho, change):
-    """Change of g z m of a tank whose mass has changed [J], integral of g (z + level) dm."""
+    """Change of the energy g z m of a tank by a change of mass [J]: integral of g (z + level) dm."""
     level, z = node["level"], node["elevation"] - st["datum"]
     if node["shape"] < 0:
         return st["gravity"] * change * (z + level + 0.5 * change / (rho * node["area"]))
@@ -296,7 +301,7 @@ def level_moment(floats, shape, rows, level):
             break
         a0 = floats[shape + rows + k]
         growth = 0.0
-        if not last and z1 >= z0:  # below its first level a tank is a prism
+        if not last and z1 >= z0:  # a tank is a prism below its first level
             growth = (floats[shape + rows + k + 1] - a0) / (floats[shape + k + 1] - z0)
         d = z1 - z0
         total += d * (a0 * (z0 + 0.5 * d) + growth * d * (0.5 * z0 + d / 3.0))
@@ -305,7 +310,7 @@ def level_moment(floats, shape, rows, level):
 
 @njit
 def stored_masses(y, out, tables, stored, at):
-    """Rows of masses, braces and stops from row `at` on."""
+    """Write the rows of masses, braces and stops from row `at` on."""
     masses, braces, stops = tables.masses, tables.braces, tables.stops
     for i in range(masses.size):
         stored[at] = 0.0

@@ -1,8 +1,9 @@
-"""Power and stored energy of every part under the laws log and table. Knows the tables; adds nothing up over time.
+"""Power and stored energy of every part under the laws log and table.
 
-A mass flow M carries the power M H, H = h(p) - h(p_ambient) + g z; a pipe stores M^2 / (2 m) + W(m) + m g z per length
-with dW/dm = h, W = m h - integral of A dp; a vessel of volume V stores m (h + g z) - (p - p_ambient) V, which is
-V (beta (exp(p / beta) - 1) - p) for a constant beta. A jet into a vessel loses M v^2 / 2. Rows as in `energy.py`.
+A mass flow M carries the power M H, H = h(p) - h(p_ambient) + g z. A pipe stores M^2 / (2 m) + W(m) + m g z per length
+with dW/dm = h, W = m h - integral of A dp. A vessel of volume V stores m (h + g z) - (p - p_ambient) V, which is
+V (beta (exp(p / beta) - 1) - p) for a constant beta. A jet into a vessel loses M v^2 / 2. Rows as in
+`linear_energy.py`.
 """
 
 from fvsolve.jit import njit
@@ -34,7 +35,7 @@ from fvsolve.kernels.masses import excess_of, leak_flow, piston_travel
 from fvsolve.kernels.records import CHAMBER, JUNCTION, LAW_LINEAR, TANK
 from fvsolve.kernels.rigid import column_drag
 
-EMPTY = 1e-6  # of what a pipe holds: the least that counts as a mass
+EMPTY = 1e-6  # least mass per length, relative to that of a full pipe
 
 
 @njit
@@ -45,7 +46,7 @@ def height_of(st, floats, p):
 
 @njit
 def head_at(st, floats, node, p):
-    """Energy that a mass would bring into a node at p [J/kg], of any law."""
+    """Energy per mass of fluid that enters a node at pressure p [J/kg], for any law."""
     height = st["gravity"] * (node["elevation"] - st["datum"])
     if st["law"] == LAW_LINEAR:
         return (p - st["ambient"]) / st["rho"] + height
@@ -76,7 +77,7 @@ def held(st, profile, pipe, i, point, change):
 
 @njit
 def pipe_power_barotropic(st, floats, profile, pipe, z, r, l, dr, dl, rows):
-    """Friction, and the rate of what is stored, of one pipe; z : height of its `from` end [m]."""
+    """Write friction and rate of stored energy of a pipe; z : height of its `from` end [m]."""
     n, c, width, dx = r.size, pipe["speed"], width_of(st, r.size), pipe["dx"]
     base, reference = enthalpy(st, floats, st["ambient"]), st["rho"] * pipe["area"]
     friction, rate = 0.0, 0.0
@@ -88,15 +89,15 @@ def pipe_power_barotropic(st, floats, profile, pipe, z, r, l, dr, dl, rows):
             v = flow / m
             h = enthalpy(st, floats, pressure_of_mass(st, floats, pipe, m)) - base
             h += st["gravity"] * (z + rise_to(profile, pipe, (i + 0.5 + PLACES[g]) * dx))
-            pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
-            friction += SHARES[g] * v * pull * (reference / m)
+            force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+            friction += SHARES[g] * v * force * (reference / m)
             rate += SHARES[g] * ((h - 0.5 * v * v) * (da + db) / c + v * (da - db))
     rows[1], rows[3] = dx * friction, dx * rate
 
 
 @njit
 def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
-    """Change of kinetic and of elastic energy (with that of height) of one pipe since the profile."""
+    """Write the changes of kinetic and of elastic energy (with energy of height) of a pipe since the profile."""
     n, c, width, dx = r.size, pipe["speed"], width_of(st, r.size), pipe["dx"]
     base = enthalpy(st, floats, st["ambient"])
     kinetic, elastic = 0.0, 0.0
@@ -116,7 +117,7 @@ def pipe_energy_barotropic(st, floats, profile, pipe, z, r, l, rows):
 
 @njit
 def jets(profile, pipe, out, end, nodes):
-    """Power that jets into vessels lose at both ends of a pipe, M v^2 / 2 [W]."""
+    """Power lost by jets into vessels at both ends of a pipe, M v^2 / 2 [W]."""
     lost = 0.0
     for side in range(2):
         i = pipe["to_node"] if side == 1 else pipe["from_node"]
@@ -130,7 +131,7 @@ def jets(profile, pipe, out, end, nodes):
 
 @njit
 def power_barotropic(t, y, dydt, out, handle, power):
-    """Fill `power` from a state, its rates and what the rhs wrote beside them."""
+    """Fill `power` from a state, its rates and the values in `out`."""
     tables = open_tables(handle)
     st, layout, nodes, pipes = tables.settings[0], tables.layout[0], tables.nodes, tables.pipes
     valves, columns, floats, profile = tables.valves, tables.columns, tables.floats, tables.profile
@@ -173,7 +174,7 @@ def power_barotropic(t, y, dydt, out, handle, power):
 
 @njit
 def power_pistons_barotropic(y, dydt, out, tables, power, at):
-    """Rows of pistons, and of storage in their chambers, H dm - (p - p_ambient) dV."""
+    """Write the rows of pistons and the storage of their chambers, H dm - (p - p_ambient) dV."""
     nodes, pistons = tables.nodes, tables.pistons
     pressure = tables.layout[0]["pressure"]
     for k in range(pistons.size):
@@ -242,7 +243,7 @@ def stored_barotropic(t, y, dydt, out, handle, stored):
 
 @njit
 def vessel_power(dydt, out, tables, device):
-    """Rate of what a vessel stores [W]: what a mass brings, P / rho or h(p) - h(p_ambient) + g z, times its flow."""
+    """Rate of the energy of a vessel [W]: energy per mass, P / rho or h(p) - h(p_ambient) + g z, times dm/dt."""
     i, nodes = device["node"], tables.nodes
     p = nodes[i]["pressure"] + out[tables.layout[0]["pressure"] + i]
     return head_at(tables.settings[0], tables.floats, nodes[i], p) * dydt[nodes[i]["y"]]

@@ -1,4 +1,4 @@
-"""How fast a valve that answers a pressure acts on it. Knows one restriction; knows no valve."""
+"""Rate of the feedback loop of a valve whose opening follows a pressure."""
 
 from math import sqrt
 
@@ -10,7 +10,7 @@ from fvsolve.kernels.restrictions import head_drop, restriction_slope
 
 @njit
 def yielding(tables, i):
-    """Rise of the pressure at a node without storage for a flow into it [Pa s/kg]; 0 of others."""
+    """Pressure rise at a junction per flow into it [Pa s/kg], 1 / admittance of its pipes; 0 for other nodes."""
     node = tables.nodes[i]
     return 1.0 / node["admittance"] if node["kind"] == JUNCTION and node["admittance"] > 0.0 else 0.0
 
@@ -19,7 +19,8 @@ def yielding(tables, i):
 def loop_rate(out, tables, k, i, speed):
     """Rate [1/s] of restriction k whose opening x moves by dx/dt = -speed p' with the pressure at node i.
 
-    p' follows dM/dx, sqrt(G dP) less what its own drop gives way, through pipes or through stored mass.
+    p' follows dM/dx = sqrt(G dP), reduced because the drop falls as the flow rises, through pipes or through stored
+    mass.
     """
     layout, valve = tables.layout[0], tables.valves[k]
     drop = head_drop(tables, out, k)[1]

@@ -1,7 +1,7 @@
-"""Forces of the fluid on legs of pipe between bends and dead ends. Knows rates of cells; changes no state.
+"""Forces of the fluid on pipe legs between bends and dead ends.
 
-What the momentum of the fluid in a pipe loses, - d/dt of the integral of M dx [N], its ends and wall gain beyond what
-they bear in the profile: positive from `from` to `to`.
+The force is the rate of momentum loss of the fluid, - d/dt of the integral of M dx [N], which acts on ends and wall in
+addition to the force of the profile; positive from `from` to `to`.
 """
 
 from fvsolve.jit import njit
@@ -16,7 +16,7 @@ from fvsolve.kernels.unsteady.memory import remember_linear
 
 @njit
 def read_forces(dydt, tables, values):
-    """values[k] = - sum of dM/dt dx over the cells of a pipe, of every probe of a force."""
+    """values[k] = - sum of dM/dt dx over the cells of the pipe, for every force probe."""
     for k in range(tables.probes.size):
         probe = tables.probes[k]
         if probe["kind"] == PIPE_FORCE:
@@ -51,7 +51,7 @@ def observe_forces_barotropic(t, y, out, handle, values):
 
 @njit
 def observe_forces_cavitating(t, y, out, handle, values):
-    """Forces on pipes under the law mixture where cavities open."""
+    """Forces on pipes under the law mixture, with cavities."""
     tables = open_tables(handle)
     at = tables.layout[0]["forces"]
     dydt = tables.work[at : at + y.size]

@@ -1,4 +1,4 @@
-"""Wall friction of a pipe flow. Knows Reynolds numbers and factors; knows no cells."""
+"""Steady wall friction of pipe flow: Darcy factor and momentum loss."""
 
 from math import log
 
@@ -10,22 +10,22 @@ from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH
 
 TWO_OVER_LN10 = 2.0 / log(10.0)
 EXPONENT = 0.852  # Hazen-Williams: drop as flow to 1.852
-MANTISSA, ONE = 0x000FFFFFFFFFFFFF, 0x3FF0000000000000  # bits of a float64
-WHOLE, REST = np.divmod(213 * (np.arange(2048) - 1023), 500)  # of 0.426 e, for every e that a float64 can have
+MANTISSA, ONE = 0x000FFFFFFFFFFFFF, 0x3FF0000000000000  # bits of a float64: the mantissa, the number 1
+WHOLE, REST = np.divmod(213 * (np.arange(2048) - 1023), 500)  # 0.426 e for every exponent e of a float64
 SCALES = np.ldexp(2.0 ** (REST / 500.0), WHOLE)  # 2^(0.426 e)
-SCALES[2047] = np.nan  # of what is not finite
+SCALES[2047] = np.nan  # exponent of inf and NaN
 C0, C1, C2, C3, C4, C5, C6, C7, C8, C9, C10, C11, C12, C13, C14, C15 = (
     float(c) * 2.0**k
     for k, c in enumerate(chebyshev.cheb2poly(chebyshev.chebinterpolate(lambda x: (1.5 + 0.5 * x) ** 0.426, 15)))
 )
-LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers between which the two laws are blended
+LAMINAR, TURBULENT = 2000.0, 4000.0  # Reynolds numbers; both laws are blended between them
 
 
 @njit
 def factor_turbulent(reynolds, roughness):
     """Darcy factor of Colebrook, 1/sqrt(f) = -2 log10(e/3.7 + 2.51/(Re sqrt(f))), by two steps of Halley from Haaland.
 
-    reynolds [-], roughness relative to the diameter [-].
+    reynolds [-]; roughness : relative to the diameter [-]
     """
     a, b = roughness / 3.7, 2.51 / reynolds
     x = -0.9 * TWO_OVER_LN10 * log(a**1.11 + 6.9 / reynolds)
@@ -39,7 +39,7 @@ def factor_turbulent(reynolds, roughness):
 
 @njit
 def factor_times_reynolds(reynolds, roughness):
-    """f Re: 64 below Re 2000, Colebrook above 4000, a smooth step between, so that the drop stays monotone."""
+    """f Re: 64 below Re 2000, Colebrook above 4000, a smooth blend between, so that the drop is monotone."""
     if reynolds <= LAMINAR:
         return 64.0
     turbulent = factor_turbulent(reynolds, roughness) * reynolds
@@ -52,10 +52,10 @@ def factor_times_reynolds(reynolds, roughness):
 
 @njit(fastmath={"contract"})
 def power_of_square(square):
-    """(M^2)^0.426 = |M|^0.852 of M^2 >= 0, to 2e-14 of itself for 1e-150 <= |M| <= 1e150.
+    """(M^2)^0.426 = |M|^0.852 from M^2 >= 0, relative error 2e-14 for 1e-150 <= |M| <= 1e150.
 
-    Mantissa in [1, 2) by a polynomial of Chebyshev's through its middle, exponent by a table: no branch and no call,
-    so that a loop over cells does four at once, and a product with its sum is one instruction.
+    The mantissa in [1, 2) goes through a Chebyshev interpolation polynomial, the exponent through a table. Without
+    branch and call a loop over cells is vectorised by four, and a product and its sum are a single instruction.
     """
     bits = np.float64(square).view(np.int64)
     u = np.int64((bits & MANTISSA) | ONE).view(np.float64) - 1.5
@@ -74,7 +74,7 @@ def drag_hazen(loss, rough, flow):
 
 @njit
 def drag(kind, loss, rough, roughness, reynolds, flow):
-    """Momentum that wall and fittings take, per length and time [kg/s2], of a mass flow [kg/s].
+    """Momentum loss by wall and fittings per length and time [kg/s2] of a mass flow [kg/s].
 
     loss |M| M + rough f(Re) |M| M, or for Hazen-Williams loss |M| M + rough |M|^0.852 M.
     """
@@ -89,7 +89,7 @@ def drag(kind, loss, rough, roughness, reynolds, flow):
 
 @njit
 def drag_slope(kind, loss, rough, roughness, reynolds, flow):
-    """d drag / d flow [1/s] by the law's exponent; exact but for the blend and the factor's own slope."""
+    """d drag / d flow [1/s]: a difference quotient where the factor depends on roughness, else exact."""
     size = abs(flow)
     slope = 2.0 * loss * size
     if kind == FRICTION_ROUGH:

@@ -1,4 +1,4 @@
-"""The functions that a scene offers to the stepper, compiled on first use. Knows jobs; knows no law."""
+"""Compiled functions of a model for the stepper, compiled at first use."""
 
 import functools
 
@@ -14,10 +14,10 @@ MARCH = "from fvsolve.steppers.march import compiled; compiled()"
 
 
 class Functions:
-    """Compiled functions of a scene: `rhs`, `observe`, `record`, `events`, and `energies` once they are asked for.
+    """Compiled functions of a model: `rhs`, `observe`, `record`, `events`, and `energies` when they are first used.
 
-    calls : int64[jobs, n]  addresses of pieces; hooks : int64[laws, hooks]  of functions of parts' laws; both stand
-    behind the handle of a model
+    calls : int64[jobs, n]  addresses of functions, a row for each job
+    hooks : int64[laws, hooks]  addresses of the functions of parts' laws; both stand behind the handle of a model
     """
 
     def __init__(self, cast: Cast) -> None:
@@ -38,24 +38,24 @@ class Functions:
         self.record, self.events = compile_readers(cast)
 
     def enter(self, job: int, functions: list) -> None:
-        """Note the addresses of a job's functions."""
-        self.calls[job, : len(functions)] = [calls.addressed(one, calls.ARGUMENTS[job]) for one in functions]
+        """Write the addresses of the functions of a job to `calls`."""
+        self.calls[job, : len(functions)] = [calls.addressed(function, calls.ARGUMENTS[job]) for function in functions]
 
     def hang(self, *hooks: str) -> None:
-        """Note the addresses of these hooks of all laws."""
+        """Write the addresses of these hooks of all laws to `hooks`."""
         for row, law in zip(self.hooks, self.cast.modules(), strict=True):
             for hook in hooks:
                 if (function := calls.hook_of(law, hook)) is not None:
                     row[HOOK[hook]] = calls.addressed(function, calls.HOOKS[hook][0])
 
     def all(self, job: int, functions: list, in_turn):
-        """The function that calls all of a job."""
+        """Store all functions of a job; return the compiled function that calls them in turn."""
         self.enter(job, functions)
         return calls.compile_as(in_turn, calls.ARGUMENTS[job].lower())
 
     @functools.cached_property
     def energies(self) -> tuple:
-        """(power, stored), each of (t, y, dydt, out, handle, rows)."""
+        """(power, stored), functions of (t, y, dydt, out, handle, rows)."""
         self.hang(*ENERGIES)
         power, stored = self.cast.functions("power"), self.cast.functions("stored")
         return self.all(calls.POWER, power, calls.power_in_turn), self.all(calls.STORED, stored, calls.stored_in_turn)
@@ -65,7 +65,7 @@ functions = once(Functions)
 
 
 def compile_readers(cast: Cast) -> tuple:
-    """(record, events) of a scene, compiled with all that they call."""
+    """(record, events) of a model, compiled together with all functions that they call."""
     for function in cast.functions("observe", "record", "events"):
         calls.addressed(function, calls.READS)
     for law in cast.modules():
@@ -77,14 +77,14 @@ def compile_readers(cast: Cast) -> tuple:
 
 
 @once
-def leap_function(wanted: bool):
-    """A whole step of upwind and Euler under the linear law; not wanted, something of its type to pass on."""
+def leap_function(needed: bool):
+    """Fused step of upwind and Euler under the linear law if `needed`, else an unused function of that type."""
     found = stay
-    if wanted:
+    if needed:
         from fvsolve.kernels.leap import leap_linear as found
     return calls.compile_as(found, "ttvvvhv")
 
 
 @njit
 def stay(t, h, y, y_new, out, handle, values):
-    """Never called."""
+    """Placeholder; it is never called."""

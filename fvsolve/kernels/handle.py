@@ -1,8 +1,8 @@
-"""The tables of a model behind one small array of addresses. Knows where tables lie; knows no law.
+"""Handle of a model: a small array with the addresses of its tables.
 
-Passing twenty arrays from function to function costs half a microsecond of copying a step and seconds of compiling.
-A handle costs nothing: compiled code loads a table only where it asks for it. Whoever makes a handle keeps its
-tables alive, and their places and sizes as they are.
+To pass twenty arrays from function to function costs half a microsecond of copying at each step and seconds of
+compilation. A handle costs nothing: compiled code loads a table where it uses it. The owner of a handle must keep its
+tables alive, at their addresses and with their sizes.
 """
 
 import numpy as np
@@ -13,51 +13,52 @@ from fvsolve.kernels.records import Called
 if COMPILING:
 
     def places_of(tables: tuple) -> tuple:
-        """Address, rows and columns of each table, one after the other."""
+        """Address, rows and columns of each table, in sequence."""
         return tuple(x for a in tables for x in (a.ctypes.data, a.shape[0], a.shape[-1]))
 
     def joined(places: tuple) -> np.ndarray:
-        """int64[3 n]: the handle of tables at these places."""
+        """Handle of the tables at these addresses: int64[3 n]."""
         return np.array(places, dtype=np.int64)
 
     def room_within() -> np.ndarray:
-        """Room for a handle among the tables behind another."""
+        """Empty array for a handle that is itself a table."""
         return np.zeros(3 * len(Called._fields), dtype=np.int64)
 
     @Intrinsic
     def open_tables(typingctx, handle):
-        """The tables behind a handle, uncounted; `tables.nodes` loads one."""
+        """Tables behind a handle, without reference counts; `tables.nodes` loads a table."""
         from fvsolve.kernels.opened import Tables, first_word
 
         return Tables()(handle), first_word
 else:
 
     def places_of(tables: tuple) -> tuple:
-        """The tables themselves: without compiling there is nothing to copy."""
+        """The tables themselves: without compilation nothing is copied."""
         return tuple(tables)
 
     def joined(places: tuple) -> Called:
-        """The handle of these tables."""
+        """Handle of these tables."""
         return Called(*places, *[None] * (len(Called._fields) - len(places)))
 
     def room_within() -> np.ndarray:
-        """Room for a handle among the tables behind another."""
+        """Empty array for a handle that is itself a table."""
         return np.empty(1, dtype=object)
 
     def open_tables(handle):
-        """The tables behind a handle, or behind one that stands among others."""
+        """Tables behind a handle, or behind a handle stored in an array."""
         return handle[0] if isinstance(handle, np.ndarray) else handle
 
 
 def make_handle(tables: tuple):
-    """The handle of these tables."""
+    """Handle of these tables."""
     return joined(places_of(tables))
 
 
 def linked(shared: tuple, sharp: tuple, written: tuple, called: tuple):
-    """The handle of a model's tables at these places and what a run writes; behind its `sharp` with others of these.
+    """Handle of the tables of a model and of the arrays of a run.
 
-    shared, sharp : places of the model's tables, and of those that a jump of a delay line meets
+    The array `sharp` of the run receives a second handle, with some of the tables replaced.
+    shared, sharp : addresses of the tables of the model, and of those used where the jump of a delay line arrives
     """
     own = places_of((*written, *called))
     if written.sharp.size > 0:
