@@ -1,9 +1,9 @@
-"""What bands of one state tell each other, each with arrays of its own. Knows addresses; knows no law.
+"""Exchange between bands of a state, each with its own arrays: halo values, greatest rate, sums.
 
-All bands make the same calls in the same order. Whoever tells something puts it down, and all wait for each other
-before they look and before anyone may write there again. `joint` of a band's handle says where; it is empty where one
-band is all there is, and then none of these functions is called. Bands are threads, which see each other's memory, or
-processes, whose joint is a function of Python's (`solve.ranks`).
+All bands make the same calls in the same order. A band writes its data, then all bands wait for each other before any
+band reads them, and again before any band overwrites them. `joint` of a band's handle holds the addresses. It is empty
+if there is a single band, and then none of these functions is called. Bands are threads, which share memory, or
+processes, whose exchange is a Python function (`solve.ranks`).
 """
 
 import numpy as np
@@ -12,21 +12,21 @@ from fvsolve.jit import COMPILING, Intrinsic, njit
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import RATE
 
-# Places in `joint`, int64: number of this band, how many there are, addresses of the board that all see, of the room
-# for sums, and of the system's function that lets others run; how often this band has waited; how many of its spans
-# all bands have; how many runs of states it takes from others, and of flows through faces: triples from HEAD on of
-# owner, first and one beyond the last; address of the function that tells processes, 0 for threads.
+# Entries of `joint`, int64: number of this band; number of bands; addresses of the board shared by all, of the buffer
+# for sums, and of the system function that yields the processor; number of barriers passed; number of spans common to
+# all bands; number of runs of states read from other bands, and of flows through faces; address of the function that
+# exchanges between processes, 0 for threads. The runs follow from HEAD on: owner, first, and last + 1 of each.
 ME, MANY, BOARD, ROOM, YIELD, TURNS, ALIKE, STATES, FLOWS, TELL = range(10)
-OF_STATES, OF_FLOWS, OF_RATES, OF_SUMS = range(4)  # what that is told: which, the address of numbers and how many
+OF_STATES, OF_FLOWS, OF_RATES, OF_SUMS = range(4)  # kind of exchange between processes
 HEAD = 16
-LINE = 8  # numbers of a cache line: on the board each band has one: how often it has come, what it shows, two rates
+LINE = 8  # numbers in a cache line; the line of a band on the board: barriers passed, shared address, two rates
 SHOWN, RATES = 1, 2
-PATIENCE = 2000  # looks before others are let run
+PATIENCE = 2000  # polls at a barrier before the thread yields
 
 if COMPILING:
 
     def at_address(context, builder, kind, address, size):
-        """An array of numbers that lie at an address."""
+        """Array of numbers at an address."""
         from numba.core import types
         from numba.np.arrayobj import make_array, populate_array
 
@@ -48,7 +48,7 @@ if COMPILING:
 
     @Intrinsic
     def address_of(typingctx, array):
-        """Where an array begins."""
+        """Address of the first entry of an array."""
         from numba.core import types
         from numba.np.arrayobj import make_array
 
@@ -60,7 +60,7 @@ if COMPILING:
 
     @Intrinsic
     def put(typingctx, address, value):
-        """Write a number that others wait for, after all that was written before."""
+        """Store a number on which other bands wait, after all writes before it (release)."""
         from numba.core import types
 
         def generate(context, builder, kind, args):
@@ -72,7 +72,7 @@ if COMPILING:
 
     @Intrinsic
     def get(typingctx, address):
-        """Read such a number, before all that is read after."""
+        """Load such a number, before all reads after it (acquire)."""
         from numba.core import types
 
         def generate(context, builder, kind, args):
@@ -82,8 +82,8 @@ if COMPILING:
         return types.int64(types.int64), generate
 
     @Intrinsic
-    def tell(typingctx, address, what, numbers, size):
-        """Call the function at an address, which tells other processes."""
+    def tell(typingctx, address, content, numbers, size):
+        """Call the function at an address, which exchanges with other processes."""
         from llvmlite import ir
         from numba.core import types
 
@@ -97,7 +97,7 @@ if COMPILING:
 
     @Intrinsic
     def let_run(typingctx, address):
-        """Call the system's function at an address, which lets other threads run."""
+        """Call the system function at an address, which yields the processor to other threads."""
         from llvmlite import ir
         from numba.core import types
 
@@ -116,49 +116,52 @@ else:
         return np.ctypeslib.as_array((ctypes.c_double * int(size)).from_address(int(address)))
 
     def address_of(array):
-        """Where an array begins."""
+        """Address of the first entry of an array."""
         return array.ctypes.data
 
     def put(address, value):
-        """Write a number that others wait for."""
+        """Store a number on which other bands wait."""
         ctypes.c_int64.from_address(int(address)).value = int(value)
 
     def get(address):
-        """Read such a number."""
+        """Load such a number."""
         return ctypes.c_int64.from_address(int(address)).value
 
-    def tell(address, what, numbers, size):
+    def tell(address, content, numbers, size):
         """Call the function at an address."""
-        ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3)(int(address))(what, numbers, int(size))
+        ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * 3)(int(address))(content, numbers, int(size))
 
     def let_run(address):
-        """Let other threads run."""
+        """Yield the processor to other threads."""
         time.sleep(0.0)
 
 
 @njit
 def wait(joint):
-    """Wait until all bands are here: a while for quick ones, then letting others run, who may want this core."""
-    board, many = joint[BOARD], joint[MANY]
+    """Wait until all bands arrive: poll first, then yield the processor, which a late band may need."""
+    board, count = joint[BOARD], joint[MANY]
     joint[TURNS] += 1
     turn = joint[TURNS]
     put(board + 8 * LINE * joint[ME], turn)
-    for k in range(many):
-        looks = 0
+    for k in range(count):
+        polls = 0
         while get(board + 8 * LINE * k) < turn:
-            looks += 1
-            if looks > PATIENCE:
+            polls += 1
+            if polls > PATIENCE:
                 let_run(joint[YIELD])
 
 
 @njit
-def fetch(joint, what, values):
-    """Take runs of states or flows from the bands that have them, in the array that each shows in its place."""
+def fetch(joint, content, values):
+    """Copy runs of states or flows from the bands that own them to the same places of `values`.
+
+    content : SEND_STATES or SEND_FLOWS. Each band shares the address of its array.
+    """
     if joint[TELL] != 0:
-        tell(joint[TELL], what, address_of(values), values.size)
+        tell(joint[TELL], content, address_of(values), values.size)
         return
     first, count = HEAD, joint[STATES]
-    if what == OF_FLOWS:
+    if content == OF_FLOWS:
         first, count = HEAD + 3 * joint[STATES], joint[FLOWS]
     place = joint[BOARD] + 8 * SHOWN
     put(place + 8 * LINE * joint[ME], address_of(values))
@@ -175,24 +178,24 @@ def fetch(joint, what, values):
 
 @njit
 def meet(t, y, dydt, out, handle):
-    """Take the states that rates of this band hang on and others step."""
+    """Copy the states of other bands on which the rates of this band depend."""
     joint = open_tables(handle).joint
     fetch(joint, OF_STATES, y)
 
 
 @njit
 def agree(t, y, dydt, out, handle):
-    """Let the greatest rate of all bands be that of each; what is no number, of any, is infinite for all."""
+    """Set out[RATE] of each band to the greatest rate of all bands; NaN in any band becomes infinity in all."""
     joint = open_tables(handle).joint
     if joint[TELL] != 0:
         tell(joint[TELL], OF_RATES, address_of(out), 1)
         return
-    many, column = joint[MANY], RATES + joint[TURNS] % 2
-    rates = floats_at(joint[BOARD], LINE * many)
+    count, column = joint[MANY], RATES + joint[TURNS] % 2
+    rates = floats_at(joint[BOARD], LINE * count)
     rates[LINE * joint[ME] + column] = out[RATE]
     wait(joint)
     most = 0.0
-    for k in range(many):
+    for k in range(count):
         rate = rates[LINE * k + column]
         most = max(most, rate if rate == rate else np.inf)
     out[RATE] = most
@@ -200,15 +203,18 @@ def agree(t, y, dydt, out, handle):
 
 @njit
 def share(sums, spans, handle):
-    """Bring to all the sums of all; spans : as of `steppers.step`, of which ALIKE are the same for all bands."""
+    """Gather the sums of all bands in each band.
+
+    spans : see `steppers.step`; the first `joint[COMMON_SPANS]` of them are the same in all bands, written by band 0
+    """
     joint = open_tables(handle).joint
     if joint[TELL] != 0:
         tell(joint[TELL], OF_SUMS, address_of(sums), sums.size)
         return
-    room = floats_at(joint[ROOM] + 8 * sums.size * (joint[TURNS] % 2), sums.size)
+    buffer = floats_at(joint[ROOM] + 8 * sums.size * (joint[TURNS] % 2), sums.size)
     for m in range(joint[ALIKE] if joint[ME] > 0 else 0, spans.shape[0]):
         for r in range(spans[m, 2], spans[m, 2] + spans[m, 3]):
-            room[r] = sums[r]
+            buffer[r] = sums[r]
     wait(joint)
     for r in range(sums.size):
-        sums[r] = room[r]
+        sums[r] = buffer[r]

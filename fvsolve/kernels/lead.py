@@ -1,7 +1,8 @@
-"""Valves that lead the rigid column which they alone hold, near their seat. Knows one valve and the columns beside it.
+"""Valves near their seat that control the single rigid column connected to them.
 
-A disc leads from its seat, a stem to its seat too (armed[event + 4], of a stem + 6), until its lift is above LEADS and
-a given step resolves what the two exchange: `kernels.led`. A disc that goes to its seat may slam.
+A disc controls its column from its seat on, a stem also down to its seat (flag armed[event + 4], of a stem + 6). This
+ends when its lift exceeds CONTROL_LIFT and a given step resolves the exchange between lift and flow:
+`kernels.column_valve_control`. A disc that moves to its seat may slam.
 """
 
 from math import sqrt
@@ -10,12 +11,12 @@ from fvsolve.jit import njit
 from fvsolve.kernels.either import either
 from fvsolve.kernels.restrictions import head_drop
 
-LEADS = 1e-4  # lift up to which it leads its column, at least
+LEADS = 1e-4  # lift up to which a valve controls its column, at least
 
 
 @njit
 def leads(tables, k):
-    """Whether restriction k leads the rigid column which it alone holds."""
+    """True if restriction k controls the rigid column of which it is the only outlet."""
     if tables.valves[k]["device"] < 0:
         return False
     device = tables.devices[tables.valves[k]["device"]]
@@ -24,33 +25,36 @@ def leads(tables, k):
 
 @njit
 def led_until(out, tables, device, speed):
-    """Lift above which it does not lead its column; 0 where it holds none alone.
+    """Lift above which a valve does not control its column; 0 if it is not the only outlet of a column.
 
-    speed : d(dx/dt) / d(drop) [1/Pa/s].
+    speed : d(dx/dt) / d(drop) [1/Pa/s]
     """
-    valve, columns, most = tables.valves[device["valve"]], tables.columns, 0.0
+    valve, columns, limit = tables.valves[device["valve"]], tables.columns, 0.0
     for k in range(columns.size):
         for i in (columns[k]["from_node"], columns[k]["to_node"]):
-            joined, node = i == valve["from_node"] or i == valve["to_node"], tables.nodes[i]
-            if joined and node["gates"] >= 0 and node["gate_count"] == 1 and node["columns"] == 1:
-                most = max(most, led_beside(out, tables, device, columns[k]["area"] / columns[k]["length"], speed))
-    return most
+            at_end, node = i == valve["from_node"] or i == valve["to_node"], tables.nodes[i]
+            if at_end and node["gates"] >= 0 and node["gate_count"] == 1 and node["columns"] == 1:
+                limit = max(limit, led_beside(out, tables, device, columns[k]["area"] / columns[k]["length"], speed))
+    return limit
 
 
 @njit
-def led_beside(out, tables, device, yielding, speed):
-    """The same, beside a column of area over length `yielding`: LEADS, or where a given step resolves their exchange.
+def led_beside(out, tables, device, mobility, speed):
+    """Such a lift at a column with A / L = `mobility`: CONTROL_LIFT, or more until a given step resolves the exchange.
 
-    Its rate is (2 dP / x) (speed + (A / L) / sqrt(G dP)).
+    The rate of the exchange is (2 dP / x) (speed + (A / L) / sqrt(G dP)).
     """
     root = sqrt(abs(head_drop(tables, out, device["valve"])[1]))
-    rate = 2.0 * root * (root * speed + yielding / sqrt(tables.valves[device["valve"]]["conductance"]))
+    rate = 2.0 * root * (root * speed + mobility / sqrt(tables.valves[device["valve"]]["conductance"]))
     return max(LEADS, 2.0 * tables.clock[0]["step"] * rate)
 
 
 @njit
 def lead_events(out, tables, device, g, x, share, speed):
-    """g: way to a lift x at which it leads no column any more; to this share of it, where it takes the lead, if any."""
+    """Write g: event functions of the lift x at which control of the column ends or, at a fraction of it, begins.
+
+    share : this fraction; 0 if the valve does not take control again
+    """
     at, most = device["leads"], led_until(out, tables, device, speed)
     if tables.armed[at] > 0.0:
         either(tables, g, at, x - most)

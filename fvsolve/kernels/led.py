@@ -1,14 +1,14 @@
-"""Rigid columns that valves lead: what flows where these are all but shut. Knows a column and the valves at its end.
+"""Flow of a rigid column whose only outlet valves are nearly closed: it follows the valves, not its inertia.
 
-A column that leads to a node without storage is held by that node's valves alone. Where these are all but shut
+If a column ends at a node without storage, only the valves of that node control it. Where these are nearly closed
 (below a thousandth of their full area), its time constant goes to zero with their area F, and its flow follows them:
-I = sum of F sqrt(dP), with (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP) the pressure that slows it down. When the
-last of them shuts, nothing can flow: the column stands, and the node has the pressure of its other end.
+I = sum of F sqrt(dP), with the decelerating pressure (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP). When the last valve
+closes, no flow is possible: the column is stationary, and the node has the pressure of its far end.
 
-A column follows a disc that leaves its seat and alone holds it, too, or the stem of a valve that regulates: lift x
-and flow start as powers of time, and dP = M^2 / (G x^2), of 0 / 0 there, would relax at an infinite rate. Until x has
-grown, dP is what drives both,
-(L / A) sqrt(G dP) dx/dt(dP) + dP = that at rest; the column's momentum is kept.
+A column also follows a disc that leaves its seat, if this disc is its only outlet, or the stem of a regulating valve.
+Lift x and flow start as powers of time, and dP = M^2 / (G x^2), there 0 / 0, would relax at an infinite rate. Until x
+has grown, dP drives both: (L / A) sqrt(G dP) dx/dt(dP) + dP = the stationary drop. The momentum of the column is
+conserved.
 """
 
 from math import sqrt
@@ -20,15 +20,19 @@ from fvsolve.kernels.lead import leads
 from fvsolve.kernels.restrictions import conductance, conductance_at
 from fvsolve.kernels.rigid import far_side, gate_area, grounded, holds_shut, is_rigid, offset_of, pressure_at
 
-NEARLY = 1e-3  # share of their full area below which valves lead their column
-LOST = 0.05  # share of the flow at which valves take the lead, more than is then missed of it
-NEAR = 1e-13  # of a pressure, relative, at which it is found
-INSTANT = 1e-7  # over which the rate of an area is measured [s]
+NEARLY = 1e-3  # fraction of their full area below which valves control their column
+LOST = 0.05  # fraction of the flow at the switch to valve control; larger than the error made there
+NEAR = 1e-13  # relative tolerance of a pressure in Newton
+INSTANT = 1e-7  # interval over which the rate of an area is measured [s]
 
 
 @njit
 def led_at(tables, out, i):
-    """Whether node i is the end of one column whose every valve is all but shut or leads, and asks for nothing."""
+    """True if valves at node i control its column.
+
+    The node joins a single column and valves. These are closed, or nearly closed with known rates of area, or the only
+    valve is near its seat.
+    """
     node = tables.nodes[i]
     if node["gates"] < 0 or node["columns"] > 1:
         return False
@@ -40,7 +44,7 @@ def led_at(tables, out, i):
 
 @njit
 def foreseen(tables, out, i):
-    """Whether the rate of area of node i's valves is known: schedules move them, one leads, events alone open them."""
+    """True if the rate of area of each valve at node i is known: by schedule, from its seat, or zero until an event."""
     node = tables.nodes[i]
     for e in range(node["gate_count"]):
         k = tables.integers[node["gates"] + e]
@@ -51,35 +55,38 @@ def foreseen(tables, out, i):
 
 @njit
 def led_side(tables, out, k):
-    """1 or -1 where valves lead column k at its `to` or `from` end, else 0; something must hold a rigid far end."""
+    """1 or -1 if valves control column k at its `to` or `from` end, else 0.
+
+    If the far end is a column junction, it must have a pressure reference besides this column.
+    """
     column, marks = tables.columns[k], tables.scratch[: tables.nodes.size]
     for side in (1, -1):
-        x, i = column["to_node"], column["from_node"]
+        near, far = column["to_node"], column["from_node"]
         if side < 0:
-            x, i = i, x
-        if led_at(tables, out, x) and (not is_rigid(tables, out, i) or grounded(tables, out, i, k, marks)):
+            near, far = far, near
+        if led_at(tables, out, near) and (not is_rigid(tables, out, far) or grounded(tables, out, far, k, marks)):
             return side
     return 0
 
 
 @njit
 def lead_columns(tables, out):
-    """Which columns their valves lead, into out[led]."""
-    at, many = tables.layout[0]["led"], tables.columns.size
-    out[at : at + many] = 0.0
-    for k in range(many):
+    """Find the columns that their valves control; write the controlled end of each, see `find_control_end`, to `out`."""
+    at, n = tables.layout[0]["led"], tables.columns.size
+    out[at : at + n] = 0.0
+    for k in range(n):
         out[at + k] = led_side(tables, out, k)
 
 
 @njit
 def led_end(tables, out, k):
-    """1 or -1 where valves lead column k at its `to` or `from` end, else 0."""
+    """1 or -1 if valves control column k at its `to` or `from` end, else 0."""
     return int(out[tables.layout[0]["led"] + k])
 
 
 @njit
 def standing_pressure(y, tables, out, k, end, solved):
-    """(p' of the led end of column k at which nothing drives it, fall of it per d/dt of its flow [Pa s2/kg])."""
+    """(p' at the controlled end of a column without driving pressure, fall of p' per d/dt of its flow [Pa s2/kg])."""
     column = tables.columns[k]
     p, softness = far_side(y, tables, out, k, end, solved)
     inertia = column["length"] / column["area"]
@@ -88,10 +95,10 @@ def standing_pressure(y, tables, out, k, end, solved):
 
 @njit
 def lift_drop(drop, still, slope, heavy):
-    """(drop across what leads its column, dx/dt), by Newton on its root r: r2 + heavy r dx/dt(r2) = drop.
+    """(drop across the valve that controls a column, dx/dt), by Newton on the root r: r^2 + heavy r dx/dt(r^2) = drop.
 
-    drop : where nothing moves; still : dx/dt there; slope : of it over the drop; heavy : (L / A) sqrt(G). From above:
-    the cubic is convex from its greatest root on.
+    drop : the stationary drop; still : dx/dt at it; slope : of dx/dt over the drop; heavy : (L / A) sqrt(G)
+    Newton starts above the root, because the cubic is convex from its greatest root on.
     """
     if drop <= 0.0 or still == 0.0:
         return drop, still
@@ -109,75 +116,75 @@ def lift_drop(drop, still, slope, heavy):
 
 @njit
 def lone_lead(tables, i):
-    """The valve that alone holds the column of node i and leads it from its seat; -1 for none."""
+    """Valve that is the only outlet of the column at node i and controls it from its seat; -1 for none."""
     k = tables.integers[tables.nodes[i]["gates"]]
     return k if leads(tables, k) else -1
 
 
 @njit
-def led_by_lift(t, y, tables, out, k, which, standing, inertia, other, drop):
-    """(drop across the valve `which` that leads column k, dx/dt), at p' beside it and a drop where nothing moves."""
-    valve, column = tables.valves[which], tables.columns[k]
+def led_by_lift(t, y, tables, out, k, index, stationary, inertia, other, drop):
+    """(drop across the valve `index` that controls column k, dx/dt), from p' of a stationary column and its drop."""
+    valve, column = tables.valves[index], tables.columns[k]
     device, heavy = tables.devices[valve["device"]], inertia * sqrt(valve["conductance"])
     ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
-    before, behind = (standing, other) if ahead else (other, standing)
+    before, behind = (stationary, other) if ahead else (other, stationary)
     still, slope = call_lead(tables.hooks[device["hooks"], LEAD], t, y, tables, device, before, behind, drop, ahead)
     driving, speed = lift_drop(drop, still, slope, heavy)
-    if driving <= 0.0 or conductance(tables, out, which) == 0.0 or tables.clock[0]["step"] == 0.0:
+    if driving <= 0.0 or conductance(tables, out, index) == 0.0 or tables.clock[0]["step"] == 0.0:
         return driving, speed
     way = 1.0 if valve["from_node"] == column["to_node"] or valve["to_node"] == column["from_node"] else -1.0
-    root = kept_root(y, tables, out, k, which, way, sqrt(driving), slope, heavy)
+    root = kept_root(y, tables, out, k, index, way, sqrt(driving), slope, heavy)
     return root * abs(root), still + slope * (root * abs(root) - drop)
 
 
 @njit
-def kept_root(y, tables, out, k, which, way, root, slope, heavy):
-    """Root of the drop that a given step keeps: of what drives both, as far as it does not resolve their exchange.
+def kept_root(y, tables, out, k, index, way, root, slope, heavy):
+    """Square root of the drop for a given step, relaxed where the step does not resolve the exchange of lift and flow.
 
-    r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 2 h 2 r0 (1 / heavy + r0 slope): M relaxes to x sqrt(G) r0 in two
-    steps at least, and not sooner than it would. What both share, x / slope + (L / A) M, does not change by it.
+    r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 2 h 2 r0 (1 / heavy + r0 slope): M relaxes to x sqrt(G) r0 over at
+    least two steps, and not faster than by itself. The sum x / slope + (L / A) M is not changed by this.
     """
-    dense, column = tables.valves[which]["conductance"], tables.columns[k]
-    x = sqrt(conductance(tables, out, which) / dense)
+    dense, column = tables.valves[index]["conductance"], tables.columns[k]
+    x = sqrt(conductance(tables, out, index) / dense)
     own = way * (column["flow"] + y[column["y"]]) / sqrt(dense)
-    slow = 4.0 * tables.clock[0]["step"] * root * (1.0 / heavy + root * slope)
-    return root + (own - x * root) / max(x, slow)
+    least_lift = 4.0 * tables.clock[0]["step"] * root * (1.0 / heavy + root * slope)
+    return root + (own - x * root) / max(x, least_lift)
 
 
 @njit
-def led_from_rest(t, y, tables, out, k, end, which, solved):
-    """`led_flow` of a column that one valve leads from its seat."""
-    valve, column = tables.valves[which], tables.columns[k]
+def led_from_rest(t, y, tables, out, k, end, index, solved):
+    """`controlled_flow` of a column that a valve controls from its seat."""
+    valve, column = tables.valves[index], tables.columns[k]
     side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
-    standing, inertia = standing_pressure(y, tables, out, k, end, solved)
+    stationary, inertia = standing_pressure(y, tables, out, k, end, solved)
     other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
-    still = valve["drop"] + side * (standing - other)
-    drop, speed = led_by_lift(t, y, tables, out, k, which, standing, inertia, other, still)
+    still = valve["drop"] + side * (stationary - other)
+    drop, speed = led_by_lift(t, y, tables, out, k, index, stationary, inertia, other, still)
     root = side * (sqrt(drop) if drop >= 0.0 else -sqrt(-drop))
     rate = speed * sqrt(valve["conductance"]) * root if drop > 0.0 else 0.0
-    return sqrt(conductance(tables, out, which)) * root, rate, standing + side * (drop - still)
+    return sqrt(conductance(tables, out, index)) * root, rate, stationary + side * (drop - still)
 
 
 @njit
 def gate_flow(t, tables, out, x, p, solved):
-    """(flow out of node x through its valves at p', its rate as their areas change, d rate / dp)."""
+    """(flow out of node x through its valves at p', its rate by the change of their areas, d rate / dp)."""
     flow, rate, rise = 0.0, 0.0, 0.0
     for e in range(tables.nodes[x]["gate_count"]):
-        which = tables.integers[tables.nodes[x]["gates"] + e]
-        drop = p - level_behind(tables, out, x, which, solved)
+        k = tables.integers[tables.nodes[x]["gates"] + e]
+        drop = p - level_behind(tables, out, x, k, solved)
         root = sqrt(drop) if drop >= 0.0 else -sqrt(-drop)
-        later = sqrt(conductance_at(t + INSTANT, tables, out, which))
-        widening = (later - sqrt(conductance_at(t, tables, out, which))) / INSTANT
-        flow += sqrt(conductance(tables, out, which)) * root
+        later = sqrt(conductance_at(t + INSTANT, tables, out, k))
+        widening = (later - sqrt(conductance_at(t, tables, out, k))) / INSTANT
+        flow += sqrt(conductance(tables, out, k)) * root
         rate += widening * root
         rise += 0.5 * widening / max(abs(root), 1e-300)
     return flow, rate, rise
 
 
 @njit
-def level_behind(tables, out, x, which, solved):
-    """p' of node x at which nothing flows through its valve `which`."""
-    valve = tables.valves[which]
+def level_behind(tables, out, x, index, solved):
+    """p' of node x at which there is no flow through its valve `index`."""
+    valve = tables.valves[index]
     side = 1.0 if valve["from_node"] == x else -1.0
     other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
     return other - side * valve["drop"]
@@ -185,7 +192,7 @@ def level_behind(tables, out, x, which, solved):
 
 @njit
 def levels_behind(tables, out, x, solved):
-    """(least, greatest) of `level_behind` of all valves of node x."""
+    """(least, greatest) `zero_flow_pressure` of all valves of node x."""
     least, most = 1e300, -1e300
     for e in range(tables.nodes[x]["gate_count"]):
         level = level_behind(tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved)
@@ -194,15 +201,15 @@ def levels_behind(tables, out, x, solved):
 
 
 @njit
-def opening_pressure(t, tables, out, x, standing, inertia, solved):
-    """p' of node x whose valves open: the one root of p - standing + inertia rate(p), by Newton between bounds."""
+def opening_pressure(t, tables, out, x, stationary, inertia, solved):
+    """p' of node x whose valves open: the only root of p - stationary + inertia rate(p), by bounded Newton."""
     low, high = levels_behind(tables, out, x, solved)
-    low, high, p = min(low, standing), max(high, standing), standing
+    low, high, p = min(low, stationary), max(high, stationary), stationary
     for _ in range(200):
         _, rate, rise = gate_flow(t, tables, out, x, p, solved)
-        left = p - standing + inertia * rate
-        low, high = (low, p) if left > 0.0 else (p, high)
-        new = p - left / (1.0 + inertia * rise)
+        residual = p - stationary + inertia * rate
+        low, high = (low, p) if residual > 0.0 else (p, high)
+        new = p - residual / (1.0 + inertia * rise)
         if not low < new < high:
             new = 0.5 * (low + high)
         if abs(new - p) <= NEAR * (1e5 + abs(new)):
@@ -212,10 +219,11 @@ def opening_pressure(t, tables, out, x, standing, inertia, solved):
 
 
 @njit
-def braked_pressure(t, tables, out, x, way, start, standing, inertia, solved):
-    """(p' of node x whose valves shut on a flow that way, 1: out of it; whether there is one), by Newton from beyond.
+def braked_pressure(t, tables, out, x, way, start, stationary, inertia, solved):
+    """(p' of node x whose valves close on a flow in direction `way`, True if a root exists), by Newton from outside.
 
-    p - standing + inertia rate(p) is convex there, and its outermost root is the one to which flows tend.
+    way : 1 for flow out of the node, -1 into it
+    p - stationary + inertia rate(p) is convex there; flows tend to its outermost root.
     """
     p = start
     for _ in range(200):
@@ -223,7 +231,7 @@ def braked_pressure(t, tables, out, x, way, start, standing, inertia, solved):
         slope = 1.0 + inertia * rise
         if slope <= 0.0 or flow * way <= 0.0:
             return p, False
-        step = (p - standing + inertia * rate) / slope
+        step = (p - stationary + inertia * rate) / slope
         p -= step
         if abs(step) <= NEAR * (1e5 + abs(p)):
             break
@@ -231,34 +239,35 @@ def braked_pressure(t, tables, out, x, way, start, standing, inertia, solved):
 
 
 @njit
-def led_pressure(t, tables, out, x, own, standing, inertia, solved):
-    """p' of node x whose valves lead a column that brings `own` [kg/s].
+def led_pressure(t, tables, out, x, own, stationary, inertia, solved):
+    """p' of node x whose valves control a column that brings the flow `own` [kg/s].
 
-    Shutting valves brake a flow either way: of two that they allow, it is the one that has been there.
+    Closing valves may allow a flow in either direction: the direction of the present flow is tried first.
     """
-    flow, rate, _ = gate_flow(t, tables, out, x, standing, solved)
+    flow, rate, _ = gate_flow(t, tables, out, x, stationary, solved)
     if flow == 0.0 and rate == 0.0:
-        return standing
+        return stationary
     if rate * flow >= 0.0:
-        return opening_pressure(t, tables, out, x, standing, inertia, solved)
+        return opening_pressure(t, tables, out, x, stationary, inertia, solved)
     brake = -inertia * rate / flow * gate_area(tables, out, x)[0]
     way = 1.0 if own > 0.0 or (own == 0.0 and flow > 0.0) else -1.0
     least, most = levels_behind(tables, out, x, solved)
-    reach = brake + sqrt(max(abs(standing - least), abs(standing - most)))
+    reach = brake + sqrt(max(abs(stationary - least), abs(stationary - most)))
     for _ in range(2):
         start = most + reach * reach if way > 0.0 else least - reach * reach
-        p, found = braked_pressure(t, tables, out, x, way, start, standing, inertia, solved)
-        if found:
+        p, exists = braked_pressure(t, tables, out, x, way, start, stationary, inertia, solved)
+        if exists:
             return p
         way = -way
-    return standing
+    return stationary
 
 
 @njit
 def led_rate(t, y, tables, out, k, end):
-    """d/dt of the flow out of column k as its valves lead it; its state keeps the way it went to the last.
+    """d/dt of the flow out of column k that its valves control; its state keeps its direction to the end.
 
-    The state misses what was lost when they took the lead, about a hundredth: below LOST of it, it fades, not turns.
+    At the switch to valve control the state has an error of about 1 %. Below the fraction SWITCH_LOSS of the flow it is
+    relaxed to zero instead of changing sign.
     """
     flow, rate, _ = led_flow(t, y, tables, out, k, end, True)
     column = tables.columns[k]
@@ -271,14 +280,14 @@ def led_rate(t, y, tables, out, k, end):
 
 @njit
 def led_flow(t, y, tables, out, k, end, solved):
-    """(flow out of column k through the valves that lead it, its rate, p' of that end)."""
+    """(flow out of column k through the valves that control it, its rate, p' of that end)."""
     column, limit = tables.columns[k], tables.clock[0]["limit"]
     x = column["to_node"] if end == 1 else column["from_node"]
     if lone_lead(tables, x) >= 0:
         return led_from_rest(t, y, tables, out, k, end, lone_lead(tables, x), solved)
-    early = t if t + 2.0 * INSTANT <= limit else t - INSTANT  # the rate on this side of a kink
-    standing, inertia = standing_pressure(y, tables, out, k, end, solved)
+    early = t if t + 2.0 * INSTANT <= limit else t - INSTANT  # the rate before a kink at `limit`
+    stationary, inertia = standing_pressure(y, tables, out, k, end, solved)
     own = end * (column["flow"] + y[column["y"]])
-    p = led_pressure(early, tables, out, x, own, standing, inertia, solved)
+    p = led_pressure(early, tables, out, x, own, stationary, inertia, solved)
     flow, rate, _ = gate_flow(early, tables, out, x, p, solved)
     return flow, rate, p

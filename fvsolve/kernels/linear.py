@@ -1,4 +1,4 @@
-"""Pipes under the linear density law, in a scene's right-hand side. Knows the tables; closes no node."""
+"""Waves of all pipes under the linear density law: outgoing, incoming and rates of the cells."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.ends import end_value
@@ -8,7 +8,7 @@ from fvsolve.kernels.pipes import family_of, pipe_rates
 
 @njit
 def offer_waves(t, y, dydt, out, handle):
-    """Outgoing waves of all pipes into out[ends], and what they carry into their nodes into out[net]."""
+    """Write the outgoing waves of all pipes to out[ends]; add their flow into nodes to out[net]."""
     tables = open_tables(handle)
     settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     scratch = tables.scratch
@@ -29,7 +29,7 @@ def offer_waves(t, y, dydt, out, handle):
 
 @njit
 def answer_waves(t, y, dydt, out, handle):
-    """Waves that the nodes send back: incoming = Y p' - outgoing."""
+    """Write the waves from the nodes into pipes: incoming = Y p' - outgoing."""
     tables = open_tables(handle)
     layout, pipes = tables.layout[0], tables.pipes
     for i in range(pipes.size):
@@ -45,7 +45,7 @@ def answer_waves(t, y, dydt, out, handle):
 
 @njit
 def wave_rates(t, y, dydt, out, handle):
-    """d/dt of the waves in the cells of all pipes, where rates are asked for."""
+    """d/dt of the waves in all pipe cells, unless `dydt` is empty."""
     tables = open_tables(handle)
     settings, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
     if dydt.size == 0:

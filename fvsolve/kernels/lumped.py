@@ -1,4 +1,4 @@
-"""Scenes of few states, which would feel a call more: several pieces of the network as one. Knows the tables."""
+"""Several network functions in a single call, for models of few states in which each call costs noticeable time."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -9,7 +9,7 @@ from fvsolve.kernels.restrictions import open_scheduled
 
 @njit
 def open_lumped(t, y, dydt, out, handle):
-    """`open_network` and `store_linear`, between which only pipes would add something."""
+    """`begin_network` and `known_pressures_linear` in a single call; only pipes would act between them."""
     tables = open_tables(handle)
     begin(out, tables)
     open_scheduled(t, out, tables)

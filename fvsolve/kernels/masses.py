@@ -1,12 +1,14 @@
-"""Masses on one axis, and pistons, springs, dampers, forces, stops, which may push bodies as well. Solves no step.
+"""Masses on an axis, with pistons, springs, dampers, forces and stops, which may act on bodies too.
 
-Wraps the rhs of the fluid: first the pressures of moving chambers and what their pistons sweep, then the fluid, then
-forces and accelerations. A chamber's state is its excess mass e over what its volume V would hold at the density
-m0 / V0 of the start, so that it is the pressure that is stepped and not the small difference of two large masses:
-p - p0 = beta e / (rho0 V) under `linear`, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under `log` and `table`.
-Of a piston between points the mass itself is stepped, which a shut chamber keeps to the last bit.
-A push goes by its travel in `out`, wherever it acts: on the axis that of two masses, of bodies that of two points,
-which `kernels.mechanism.lines` has written. Its masses are then one that stands still, and it pushes none.
+These functions enclose those of the fluid: first pressures of moving chambers and the flows swept by their pistons,
+then the fluid, then forces and accelerations. The state of a chamber is its excess mass e over the content of its
+volume V at the density m0 / V0 of the start. So the pressure itself is integrated, not a small difference of two large
+masses:
+p - p0 = beta e / (rho0 V) under the law linear, ln(rho / rho_0) = ln(1 + e V0 / (m0 V)) under log and table.
+For a piston between points of bodies the state is the mass itself, which a closed chamber conserves to the last bit.
+The force of a spring, stop or piston follows from its travel in `out`: on the axis from the positions of two masses,
+between bodies from two points, written by `kernels.mechanism.force_elements`. Its two masses are then the same fixed
+frame, on which the net force is zero.
 """
 
 from math import log, log1p, sqrt
@@ -39,7 +41,7 @@ def motion(mass, y):
 
 @njit(forceinline=True)
 def between(tables, y, i, j):
-    """(change of the distance from mass i to mass j, its rate)."""
+    """(change of the distance from mass i to mass j, its rate) [m, m/s]."""
     x_i, v_i = motion(tables.masses[i], y)
     x_j, v_j = motion(tables.masses[j], y)
     return x_j - x_i, v_j - v_i
@@ -47,14 +49,14 @@ def between(tables, y, i, j):
 
 @njit(forceinline=True)
 def travel_of(out, tables, k):
-    """(change of length, its rate) of push k: of springs and their like, then of stops, then of pistons."""
+    """(change of length, its rate) of element k: springs, dampers and forces first, then stops, then pistons."""
     at = tables.layout[0]["travel"] + 2 * k
     return out[at], out[at + 1]
 
 
 @njit
 def travels(y, out, tables):
-    """Travel of all pushes on the axis into `out`; those on lines between points stand there."""
+    """Write the travel of all elements on the axis to `out`; those between points are written already."""
     braces, stops, pistons = tables.braces, tables.stops, tables.pistons
     at = tables.layout[0]["travel"]
     for k in range(braces.size):
@@ -73,28 +75,28 @@ def travels(y, out, tables):
 
 @njit(forceinline=True)
 def stop_travel(out, tables, k):
-    """Travel of stop k."""
+    """(travel, its rate) of stop k."""
     return travel_of(out, tables, tables.braces.size + k)
 
 
 @njit(forceinline=True)
 def piston_travel(out, tables, k):
-    """Travel of piston k."""
+    """(travel, its rate) of piston k."""
     return travel_of(out, tables, tables.braces.size + tables.stops.size + k)
 
 
 @njit(forceinline=True)
 def contact(stiffness, damping, depth, speed):
-    """Force of an armed contact that is `depth` deep and gets deeper at `speed`; it never pulls [N].
+    """Force of an active contact at `depth`, which grows at `speed` [N]; it never pulls.
 
-    Without a jump at depth 0: differences there would take it for an endless slope.
+    There is no jump at depth 0, which difference quotients would turn into an infinite slope.
     """
     return max(0.0, stiffness * depth + damping * speed)
 
 
 @njit
 def leak_flow(tables, piston, p_a, p_b):
-    """Mass flow from A to B past the piston [kg/s], at the density upstream."""
+    """Mass flow from A to B past the piston [kg/s], at the upstream density."""
     st = tables.settings[0]
     rho = st["rho"]
     if st["law"] != LAW_LINEAR:
@@ -104,7 +106,7 @@ def leak_flow(tables, piston, p_a, p_b):
 
 @njit
 def chamber_state(tables, node, volume, excess):
-    """(deviation of pressure [Pa], stiffness [Pa/kg]) of a moving chamber of `volume` now."""
+    """(deviation of pressure [Pa], stiffness [Pa/kg]) of a moving chamber with the present `volume`."""
     st, floats = tables.settings[0], tables.floats
     if st["law"] == LAW_LINEAR:
         stiffness = node["stiffness"] * node["volume"] / volume
@@ -118,14 +120,17 @@ def chamber_state(tables, node, volume, excess):
 
 @njit(forceinline=True)
 def excess_of(y, tables, piston, i, sweep, x):
-    """Excess mass of chamber i [kg]: its state, or on a line between points what that leaves of all that came in."""
-    held = y[tables.nodes[i]["y"]]
-    return held - sweep * x if piston["line"] >= 0 else held
+    """Excess mass of chamber i [kg]: its state.
+
+    Between points of bodies it is the mass that has entered, minus the content of the swept volume.
+    """
+    state = y[tables.nodes[i]["y"]]
+    return state - sweep * x if piston["line"] >= 0 else state
 
 
 @njit
 def chambers(t, y, dydt, out, handle):
-    """Pressures and stiffness of moving chambers, and the flow that the piston and its leak take from each."""
+    """Write pressure and stiffness of moving chambers, and the flow that piston and leak take from each."""
     tables = open_tables(handle)
     layout, nodes, pistons = tables.layout[0], tables.nodes, tables.pistons
     travels(y, out, tables)
@@ -152,7 +157,7 @@ def chambers(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def push(out, tables, k, i, j, change, start):
-    """Book push k, `start` at the start and changed by `change`, on mass j forward and on mass i back."""
+    """Write element force k, `start` at the start and changed by `change`; add it to mass j and, reversed, to mass i."""
     layout = tables.layout[0]
     out[layout["push"] + k] = start + change
     out[layout["net_force"] + i] -= change
@@ -161,7 +166,7 @@ def push(out, tables, k, i, j, change, start):
 
 @njit
 def forces(t, y, out, tables):
-    """Net force on every mass; what was balanced at the start and has not changed adds no bit."""
+    """Write the net force on every mass; forces that have not changed since the start add exactly zero."""
     layout, masses, braces = tables.layout[0], tables.masses, tables.braces
     stops, pistons, armed = tables.stops, tables.pistons, tables.armed
     for i in range(masses.size):
@@ -195,7 +200,7 @@ def forces(t, y, out, tables):
 
 @njit(forceinline=True)
 def load(tables, i, j, stiffness, damping):
-    """Add to what holds and brakes two masses, per mass [1/s2, 1/s], in scratch."""
+    """Add stiffness and damping of an element to those of its two masses, per mass [1/s2, 1/s], in scratch."""
     masses, work = tables.masses, tables.scratch
     lightness = masses[i]["lightness"] + masses[j]["lightness"]
     for mass in (i, j):
@@ -205,7 +210,7 @@ def load(tables, i, j, stiffness, damping):
 
 @njit
 def held_by(out, tables, k):
-    """(stiffness, damping) of push k now: a spring's, a stop's that is in touch, a piston's between its chambers."""
+    """Present (stiffness, damping) of element k: spring, active stop, or piston between its chambers."""
     braces, stops, pistons, armed = tables.braces, tables.stops, tables.pistons, tables.armed
     if k < braces.size:
         return braces[k]["stiffness"], braces[k]["damping"]
@@ -217,13 +222,13 @@ def held_by(out, tables, k):
         return 0.0, 0.0
     piston, stiffness, nodes = pistons[k - stops.size], tables.layout[0]["stiffness"], tables.nodes
     stiff_a, stiff_b = out[stiffness + nodes[piston["a"]]["row"]], out[stiffness + nodes[piston["b"]]["row"]]
-    spring = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
-    return spring, piston["damping"]
+    stiff = piston["area_a"] * stiff_a * piston["sweep_a"] - piston["area_b"] * stiff_b * piston["sweep_b"]
+    return stiff, piston["damping"]
 
 
 @njit
 def mechanical_rate(out, tables):
-    """Greatest rate of a mass [1/s], c / 2 + sqrt(c^2 / 4 + k) with all springs k, fluid ones too, and dampers c."""
+    """Greatest rate of a mass [1/s], c / 2 + sqrt(c^2 / 4 + k): k of all springs and fluid, c of all dampers."""
     masses, braces, stops, pistons, work = tables.masses, tables.braces, tables.stops, tables.pistons, tables.scratch
     for i in range(2 * masses.size):
         work[i] = 0.0
@@ -243,7 +248,10 @@ def mechanical_rate(out, tables):
 
 @njit
 def finish_masses(t, y, dydt, out, handle):
-    """Forces, d/dt of positions and velocities, the rate; status where a piston has used up its chamber."""
+    """Write net forces, d/dt of positions and velocities; raise out[RATE].
+
+    The status is NO_VOLUME if a piston has used up its chamber.
+    """
     tables = open_tables(handle)
     layout, nodes, masses = tables.layout[0], tables.nodes, tables.masses
     forces(t, y, out, tables)
@@ -263,7 +271,7 @@ def finish_masses(t, y, dydt, out, handle):
 
 @njit
 def observe_masses(t, y, out, handle, values):
-    """Values of the probes that read masses and what pushes them."""
+    """Values of the probes of masses, elements and pistons."""
     tables = open_tables(handle)
     layout, masses, pistons, probes = tables.layout[0], tables.masses, tables.pistons, tables.probes
     for k in range(probes.size):
@@ -282,7 +290,7 @@ def observe_masses(t, y, out, handle, values):
 
 @njit
 def record_masses(t, y, out, handle, values):
-    """The first time that a piston is beyond its stroke."""
+    """Record the first time at which a piston leaves its stroke."""
     tables = open_tables(handle)
     marks, pistons = tables.marks, tables.pistons
     first = tables.pipes.size + 3 * tables.nodes.size + tables.columns.size
@@ -295,7 +303,7 @@ def record_masses(t, y, out, handle, values):
 
 @njit
 def mass_events(t, y, out, handle, g):
-    """The room that is left before each side of a stop."""
+    """Write the remaining distance to each side of a stop."""
     tables = open_tables(handle)
     stops = tables.stops
     travels(y, out, tables)
