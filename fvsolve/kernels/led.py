@@ -71,7 +71,7 @@ def led_side(tables, out, k):
 
 @njit
 def lead_columns(tables, out):
-    """Find the columns that their valves control; write the controlled end of each, see `find_control_end`, to `out`."""
+    """Find the columns that their valves control; write the controlled end of each to `out`: `find_control_end`."""
     at, n = tables.layout[0]["led"], tables.columns.size
     out[at : at + n] = 0.0
     for k in range(n):

@@ -157,7 +157,7 @@ def chambers(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def push(out, tables, k, i, j, change, start):
-    """Write element force k, `start` at the start and changed by `change`; add it to mass j and, reversed, to mass i."""
+    """Write the force of element k, `start` at the start plus `change`; add it to mass j, and reversed to mass i."""
     layout = tables.layout[0]
     out[layout["push"] + k] = start + change
     out[layout["net_force"] + i] -= change

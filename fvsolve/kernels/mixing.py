@@ -1,7 +1,8 @@
-"""Scalars at nodes: what arrives is mixed by mass, at once. Knows ends of links; knows no cells but those at ends.
+"""Scalars at nodes: inflows are mixed by mass, instantly.
 
-A place has one value. What stores has that of its contents, what a given pressure or flow brings in has a given one,
-and elsewhere it is the mean of all that flows in. A pipe's end also exchanges g (c_cell - value), g = 2 D m / dx.
+A node has a single value. With storage it is the value of the content, at a given pressure or flow a given value for
+inflow from outside, and elsewhere the mean of all inflows. A pipe end also exchanges g (c_cell - value),
+g = 2 D m / dx.
 """
 
 from fvsolve.jit import njit
@@ -9,13 +10,14 @@ from fvsolve.kernels.limiters import limited
 from fvsolve.kernels.records import CHAMBER, FIXED, JUNCTION, PATCH, RATE, TANK, UPWIND
 from fvsolve.kernels.schedules import schedule_value
 
-ROUNDS, SAME = 10000, 4e-16  # of flow that runs in a circle without volume, which is mixed by iteration
-DAMP, SHALLOW = 1e-9, 1e-3  # depths of a tank below which it holds no value, and gets no quicker [m]
+# Flow in a loop of nodes without volume is mixed by iteration: greatest number of sweeps, relative tolerance.
+ROUNDS, SAME = 10000, 4e-16
+DAMP, SHALLOW = 1e-9, 1e-3  # depths of a tank below which it has no value of its own; its rate stays constant [m]
 
 
 @njit(forceinline=True)
 def end_flow(out, tables, p, right):
-    """Mass flow of pipe p at its `from` (0) or `to` (1) end, along it [kg/s]."""
+    """Mass flow along pipe p at its `from` (0) or `to` (1) end [kg/s]."""
     at = tables.layout[0]["ends"] + 4 * p + 2 * right
     return tables.pipes[p]["flow"] + (out[at] - out[at + 1])
 
@@ -36,7 +38,7 @@ def cell_value(y, tables, q, p, i):
 
 @njit(forceinline=True)
 def end_cell(tables, p, right, k):
-    """Number of the k-th cell from an end of pipe p, the last one again where there are fewer."""
+    """Index of the k-th cell from an end of pipe p; the last cell if there are fewer."""
     n = tables.pipes[p]["cells"]
     k = min(k, n - 1)
     return n - 1 - k if right == 1 else k
@@ -44,13 +46,13 @@ def end_cell(tables, p, right, k):
 
 @njit(forceinline=True)
 def bounded(value, scalar):
-    """The value, within what can be."""
+    """The value, limited to the bounds of the scalar."""
     return min(max(value, scalar["least"]), scalar["greatest"])
 
 
 @njit
 def leaving_values(y, out, tables, q):
-    """Value with which water leaves each pipe by each end: along a limited slope, never beyond what can be."""
+    """Value of a scalar in the water that leaves each pipe through each end: from a limited slope, within bounds."""
     st, scalar, at = tables.settings[0], tables.scalars[q], tables.layout[0]["edge"]
     pipes, limiter = tables.pipes, st["limiter"]
     for p in range(pipes.size):
@@ -77,11 +79,14 @@ def end_conductance(y, tables, q, p, right):
 
 
 @njit
-def arrivals(y, out, tables, q, amount, weight, beside, count):
-    """What pipes bring to every node, and with what weight; sum and number of the values beside it."""
+def arrivals(y, out, tables, q, amount, weight, cells, count):
+    """Sum the inflows of all nodes from pipes: amount of scalar and weight (mass flow and conductance).
+
+    cells, count : sum and number of the values in pipe cells beside the node
+    """
     pipes, edge = tables.pipes, tables.layout[0]["edge"]
     for i in range(amount.size):
-        amount[i] = weight[i] = beside[i] = count[i] = 0.0
+        amount[i] = weight[i] = cells[i] = count[i] = 0.0
     for p in range(pipes.size):
         for right in range(2):
             node = pipes[p]["to_node"] if right == 1 else pipes[p]["from_node"]
@@ -90,7 +95,7 @@ def arrivals(y, out, tables, q, amount, weight, beside, count):
             g = end_conductance(y, tables, q, p, right)
             amount[node] += g * cell
             weight[node] += g
-            beside[node] += cell
+            cells[node] += cell
             count[node] += 1.0
             if flow > 0.0:
                 amount[node] += flow * out[edge + 2 * (q * pipes.size + p) + right]
@@ -99,7 +104,7 @@ def arrivals(y, out, tables, q, amount, weight, beside, count):
 
 @njit(forceinline=True)
 def given_value(t, tables, q, i):
-    """Value of what flows in from outside at node i."""
+    """Value of the inflow from outside at node i."""
     scalar, kind = tables.scalars[q], tables.nodes[i]["kind"]
     place = tables.integers[scalar["places"] + i]
     return schedule_value(tables, place, t) if place >= 0 and not stores(kind) else scalar["initial"]
@@ -107,13 +112,13 @@ def given_value(t, tables, q, i):
 
 @njit(forceinline=True)
 def stores(kind):
-    """Whether a node of this kind holds an amount."""
+    """True if a node of this kind stores an amount."""
     return kind == TANK or kind == CHAMBER
 
 
 @njit(forceinline=True)
 def mixes(y, out, tables, i):
-    """Whether node i has the value of what flows in now: it has no volume, or is dry."""
+    """True if the value at node i is that of the present inflow: the node has no volume, or is dry."""
     node = tables.nodes[i]
     if not stores(node["kind"]):
         return node["kind"] == JUNCTION
@@ -122,8 +127,8 @@ def mixes(y, out, tables, i):
 
 
 @njit
-def start_values(t, y, out, tables, q, amount, weight, beside, count):
-    """Values of all places as far as they do not hang on other nodes."""
+def start_values(t, y, out, tables, q, amount, weight, cells, count):
+    """Write the values of all nodes as far as they do not depend on other nodes."""
     nodes, layout, scalar = tables.nodes, tables.layout[0], tables.scalars[q]
     at = layout["value"] + q * nodes.size
     for i in range(nodes.size):
@@ -135,15 +140,15 @@ def start_values(t, y, out, tables, q, amount, weight, beside, count):
             if supply > 0.0:
                 amount[i] += supply * given_value(t, tables, q, i)
                 weight[i] += supply
-            out[at + i] = beside[i] / count[i] if count[i] > 0.0 else scalar["initial"]
-        elif kind != PATCH:  # whose basin has set it
+            out[at + i] = cells[i] / count[i] if count[i] > 0.0 else scalar["initial"]
+        elif kind != PATCH:  # the basin has set its value
             mass = nodes[i]["mass"] + y[nodes[i]["y"]]
             out[at + i] = bounded(y[tables.integers[scalar["places"] + i]] / mass, scalar)
 
 
 @njit
 def mix(t, y, out, tables, q):
-    """Value of scalar q at every node; nodes without volume in the order of the flow, until nothing changes."""
+    """Write the value of scalar q at every node, in sweeps over nodes without volume until no value changes."""
     nodes, valves, layout, scratch = tables.nodes, tables.valves, tables.layout[0], tables.scratch
     n, at = nodes.size, layout["value"] + q * nodes.size
     amount, weight, total, share = scratch[:n], scratch[n : 2 * n], scratch[2 * n : 3 * n], scratch[3 * n : 4 * n]
@@ -154,11 +159,11 @@ def mix(t, y, out, tables, q):
             total[i], share[i] = amount[i], weight[i]
         for k in range(valves.size):
             flow = out[layout["valve"] + k]
-            giver, taker = valves[k]["from_node"], valves[k]["to_node"]
+            upstream, downstream = valves[k]["from_node"], valves[k]["to_node"]
             if flow < 0.0:
-                giver, taker = taker, giver
-            total[taker] += abs(flow) * out[at + giver]
-            share[taker] += abs(flow)
+                upstream, downstream = downstream, upstream
+            total[downstream] += abs(flow) * out[at + upstream]
+            share[downstream] += abs(flow)
         changed = False
         for i in range(n):
             if share[i] > 0.0 and mixes(y, out, tables, i):
@@ -175,7 +180,7 @@ def mix(t, y, out, tables, q):
 
 @njit(forceinline=True)
 def lose(out, tables, q, k, lost):
-    """Book what decays of scalar q, `lost` [kg/s] of its k-th state or states."""
+    """Subtract the decay `lost` [kg/s] of the k-th state or states of scalar q from the ledger."""
     scalar, at = tables.scalars[q], tables.layout[0]["loss"] + tables.scalars[q]["loss"]
     if scalar["losses"] == 1:
         out[at] -= lost
@@ -185,12 +190,12 @@ def lose(out, tables, q, k, lost):
 
 @njit
 def exchange(t, y, dydt, out, tables, q):
-    """Amounts of scalar q through the ends of pipes and into nodes, rates of what stores, and the ledger."""
+    """Write the flows of scalar q through pipe ends and into nodes, rates of storage in nodes, and the ledger."""
     nodes, pipes, valves, layout = tables.nodes, tables.pipes, tables.valves, tables.layout[0]
     scalar, n = tables.scalars[q], nodes.size
-    value, brought, gain = layout["value"] + q * n, layout["brought"] + q * n, layout["gain"] + q * n
+    value, inflow, gain = layout["value"] + q * n, layout["brought"] + q * n, layout["gain"] + q * n
     for i in range(n):
-        out[brought + i] = 0.0
+        out[inflow + i] = 0.0
     for p in range(pipes.size):
         for right in range(2):
             sign, at = (1.0 if right == 1 else -1.0), 2 * (q * pipes.size + p) + right
@@ -200,16 +205,16 @@ def exchange(t, y, dydt, out, tables, q):
             through = flow * (out[layout["edge"] + at] if sign * flow > 0.0 else out[value + node])
             through += sign * end_conductance(y, tables, q, p, right) * (cell - out[value + node])
             out[layout["carried"] + at] = through
-            out[brought + node] += sign * through
+            out[inflow + node] += sign * through
     for k in range(valves.size):
         i, j, flow = valves[k]["from_node"], valves[k]["to_node"], out[layout["valve"] + k]
         amount = flow * (out[value + i] if flow > 0.0 else out[value + j])
-        out[brought + i] -= amount
-        out[brought + j] += amount
+        out[inflow + i] -= amount
+        out[inflow + j] += amount
     for i in range(n):
         kind, supply = nodes[i]["kind"], out[layout["supply"] + i]
         if kind == FIXED:
-            out[gain + i] = -out[brought + i]
+            out[gain + i] = -out[inflow + i]
         elif kind != PATCH and supply > 0.0:
             out[gain + i] = supply * given_value(t, tables, q, i)
         else:
@@ -217,5 +222,5 @@ def exchange(t, y, dydt, out, tables, q):
         if stores(kind) and dydt.size > 0:
             at = tables.integers[scalar["places"] + i]
             fades = scalar["decay"] * (y[at] - scalar["ambient"] * (nodes[i]["mass"] + y[nodes[i]["y"]]))
-            dydt[at] = out[brought + i] + out[gain + i] - fades
+            dydt[at] = out[inflow + i] + out[gain + i] - fades
             lose(out, tables, q, at - scalar["y"], fades)

@@ -1,7 +1,7 @@
-"""What all links and nodes share in a scene's right-hand side, under every density law. Knows the tables; no law.
+"""Network balances common to all density laws: net flows, rates of storage, rate limits of nodes and valves.
 
-out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s], net flow into nodes
-[kg/s], four wave values a pipe (r and l at `from`, r and l at `to`), valve flows, column flows].
+out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s], net flow into nodes [kg/s], four
+wave values of each pipe (r and l at `from`, r and l at `to`), valve flows, column flows].
 """
 
 from fvsolve.jit import njit
@@ -13,7 +13,7 @@ from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled,
 
 @njit(forceinline=True)
 def begin(out, tables):
-    """No fault, and nothing in out[net], to which links then add what they carry into their nodes."""
+    """Clear the status and out[net], to which links then add their flows into nodes."""
     net = tables.layout[0]["net"]
     out[STATUS], out[WHERE] = OK, -1.0
     for i in range(tables.nodes.size):
@@ -22,7 +22,7 @@ def begin(out, tables):
 
 @njit
 def open_network(t, y, dydt, out, handle):
-    """Begin, with the conductances of restrictions that follow schedules."""
+    """Clear outputs and write the conductances of restrictions that follow schedules."""
     tables = open_tables(handle)
     begin(out, tables)
     open_scheduled(t, out, tables)
@@ -30,7 +30,7 @@ def open_network(t, y, dydt, out, handle):
 
 @njit
 def open_alone(t, y, dydt, out, handle):
-    """Begin a scene of basins that no link joins: nothing flows between nodes."""
+    """Clear outputs of a model of basins without links: there is no flow between nodes."""
     tables = open_tables(handle)
     begin(out, tables)
     out[RATE] = tables.settings[0]["rate"]
@@ -38,7 +38,7 @@ def open_alone(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def net_flows(out, tables):
-    """Net flow into every node from its links [kg/s], total, profile included."""
+    """Net flow into every node from its links [kg/s]; total, including the profile."""
     layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes
     valves, columns = tables.valves, tables.columns
     net = layout["net"]
@@ -63,16 +63,19 @@ def net_flows(out, tables):
 
 @njit(forceinline=True)
 def stiffness_of(nodes, layout, out, i):
-    """Pressure per stored mass [Pa/kg] of node i now, 0 where it stores none."""
+    """Present pressure per stored mass [Pa/kg] of node i, 0 without storage."""
     kind = nodes[i]["kind"]
-    if kind >= MOVING or (kind == CHAMBER and nodes[i]["row"] >= 0):  # a chamber that gas softens
+    if kind >= MOVING or (kind == CHAMBER and nodes[i]["row"] >= 0):  # a chamber softened by gas
         return out[layout["stiffness"] + nodes[i]["row"]]
     return nodes[i]["stiffness"]
 
 
 @njit(forceinline=True)
 def stored_rates(y, dydt, out, tables):
-    """d/dt of stored masses; what reservoirs give, full tanks spill, dry ones are asked for is supply."""
+    """d/dt of stored masses, and supplies.
+
+    A supply is the outflow of a reservoir, the spill of a full tank (negative), or the unmet demand from a dry tank.
+    """
     layout, nodes, armed = tables.layout[0], tables.nodes, tables.armed
     for i in range(nodes.size):
         kind, net = nodes[i]["kind"], out[layout["net"] + i]
@@ -92,7 +95,7 @@ def stored_rates(y, dydt, out, tables):
 
 @njit(forceinline=True)
 def quickest_node(out, tables):
-    """Greatest rate of waves over cells, and of stored masses against the pipes that touch them [1/s]."""
+    """Greatest rate of waves over cells, and of stored masses with the pipes at their nodes [1/s]."""
     layout, nodes = tables.layout[0], tables.nodes
     rate = tables.settings[0]["rate"]
     for i in range(nodes.size):
@@ -103,7 +106,7 @@ def quickest_node(out, tables):
 
 @njit
 def balance_network(t, y, dydt, out, handle):
-    """Net flows into nodes, rates of what these store, and their greatest rate into out[RATE]."""
+    """Write net flows into nodes and rates of storage; set out[RATE] to their greatest rate."""
     tables = open_tables(handle)
     net_flows(out, tables)
     stored_rates(y, dydt, out, tables)
@@ -112,7 +115,7 @@ def balance_network(t, y, dydt, out, handle):
 
 @njit
 def quickest_valve(t, y, dydt, out, handle):
-    """Let steps see how quickly stored masses answer through valves."""
+    """Raise out[RATE] to the greatest rate at which stored masses equalise through valves."""
     tables = open_tables(handle)
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     rate = out[RATE]
@@ -121,13 +124,13 @@ def quickest_valve(t, y, dydt, out, handle):
         i, j = valve["from_node"], valve["to_node"]
         stiff_i, stiff_j = stiffness_of(nodes, layout, out, i), stiffness_of(nodes, layout, out, j)
         drop = head_drop(tables, out, k)[1]
-        if nodes[i]["kind"] == PATCH and drop >= 0.0:  # what there is no water for cannot answer
+        if nodes[i]["kind"] == PATCH and drop >= 0.0:  # without water a patch cannot respond
             stiff_i *= out[layout["had"] + nodes[i]["row"]]
         if nodes[j]["kind"] == PATCH and drop <= 0.0:
             stiff_j *= out[layout["had"] + nodes[j]["row"]]
         stiff = stiff_i + stiff_j
         if valve["device"] >= 0 and tables.devices[valve["device"]]["row"] >= 0:
-            continue  # the gate of a vessel, which says itself how quick it is
+            continue  # valve of a vessel, whose device sets its own rate
         if stiff > 0.0:
             g = conductance(tables, out, k)
             slope = restriction_slope(tables, out, k, drop)
@@ -141,6 +144,6 @@ def quickest_valve(t, y, dydt, out, handle):
                 change = stiff_i * out[layout["net"] + i]
                 change -= stiff_j * out[layout["net"] + j]
                 width = max(valve["transition"] ** 2 / g, valve["unseen"])
-                if change * drop < 0.0:  # two steps at least to a drop of zero: a longer one would leap over it
+                if change * drop < 0.0:  # at least two steps to a drop of zero: a longer step would pass it
                     rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))
     out[RATE] = rate

@@ -1,7 +1,7 @@
-"""Nodes under the linear density law: from the waves that arrive to pressures and flows. Knows no cells.
+"""Nodes under the linear density law: pressures and flows from the waves that arrive.
 
-A pipe end offers its outgoing wave w; with node deviation p' it carries 2 w - Y p' [kg/s] into the node,
-Y = area / speed. A node without storage makes these and the flows of its other links add up to zero.
+With the outgoing wave w at a pipe end and node deviation p' the pipe brings 2 w - Y p' [kg/s] into the node,
+Y = area / speed. At a node without storage these flows and those of its other links add up to zero.
 """
 
 from fvsolve.jit import njit
@@ -20,7 +20,7 @@ from fvsolve.kernels.valves import (
 
 @njit(forceinline=True)
 def stored_pressures(t, y, out, tables):
-    """Deviations [Pa] of given pressures, tanks and chambers."""
+    """Write the pressure deviations [Pa] of fixed nodes, tanks and chambers."""
     settings, layout, nodes = tables.settings[0], tables.layout[0], tables.nodes
     for i in range(nodes.size):
         node = nodes[i]
@@ -36,7 +36,7 @@ def stored_pressures(t, y, out, tables):
 
 @njit(forceinline=True)
 def junction_flows(t, out, tables):
-    """Change of flow into each node without storage at p' = 0, less its demand; kept in out[net]."""
+    """Change of flow into each node without storage at p' = 0, minus its demand, in out[net]."""
     layout, nodes = tables.layout[0], tables.nodes
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION:
@@ -47,7 +47,7 @@ def junction_flows(t, out, tables):
 
 @njit
 def store_linear(t, y, dydt, out, handle):
-    """Pressure deviations of nodes that store or are given, and what flows into the others from outside."""
+    """Write pressure deviations of nodes with storage or given pressure, and flows from outside into other nodes."""
     tables = open_tables(handle)
     stored_pressures(t, y, out, tables)
     junction_flows(t, out, tables)
@@ -55,7 +55,7 @@ def store_linear(t, y, dydt, out, handle):
 
 @njit(forceinline=True)
 def close_alone(out, tables):
-    """Nodes that no valve touches: p' = (sum of what arrives) / Y."""
+    """Pressures of nodes without valves: p' = (sum of inflows) / Y."""
     layout, nodes = tables.layout[0], tables.nodes
     for i in range(nodes.size):
         if nodes[i]["kind"] == JUNCTION and nodes[i]["solve"] == ALONE:
@@ -64,7 +64,7 @@ def close_alone(out, tables):
 
 @njit(forceinline=True)
 def side_of(out, layout, nodes, i):
-    """Pressure deviation of a node at no change of valve flow, and how much a unit of outflow lowers it."""
+    """Pressure deviation of a node at unchanged valve flow, and its fall per unit of outflow."""
     if nodes[i]["kind"] != JUNCTION:
         return out[layout["pressure"] + i], 0.0
     return out[layout["net"] + i] / nodes[i]["admittance"], 1.0 / nodes[i]["admittance"]
@@ -72,7 +72,7 @@ def side_of(out, layout, nodes, i):
 
 @njit(forceinline=True)
 def close_single(out, tables):
-    """Valves with at most one node without storage at each end, that no other valve touches: closed roots."""
+    """Solve valves that join at most a node without storage at each end, and no other valve: closed roots."""
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     for k in range(valves.size):
         valve = valves[k]
@@ -97,7 +97,7 @@ def close_single(out, tables):
 
 @njit
 def close_linear(t, y, dydt, out, handle):
-    """Pressure deviations of nodes without storage and flows of valves, but for those that several valves join."""
+    """Pressures of nodes without storage and flows of valves, except clusters, where several valves join."""
     tables = open_tables(handle)
     close_alone(out, tables)
     close_single(out, tables)

@@ -1,4 +1,4 @@
-"""What is read off a state: probes, least and greatest values, marks and events. Changes no state."""
+"""Observation of a state: probes, extremes, times of first occurrence, events of tanks. Changes no state."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, run
@@ -17,16 +17,16 @@ from fvsolve.kernels.records import (
 )
 from fvsolve.kernels.tanks import tank_level
 
-HUGE = 1e100  # waves beyond it are not finite, though their squares might still be
-BLOCK = 64
-TRACE = 1e-9  # of a level [m/s]: a slower supply of a tank is rounding, and no mark
-STOP_HERE = -2.0  # in out[WHERE]: the run is to end
+HUGE = 1e100  # waves beyond it count as not finite, although their squares may be finite
+BLOCK = 64  # cells compared with the envelope at a time
+TRACE = 1e-9  # speed of a level [m/s]: a smaller supply of a tank is rounding and is not recorded
+STOP_HERE = -2.0  # in out[WHERE]: the run must end
 
 
 @njit(forceinline=True)
-def wave_sum(probe, pipe, sign, which, y, out, tables):
-    """r + l or r - l of a pipe at a place: at an end from the node, inside from a polynomial over cells."""
-    at = tables.layout[0]["ends"] + 4 * which
+def wave_sum(probe, pipe, sign, index, y, out, tables):
+    """r + l or r - l at a probe of a pipe: at an end from the node, inside from a polynomial over cells."""
+    at = tables.layout[0]["ends"] + 4 * index
     if probe["side"] < 0:
         return out[at] + sign * out[at + 1]
     if probe["side"] > 0:
@@ -40,7 +40,7 @@ def wave_sum(probe, pipe, sign, which, y, out, tables):
 
 @njit
 def observe_linear(t, y, out, handle, values):
-    """values[k] = scale * quantity + offset of every probe."""
+    """values[k] = scale * quantity + offset for every probe."""
     tables = open_tables(handle)
     layout, probes = tables.layout[0], tables.probes
     for k in range(probes.size):
@@ -70,7 +70,7 @@ def observe_linear(t, y, out, handle, values):
 
 @njit(forceinline=True)
 def widen(envelope, c, t, value):
-    """Let the least and greatest value of column c, and their times, include a value."""
+    """Update the least and greatest value of column c, and their times, with a value."""
     if value < envelope[0, c]:
         envelope[0, c], envelope[1, c] = value, t
     if value > envelope[2, c]:
@@ -79,7 +79,7 @@ def widen(envelope, c, t, value):
 
 @njit(forceinline=True)
 def outside(r, l, least, greatest):
-    """How many of the cells lie below and above what was seen before; what is not a number lies on both sides."""
+    """Count the cells below and above their extremes so far; NaN counts as below and above."""
     low, high = 0, 0
     for i in range(r.size):
         s = r[i] + l[i]
@@ -90,7 +90,7 @@ def outside(r, l, least, greatest):
 
 @njit
 def widen_low(t, r, l, least, t_least):
-    """`widen` for many cells, downwards and without a branch; returns how many are not finite."""
+    """Update least values and their times of many cells, without a branch; return how many are not finite."""
     bad = 0
     for i in range(r.size):
         s = r[i] + l[i]
@@ -103,7 +103,7 @@ def widen_low(t, r, l, least, t_least):
 
 @njit
 def widen_high(t, r, l, greatest, t_greatest):
-    """`widen_low`, upwards."""
+    """Update greatest values and their times, as `update_minima` does for the least."""
     bad = 0
     for i in range(r.size):
         s = r[i] + l[i]
@@ -116,7 +116,7 @@ def widen_high(t, r, l, greatest, t_greatest):
 
 @njit
 def count_below(r, l, boiling):
-    """How many of the cells are below vapour pressure, r + l below `boiling`."""
+    """Number of cells below vapour pressure: r + l below `boiling`."""
     count = 0
     for i in range(r.size):
         count += (r[i] + l[i]) < boiling[i]
@@ -124,39 +124,39 @@ def count_below(r, l, boiling):
 
 
 @njit
-def note(t, r, l, at, low, high, which, tables):
-    """Widen the envelope from cell `at` on by r + l, `low` and `high` of which lie outside; marks a pipe that boils.
+def note(t, r, l, at, low, high, index, tables):
+    """Update the envelope of r + l from cell `at` on; record the first time that pipe `index` is below vapour pressure.
 
-    Returns zero where all values are finite.
+    low, high : numbers of cells outside their extremes. Returns 0 if all values are finite.
     """
     e, profile, marks = tables.envelope, tables.profile, tables.marks
     b, bad = at + r.size, 0
     if low > 0:
         bad += widen_low(t, r, l, e[0, at:b], e[1, at:b])
-        if marks[which] != marks[which]:
+        if marks[index] != marks[index]:
             if count_below(r, l, profile[at:b]) > 0:
-                marks[which] = t
+                marks[index] = t
     if high > 0:
         bad += widen_high(t, r, l, e[2, at:b], e[3, at:b])
     return bad
 
 
 @njit
-def record_pipe(t, r, l, pipe, which, tables):
-    """Envelope of r + l, cell by cell; most blocks hold nothing new and are only compared."""
+def record_pipe(t, r, l, pipe, index, tables):
+    """Update the envelope of r + l of a pipe; most blocks have no new extreme and are only compared."""
     start, at, envelope = 0, pipe["cell"], tables.envelope
     while start < r.size:
         stop = min(start + BLOCK, r.size)
         a, b = at + start, at + stop
         low, high = outside(r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b])
         if low + high > 0:
-            note(t, r[start:stop], l[start:stop], a, low, high, which, tables)
+            note(t, r[start:stop], l[start:stop], a, low, high, index, tables)
         start = stop
 
 
 @njit
 def record_pipes(t, y, out, handle, values):
-    """Envelopes of pipes, and when they first fall below vapour pressure, after every accepted step."""
+    """Update envelopes of pipes, and first times below vapour pressure, after every accepted step."""
     tables = open_tables(handle)
     pipes = tables.pipes
     for i in range(pipes.size):
@@ -166,18 +166,18 @@ def record_pipes(t, y, out, handle, values):
 
 @njit
 def record_nodes(t, y, out, handle, values):
-    """Extremes of probes and first times of marks, after every accepted step and its pipes.
+    """Update extremes of probes and first times of marks, after an accepted step and after `record_pipes`.
 
-    marks = first time of: pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; nan: never.
+    marks : first times of pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; NaN for never
     """
     tables = open_tables(handle)
     pipes, nodes, extremes = tables.pipes, tables.nodes, tables.extremes
     marks, layout, vapor = tables.marks, tables.layout[0], tables.settings[0]["vapor"]
     for k in range(values.size):
         widen(extremes, k, t, values[k])
-        which = tables.probes[k]["mark"]
-        if which >= 0 and values[k] < vapor and marks[which] != marks[which]:
-            marks[which] = t
+        mark = tables.probes[k]["mark"]
+        if mark >= 0 and values[k] < vapor and marks[mark] != marks[mark]:
+            marks[mark] = t
     for i in range(nodes.size):
         at = pipes.size + i
         if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
@@ -194,17 +194,18 @@ def record_nodes(t, y, out, handle, values):
 
 @njit
 def tank_events(t, y, out, handle, g):
-    """Event functions of the bottom and the rim of tanks; at either nodes are closed, as what flows then counts."""
+    """Event functions of tanks at bottom and rim; at a limit they need the net flow, so nodes are solved first."""
     tables = open_tables(handle)
-    nodes, armed, closed = tables.nodes, tables.armed, tables.devices.size > 0  # whose events have done so
+    # event functions of devices have solved the nodes
+    nodes, armed, solved = tables.nodes, tables.armed, tables.devices.size > 0
     for i in range(nodes.size):
         if nodes[i]["kind"] == TANK:
             node, k = nodes[i], EVENTS * nodes[i]["row"]
             stored = node["mass"] + y[node["y"]]
-            room = node["full"] - stored
-            if not closed and (near(node, stored) or near(node, room)):
+            space = node["full"] - stored
+            if not solved and (near(node, stored) or near(node, space)):
                 run(CLOSE, t, y, y[:0], out, handle)
-                closed = True
+                solved = True
             net = out[tables.layout[0]["net"] + i]
             limit_events(node, armed, g, k + BOTTOM, stored, net)
-            limit_events(node, armed, g, k + RIM, room, -net)
+            limit_events(node, armed, g, k + RIM, space, -net)

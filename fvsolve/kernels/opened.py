@@ -1,4 +1,4 @@
-"""What compiled code sees behind a handle: attributes that load a table. Knows numba's array layout; knows no law."""
+"""Numba type of an open handle: its attributes load the tables."""
 
 from numba.core import cgutils, types
 from numba.core.imputils import lower_getattr_generic
@@ -10,7 +10,7 @@ from fvsolve.kernels.records import Called, table_types
 
 
 class Tables(types.Opaque):
-    """What `open_tables` gives: a bare address, whose attributes are the tables."""
+    """Result of `open_tables`: a bare address, whose attributes are the tables."""
 
     def __init__(self) -> None:
         super().__init__("Tables")
@@ -20,14 +20,14 @@ register_model(Tables)(models.OpaqueModel)
 
 
 def first_word(context, builder, kind, args):
-    """The address of a handle's first word."""
+    """Address of the first word of a handle."""
     base = make_array(kind.args[0])(context, builder, args[0]).data
     return builder.bitcast(base, context.get_value_type(kind.return_type))
 
 
 @infer_getattr
 class TableOf(AttributeTemplate):
-    """The type of `tables.name`."""
+    """Type of `tables.name`."""
 
     key = Tables
 
@@ -37,7 +37,7 @@ class TableOf(AttributeTemplate):
 
 @lower_getattr_generic(Tables)
 def load_table(context, builder, kind, value, name):
-    """The array whose address, rows and columns are three words of the handle; they never change."""
+    """Array of a table; its address, rows and columns are three words of the handle, which never change."""
     member, word = getattr(table_types(), name), context.get_value_type(types.intp)
     base, first = builder.bitcast(value, word.as_pointer()), 3 * Called._fields.index(name)
 

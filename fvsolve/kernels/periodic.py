@@ -1,4 +1,4 @@
-"""Linear advection on a circle of cells by any scheme, with the pipes' reconstruction. Knows no ends and no nodes."""
+"""Linear advection on a periodic row of cells, with the reconstruction of pipes."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.handle import open_tables
@@ -8,7 +8,7 @@ from fvsolve.kernels.records import OK, RATE, STATUS, WHERE
 
 @njit
 def rhs_periodic(t, y, dydt, out, handle):
-    """du_j/dt = F[j] - F[j+1], a wave that runs forward with one cell a time unit; `noise` is WENO's small number.
+    """du_j/dt = F[j] - F[j+1], a forward wave that passes a cell per unit of time; `noise` is the small number of WENO.
 
     scratch : float64[2 n + 7]  window of values, then faces
     """

@@ -1,6 +1,6 @@
-"""One pipe under the linear density law: two waves, each carried by its own side. Knows no nodes.
+"""Rates of a pipe under the linear density law: two waves, each reconstructed from the side it comes from.
 
-State, per cell: forward r = (c m' + M') / 2 and backward l = (c m' - M') / 2 [kg/s], deviations of mass per
+State, for each cell: forward r = (c m' + M') / 2 and backward l = (c m' - M') / 2 [kg/s], from deviations of mass per
 length m = rho A and mass flow M from the profile. r_t + c r_x = -drag'/2, l_t - c l_x = drag'/2.
 """
 
@@ -15,7 +15,7 @@ GAUSS = 0.28867513459481287  # 1 / sqrt(12): two Gauss points of a cell, in cell
 
 @njit
 def family_of(settings, n):
-    """Scheme family that a pipe of n cells bears: below five, fifth-order stencils would grow or not fit."""
+    """Scheme family for a pipe of n cells: below five cells fifth-order stencils would be unstable or would not fit."""
     family = settings["scheme"]
     if n < 5 and family == LINEAR and settings["degree"] > 2:
         return SHORT
@@ -24,7 +24,7 @@ def family_of(settings, n):
 
 @njit
 def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
-    """Values of one wave at all faces, from its cells c and three imagined cells beyond each end."""
+    """Values of a wave at all faces, from its cells c and three ghost cells beyond each end."""
     n = c.size
     if n <= 5:
         pad = scratch[: n + 6]
@@ -36,18 +36,18 @@ def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
         return
     faces(settings, family, small, backward, c, f[3 : n - 2])
     for side in range(2):
-        pad, to = scratch[:8], f[:3]
+        pad, target = scratch[:8], f[:3]
         for k in range(5):
             pad[k + 3 - 3 * side] = c[k + side * (n - 5)]
         for g in range(3):
             pad[5 + g if side == 1 else 2 - g] = right[g] if side == 1 else left[g]
-        to = f[n - 2 :] if side == 1 else f[:3]
-        faces(settings, family, small, backward, pad, to)
+        target = f[n - 2 :] if side == 1 else f[:3]
+        faces(settings, family, small, backward, pad, target)
 
 
 @njit
 def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
-    """Face values of both waves; the values at the two ends are the nodes' and the outgoing ones."""
+    """Face values of both waves; at the ends those given: incoming from the node, outgoing from the cells."""
     n, small = r.size, pipe["noise"]
     family, degree, limiter = family_of(settings, n), settings["degree"], settings["limiter"]
     edge, ghosts, beyond = scratch[16:21], scratch[21:24], scratch[24:27]
@@ -65,7 +65,7 @@ def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
 
 @njit
 def rates_from_faces(k, fr, fl, dr, dl):
-    """dr, dl from face values, without friction."""
+    """Write dr, dl from face values, without friction."""
     for i in range(dr.size):
         dr[i] = -k * (fr[i + 1] - fr[i])
         dl[i] = k * (fl[i + 1] - fl[i])
@@ -73,7 +73,7 @@ def rates_from_faces(k, fr, fl, dr, dl):
 
 @njit
 def weigh(e0, e1, e2, e3, e4, e5, c, d):
-    """d[i] = sum of e_k c[i+k], in pairs from outside in: the mirror image has the same bits."""
+    """d[i] = sum of e_k c[i+k], in pairs from the outside in: the mirror image has the same bits."""
     c1, c2, c3, c4, c5 = c[1:], c[2:], c[3:], c[4:], c[5:]
     for i in range(d.size):
         d[i] = (e0 * c[i] + e5 * c5[i]) + ((e1 * c1[i] + e4 * c4[i]) + (e2 * c2[i] + e3 * c3[i]))
@@ -81,7 +81,7 @@ def weigh(e0, e1, e2, e3, e4, e5, c, d):
 
 @njit
 def rates_linear(settings, k, backward, c, datum, edge, d):
-    """k (F[i] - F[i+1]) along one wave by a linear scheme, from five cells up: weights of cells, no faces."""
+    """k (F[i] - F[i+1]) along a wave by a linear scheme, for at least five cells, from weights of cells."""
     n, inside, enter, leave = c.size, settings["inside"], settings["enter"], settings["leave"]
     e0, e1, e2, e3, e4, e5 = k * inside[0], k * inside[1], k * inside[2], k * inside[3], k * inside[4], k * inside[5]
     if backward == 1:
@@ -104,14 +104,14 @@ def rates_linear(settings, k, backward, c, datum, edge, d):
 
 @njit
 def rub(k, flow, loss, base, r, l, dr, dl):
-    """Take loss |M| M - drag off rates that hold -k and k times the differences of face values.
+    """Subtract loss |M| M - drag from rates that hold -k and k times the differences of face values.
 
-    Averaged by two Gauss points of a cell: fourth order and blind to no kink.
+    Averaged over two Gauss points of a cell: fourth order, and no kink of the law is missed.
     """
-    half, lean = 0.25 * loss, GAUSS / k
+    half, spread = 0.25 * loss, GAUSS / k
     for i in range(r.size):
         m = flow + (r[i] - l[i])
-        d = lean * (dr[i] + dl[i])
+        d = spread * (dr[i] + dl[i])
         hi, lo = m + d, m - d
         s = half * (abs(hi) * hi + abs(lo) * lo) - base
         dr[i] -= s
@@ -120,12 +120,12 @@ def rub(k, flow, loss, base, r, l, dr, dl):
 
 @njit
 def rub_rough(k, pipe, base, r, l, dr, dl):
-    """`rub` with a friction law that follows the flow by roughness."""
+    """`subtract_friction` for a friction factor that follows from roughness."""
     loss, rough = pipe["loss"], pipe["rough"]
-    e, reynolds, flow, lean = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
+    e, reynolds, flow, spread = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
     for i in range(r.size):
         m = flow + (r[i] - l[i])
-        d = lean * (dr[i] + dl[i])
+        d = spread * (dr[i] + dl[i])
         high = drag(FRICTION_ROUGH, loss, rough, e, reynolds, m + d)
         both = high + drag(FRICTION_ROUGH, loss, rough, e, reynolds, m - d)
         s = 0.25 * both - base
@@ -135,14 +135,14 @@ def rub_rough(k, pipe, base, r, l, dr, dl):
 
 @njit
 def rub_hazen(k, flow, loss, rough, base, r, l, dr, dl):
-    """`rub` with Hazen-Williams, of whose power one value stands for both points.
+    """`subtract_friction` for Hazen-Williams, whose power is evaluated once for both points.
 
-    M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d up to 0.43 (d/M)^4 of itself.
+    M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d with a relative error of 0.43 (d/M)^4.
     """
-    lean, half, quarter = GAUSS / k, 0.5 * rough, 0.25 * loss
+    spread, half, quarter = GAUSS / k, 0.5 * rough, 0.25 * loss
     for i in range(r.size):
         m = flow + (r[i] - l[i])
-        d = lean * (dr[i] + dl[i])
+        d = spread * (dr[i] + dl[i])
         hi, lo = m + d, m - d
         s = (
             quarter * (abs(hi) * hi + abs(lo) * lo)
@@ -155,20 +155,20 @@ def rub_hazen(k, flow, loss, rough, base, r, l, dr, dl):
 
 @njit
 def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
-    """First order: each wave takes the cell it comes from; one loop, no face arrays."""
+    """Rates of the first-order upwind scheme with friction, in a single loop without face arrays."""
     n = r.size
     half = 0.5 * loss
     m = flow + (r[0] - l[0])
     dr[0] = -k * (r[0] - r_in) - (half * (abs(m) * m) - base)
     head, body, out = r[: n - 1], r[1:], dr[1:]
-    meet = l[1:]
+    opposite = l[1:]
     for i in range(n - 1):
-        m = flow + (body[i] - meet[i])
+        m = flow + (body[i] - opposite[i])
         out[i] = -k * (body[i] - head[i]) - (half * (abs(m) * m) - base)
     head, body, out = l[1:], l[: n - 1], dl[: n - 1]
-    meet = r[: n - 1]
+    opposite = r[: n - 1]
     for i in range(n - 1):
-        m = flow + (meet[i] - body[i])
+        m = flow + (opposite[i] - body[i])
         out[i] = k * (head[i] - body[i]) + (half * (abs(m) * m) - base)
     m = flow + (r[n - 1] - l[n - 1])
     dl[n - 1] = k * (l_in - l[n - 1]) + (half * (abs(m) * m) - base)
@@ -176,7 +176,7 @@ def rates_upwind(k, flow, loss, base, r, l, r_in, l_in, dr, dl):
 
 @njit(forceinline=True)
 def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
-    """d/dt of both waves of one pipe from its cells and the four wave values at its ends."""
+    """d/dt of both waves of a pipe from its cells and the four wave values at its ends."""
     n = r.size
     k = pipe["speed"] / pipe["dx"]
     base = 0.5 * pipe["drag"]

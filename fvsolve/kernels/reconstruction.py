@@ -1,7 +1,7 @@
-"""Values at faces from cell averages, biased to the side a wave comes from. Knows no physics and no ends.
+"""Values at faces from cell averages, biased to the side that a wave comes from.
 
-Every loop reads a window P and writes F: face j lies between P[j+2] and P[j+3]. A forward wave looks at
-P[j] .. P[j+4], a backward wave at P[j+5] .. P[j+1].
+Every loop reads a window P and writes F: face j lies between P[j+2] and P[j+3]. A forward wave uses P[j] .. P[j+4], a
+backward wave P[j+5] .. P[j+1].
 """
 
 from fvsolve.jit import inner, njit
@@ -11,7 +11,7 @@ from fvsolve.kernels.records import LINEAR, MUSCL, SHORT, UPWIND
 
 @njit
 def value_weno5(a, b, c, d, e, small):
-    """Fifth-order WENO-Z value at the face after c (Borges et al. 2008), `small` against a division by zero."""
+    """Fifth-order WENO-Z value at the face after c (Borges et al. 2008); `small` prevents a division by zero."""
     p0 = (2.0 * a - 7.0 * b + 11.0 * c) / 6.0
     p1 = (-b + 5.0 * c + 2.0 * d) / 6.0
     p2 = (2.0 * c + 5.0 * d - e) / 6.0
@@ -43,21 +43,21 @@ def faces_linear(w0, w1, w2, w3, w4, w5, p, f):
 
 @inner
 def muscl_forward(limiter, p, f):
-    """Limited second-order values of waves that go forward."""
+    """Limited second-order face values of forward waves."""
     for j in range(f.size):
         f[j] = p[j + 2] + 0.5 * slope(limiter, p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
 
 
 @inner
 def muscl_backward(limiter, p, f):
-    """The same of waves that go backward."""
+    """Limited second-order face values of backward waves."""
     for j in range(f.size):
         f[j] = p[j + 3] - 0.5 * slope(limiter, p[j + 4] - p[j + 3], p[j + 3] - p[j + 2])
 
 
 @njit
 def faces_weno5(small, backward, p, f):
-    """Fifth-order WENO-Z values."""
+    """Fifth-order WENO-Z face values."""
     if backward == 1:
         for j in range(f.size):
             f[j] = value_weno5(p[j + 5], p[j + 4], p[j + 3], p[j + 2], p[j + 1], small)
@@ -68,7 +68,7 @@ def faces_weno5(small, backward, p, f):
 
 @njit
 def faces(settings, scheme, small, backward, p, f):
-    """Values at the faces of window `p` by the case's scheme; `scheme` is its family there."""
+    """Values at the faces of window `p`; `scheme` is the scheme family for this number of cells."""
     if scheme == UPWIND:
         for j in range(f.size):
             f[j] = p[j + 3] if backward == 1 else p[j + 2]

@@ -1,4 +1,4 @@
-"""What restrictions carry now: their conductances, and a Newton step of each law. Knows the tables; closes no node."""
+"""Restrictions: present conductance, Newton step of each law, slope and events."""
 
 from math import sqrt
 
@@ -14,7 +14,7 @@ from fvsolve.kernels.valves import LEAST, flow_slope, transition_of, valve_condu
 
 @njit(forceinline=True)
 def open_scheduled(t, out, tables):
-    """Conductances of the restrictions that no device opens and shuts, into out[conductance]."""
+    """Write the conductances of restrictions that no device opens and closes to out[conductance]."""
     valves, at = tables.valves, tables.layout[0]["conductance"]
     for k in range(valves.size):
         if valves[k]["device"] < 0:
@@ -23,22 +23,23 @@ def open_scheduled(t, out, tables):
 
 @njit(forceinline=True)
 def conductance(tables, out, k):
-    """Conductance of restriction k now, 0 where it is shut [kg2/s2/Pa]."""
+    """Present conductance of restriction k, 0 if it is closed [kg2/s2/Pa]."""
     return out[tables.layout[0]["conductance"] + k]
 
 
 @njit
 def conductance_at(t, tables, out, k):
-    """The same at another time near by; what a device does is not foreseen."""
+    """Conductance at another time t close to the present; for a restriction with a device the present value."""
     return valve_conductance(tables, k, t) if tables.valves[k]["device"] < 0 else conductance(tables, out, k)
 
 
 @njit
 def restriction_step(tables, out, k, g, m, drop, denser, wide):
-    """a, s with dM = a + s d(drop) for the next Newton step of restriction k, which carries m [kg/s] at a drop [Pa].
+    """a, s with dM = a + s d(drop) for the next Newton step of restriction k with flow m [kg/s] at a drop [Pa].
 
-    g : its conductance now, above zero; denser : density upstream over that of reference, 1 under the linear law
-    wide : where two flows would do, Newton comes from above, from where what pressures lift is `wide` open
+    g : present conductance, above zero; denser : upstream density over reference density, 1 under the linear law
+    wide : start with restrictions that pressure lifts wide open; where two flows are possible, Newton then comes from
+    above
     """
     valve = tables.valves[k]
     if valve["hooks"] >= 0:
@@ -48,7 +49,7 @@ def restriction_step(tables, out, k, g, m, drop, denser, wide):
 
 @njit
 def root_step(tables, k, g, m, drop, denser):
-    """The same by the root, M |M| = G dp."""
+    """`restriction_step` for the square-root law M |M| = G dp."""
     valve, g = tables.valves[k], g * denser
     if drop < 0.0:
         g *= valve["back"]
@@ -58,14 +59,14 @@ def root_step(tables, k, g, m, drop, denser):
     target = g * drop
     chord = max(abs(m) + sqrt(abs(target)), LEAST * sqrt(g))
     upstream = valve["from_node"] if target >= 0.0 else valve["to_node"]
-    if inner_row(tables.nodes, upstream) >= 0:  # whose density grows with its pressure
+    if inner_row(tables.nodes, upstream) >= 0:  # its density grows with its pressure
         g += abs(target) / tables.settings[0]["beta"]
     return (target - abs(m) * m) / chord, g / chord
 
 
 @njit
 def head_drop(tables, out, k):
-    """(density at its `from` end [kg/m3], that times what heads fall by along restriction k [J/kg]): [Pa] as a drop."""
+    """(density at the `from` end [kg/m3], density times difference of specific energy over restriction k [Pa])."""
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
@@ -89,7 +90,7 @@ def restriction_slope(tables, out, k, drop):
 
 @njit
 def root_slope(tables, k, g, drop):
-    """The same by the root."""
+    """`restriction_slope` for the square-root law."""
     valve = tables.valves[k]
     if drop < 0.0:
         g *= valve["back"]
@@ -98,7 +99,7 @@ def root_slope(tables, k, g, drop):
 
 @njit
 def lifts(tables, k):
-    """Whether the pressure before restriction k lifts it, by its law: it is not shut (first flag) nor open (third)."""
+    """True if pressure lifts restriction k by its law: it is neither closed (flag 0) nor fully open (flag 2)."""
     valve = tables.valves[k]
     if valve["hooks"] < 0 or tables.hooks[valve["hooks"], LIFT] == 0:
         return False
@@ -108,7 +109,7 @@ def lifts(tables, k):
 
 @njit
 def restriction_lift(tables, out, k, g, drop, denser, wide):
-    """What the pressure before restriction k adds to its flow, beside the drop [kg/s/Pa]; 0 where it lifts nothing."""
+    """d flow / d upstream pressure at constant drop of restriction k [kg/s/Pa]; 0 if pressure does not lift it."""
     if not lifts(tables, k):
         return 0.0
     return call_lift(tables.hooks[tables.valves[k]["hooks"], LIFT], out, tables, k, g, drop, denser, wide)
@@ -116,13 +117,13 @@ def restriction_lift(tables, out, k, g, drop, denser, wide):
 
 @njit
 def runs_back(tables, k, m):
-    """Whether the pressure before restriction k lifts it and it carries its flow m backwards."""
+    """True if the upstream pressure lifts restriction k and its flow m is negative."""
     return m < 0.0 and lifts(tables, k)
 
 
 @njit
 def restriction_events(t, y, out, handle, g):
-    """Event functions of restrictions whose laws have bends, from closed nodes; what is outside lies on their level."""
+    """Event functions of restrictions with kinks in their law, from solved nodes."""
     tables = open_tables(handle)
     nodes, valves, pressure = tables.nodes, tables.valves, tables.layout[0]["pressure"]
     for k in range(valves.size):
@@ -134,5 +135,5 @@ def restriction_events(t, y, out, handle, g):
 
 @njit
 def step_at(hook, out, handle, k, g, m, drop, denser):
-    """`restriction_step` of restriction k by the step of its law, as Python asks."""
+    """`restriction_step` of restriction k by the step function of its law, for calls from Python."""
     return call_step(hook, out, open_tables(handle), k, g, m, drop, denser, False)

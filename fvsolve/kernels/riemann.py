@@ -1,9 +1,9 @@
-"""The Riemann problem of a pipe under the law `mixture`: two states meet, a wave runs to either side. Knows no cells.
+"""Riemann problem of a pipe under the law mixture: two states, and a wave to either side.
 
 Across a shock [v]^2 = [F] [-1 / m], F the integral of A dp (Rankine-Hugoniot for mass and momentum); across a
 rarefaction dv = dp / (rho c). The law is convex (1 / m falls ever less steeply with F), so there are no other waves.
-The pressure between the waves stays above the law's floor however fast the sides part: there a cavity opens.
-A side is (pressure p [Pa], mass per length m [kg/m], F [N], m c [kg/s], the integral of dp / (rho c) up to p [m/s]).
+The pressure between the waves stays above the floor of the law however fast the states part: a cavity opens there.
+A state is (pressure p [Pa], mass per length m [kg/m], F [N], m c [kg/s], the integral of dp / (rho c) up to p [m/s]).
 """
 
 from math import exp, log, sqrt
@@ -11,28 +11,28 @@ from math import exp, log, sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.density.mixture import impedance, mass_of_pressure, velocity_change, wall_stretch
 
-NEAR = 1e-3  # of the gas pressure: smaller jumps are taken by the mean of 1 / (m c), lest differences cancel
-LEAST = 1e-10  # gas pressure that is a vacuum [Pa]
-FALL = 0.03  # of the gas pressure, where Newton would pass the floor
+NEAR = 1e-3  # fraction of the gas pressure; smaller jumps use the mean of 1 / (m c), because differences would cancel
+LEAST = 1e-10  # gas pressure of a vacuum [Pa]
+FALL = 0.03  # factor on the gas pressure for a step of Newton that would pass the floor
 UNBOUNDED = 1e300
 
 
 @njit(forceinline=True)
 def plain_integral(st, compliance, x):
-    """Integral of sqrt((a + b / x + gas / x^2) / rho_ref) dx [m/s], dp / (rho c) but for the wall's own stretch.
+    """Integral of sqrt((a + b / x + gas / x^2) / rho_ref) dx [m/s]: dp / (rho c) without the stretch of the wall.
 
     a = 1 / beta + compliance, b = compliance gas; closed form by sqrt(R), R = a x^2 + b x + gas.
     """
     a, gas = 1.0 / st["beta"] + compliance, st["gas"]
     b = compliance * gas
     root, side, base = sqrt((a * x + b) * x + gas), sqrt(a), sqrt(gas)
-    found = root + 0.5 * b / side * log(2.0 * (side * root + a * x) + b)
-    return (found - base * log((2.0 * (gas + base * root) + b * x) / x)) / sqrt(st["rho"])
+    value = root + 0.5 * b / side * log(2.0 * (side * root + a * x) + b)
+    return (value - base * log((2.0 * (gas + base * root) + b * x) / x)) / sqrt(st["rho"])
 
 
 @njit
 def side_at(st, floats, pipe, p):
-    """The side of a pipe at a pressure."""
+    """State of a pipe at a pressure."""
     m, dm = mass_of_pressure(st, floats, pipe, p)
     over = p - st["reference"]
     force = pipe["area"] * over * (1.0 + 0.5 * pipe["compliance"] * over)
@@ -43,13 +43,13 @@ def side_at(st, floats, pipe, p):
 
 @njit(forceinline=True)
 def is_plain(st):
-    """Whether the gas is isothermal and does not dissolve."""
+    """True if the gas is isothermal and does not dissolve."""
     return st["gas_power"] == 1.0 and st["saturation"] > UNBOUNDED
 
 
 @njit
 def lead(st, floats, pipe, p):
-    """The integrand of dp / (rho c) over that of `plain_integral` at a pressure: one, but for the wall's stretch."""
+    """Integrand of dp / (rho c) over that of `isothermal_integral` at a pressure: 1 but for the stretch of the wall."""
     x = p - st["floor"]
     plain = 1.0 / st["beta"] + pipe["compliance"] + st["gas"] / x * (pipe["compliance"] + 1.0 / x)
     return sqrt(st["rho"] / plain) / impedance(st, floats, pipe, p)
@@ -57,7 +57,7 @@ def lead(st, floats, pipe, p):
 
 @njit
 def thinned(st, floats, pipe, low, high):
-    """Integral of dp / (rho c) between two sides [m/s]."""
+    """Integral of dp / (rho c) between two states [m/s]."""
     if not is_plain(st):
         return velocity_change(st, floats, pipe, low[0], high[0])
     return (high[4] - low[4]) * 0.5 * (lead(st, floats, pipe, low[0]) + lead(st, floats, pipe, high[0]))
@@ -65,22 +65,22 @@ def thinned(st, floats, pipe, low, high):
 
 @njit
 def jump(st, floats, pipe, side, to):
-    """(velocity [m/s] that a wave takes off on its way from one side to another, its slope over the pressure there)."""
+    """(velocity that a wave subtracts on its way from a state to another [m/s], its slope over the second pressure)."""
     area = pipe["area"] * wall_stretch(st, pipe["compliance"], to[0])
     if abs(to[0] - side[0]) <= NEAR * (to[0] - st["floor"]):
         return (to[2] - side[2]) * 0.5 * (1.0 / side[3] + 1.0 / to[3]), area / to[3]
     if to[0] < side[0]:
         return -thinned(st, floats, pipe, to, side), area / to[3]
-    force, thin = to[2] - side[2], 1.0 / side[1] - 1.0 / to[1]
-    change = sqrt(force * thin)
-    return change, 0.5 * area * (thin + force / (to[3] * to[3])) / change
+    force, expansion = to[2] - side[2], 1.0 / side[1] - 1.0 / to[1]
+    change = sqrt(force * expansion)
+    return change, 0.5 * area * (expansion + force / (to[3] * to[3])) / change
 
 
 @njit
 def star(st, floats, pipe, left, v_l, right, v_r):
-    """(the side between the waves of two states, its velocity after the left and after the right wave), by Newton.
+    """(state between the waves of two states, its velocity after the left and after the right wave), by Newton.
 
-    Both velocities are one, but where the sides part so fast that nothing is left between them.
+    Both velocities are equal, except where the states part so fast that a vacuum remains between them.
     """
     floor, low, high = st["floor"], st["floor"], UNBOUNDED
     both = right[3] * left[0] + left[3] * right[0] + left[3] * right[3] * (v_l - v_r) / pipe["area"]
@@ -89,24 +89,24 @@ def star(st, floats, pipe, left, v_l, right, v_r):
         p = floor + LEAST
     for _ in range(100):
         middle = side_at(st, floats, pipe, p)
-        take, rise_l = jump(st, floats, pipe, left, middle)
-        give, rise_r = jump(st, floats, pipe, right, middle)
-        gap, before = (v_l - take) - (v_r + give), p
+        change_l, rise_l = jump(st, floats, pipe, left, middle)
+        change_r, rise_r = jump(st, floats, pipe, right, middle)
+        gap, before = (v_l - change_l) - (v_r + change_r), p
         if gap > 0.0:
             low = p
         else:
             high = p
         p += gap / (rise_l + rise_r)
         if abs(p - before) <= 1e-11 * (before - floor) + 1e-16 * before or (gap <= 0.0 and before - floor <= LEAST):
-            return middle, v_l - take, v_r + give
+            return middle, v_l - change_l, v_r + change_r
         if p <= low or p >= high:
             p = between(floor, low, high, before)
-    return middle, v_l - take, v_r + give
+    return middle, v_l - change_l, v_r + change_r
 
 
 @njit(forceinline=True)
 def between(floor, low, high, p):
-    """A pressure between two bounds, one of which may not be known yet, by ratio of the gas pressures."""
+    """Pressure between two bounds, of which one may be unknown, by the ratio of gas pressures."""
     if low <= floor:
         return floor + max(FALL * (p - floor), LEAST)
     if high >= UNBOUNDED:
@@ -116,26 +116,26 @@ def between(floor, low, high, p):
 
 @njit
 def sonic(st, floats, pipe, side, v0, end):
-    """(side, velocity) in the rarefaction from a side to `end` where the velocity is that of sound, by bisection."""
+    """(state, velocity) where the rarefaction from a state to `end` has the speed of sound, by bisection."""
     floor = st["floor"]
     low, high = log(end[0] - floor), log(side[0] - floor)
-    found, v = side, v0
+    state, v = side, v0
     for _ in range(50):
         middle = 0.5 * (low + high)
-        found = side_at(st, floats, pipe, floor + exp(middle))
-        v = v0 - jump(st, floats, pipe, side, found)[0]
-        if v > found[3] / found[1]:
+        state = side_at(st, floats, pipe, floor + exp(middle))
+        v = v0 - jump(st, floats, pipe, side, state)[0]
+        if v > state[3] / state[1]:
             low = middle
         else:
             high = middle
         if high - low < 1e-12:
             break
-    return found, v
+    return state, v
 
 
 @njit
 def beside(st, floats, pipe, side, v0, end, v):
-    """(m, v, F) at a face which the wave from a side to `end` is near; it runs left and leaves v >= 0 behind it."""
+    """(m, v, F) at a face from the wave between a state and `end`; the wave runs left and leaves v >= 0 behind it."""
     if end[0] > side[0]:
         if end[1] * v >= side[1] * v0 and end[1] > side[1]:
             return side[1], v0, side[2]
@@ -149,7 +149,7 @@ def beside(st, floats, pipe, side, v0, end, v):
 
 @njit
 def face_flux(st, floats, pipe, p_l, v_l, p_r, v_r):
-    """Flux of mass [kg/s] and of momentum M^2 / m + F [N] between two states, pressure [Pa] and velocity [m/s]."""
+    """Flux of mass [kg/s] and of momentum M^2 / m + F [N] between two states; p [Pa], v [m/s]."""
     left, right = side_at(st, floats, pipe, p_l), side_at(st, floats, pipe, p_r)
     middle, after, ahead = star(st, floats, pipe, left, v_l, right, v_r)
     m, v, force = middle[1], 0.5 * (after + ahead), middle[2]

@@ -1,9 +1,9 @@
-"""Places where rigid columns meet and every valve is shut: what flows is theirs alone. Solves no other node.
+"""Junctions of rigid columns whose valves are all closed: balance of flows, pressures, impulses.
 
-Nothing flows out, so the flows into such a place add up to zero, and its pressure is the one that keeps them so:
-sum of (A / L) (P_far - P) = sum of what friction takes. Flows that do not add up meet at once by an impulse J [Pa s] of
-pressure, dM = (A / L) J away from it: momentum is kept (an inelastic impact). What
-rounding leaves of the sum is taken off alike. Columns that valves lead have a given flow here.
+No flow leaves such a junction, so the flows into it add up to zero, and its pressure keeps them so:
+sum of (A / L) (P_far - P) = sum of friction terms. Flows that do not add up are equalised by an impulse J [Pa s] of
+pressure, dM = (A / L) J away from the junction: momentum is conserved (an inelastic impact). The rounding of the sum
+is removed in the same way. Columns controlled by valves have a given flow here.
 """
 
 from math import sqrt
@@ -17,14 +17,14 @@ from fvsolve.kernels.restrictions import conductance
 
 @njit
 def is_vessel(tables, k):
-    """Whether valve k is the way into the chamber of an air valve."""
+    """True if valve k leads into the chamber of an air valve."""
     device = tables.valves[k]["device"]
     return device >= 0 and tables.devices[device]["row"] >= 0
 
 
 @njit
 def holds_shut(tables, out, k):
-    """Whether valve k is shut and opens by an event alone, as that of air and an ideal check valve: till then none."""
+    """True if valve k is closed and only an event opens it, as for air valves and ideal check valves."""
     if conductance(tables, out, k) > 0.0:
         return False
     device = tables.valves[k]["device"]
@@ -33,7 +33,10 @@ def holds_shut(tables, out, k):
 
 @njit
 def gate_area(tables, out, i):
-    """(sum of the roots of the conductances of a node's valves, the same at full opening of all that count)."""
+    """(sum of the square roots of the conductances of a node's valves, the sum at full opening).
+
+    The second sum leaves out air valves and valves that only an event opens.
+    """
     node, area, full = tables.nodes[i], 0.0, 0.0
     for e in range(node["gate_count"]):
         k = tables.integers[node["gates"] + e]
@@ -45,7 +48,7 @@ def gate_area(tables, out, i):
 
 @njit
 def is_rigid(tables, out, i):
-    """Whether columns meet at node i, two at least, and nothing else flows there."""
+    """True if at least two columns join at node i and nothing else flows there."""
     node = tables.nodes[i]
     return node["gates"] >= 0 and node["columns"] > 1 and gate_area(tables, out, i)[0] == 0.0
 
@@ -59,7 +62,7 @@ def column_drag(column, flow):
 
 @njit(forceinline=True)
 def body_drive(tables, out, column):
-    """What the motion of its body drives a column by since the start [J/kg]; 0 where it stands still."""
+    """Energy per mass that the motion of its body gives a column since the start [J/kg]; 0 for a fixed column."""
     total, at = 0.0, tables.layout[0]["ride"] + column["ride"]
     for k in range(column["rides"]):
         total += out[at + k]
@@ -68,13 +71,13 @@ def body_drive(tables, out, column):
 
 @njit(forceinline=True)
 def offset_of(tables, out, column):
-    """Driving pressure of a column beside that of its ends [Pa]."""
+    """Driving pressure of a column in addition to that of its ends [Pa]."""
     return column["offset"] + tables.settings[0]["rho"] * body_drive(tables, out, column)
 
 
 @njit
 def pressure_at(tables, out, i, extra, solved):
-    """p' of node i; of a junction, until nodes are `solved`, a guess from what its pipes and `extra` [kg/s] bring."""
+    """p' of node i; of a junction, until nodes are `solved`, an estimate from its pipes and `extra` inflow [kg/s]."""
     layout, node = tables.layout[0], tables.nodes[i]
     if node["kind"] != JUNCTION or solved:
         return out[layout["pressure"] + i]
@@ -83,26 +86,29 @@ def pressure_at(tables, out, i, extra, solved):
 
 @njit
 def grounded(tables, out, i, k, seen):
-    """Whether columns that nothing leads, but for k, join rigid node i to one that is not; seen[]: what they join."""
-    columns, led = tables.columns, tables.layout[0]["led"]
+    """True if columns other than k, not controlled by valves, join junction i to a node of another kind.
+
+    seen[] : 1 for the nodes that these columns join
+    """
+    columns, controlled = tables.columns, tables.layout[0]["led"]
     seen[:] = 0.0
-    seen[i], grown = 1.0, True
-    while grown:
-        grown = False
+    seen[i], changed = 1.0, True
+    while changed:
+        changed = False
         for j in range(columns.size):
             a, b = columns[j]["from_node"], columns[j]["to_node"]
-            if j == k or out[led + j] != 0.0 or seen[a] == seen[b]:
+            if j == k or out[controlled + j] != 0.0 or seen[a] == seen[b]:
                 continue
             other = b if seen[a] > 0.0 else a
             if not is_rigid(tables, out, other):
                 return True
-            seen[other], grown = 1.0, True
+            seen[other], changed = 1.0, True
     return False
 
 
 @njit
 def is_pinned(tables, out, i, seen):
-    """Whether nothing sets the level of pressure of what is joined to rigid node i, and it is the first of these."""
+    """True if junction i is the first of a connected group in which no node sets the level of pressure."""
     if grounded(tables, out, i, -1, seen):
         return False
     for j in range(i):
@@ -113,16 +119,16 @@ def is_pinned(tables, out, i, seen):
 
 @njit
 def rigid_space(tables, n):
-    """Scratch : (row of each node, marks of nodes, matrix, right side, pinned, given)."""
-    many, work = tables.nodes.size, tables.scratch
-    at = 2 * many + n * n
+    """Work arrays in scratch: (row of each node, marks of nodes, matrix, right side, pinned, given)."""
+    n_nodes, work = tables.nodes.size, tables.scratch
+    at = 2 * n_nodes + n * n
     right, pinned, given = work[at : at + n], work[at + n : at + 2 * n], work[at + 2 * n : at + 3 * n]
-    return work[:many], work[many : 2 * many], work[2 * many : at], right, pinned, given
+    return work[:n_nodes], work[n_nodes : 2 * n_nodes], work[2 * n_nodes : at], right, pinned, given
 
 
 @njit
 def number_rigid(tables, out):
-    """Number the rigid nodes in scratch, -1 for others; returns how many there are."""
+    """Number the column junctions in scratch, -1 for other nodes; return their count."""
     rows, n = tables.scratch, 0
     for i in range(tables.nodes.size):
         rows[i] = -1.0
@@ -134,22 +140,25 @@ def number_rigid(tables, out):
 
 @njit
 def join(tables, out, n, k):
-    """Matrix of n numbered rigid nodes, sum of A / L of their columns [m] but for those that are led and k."""
+    """Matrix of n column junctions: sums of A / L of their columns [m], except valve-controlled columns and column k.
+
+    Clears the right side and marks pinned junctions.
+    """
     rows, seen, matrix, right, pinned, _ = rigid_space(tables, n)
-    columns, led = tables.columns, tables.layout[0]["led"]
+    columns, controlled = tables.columns, tables.layout[0]["led"]
     matrix[:], right[:] = 0.0, 0.0
     for j in range(columns.size):
-        if j == k or out[led + j] != 0.0:
+        if j == k or out[controlled + j] != 0.0:
             continue
         a, b = int(rows[columns[j]["from_node"]]), int(rows[columns[j]["to_node"]])
-        yielding = columns[j]["area"] / columns[j]["length"]
+        mobility = columns[j]["area"] / columns[j]["length"]
         if a >= 0:
-            matrix[n * a + a] += yielding
+            matrix[n * a + a] += mobility
         if b >= 0:
-            matrix[n * b + b] += yielding
+            matrix[n * b + b] += mobility
         if a >= 0 and b >= 0:
-            matrix[n * a + b] -= yielding
-            matrix[n * b + a] -= yielding
+            matrix[n * a + b] -= mobility
+            matrix[n * b + a] -= mobility
     for i in range(rows.size):
         if rows[i] >= 0.0:
             pinned[int(rows[i])] = 1.0 if is_pinned(tables, out, i, seen) else 0.0
@@ -157,7 +166,7 @@ def join(tables, out, n, k):
 
 @njit
 def join_given(tables, out, n):
-    """`join` with what is given on the right side."""
+    """`assemble_junctions` with the given rates on the right side."""
     join(tables, out, n, -1)
     _, _, _, right, _, given = rigid_space(tables, n)
     for r in range(n):
@@ -166,7 +175,7 @@ def join_given(tables, out, n):
 
 @njit
 def settle_rigid(tables, out, n):
-    """right <- matrix^-1 right; a pinned row keeps what it has on its right side."""
+    """right <- matrix^-1 right; a pinned row keeps its value on the right side."""
     _, _, matrix, right, pinned, _ = rigid_space(tables, n)
     for r in range(n):
         if pinned[r] > 0.0:
@@ -178,13 +187,16 @@ def settle_rigid(tables, out, n):
 
 @njit
 def value_at(rows, right, i):
-    """What was solved for at node i, 0 where it is not rigid."""
+    """Solution at node i, 0 if it is not a column junction."""
     return right[int(rows[i])] if rows[i] >= 0.0 else 0.0
 
 
 @njit
 def meet(tables, out):
-    """Let the flows into rigid nodes add up to zero: changes since the profile, in out[column] and out[net]."""
+    """Make the flows into column junctions add up to zero, by impulses.
+
+    Changes out[column] and out[net], which hold flows and changes since the profile.
+    """
     n = number_rigid(tables, out)
     if n == 0:
         return
@@ -207,7 +219,7 @@ def meet(tables, out):
 
 @njit
 def gate_inflow(tables, i):
-    """What the valves of a node bring into it in the profile [kg/s]."""
+    """Flow into a node through its valves in the profile [kg/s]."""
     node, valves, total = tables.nodes[i], tables.valves, 0.0
     for e in range(node["gate_count"]):
         k = tables.integers[node["gates"] + e]
@@ -217,7 +229,7 @@ def gate_inflow(tables, i):
 
 @njit
 def add_sums(tables, out, rows, right):
-    """Add to right[] what columns bring into rigid nodes [kg/s]: to the bit nothing where all is as at the start."""
+    """Add to right[] the flows of columns into column junctions [kg/s]; exactly zero in the state of the start."""
     nodes, columns, at = tables.nodes, tables.columns, tables.layout[0]["column"]
     for i in range(rows.size):
         if rows[i] >= 0.0:
@@ -233,9 +245,10 @@ def add_sums(tables, out, rows, right):
 
 @njit
 def add_pushes(y, tables, out, n, skip, solved):
-    """Add to the right side d/dt of what columns would bring into rigid nodes at p' = 0 there [kg/s2].
+    """Add to the right side the rates of flow of columns into column junctions at p' = 0 there [kg/s2].
 
-    But for those that are led and `skip`; until nodes are `solved`, by states and guesses.
+    Valve-controlled columns and column `skip` are left out. Until nodes are `solved`, flows come from the state and
+    pressures are estimates.
     """
     rows, _, _, right, pinned, _ = rigid_space(tables, n)
     layout, columns = tables.layout[0], tables.columns
@@ -260,9 +273,9 @@ def add_pushes(y, tables, out, n, skip, solved):
 
 @njit
 def far_side(y, tables, out, k, end, solved):
-    """(p' of the other end of column k while its flow holds, its fall per d/dt of what it takes [Pa s2/kg]).
+    """(p' at the far end of column k while its flow is constant, its fall per d/dt of that flow [Pa s2/kg]).
 
-    end : 1 or -1, its `to` or `from` end is the near one.
+    end : 1 or -1, the near end is the `to` or `from` end
     """
     column = tables.columns[k]
     i = column["from_node"] if end == 1 else column["to_node"]

@@ -1,8 +1,8 @@
-"""Scalars in pipes, carried by the very flow that the mass equation uses. Knows cells and ends; mixes no node.
+"""Scalars in pipes, carried by the mass flow of the mass equation.
 
 State of a cell: amount per length s = m c, m the mass per length, s_t + (M c - D m c_x)_x = -decay (s - m ambient).
-Flows at faces are summed from the `from` end, M[i+1] = M[i] - dx dm[i]/dt, with dm/dt of the waves: so a uniform c
-stays uniform.
+Flows at faces are summed from the `from` end, M[i+1] = M[i] - dx dm[i]/dt, with dm/dt of the waves. So a uniform c
+remains uniform.
 """
 
 from fvsolve.jit import inner, njit
@@ -14,7 +14,7 @@ from fvsolve.kernels.records import FLAT, NODE_SCALAR, PIPE_SCALAR, RATE, UPWIND
 
 @njit
 def masses(base, slowness, r, l, m):
-    """m[i], mass per length of cells [kg/m]: the profile's, and (r + l) / speed."""
+    """m[i], mass per length of cells [kg/m]: that of the profile plus (r + l) / speed."""
     for i in range(m.size):
         m[i] = base[i] + slowness * (r[i] + l[i])
 
@@ -37,7 +37,7 @@ def values(s, m, c):
 
 @inner
 def inner_slopes(limiter, c, d):
-    """Limited differences across all cells but those at the ends."""
+    """Limited differences over all cells except those at the ends."""
     here, next, inside = c[1:], c[2:], d[1:]
     for i in range(c.size - 2):
         inside[i] = slope(limiter, here[i] - c[i], next[i] - here[i])
@@ -45,9 +45,9 @@ def inner_slopes(limiter, c, d):
 
 @njit
 def inner_fluxes(conductance, c, d, m, flow, f):
-    """f[i + 1] through the face after cell i: the value on the side that the flow comes from, less D m c_x.
+    """f[i + 1] through the face after cell i: flow times the upstream value, minus D m c_x.
 
-    conductance : D / (2 dx), times the sum of both masses [kg/s]
+    conductance : D / (2 dx), multiplied with the sum of both masses [kg/s]
     """
     next, bend, mass, through, f = c[1:], d[1:], m[1:], flow[1:], f[1:]
     for i in range(c.size - 1):
@@ -66,7 +66,7 @@ def amount_rates(k, f, ds):
 
 @njit
 def fade(decay, ambient, s, m, ds):
-    """Take what decays off ds; returns its sum."""
+    """Subtract the decay from ds; return its sum."""
     lost = 0.0
     for i in range(s.size):
         fades = decay * (s[i] - ambient * m[i])
@@ -77,7 +77,7 @@ def fade(decay, ambient, s, m, ds):
 
 @njit
 def greatest_velocity(m, flow):
-    """Greatest |M| / m of faces and the lightest cell [m/s]."""
+    """Greatest |M| of faces over the least m of cells [m/s]."""
     least, most = m[0], abs(flow[m.size])
     for i in range(m.size):
         least, most = min(least, m[i]), max(most, abs(flow[i]))
@@ -86,7 +86,7 @@ def greatest_velocity(m, flow):
 
 @njit
 def carry_in_pipe(y, dydt, out, tables, p):
-    """Rates of all scalars in pipe p; what decays goes to the ledger, the greatest rate to out[RATE]."""
+    """Write rates of all scalars in pipe p; add the decay to the ledger, raise out[RATE]."""
     st, layout, pipe, scratch = tables.settings[0], tables.layout[0], tables.pipes[p], tables.scratch
     n, o, dx = pipe["cells"], pipe["y"], pipe["dx"]
     base, r, l = tables.profile[pipe["center"] :], y[o : o + n], y[o + n : o + 2 * n]
@@ -109,14 +109,14 @@ def carry_in_pipe(y, dydt, out, tables, p):
         if st["scheme"] != UPWIND and limiter != FLAT:
             by_limiter(inner_slopes, limiter, c, d)
             for right in range(2):
-                near, beside = (n - 1, n - 2) if right == 1 else (0, 1)
+                near, inner = (n - 1, n - 2) if right == 1 else (0, 1)
                 sign = 1.0 if right == 1 else -1.0
-                if sign * (last if right == 1 else first) > 0.0:  # leaves: as far as its value at the end says
+                if sign * (last if right == 1 else first) > 0.0:  # outflow: the slope follows from the value at the end
                     d[near] = 2.0 * sign * (out[layout["edge"] + ends + right] - c[near])
                 elif n > 1:
                     node = pipe["to_node"] if right == 1 else pipe["from_node"]
                     datum = out[layout["value"] + q * nodes + node]
-                    d[near] = sign * limited(limiter, 2.0 * (datum - c[near]), c[near] - c[beside])
+                    d[near] = sign * limited(limiter, 2.0 * (datum - c[near]), c[near] - c[inner])
         inner_fluxes(0.5 * scalar["diffusivity"] / dx, c, d, m, flow, f)
         f[0], f[n] = out[layout["carried"] + ends], out[layout["carried"] + ends + 1]
         amount_rates(1.0 / dx, f, ds)
@@ -132,7 +132,7 @@ def carry_in_pipe(y, dydt, out, tables, p):
 
 @njit
 def clear_losses(t, y, dydt, out, handle):
-    """No scalar has lost anything yet."""
+    """Clear the rows of decay in the ledger."""
     tables = open_tables(handle)
     for q in range(tables.scalars.size):
         if tables.scalars[q]["losses"] > 0:
@@ -141,7 +141,7 @@ def clear_losses(t, y, dydt, out, handle):
 
 @njit
 def leave_pipes(t, y, dydt, out, handle):
-    """Values with which water leaves all pipes."""
+    """Values of all scalars in the water that leaves pipes."""
     tables = open_tables(handle)
     for q in range(tables.scalars.size):
         leaving_values(y, out, tables, q)
@@ -149,7 +149,7 @@ def leave_pipes(t, y, dydt, out, handle):
 
 @njit
 def mix_scalars(t, y, dydt, out, handle):
-    """Values at all nodes and what links bring there; rates of what nodes store, where rates are asked for."""
+    """Write values at all nodes, flows of scalars into them, and rates of storage unless `dydt` is empty."""
     tables = open_tables(handle)
     for q in range(tables.scalars.size):
         mix(t, y, out, tables, q)
@@ -158,7 +158,7 @@ def mix_scalars(t, y, dydt, out, handle):
 
 @njit
 def carry_in_pipes(t, y, dydt, out, handle):
-    """Rates of all amounts in pipes, where rates are asked for."""
+    """Rates of all amounts in pipes, unless `dydt` is empty."""
     tables = open_tables(handle)
     for p in range(tables.pipes.size if dydt.size > 0 else 0):
         carry_in_pipe(y, dydt, out, tables, p)
@@ -166,7 +166,7 @@ def carry_in_pipes(t, y, dydt, out, handle):
 
 @njit
 def observe_scalars(t, y, out, handle, values):
-    """values[k] of every probe of a scalar: at a node, at a pipe's end, or between the centres of two cells."""
+    """values[k] of every scalar probe: at a node, at a pipe end, or between the centres of two cells."""
     tables = open_tables(handle)
     layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes.size
     for k in range(tables.probes.size):

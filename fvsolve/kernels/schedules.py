@@ -1,15 +1,15 @@
-"""Values of schedules at a time. Knows pieces of polynomials, powers and waves; knows no units."""
+"""Values and derivatives of schedules at a time: pieces of polynomials, powers and waves."""
 
 from math import cos, sin
 
 from fvsolve.jit import njit
 
-POLYNOMIAL, POWER, WAVE, CREST = 0.0, 1.0, 2.0, 3.0  # kinds of pieces; CREST: of a wave what is above zero
+POLYNOMIAL, POWER, WAVE, CREST = 0.0, 1.0, 2.0, 3.0  # kinds of pieces; CREST: wave cut off below zero
 
 
 @njit(forceinline=True)
 def piece_at(pieces, first, count, t, limit):
-    """Row of the piece that holds at t; from `limit` on the piece that ends there (left limit)."""
+    """Row of the piece that applies at t; from `limit` on the piece that ends there (left limit)."""
     low, high = first, first + count
     while high - low > 1:
         middle = (low + high) // 2
@@ -23,7 +23,7 @@ def piece_at(pieces, first, count, t, limit):
 
 @njit(forceinline=True)
 def piece_value(pieces, row, t):
-    """a + b s + c s^2 + d s^3 with s = t - origin, or the power v1 + (v0 - v1) (1 - s / duration)^exponent, or a wave.
+    """a + b s + c s^2 + d s^3 with s = t - origin, or v1 + (v0 - v1) (1 - s / duration)^exponent, or a wave.
 
     A wave is mean + amplitude sin(frequency s + phase).
     """
@@ -39,7 +39,7 @@ def piece_value(pieces, row, t):
 
 @njit(forceinline=True)
 def piece_slopes(pieces, row, t):
-    """First and second derivative of a piece that is no crest."""
+    """First and second derivative of a piece, but not of a CREST."""
     s = t - pieces[row, 2]
     if pieces[row, 1] == POLYNOMIAL:
         c, d = pieces[row, 5], pieces[row, 6]
@@ -50,13 +50,13 @@ def piece_slopes(pieces, row, t):
         if rest <= 0.0:
             return fall if n == 1.0 else 0.0, 0.0
         return fall * rest ** (n - 1.0), -fall * (n - 1.0) / span * rest ** (n - 2.0)
-    often, at = pieces[row, 5], pieces[row, 5] * s + pieces[row, 6]
-    return pieces[row, 4] * often * cos(at), -pieces[row, 4] * often * often * sin(at)
+    frequency, at = pieces[row, 5], pieces[row, 5] * s + pieces[row, 6]
+    return pieces[row, 4] * frequency * cos(at), -pieces[row, 4] * frequency * frequency * sin(at)
 
 
 @njit
 def schedule_slopes(tables, index, t):
-    """First and second derivative of schedule `index` at t [per s, per s2], the left ones at the end of the segment."""
+    """First and second derivative of schedule `index` at t [per s, per s2], from the left at the end of the segment."""
     record, limit = tables.schedules[index], tables.clock[0]["limit"]
     if record["pieces"] == 1:
         return piece_slopes(tables.pieces, record["first"], t)
@@ -66,13 +66,13 @@ def schedule_slopes(tables, index, t):
 
 @njit(forceinline=True)
 def schedule_value(tables, index, t):
-    """Value of schedule `index` at t [s], its left limit from the end of the segment on."""
+    """Value of schedule `index` at t [s]; from the end of the segment on its left limit."""
     return value_until(tables.schedules, tables.pieces, index, t, tables.clock[0]["limit"])
 
 
 @njit(forceinline=True)
 def value_until(schedules, pieces, index, t, limit):
-    """Value of schedule `index` at t [s], right-continuous, but its left limit from `limit` on."""
+    """Value of schedule `index` at t [s]: right-continuous, from `limit` on its left limit."""
     record = schedules[index]
     if record["pieces"] == 1:
         return piece_value(pieces, record["first"], t)

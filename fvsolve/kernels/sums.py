@@ -1,66 +1,67 @@
-"""Sums of stages, those of a block of rows beside its rates, while both lie in cache. Knows addresses; knows no law.
+"""Sums of stages, computed for a block of rows together with its rates, while both lie in the cache.
 
-A stage y + h sum a_j k_j of a large basin is formed by whoever finds its rates, just ahead of them, and the end of the
-step just behind: so each array passes the memory once a stage. `sums` of a handle says what is to be formed; steps
-write there before they ask for rates (`steppers.erk`). Values are those of sums over all rows, to the bit.
+The function that computes the rates of a large basin also forms their stage y + h sum a_j k_j just before, and the end
+of the step just after. So each array passes through memory once for each stage. `sums` of a handle describes the sums;
+steps write there before they call for rates (`steppers.erk`). Values equal those of sums over all rows, to the bit.
 """
 
 from fvsolve.jit import njit
 from fvsolve.kernels.joint import address_of, floats_at
 
-HUGE = 1e100  # values beyond it count as not finite
-# Places in `sums`, int64, empty where nothing is formed so: what is asked for; values found that are not finite; where
-# the present state, what is formed, rates of stages and their weights lie; how many states, stages before this one and
-# stages; the step's length, a float; weights at the end; of the runs that steps form themselves how many there are of
-# states that nobody else forms, of cells that all look at, and of rows at the edges of bands; how many basins; how many
-# cells a block has. From HEAD on 1 for each basin whose rows are formed so, 0 for others; behind them the runs, first
-# and one beyond the last.
+HUGE = 1e100  # greater values count as not finite
+# Entries of `sums`, int64, empty if no sums are formed in blocks: mode; number of values that are not finite; addresses
+# of the present state, of the sum, of the rates of stages and of their weights; number of states, of earlier stages and
+# of all stages; step size, a float; address of the weights at the end of the step; numbers of runs that the step itself
+# forms: states in no such basin, cells that all bands read, rows at the edges of bands; number of basins; cells of a
+# block. From HEAD on 1 for each basin whose rows are formed in blocks, else 0; then the runs, first and last + 1.
 MODE, BAD, NOW, TO, RATES, WEIGHTS, SIZE, COUNT, STAGES, STEP, LAST, OTHERS, LOOKED, EDGES, BASINS, CELLS = range(16)
 HEAD = 16
-OFF, LOOK, AHEAD, BOTH = range(4)  # MODE: nothing; whether all is finite; the stage ahead; and the end behind
+OFF, LOOK, AHEAD, BOTH = range(
+    4
+)  # MODE: nothing; check that all is finite; form the stage before rates; and the end after them
 
 
 @njit(forceinline=True)
 def copy(source, target):
-    """target = source, by a plain loop: numba's slice assignment looks for overlaps first."""
+    """target = source, by a plain loop: slice assignment of numba checks for overlaps first."""
     for i in range(target.size):
         target[i] = source[i]
 
 
 @njit
 def combine(begin, end, y, h, weights, count, k, out):
-    """out = y + h sum of weights[j] k[j] over j < count, of [begin:end]; three terms a pass where there are so many."""
-    one, two, moved = -1, -1, False
+    """out = y + h sum of weights[j] k[j] over j < count, of [begin:end]; three terms in a pass where possible."""
+    first, second, copied = -1, -1, False
     y, out = y[begin:end], out[begin:end]
     base = y
     for j in range(count):
         if weights[j] == 0.0:
             continue
-        if one < 0:
-            one = j
-        elif two < 0:
-            two = j
+        if first < 0:
+            first = j
+        elif second < 0:
+            second = j
         else:
-            c0, c1, c2 = h * weights[one], h * weights[two], h * weights[j]
-            k0, k1, k2 = k[one, begin:end], k[two, begin:end], k[j, begin:end]
+            c0, c1, c2 = h * weights[first], h * weights[second], h * weights[j]
+            k0, k1, k2 = k[first, begin:end], k[second, begin:end], k[j, begin:end]
             for i in range(out.size):
                 out[i] = base[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
-            base, moved, one, two = out, True, -1, -1
-    if two >= 0:
-        c0, c1, k0, k1 = h * weights[one], h * weights[two], k[one, begin:end], k[two, begin:end]
+            base, copied, first, second = out, True, -1, -1
+    if second >= 0:
+        c0, c1, k0, k1 = h * weights[first], h * weights[second], k[first, begin:end], k[second, begin:end]
         for i in range(out.size):
             out[i] = base[i] + (c0 * k0[i] + c1 * k1[i])
-    elif one >= 0:
-        c0, k0 = h * weights[one], k[one, begin:end]
+    elif first >= 0:
+        c0, k0 = h * weights[first], k[first, begin:end]
         for i in range(out.size):
             out[i] = base[i] + c0 * k0[i]
-    elif not moved:
+    elif not copied:
         copy(y, out)
 
 
 @njit(forceinline=True)
 def endless(begin, end, y):
-    """How many values of [begin:end] are not finite or have no finite square: in integers, which is vectorised."""
+    """Number of values of [begin:end] that are not finite or have no finite square; integers are vectorised."""
     bad = 0
     for i in range(begin, end):
         bad += not abs(y[i]) < HUGE
@@ -69,7 +70,7 @@ def endless(begin, end, y):
 
 @njit
 def ask(sums, mode, y, h, weights, count, k, to, last):
-    """Say what whoever finds the next rates is to form: the stage in `to`, from weights of `count` stages before it.
+    """Request a sum in `to` from the function that computes the next rates: weights of `count` earlier stages.
 
     last : weights of all stages at the end of the step
     """
@@ -81,7 +82,7 @@ def ask(sums, mode, y, h, weights, count, k, to, last):
 
 @njit
 def sum_runs(sums, first, last, y, h, weights, count, k, to):
-    """Form runs `first` to `last`, which nobody else does, or not in time."""
+    """Form the runs `first` to `last`, which no other function forms, or not in time."""
     at = HEAD + sums[BASINS]
     for r in range(first, last):
         combine(sums[at + 2 * r], sums[at + 2 * r + 1], y, h, weights, count, k, to)
@@ -89,42 +90,42 @@ def sum_runs(sums, first, last, y, h, weights, count, k, to):
 
 @njit(forceinline=True)
 def asked(tables, b):
-    """What is to be formed of a basin."""
+    """Mode of the sums of basin b."""
     if tables.sums.size == 0 or tables.sums[HEAD + b] == 0:
         return OFF
     return tables.sums[MODE]
 
 
 @njit
-def form(sums, behind, at, wide, begin, stop, left, right):
-    """Form columns `left` to `right` of rows `begin` to `stop` of a quantity that lies at `at`, rows `wide` cells.
+def form(sums, behind, at, width, begin, stop, left, right):
+    """Form columns `left` to `right` of rows `begin` to `stop` of a quantity at offset `at`, rows of `width` cells.
 
-    behind : the end of the step in place of the stage
+    behind : True for the end of the step instead of the stage
     """
     size, stages = sums[SIZE], sums[STAGES]
     y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
     k = floats_at(sums[RATES], stages * size).reshape((stages, size))
     weights, count = floats_at(sums[LAST if behind else WEIGHTS], stages), stages if behind else sums[COUNT]
-    if left == 0 and right == wide:
-        combine(at + wide * begin, at + wide * stop, y, h, weights, count, k, to)
+    if left == 0 and right == width:
+        combine(at + width * begin, at + width * stop, y, h, weights, count, k, to)
         return
     for j in range(begin, stop):
-        combine(at + wide * j + left, at + wide * j + right, y, h, weights, count, k, to)
+        combine(at + width * j + left, at + width * j + right, y, h, weights, count, k, to)
 
 
 @njit
-def look(sums, y, at, wide, begin, stop, left, right):
-    """Count what is not finite of such rows of y."""
-    if left == 0 and right == wide:
-        sums[BAD] += endless(at + wide * begin, at + wide * stop, y)
+def look(sums, y, at, width, begin, stop, left, right):
+    """Count the values that are not finite in such rows of y."""
+    if left == 0 and right == width:
+        sums[BAD] += endless(at + width * begin, at + width * stop, y)
         return
     for j in range(begin, stop):
-        sums[BAD] += endless(at + wide * j + left, at + wide * j + right, y)
+        sums[BAD] += endless(at + width * j + left, at + width * j + right, y)
 
 
 @njit
 def form_looked_at(sums):
-    """Form stages of cells that all look at once more, where the end of the step was put in their place."""
+    """Form the stage again in cells that all bands read, where the end of the step has replaced it."""
     size, stages = sums[SIZE], sums[STAGES]
     y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
     k, weights = floats_at(sums[RATES], stages * size).reshape((stages, size)), floats_at(sums[WEIGHTS], stages)

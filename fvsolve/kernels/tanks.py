@@ -1,4 +1,4 @@
-"""Stored mass against level and pressure. Knows one tank or chamber; knows no links."""
+"""Level of a tank from its stored mass."""
 
 from math import sqrt
 
@@ -7,7 +7,7 @@ from fvsolve.jit import njit
 
 @njit
 def level_of_volume(floats, shape, rows, volume):
-    """Level of a shaped tank: areas linear between levels, hence a quadratic in each row; prism outside them.
+    """Level of a shaped tank: area linear between levels, so a quadratic in each row; prism outside the table.
 
     floats[shape:] holds `rows` levels [m], areas [m2] and volumes below them [m3].
     """
@@ -29,7 +29,7 @@ def level_of_volume(floats, shape, rows, volume):
 
 @njit(forceinline=True)
 def tank_level(node, floats, rho, stored):
-    """Level [m] of a tank whose mass deviates by `stored` [kg] from the profile's."""
+    """Level [m] of a tank whose mass deviates by `stored` [kg] from that of the profile."""
     if node["shape"] < 0:
         return node["level"] + stored / (rho * node["area"])
     return level_of_volume(floats, node["shape"], node["shapes"], (node["mass"] + stored) / rho)

@@ -1,4 +1,4 @@
-"""The valve equation, alone and against pipe ends. Knows one valve; knows no network.
+"""Valve equation, alone and with pipe ends.
 
 M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equation (79).
 """
@@ -8,7 +8,7 @@ from math import exp, log, sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.schedules import schedule_value
 
-LEAST = 1e-4  # chords are no steeper than at a drop of LEAST squared [Pa], the rounding of pressures
+LEAST = 1e-4  # chords are not steeper than at a drop of LEAST squared [Pa], the rounding of pressures
 
 
 @njit(forceinline=True)
@@ -36,7 +36,7 @@ def valve_conductance(tables, index, t):
 
 @njit(forceinline=True)
 def conductance_of(tables, index, opening):
-    """The same at an opening."""
+    """G = 2 rho (Cd A)^2 at an opening [kg2/s2/Pa]."""
     valve = tables.valves[index]
     area = relative_area(valve["characteristic"], tables.floats, valve["table"], valve["table_size"], opening)
     return valve["conductance"] * area * area
@@ -44,7 +44,7 @@ def conductance_of(tables, index, opening):
 
 @njit(forceinline=True)
 def transition_of(valve, g):
-    """Flow below which the law of a restriction is laminar at a conductance [kg/s]."""
+    """Flow below which the law of a restriction with conductance g is laminar [kg/s]."""
     return max(valve["transition"], sqrt(g * valve["unseen"]))
 
 
@@ -76,9 +76,9 @@ def flow_slope(conductance, transition, drop):
 
 @njit(forceinline=True)
 def valve_step(g, transition, m, drop):
-    """a, s with dM = a + s d(drop) for the next Newton step of a valve that carries m [kg/s] at a drop [Pa].
+    """a, s with dM = a + s d(drop) for the next Newton step of a valve with flow m [kg/s] at a drop [Pa].
 
-    The chord of the square root stands for its slope: between the flow now and the flow the drop asks for, it is
+    The chord of the square root replaces its slope: between the present flow and the flow of the law at this drop it is
     finite and never too steep.
     """
     if transition > 0.0:
@@ -90,11 +90,11 @@ def valve_step(g, transition, m, drop):
 
 
 @njit(forceinline=True)
-def flow_change(conductance, impedance, flow, surplus, asked):
-    """Exact root x of |M + x| (M + x) = G (dp0 + dp' - Z x): what a valve between pipe ends adds to M.
+def flow_change(conductance, impedance, flow, surplus, target):
+    """Exact root x of |M + x| (M + x) = G (dp0 + dp' - Z x): change of the flow M of a valve between pipe ends.
 
-    conductance G [kg2/s2/Pa]; impedance Z of the ends together [Pa s/kg], zero for given pressures;
-    asked = G (dp0 + dp'); surplus = asked - |M| M, formed so that it is zero while nothing changes: then x is too.
+    conductance G [kg2/s2/Pa]; impedance Z of both ends together [Pa s/kg], zero for given pressures
+    target = G (dp0 + dp'); surplus = target - |M| M, computed so that it is zero if nothing changes: then x is zero too
     """
     if conductance <= 0.0:
         return -flow
@@ -103,16 +103,16 @@ def flow_change(conductance, impedance, flow, surplus, asked):
     if abs(surplus) <= 0.5 * flow * flow:
         b = 2.0 * abs(flow) + gz
         return 2.0 * surplus / (b + sqrt(b * b + 4.0 * side * surplus)) if b > 0.0 else 0.0
-    total = asked + gz * flow
+    total = target + gz * flow
     root = gz + sqrt(gz * gz + 4.0 * abs(total))
     return (2.0 * total / root if root > 0.0 else 0.0) - flow
 
 
 @njit
 def flow_change_laminar(conductance, transition, impedance, flow, base, drop):
-    """x with M + x = law(drop - Z x): a law with a laminar part against pipe ends, by safeguarded Newton.
+    """x with M + x = law(drop - Z x): a law with a laminar part and pipe ends, by bounded Newton.
 
-    base is law(dp0) of the profile less M, so that nothing moves while nothing changes.
+    base : law(dp0) of the profile minus M, so that x is zero if nothing changes
     """
     if conductance <= 0.0:
         return -flow

@@ -1,7 +1,7 @@
-"""Vectors as calls by address take them: an address and a length. Knows numba's array layout; knows no law.
+"""Argument type of vectors in calls by address: an address and a length.
 
-Numba passes an array as seven words, of which five are the same for all vectors; four arrays a call then cost more
-than a small piece of a right-hand side does.
+Numba passes an array as seven words, of which five are equal for all vectors. Four arrays in a call then cost more than
+a small function of the right-hand side.
 """
 
 from numba.core import cgutils, types
@@ -12,7 +12,7 @@ from numba.core.types.npytypes import Array
 
 
 class Vector(Array):
-    """A contiguous row of numbers of one kind; an array in all but how it is passed."""
+    """Contiguous vector of numbers; an array except in how it is passed."""
 
     def __init__(self, dtype: types.Type) -> None:
         super().__init__(dtype, 1, "C", name=f"vector({dtype})")
@@ -20,7 +20,7 @@ class Vector(Array):
 
 @register_default(Vector)
 class VectorModel(ArrayModel):
-    """An array, whose other five words are made where it arrives."""
+    """Array whose other five words are set by the called function."""
 
     def get_argument_type(self) -> tuple:
         """Address and length."""
@@ -30,24 +30,24 @@ class VectorModel(ArrayModel):
         return self.get_model(self.get_field_position(field))
 
     def as_argument(self, builder, value) -> tuple:
-        """What is passed of an array."""
+        """Words that are passed for an array."""
         return self.get(builder, value, "data"), self.get(builder, value, "nitems")
 
     def from_argument(self, builder, value):
-        """The array again: uncounted, of one row without gaps."""
-        data, many = value
-        size = many.type(self.fe_type.dtype.bitwidth // 8)
+        """Array from its two words: without reference count, a single row without gaps."""
+        data, count = value
+        size = count.type(self.fe_type.dtype.bitwidth // 8)
         empty = cgutils.get_null_value(self.get_value_type())
-        for field, found in (("data", data), ("nitems", many), ("itemsize", size)):
-            empty = self.set(builder, empty, found, field)
-        for field, found in (("shape", many), ("strides", size)):
+        for field, word in (("data", data), ("nitems", count), ("itemsize", size)):
+            empty = self.set(builder, empty, word, field)
+        for field, word in (("shape", count), ("strides", size)):
             place = self.get_field_position(field)
-            empty = builder.insert_value(empty, found, [place, 0])
+            empty = builder.insert_value(empty, word, [place, 0])
         return empty
 
 
 @lower_cast(Array, Vector)
 @lower_cast(Vector, Array)
-def as_it_is(context, builder, given, wanted, value):
-    """The same words."""
+def as_it_is(context, builder, from_type, to_type, value):
+    """The words of an array and a vector are equal: nothing is converted."""
     return value
