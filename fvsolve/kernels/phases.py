@@ -1,7 +1,7 @@
-"""The one list: of which pieces the right-hand side of a scene consists, phase by phase. Knows names; knows no law.
+"""Assembly of the right-hand side of a model: a list of its functions, phase by phase.
 
-Every piece is a function of (t, y, dydt, out, handle) and may ask for what earlier phases have written. An empty dydt
-asks for `out` alone. A band of rows is a handle whose tables are parts of these: a piece sees no difference.
+Each function has the arguments (t, y, dydt, out, handle) and may read what earlier phases have written. With an empty
+dydt it computes `out` alone. A band of rows is a handle whose tables are parts of these: no function depends on it.
 """
 
 from __future__ import annotations
@@ -17,40 +17,40 @@ HOME = "fvsolve.kernels"
 
 @dataclass(frozen=True)
 class Pieces:
-    """What one member of a scene adds: functions as `module: function`, "" for none; the phases first, in order.
+    """Functions that a component adds to a model, as `module: function`, "" for none; the phases first, in order.
 
     home : package of the modules
     """
 
-    meet: str = ""  # what bands of a state tell each other of it
-    prepare: str = ""  # what (t, y) alone tell: conductances, speeds, pressures of vessels
-    offer: str = ""  # what pipes say of their ends
-    store: str = ""  # pressures that are stored or given, flows from outside
-    inflow: str = ""  # what rigid columns bring into nodes
-    close: str = ""  # pressures of the other nodes, flows of restrictions
-    hold: str = ""  # pressures of nodes that columns alone hold
-    answer: str = ""  # what nodes send back into pipes
-    balance: str = ""  # net flows into nodes, rates of what these store
-    brake: str = ""  # rates that steps have to see; so far nodes are closed, which events ask for
-    move: str = ""  # rates of what stands between nodes: columns, bodies, devices
-    rates: str = ""  # of cells, in pipes and basins
-    together: str = ""  # what bands tell each other of what passes boundaries
-    enter: str = ""  # what comes into these by patches
-    accelerate: str = ""  # bodies, once all that pushes them is known
-    follow: str = ""  # what feels these accelerations
-    leave: str = ""  # values of scalars with which water leaves pipes and cells
-    mix: str = ""  # and their values at nodes
-    carry: str = ""  # rates of what is carried in cells
-    swell: str = ""  # of rates of scalars in cells that stretch, those of what they contain
-    agree: str = ""  # on the rate that the quickest of all bands has
-    # and beside the right-hand side
-    observe: str = ""  # reads probes
-    record: str = ""  # notes an accepted state
+    meet: str = ""  # exchange of states between bands
+    prepare: str = ""  # from (t, y) alone: conductances, speeds, pressures of vessels
+    offer: str = ""  # outgoing waves at pipe ends
+    store: str = ""  # pressures of nodes with storage or given pressure, flows from outside
+    inflow: str = ""  # flows of rigid columns into nodes
+    close: str = ""  # pressures of other nodes, flows of restrictions
+    hold: str = ""  # pressures of nodes that only columns determine
+    answer: str = ""  # incoming waves from nodes into pipes
+    balance: str = ""  # net flows into nodes, rates of storage in nodes
+    brake: str = ""  # rates that limit the step; event functions need the phases up to here
+    move: str = ""  # rates of columns, bodies, devices
+    rates: str = ""  # rates of cells, in pipes and basins
+    together: str = ""  # exchange between bands of flows through boundaries
+    enter: str = ""  # flows into cells through patches
+    accelerate: str = ""  # accelerations of bodies, from all forces
+    follow: str = ""  # terms that depend on the accelerations of bodies
+    leave: str = ""  # values of scalars in the water that leaves pipes and cells
+    mix: str = ""  # values of scalars at nodes
+    carry: str = ""  # rates of scalars in cells
+    swell: str = ""  # conversion of rates of scalars in stretching cells to rates of their content
+    agree: str = ""  # greatest rate of all bands
+    # jobs other than the right-hand side
+    observe: str = ""  # probe values
+    record: str = ""  # records of an accepted state
     events: str = ""  # event functions
     power: str = ""
     stored: str = ""
-    see: str = ""  # makes of states what all these see of them, in place of dydt
-    damp: str = ""  # divides rates dydt of a stage by 1 + h r, of a step h in place of t; h r in place of out
+    see: str = ""  # values that these jobs read instead of the state, written to dydt
+    damp: str = ""  # divides rates dydt of a stage by 1 + h r; step h passed as t, h r written to out
     home: str = HOME
 
 
@@ -59,7 +59,7 @@ PHASES = JOBS[: JOBS.index("agree") + 1]
 CLOSING = PHASES[: PHASES.index("brake") + 1]
 
 BAROTROPIC = {"store": "barotropic_nodes: store_barotropic", "close": "barotropic_nodes: close_barotropic"}
-NODES = {  # and the network, by the family of the density law
+NODES = {  # nodes, by the family of the density law
     "linear": Pieces(store="nodes: store_linear", close="nodes: close_linear"),
     "barotropic": Pieces(**BAROTROPIC),
     "cavitating": Pieces(**BAROTROPIC | {"close": "cavitating_nodes: close_cavitating"}),
@@ -161,13 +161,13 @@ ALWAYS = Pieces(record="observer: record_nodes", events="observer: tank_events")
 
 @dataclass(frozen=True)
 class Cast:
-    """What decides which functions a scene is made of.
+    """Features of a model, which decide on the functions of its right-hand side.
 
-    family : of kernels that the density law runs on, "linear", "barotropic" or "cavitating"; laws : modules of the laws
-    of parts, as rows of `hooks` lie
-    basins : of what basins consist, and with scalars of what carries these there; see `basins.lower_pieces`
-    alone : whether there is nothing but basins, and no link
-    bands, together : whether threads step bands of the state, and whether more than one of these has an open boundary
+    family : kernels of the density law, "linear", "barotropic" or "cavitating"
+    laws : modules of the laws of parts, in the order of the rows of `hooks`
+    basins, carried : components of basins, and of the scalars in them; see `basins.lower_pieces`
+    alone : True if there are only basins, and no link
+    bands, together : True if threads step bands of the state, and if several bands have an open boundary
     """
 
     family: str
@@ -195,7 +195,7 @@ class Cast:
     forces: bool = False
 
     def members(self) -> Iterator[Pieces]:
-        """Of what it consists, in the order in which pieces of one phase run."""
+        """Components of the model, in the order in which functions of a phase run."""
         if self.bands:
             yield BANDS
         if self.together:
@@ -212,7 +212,7 @@ class Cast:
         if self.valves:
             yield MEMBERS["valves"]
         bends = any(hook_of(law, "bends") is not None for law in self.modules())
-        if self.devices or bends:  # whose events are read off closed nodes
+        if self.devices or bends:  # their event functions need solved nodes
             yield MEMBERS["closed"]
         if bends:
             yield MEMBERS["bends"]
@@ -242,7 +242,7 @@ class Cast:
         if self.creep:
             yield MEMBERS["creep" if linear else "creep, barotropic"]
         yield from self.basins
-        if self.scalars:  # which the flow carries that rates of waves now have
+        if self.scalars:  # carried by the flow from the rates of waves, which come before
             yield MEMBERS["scalars"]
             if not self.alone:
                 yield MIXED
@@ -256,20 +256,20 @@ class Cast:
         yield ALWAYS
 
     def modules(self) -> list:
-        """The laws of its parts."""
+        """Modules of the laws of parts."""
         return [import_module(name) for name in self.laws]
 
     def homes(self) -> list[str]:
-        """The modules and packages that it names."""
+        """Modules and packages that the model needs."""
         return [*self.laws, *(member.home for member in self.basins)]
 
     def functions(self, *jobs: str) -> list:
-        """The functions of jobs, one job after the other; modules that a scene does not need are not even loaded."""
-        members = dict.fromkeys(self.members())  # those that several basins ask for, once
+        """Functions of jobs, job by job; modules that a model does not need are not loaded."""
+        members = dict.fromkeys(self.members())  # components that several basins need, once
         return [found(member.home, name) for job in jobs for member in members if (name := getattr(member, job))]
 
 
 def found(home: str, name: str):
-    """The function of a name."""
+    """Load a function by package and `module: function`."""
     module, function = name.split(": ")
     return getattr(import_module(f"{home}.{module}"), function)
