@@ -1,8 +1,8 @@
-"""The one fixed record type of each table of a model, and of what its runs write. Knows layouts; knows no laws.
+"""Record types of the tables of a model, and of the arrays that its runs write.
 
-A model's `tables` are these arrays by name, `tables.nodes[i]["mass"]` in Python as in compiled code, which finds beside
-them what the run writes, `tables.armed`. Their types are part of every compiled signature, so they are fixed here once
-and a new scene compiles nothing.
+The `tables` of a model are these arrays by name, `tables.nodes[i]["mass"]` in Python and in compiled code. Compiled
+code also finds the arrays of a run among them, `tables.armed`. Their types are part of every compiled signature, so
+they are fixed here once, and a new model compiles nothing.
 """
 
 import functools
@@ -10,10 +10,10 @@ from collections import namedtuple
 
 import numpy as np
 
-# Codes of kinds, as the kernels see them.
-FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: a given pressure, storage, storage, none
-MOVING, VESSEL = 4, 5  # stores whose pressure is there before nodes are closed: of a piston, of a device
-PATCH = 6  # of a basin, which sets its pressure and takes its flow
+# Codes of kinds, for kernels.
+FIXED, TANK, CHAMBER, JUNCTION = 0, 1, 2, 3  # node kinds: given pressure, storage, storage, no storage
+MOVING, VESSEL = 4, 5  # storage with pressure known before nodes are solved: chamber of a piston, vessel of a device
+PATCH = 6  # patch of a basin, which sets its pressure and receives its flow
 FRICTION_NONE, FRICTION_FACTOR, FRICTION_ROUGH, FRICTION_HAZEN = 0, 1, 2, 3
 UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
     0,
@@ -21,65 +21,58 @@ UPWIND, LINEAR, MUSCL, WENO5, SHORT = (
     2,
     3,
     4,
-)  # scheme families; LINEAR ones are six weights, SHORT upwind3
-MINMOD, VAN_LEER, MONOTONIZED_CENTRAL, FLAT = 0, 1, 2, 3  # FLAT: no slope, of scalars that are linearised
+)  # scheme families; LINEAR: six weights, SHORT: upwind3
+MINMOD, VAN_LEER, MONOTONIZED_CENTRAL, FLAT = 0, 1, 2, 3  # FLAT: no slope, for scalars in linearisation
 ALONE, SINGLE, CLUSTER = 0, 1, 2  # how a node without storage is solved
 LAW_LINEAR, LAW_LOG, LAW_TABLE, LAW_MIXTURE = 0, 1, 2, 3
 
-# Status codes that travel up; the message is made in Python.
+# Status codes, returned to Python, which makes the message.
 OK, NO_SOLUTION, NOT_CONVERGED, NOT_FINITE, NO_VOLUME, NO_ROOM, NO_WEIGHT = 0, 1, 2, 3, 4, 5, 6
-AMENDED = 7  # no fault: what notes an accepted state has put it right, and it is to be looked at again
-ARRIVED = 8  # no fault: what notes an accepted state is to let jumps arrive that end the step
+AMENDED = 7  # no fault: a record function has corrected the accepted state; evaluate it again
+ARRIVED = 8  # no fault: record functions must let the jumps arrive that end the step
 
 SETTINGS = np.dtype(
     [
         ("scheme", "i8"),
         ("limiter", "i8"),
-        ("degree", "i8"),  # of the polynomials next to an end
-        ("w0", "f8"),  # weights of cells i-3 .. i+2 in the value at face i, for waves that run forward
+        ("degree", "i8"),  # degree of the polynomials next to an end
+        ("w0", "f8"),  # weights of cells i-3 .. i+2 in the value at face i, for forward waves
         ("w1", "f8"),
         ("w2", "f8"),
         ("w3", "f8"),
         ("w4", "f8"),
         ("w5", "f8"),
-        (
-            "inside",
-            "f8",
-            (6,),
-        ),  # linear schemes: weights of cells i-3 .. i+2 in the difference F[i] - F[i+1], and
-        (
-            "enter",
-            "f8",
-            (3, 6),
-        ),  # of the datum and five cells in the three cells next to where a wave enters,
-        ("leave", "f8", (2, 5)),  # of five cells in the two next to where it leaves; nearest first
+        # Linear schemes: weights in the difference F[i] - F[i+1], nearest cell first.
+        ("inside", "f8", (6,)),  # of cells i-3 .. i+2
+        ("enter", "f8", (3, 6)),  # of the datum and five cells, for the three cells at the end where the wave enters
+        ("leave", "f8", (2, 5)),  # of five cells, for the two cells at the end where it leaves
         ("rho", "f8"),  # reference density [kg/m3]
         ("viscosity", "f8"),  # dynamic [Pa s]
         ("ambient", "f8"),  # ambient pressure [Pa]
         ("gravity", "f8"),
-        ("datum", "f8"),  # elevation from which energy studies count heights [m]
+        ("datum", "f8"),  # elevation of zero height in energy studies [m]
         ("vapor", "f8"),  # vapour pressure [Pa]
-        ("rate", "f8"),  # greatest wave rate that does not change, speed / dx [1/s]
+        ("rate", "f8"),  # greatest constant wave rate, speed / dx [1/s]
         ("stop_below", "i8"),  # 1: a pressure below vapour pressure ends the run
         ("law", "i8"),
         ("beta", "f8"),  # bulk modulus of the fluid [Pa]
-        ("reference", "f8"),  # pressure at which rho holds [Pa]
+        ("reference", "f8"),  # pressure at which the density is rho [Pa]
         ("table", "i8"),  # offset of the density table in `floats`, its length and pressure step
         ("table_size", "i8"),
         ("table_start", "f8"),
         ("table_step", "f8"),
-        ("floor", "f8"),  # mixture: what the pressure of the gas adds to, vapour pressure or 0 [Pa]
-        ("gas", "f8"),  # its volume over the liquid's, times pressure to the power below [Pa^gas_power]
+        ("floor", "f8"),  # mixture: pressure below that of the gas, vapour pressure or 0 [Pa]
+        ("gas", "f8"),  # gas volume over liquid volume, times pressure to the power gas_power [Pa^gas_power]
         ("gas_power", "f8"),  # 1 / (gas exponent)
-        ("weights", "i8"),  # offset in `floats` of the method's b, its c follow, and how many these are
+        ("weights", "i8"),  # offset in `floats` of the weights b of the method, followed by its c; number of stages
         ("stages", "i8"),
-        ("jumps", "f8"),  # share of the greatest wave from which on a jump in a delay line is kept as one
-        ("saturation", "f8"),  # gas pressure at which all of it is dissolved; infinite for none [Pa]
+        ("jumps", "f8"),  # least jump in a delay line that is stored as a jump, as fraction of the greatest wave
+        ("saturation", "f8"),  # gas pressure at which all gas is dissolved; infinite for no dissolution [Pa]
     ],
     align=True,
 )
 
-PIPE = np.dtype(  # what delay lines read comes first, in as few cache lines as it takes
+PIPE = np.dtype(  # columns read by delay lines come first, in as few cache lines as possible
     [
         ("y", "i8"),  # offset of the forward wave in y; the backward wave follows it
         ("cell", "i8"),  # offset of its cells in per-cell arrays
@@ -87,61 +80,58 @@ PIPE = np.dtype(  # what delay lines read comes first, in as few cache lines as 
         ("to_node", "i8"),
         ("admittance", "f8"),  # area / speed [kg/s per Pa]
         ("flow", "f8"),  # mass flow of the profile [kg/s]
-        ("drag", "f8"),  # what holds the profile's pressure gradient, its friction where that is steady [kg/s2]
+        ("drag", "f8"),  # balances the pressure gradient of the profile; its friction if steady [kg/s2]
         ("friction", "i8"),
         ("loss", "f8"),  # dM/dt = -loss |M| M, the part with a fixed factor [1/kg]
         ("rough", "f8"),  # dM/dt = -rough f(Re) |M| M  [1/kg]
         ("cells", "i8"),
         ("dx", "f8"),
         ("speed", "f8"),  # wave speed [m/s]
-        ("quicker", "f8"),  # factor on speed / dx that the ends of a short pipe ask for
+        ("quicker", "f8"),  # factor on speed / dx for the ends of a short pipe
         ("area", "f8"),
         ("diameter", "f8"),
         ("roughness", "f8"),  # relative roughness
         ("reynolds", "f8"),  # Reynolds number per mass flow [s/kg]
-        ("noise", "f8"),  # a flow too small to mean anything, squared [kg2/s2]
+        ("noise", "f8"),  # square of a negligible flow [kg2/s2]
         ("compliance", "f8"),  # of the wall, d ln(area) / dp [1/Pa]
-        ("slope", "f8"),  # rise per length, 0 of one with a profile
-        ("rise", "i8"),  # offset in `profile` of its rise from its `from` end at faces and centres [m]; -1: straight
-        ("terms", "i8"),  # exponentials of its unsteady friction; 0 for none
-        ("term", "i8"),  # offset in `floats` of pairs: drag per flow that is yet to follow [1/s], rate of following
-        ("memory", "i8"),  # offset in y of the flows that follow, a row of cells for each term [kg/s]
-        ("elements", "i8"),  # Kelvin-Voigt elements of its wall; 0 for none
+        ("slope", "f8"),  # rise per length, 0 for a pipe with an elevation profile
+        ("rise", "i8"),  # offset in `profile` of rises above its `from` end at faces and centres [m]; -1: straight
+        ("terms", "i8"),  # number of exponentials of unsteady friction; 0 for none
+        ("term", "i8"),  # offset in `floats` of pairs: drag per lag of the flow [1/s], rate of the lag [1/s]
+        ("memory", "i8"),  # offset in y of the lagged flows, a row of cells for each term [kg/s]
+        ("elements", "i8"),  # number of Kelvin-Voigt elements of the wall; 0 for none
+        ("element", "i8"),  # offset in `floats` of pairs: loss of both waves per lag of w [1/s], rate of the lag [1/s]
         (
-            "element",
+            "strain",
             "i8",
-        ),  # offset in `floats` of pairs: what both waves lose per w yet to follow, rate [1/s]
-        ("strain", "i8"),  # offset in y of what follows w, the sum of both waves, a row of cells an element [kg/s]
-        (
-            "face",
-            "i8",
-        ),  # offsets in `profile`: mass per length at faces, momentum flux there, mass at centres
-        ("flux", "i8"),
-        ("center", "i8"),  # the last with scalars under the linear law too
-        ("from_base", "f8"),  # laws log and table: flow into the node that the profile computes to
+        ),  # offset in y of the lagged w, w the sum of both waves; a row of cells for each element [kg/s]
+        ("face", "i8"),  # offset in `profile` of mass per length at faces
+        ("flux", "i8"),  # offset in `profile` of momentum flux at faces
+        ("center", "i8"),  # offset in `profile` of mass per length at centres; with scalars under the linear law too
+        ("from_base", "f8"),  # laws log and table: flow into the node, computed for the profile [kg/s]
         ("to_base", "f8"),
-        ("from_mass", "f8"),  # and the mass per length at the end that it computes to [kg/m]
+        ("from_mass", "f8"),  # mass per length at the end, computed for the profile [kg/m]
         ("to_mass", "f8"),
-        ("ride", "i8"),  # of its first cell in `rides`; -1 where it stands still
-        ("delay", "i8"),  # of `delays`, where it has no cells; else -1
+        ("ride", "i8"),  # row of its first cell in `moving_segments`; -1 for a fixed pipe
+        ("delay", "i8"),  # row of `delays` for a delay line, which has no cells; else -1
     ],
     align=True,
 )
 
-DELAY = np.dtype(  # a pipe as a delay line: stretches of equal travel time, friction in the middle of each
+DELAY = np.dtype(  # delay line: stretches of equal travel time, friction in the middle of each
     [
         ("pipe", "i8"),
-        ("stretch", "i8"),  # its first
+        ("stretch", "i8"),  # first stretch
         ("stretches", "i8"),
         ("tau", "f8"),  # travel time of a stretch [s]
-        ("hold", "f8"),  # what is read was sent so long ago: tau, or of a shorter one the longest step [s]
-        ("now", "f8"),  # share of a shorter one that arrives at once, 1 - tau / hold; 0 of others
-        ("ring", "i8"),  # entries of its past before its own, and how many of each stretch, see `kernels.delay.history`
-        ("room", "i8"),
-        ("passes", "f8"),  # share of a small change of flow that friction in the middle of a stretch lets pass
-        ("places", "i8"),  # at which fields and envelopes are told
-        ("couple", "f8"),  # of a shorter one, flow between its ends per pressure [kg/s per Pa]
-        ("acts", "i8"),  # ends whose nodes act at once: 1 `from`, 2 `to`, 3 both
+        ("hold", "f8"),  # age of the waves that are read: tau, or the longest step for a shorter stretch [s]
+        ("now", "f8"),  # fraction that arrives instantly in a shorter stretch, 1 - tau / hold; else 0
+        ("ring", "i8"),  # number of entries of `past` before its own, see `kernels.delay_lines.history`
+        ("room", "i8"),  # number of entries of each stretch
+        ("passes", "f8"),  # fraction of a small change of flow transmitted by the friction in the middle of a stretch
+        ("places", "i8"),  # number of places of fields and envelopes
+        ("couple", "f8"),  # instantaneous flow between the ends of a shorter stretch per pressure [kg/s per Pa]
+        ("acts", "i8"),  # ends whose nodes respond instantly: 1 `from`, 2 `to`, 3 both
     ],
     align=True,
 )
@@ -155,27 +145,24 @@ NODE = np.dtype(
         ("pressure", "f8"),  # of the profile [Pa]
         ("elevation", "f8"),
         ("demand", "f8"),  # of the profile [kg/s]
-        ("inflow", "f8"),  # sum of the profile's link flows into it less demand, snapped to zero [kg/s]
-        ("admittance", "f8"),  # sum over its pipe ends [kg/s per Pa]
+        ("inflow", "f8"),  # link flows of the profile into it minus demand, rounding set to zero [kg/s]
+        ("admittance", "f8"),  # sum of area / speed of its pipe ends [kg/s per Pa]
         ("stiffness", "f8"),  # chamber and prism: pressure per stored mass [Pa/kg]
         ("area", "f8"),  # tank [m2]
-        ("level", "f8"),  # tank, of the profile [m]
-        ("mass", "f8"),  # stored in the profile [kg]
+        ("level", "f8"),  # level of a tank in the profile [m]
+        ("mass", "f8"),  # mass stored in the profile [kg]
         ("full", "f8"),  # stored mass above which a tank spills [kg]
-        (
-            "shape",
-            "i8",
-        ),  # offset of a shaped tank's table in `floats` (levels, areas, volumes); -1 for a prism
-        ("shapes", "i8"),  # rows of that table
-        ("volume", "f8"),  # chamber [m3]; of a moving one, at the start
-        ("row", "i8"),  # row in its cluster; of a tank or moving chamber, its number
-        ("gates", "i8"),  # where rigid columns and valves alone meet: offset of the valves in `integers`, else -1
+        ("shape", "i8"),  # offset of a tank's table in `floats` (levels, areas, volumes); -1 for a prism
+        ("shapes", "i8"),  # number of rows of that table
+        ("volume", "f8"),  # volume of a chamber [m3]; of a moving chamber at the start
+        ("row", "i8"),  # row in its cluster; number of a tank or moving chamber
+        ("gates", "i8"),  # at a node of rigid columns and valves only: offset of the valves in `integers`, else -1
         ("gate_count", "i8"),
-        ("columns", "i8"),  # how many columns these are
-        ("head_given", "i8"),  # laws log and table: the schedule is a head [m]
-        ("density", "f8"),  # of what a tank holds [kg/m3]
-        ("ride", "i8"),  # in `rides`; -1 where it stands still
-        ("lines", "i8"),  # offset in `integers` of ends of delay lines that touch it, twice the line plus side
+        ("columns", "i8"),  # number of these columns
+        ("head_given", "i8"),  # laws log and table: 1 if the schedule is a head [m]
+        ("density", "f8"),  # density in a tank [kg/m3]
+        ("ride", "i8"),  # row of `moving_segments`; -1 for a fixed node
+        ("lines", "i8"),  # offset in `integers` of the ends of delay lines at it, 2 line + side
         ("line_count", "i8"),
     ],
     align=True,
@@ -191,15 +178,15 @@ VALVE = np.dtype(
         ("table_size", "i8"),
         ("solve", "i8"),  # SINGLE, CLUSTER, or ALONE between two stored or given pressures
         ("conductance", "f8"),  # 2 rho (Cd A)^2 at full opening: M |M| = conductance * dp
-        ("transition", "f8"),  # flow below which the law is laminar [kg/s]; 0 where pipes soften the root
-        ("unseen", "f8"),  # drop below which it is so at any opening [Pa]: error control sees none as small
-        ("hooks", "i8"),  # row of `hooks`: the functions of its own law; -1 for the root
-        ("device", "i8"),  # which device sets its conductance; -1: its schedule does
-        ("data", "i8"),  # offset of a law's own numbers in `floats`
-        ("event", "i8"),  # place of its own flags in `armed`, of a law with bends
-        ("back", "f8"),  # of a root: share of the conductance that holds for flow from `to` to `from`
-        ("drive", "f8"),  # of a pump: relative speed of the profile
-        ("open", "f8"),  # conductance of the profile; 0 where its flow does not obey it
+        ("transition", "f8"),  # flow below which the law is laminar [kg/s]; 0 if pipes bound the slope of the root
+        ("unseen", "f8"),  # drop below which the law is laminar at any opening [Pa]: too small for error control
+        ("hooks", "i8"),  # row of `hooks`, the functions of its own law; -1 for the square-root law
+        ("device", "i8"),  # device that sets its conductance; -1: its schedule sets it
+        ("data", "i8"),  # offset of the numbers of its law in `floats`
+        ("event", "i8"),  # offset of its flags in `armed`, for a law with kinks
+        ("back", "f8"),  # square-root law: fraction of the conductance for flow from `to` to `from`
+        ("drive", "f8"),  # relative speed of a pump in the profile
+        ("open", "f8"),  # conductance of the profile; 0 if the flow does not obey its law
         ("flow", "f8"),  # of the profile [kg/s]
         ("drop", "f8"),  # of the profile [Pa]
     ],
@@ -220,36 +207,36 @@ COLUMN = np.dtype(
         ("reynolds", "f8"),
         ("flow", "f8"),
         ("drag", "f8"),
-        ("offset", "f8"),  # driving pressure of the profile that friction does not balance [Pa]
+        ("offset", "f8"),  # driving pressure of the profile not balanced by friction [Pa]
         ("base", "f8"),  # laws log and table: driving pressure of the profile [Pa]
-        ("ride", "i8"),  # of its first stretch in `rides`; -1 where it stands still
-        ("rides", "i8"),  # how many these are
+        ("ride", "i8"),  # row of its first stretch in `moving_segments`; -1 for a fixed column
+        ("rides", "i8"),  # number of these stretches
     ],
     align=True,
 )
 
-BODY = np.dtype(  # axes of its own, its origin at its joint
+BODY = np.dtype(  # its axes have their origin at its joint
     [
-        ("parent", "i8"),  # row of the body that it is joined to, a lesser one; -1 for the world
+        ("parent", "i8"),  # row of its parent body, a smaller number; -1 for the world
         ("root", "i8"),  # row of the first body of its tree
         ("joint", "i8"),  # REVOLUTE ...
-        ("y", "i8"),  # offsets of its coordinates and of its velocities, both as deviations; -1 for none
-        ("rate", "i8"),
-        ("freedom", "i8"),  # first of its rows of `freedoms`
-        ("freedoms", "i8"),  # how many it has
-        ("schedule", "i8"),  # of a driven joint, its angle [rad] or travel [m]; -1 for none
-        ("at", "f8", (3,)),  # place of the joint in the parent's axes [m]
-        ("attitude", "f8", (9,)),  # of the joint's axes in the parent's, by rows
-        ("axis", "f8", (3,)),  # in the joint's axes and its own
+        ("y", "i8"),  # offset in y of its coordinates, as deviations; -1 for none
+        ("rate", "i8"),  # offset in y of its velocities, as deviations; -1 for none
+        ("freedom", "i8"),  # its first row of `freedoms`
+        ("freedoms", "i8"),  # number of its degrees of freedom
+        ("schedule", "i8"),  # angle [rad] or travel [m] of a driven joint; -1 for none
+        ("at", "f8", (3,)),  # position of the joint in the axes of the parent [m]
+        ("attitude", "f8", (9,)),  # rotation matrix of the joint axes in the axes of the parent, by rows
+        ("axis", "f8", (3,)),  # axis of the joint, in the joint axes and in its own
         ("mass", "f8"),
-        ("centre", "f8", (3,)),  # of mass [m]
-        ("inertia", "f8", (9,)),  # about it [kg m2]
-        ("damping", "f8"),  # of its joint [N m s] or [N s/m]
-        ("stiffness", "f8"),  # and [N m/rad] or [N/m]
+        ("centre", "f8", (3,)),  # centre of mass [m]
+        ("inertia", "f8", (9,)),  # about the centre of mass [kg m2]
+        ("damping", "f8"),  # damping of its joint [N m s] or [N s/m]
+        ("stiffness", "f8"),  # stiffness of its joint [N m/rad] or [N/m]
         ("start", "f8", (7,)),  # coordinates at the start
         ("speed", "f8", (6,)),  # velocities at the start
-        ("height", "f8"),  # of its centre of mass at the start [m], and
-        ("energy", "f8"),  # its kinetic energy [J]
+        ("height", "f8"),  # height of its centre of mass at the start [m]
+        ("energy", "f8"),  # kinetic energy at the start [J]
     ],
     align=True,
 )
@@ -257,24 +244,26 @@ REVOLUTE, PRISMATIC, BALL, FREE, WELD = 0, 1, 2, 3, 4  # joints
 
 FREEDOM = np.dtype(
     [
-        ("depth", "i8"),  # how many freedoms its own hangs on
+        ("depth", "i8"),  # number of degrees of freedom on which its position depends
         ("path", "i8"),  # offset in `integers` of these, from the root on, and of itself
-        ("row", "i8"),  # offset of its row of the mass matrix, of those on its path
-        ("balance", "f8"),  # force of the start that is rounding [N] or [N m]
+        ("row", "i8"),  # offset of its row of the mass matrix, for those on its path
+        ("balance", "f8"),  # generalised force at the start that is rounding [N] or [N m]
     ],
     align=True,
 )
 
-POINT = np.dtype([("body", "i8"), ("place", "f8", (3,))], align=True)  # body -1: the world; in axes of the body
+POINT = np.dtype(
+    [("body", "i8"), ("place", "f8", (3,))], align=True
+)  # body -1: the world; place in the axes of the body
 
-LINE = np.dtype(  # a push on points of bodies
+LINE = np.dtype(  # line of action of a force element on points of bodies
     [
         ("push", "i8"),
         ("from_point", "i8"),  # -1 for none
         ("to_point", "i8"),
-        ("acts", "i8"),  # ALONG the line between both, TOWARD a direction of the world, ABOUT an axis of `to`
+        ("acts", "i8"),  # ALONG the line between points, TOWARD a direction of the world, ABOUT an axis of `to`
         ("direction", "f8", (3,)),
-        ("length", "f8"),  # at the start [m]
+        ("length", "f8"),  # length at the start [m]
     ],
     align=True,
 )
@@ -284,11 +273,11 @@ PIN = np.dtype(
     [
         ("from_point", "i8"),
         ("to_point", "i8"),
-        ("rows", "i8"),  # in how many directions it holds
-        ("directions", "f8", (9,)),  # in axes of the body of `from`
-        ("pull", "f8"),  # [1/s]
-        ("gap", "f8", (3,)),  # along each at the start [m], and
-        ("force", "f8", (3,)),  # its force there [N]
+        ("rows", "i8"),  # number of constrained directions
+        ("directions", "f8", (9,)),  # in the axes of the body of `from`
+        ("pull", "f8"),  # rate of stabilisation (Baumgarte) [1/s]
+        ("gap", "f8", (3,)),  # gap along each direction at the start [m]
+        ("force", "f8", (3,)),  # constraint force at the start [N]
     ],
     align=True,
 )
@@ -301,36 +290,36 @@ BUSHING = np.dtype(
         ("damping", "f8"),
         ("turn_stiffness", "f8"),
         ("turn_damping", "f8"),
-        ("attitude", "f8", (9,)),  # of the body of `to` in axes of that of `from` at the start
-        ("energy", "f8"),  # stored at the start [J]
+        ("attitude", "f8", (9,)),  # rotation matrix of the body of `to` in the axes of that of `from` at the start
+        ("energy", "f8"),  # energy stored at the start [J]
     ],
     align=True,
 )
 
-RIDE = np.dtype(  # a stretch of a pipe, a column or what a place holds, on a body and in its axes
+RIDE = np.dtype(  # moving stretch of a pipe or column, or content of a node, on a body and in its axes
     [
         ("body", "i8"),
-        ("start", "f8", (3,)),  # where it begins [m]; of a place, that
-        ("end", "f8", (3,)),  # where it ends; of a tank, what is above a bottom is along z
+        ("start", "f8", (3,)),  # its start [m]; position of a node
+        ("end", "f8", (3,)),  # its end [m]; the level of a tank rises along z
         ("swept", "f8", (3,)),  # integral of r x dr along it [m2]
-        ("rest", "f8"),  # what gravity does along it at the start [J/kg]
-        ("heavy", "i8"),  # 1 where that body feels it: forces move it; 2 where someone asks what its joint holds
+        ("rest", "f8"),  # work of gravity along it at the start [J/kg]
+        ("heavy", "i8"),  # load on the body: MOVED_BY_FORCES, JOINT_LOAD_READ, or 0 if neither applies
     ],
     align=True,
 )
 
 MASS = np.dtype(
     [
-        ("y", "i8"),  # offset of its position, velocity follows; both as deviations; -1 for a frame
+        ("y", "i8"),  # offset in y of its position, then velocity, both as deviations; -1 for a frame
         ("lightness", "f8"),  # 1 / mass, 0 for a frame [1/kg]
         ("position", "f8"),  # at the start [m]
         ("velocity", "f8"),  # at the start [m/s]
-        ("force", "f8"),  # sum of all at the start, snapped to zero [N]
+        ("force", "f8"),  # sum of all forces at the start, rounding set to zero [N]
     ],
     align=True,
 )
 
-BRACE = np.dtype(  # springs, dampers and forces: push = force + (schedule - given) - stiffness dx - damping (v - speed)
+BRACE = np.dtype(  # spring, damper or force: push = force + (schedule - given) - stiffness dx - damping (v - speed)
     [
         ("from_mass", "i8"),
         ("to_mass", "i8"),
@@ -340,7 +329,7 @@ BRACE = np.dtype(  # springs, dampers and forces: push = force + (schedule - giv
         ("damping", "f8"),
         ("speed", "f8"),  # v_to - v_from at the start [m/s]
         ("force", "f8"),  # push at the start [N]
-        ("line", "i8"),  # its row of `lines` where it joins points of bodies; -1 on the axis of masses
+        ("line", "i8"),  # row of `lines` if it joins points of bodies; -1 on the axis of masses
     ],
     align=True,
 )
@@ -351,10 +340,10 @@ STOP = np.dtype(
         ("to_mass", "i8"),
         ("stiffness", "f8"),
         ("damping", "f8"),
-        ("below", "f8"),  # room at the start before it pushes forward, infinite for none [m]
-        ("above", "f8"),  # and before it holds back
+        ("below", "f8"),  # free travel at the start before it pushes forward, infinite for none [m]
+        ("above", "f8"),  # free travel at the start before it pushes back [m]
         ("force", "f8"),
-        ("line", "i8"),  # its row of `lines` where it joins points of bodies; -1 on the axis of masses
+        ("line", "i8"),  # row of `lines` if it joins points of bodies; -1 on the axis of masses
     ],
     align=True,
 )
@@ -367,7 +356,7 @@ PISTON = np.dtype(
         ("b", "i8"),
         ("area_a", "f8"),
         ("area_b", "f8"),
-        ("sweep_a", "f8"),  # mass in A per travel at the density of the start, its change is no excess [kg/m]
+        ("sweep_a", "f8"),  # mass in A per travel at the density of the start, not part of the excess [kg/m]
         ("sweep_b", "f8"),  # likewise in B, negative
         ("position", "f8"),  # x at the start [m]
         ("stroke", "f8"),
@@ -376,31 +365,31 @@ PISTON = np.dtype(
         ("damping", "f8"),
         ("speed", "f8"),
         ("force", "f8"),
-        ("line", "i8"),  # its row of `lines` where it joins points of bodies; -1 on the axis of masses
+        ("line", "i8"),  # row of `lines` if it joins points of bodies; -1 on the axis of masses
     ],
     align=True,
 )
 
 DEVICE = np.dtype(
     [
-        ("hooks", "i8"),  # row of `hooks`: the functions of its law
-        ("mode", "i8"),  # what its law knows it as, of several kinds that share one
-        ("y", "i8"),  # offset of its own states; -1 for none
+        ("hooks", "i8"),  # row of `hooks`, the functions of its law
+        ("mode", "i8"),  # kind of device within its law, if several kinds share a law
+        ("y", "i8"),  # offset in y of its states; -1 for none
         ("states", "i8"),
-        ("valve", "i8"),  # the restriction that it opens and shuts; -1 for none
-        ("node", "i8"),  # the vessel whose pressure it computes, or the place that it senses; -1 for none
+        ("valve", "i8"),  # restriction that it opens and closes; -1 for none
+        ("node", "i8"),  # vessel whose pressure it computes, or sensed node; -1 for none
         ("event", "i8"),  # its first event function
         ("data", "i8"),  # offset of its numbers in `floats`
         ("schedule", "i8"),  # -1 for none
-        ("row", "i8"),  # of the vessel that it fills: its number among all whose stiffness changes; -1 for none
-        ("sudden", "i8"),  # 1 where events alone open it
-        ("leads", "i8"),  # flag in `armed` that it leads the rigid column which it alone holds; -1 where it never does
+        ("row", "i8"),  # number of the vessel that it fills, among nodes of variable stiffness; -1 for none
+        ("sudden", "i8"),  # 1 if only events open it
+        ("leads", "i8"),  # offset in `armed` of the flag that it controls its rigid column; -1 if it never does
     ],
     align=True,
 )
 
 SCHEDULE = np.dtype([("first", "i8"), ("pieces", "i8")], align=True)
-# Piece: start, kind (0 polynomial in t - origin, 1 power, 2 wave, 3 what of a wave is above zero), origin, then
+# Piece: start, kind (0 polynomial in t - origin, 1 power, 2 wave, 3 wave cut off below zero), origin, then
 # a, b, c, d or v0, v1, duration, exponent or mean, amplitude, frequency [1/s], phase
 PIECE_COLUMNS = 7
 
@@ -425,66 +414,66 @@ LAYOUT = np.dtype(
         ("ends", "i8"),
         ("valve", "i8"),
         ("column", "i8"),
-        ("led", "i8"),  # of columns, 1 or -1 where valves lead it at its `to` or `from` end
-        ("stiffness", "i8"),  # of moving chambers, pressure per mass [Pa/kg]
-        ("had", "i8"),  # of patches, share of the outflow asked for that there is water for
-        ("swept", "i8"),  # mass flow that the piston and its leak take from moving chambers [kg/s]
+        ("led", "i8"),  # of columns: 1 or -1 if valves control it at its `to` or `from` end, else 0
+        ("stiffness", "i8"),  # of moving chambers: pressure per mass [Pa/kg]
+        ("had", "i8"),  # of patches: fraction of the requested outflow for which there is water
+        ("swept", "i8"),  # mass flow out of moving chambers by piston and leak [kg/s]
         ("net_force", "i8"),  # on masses [N]
-        ("push", "i8"),  # of braces, then of stops, then of pistons [N]
-        ("conductance", "i8"),  # of valves now, 0 where they are shut [kg2/s2/Pa]
-        ("drive", "i8"),  # relative speeds of pumps now, one a valve
-        ("gain", "i8"),  # behind `supply` in the ledger: amounts of each scalar that enter by nodes [kg/s]
-        ("loss", "i8"),  # and, negative, what decays of it
+        ("push", "i8"),  # forces of braces, then of stops, then of pistons [N]
+        ("conductance", "i8"),  # present conductances of valves, 0 if closed [kg2/s2/Pa]
+        ("drive", "i8"),  # present relative speeds of pumps, an entry for each valve
+        ("gain", "i8"),  # after `supply` in the ledger: inflow of each scalar through nodes [kg/s]
+        ("loss", "i8"),  # then the negative decay of each scalar [kg/s]
         ("value", "i8"),  # of each scalar at all nodes
-        ("edge", "i8"),  # values that the water of pipes has at both ends
-        ("carried", "i8"),  # amounts through both ends of pipes, along them [kg/s]
-        ("brought", "i8"),  # amounts that links bring into nodes [kg/s]
-        ("ride", "i8"),  # what drives stretches on bodies since the start [J/kg]
-        ("rates", "i8"),  # in `work`: room for rates where `out` alone is asked for and hangs on them; else -1
-        ("forces", "i8"),  # in `work`: room for the rates that forces on pipes are read off; else -1
-        ("tank", "i8"),  # of basins that ride on bodies, what their mass is along their normal
-        ("wall", "i8"),  # force of the water on walls that move, outward, less that of the profile [N]
-        ("travel", "i8"),  # of pushes, change of length since the start and its rate, of each [m, m/s]
-        ("along", "i8"),  # of lines, from the one point to the other, of length 1
-        ("pin", "i8"),  # forces of pins, three each [N]
-        ("body", "i8"),  # of bodies, as `kernels.mechanism.room` says
+        ("edge", "i8"),  # values of scalars in pipes at both ends
+        ("carried", "i8"),  # flow of scalars along pipes through both ends [kg/s]
+        ("brought", "i8"),  # flow of scalars from links into nodes [kg/s]
+        ("ride", "i8"),  # change of the driving energy of moving stretches since the start [J/kg]
+        ("rates", "i8"),  # in `work`: rates, if `out` depends on them and they are not requested; else -1
+        ("forces", "i8"),  # in `work`: rates from which forces on pipes are computed; else -1
+        ("tank", "i8"),  # inertia of basins on bodies, see `kernels.mechanism.basin_inertia`
+        ("wall", "i8"),  # outward force of the water on moving walls, minus that of the profile [N]
+        ("travel", "i8"),  # of force elements: change of length since the start and its rate [m, m/s]
+        ("along", "i8"),  # unit vectors of lines, between their points
+        ("pin", "i8"),  # forces of pins, three for each [N]
+        ("body", "i8"),  # data of bodies, see `kernels.mechanism.body_layout`
         ("size", "i8"),
     ],
     align=True,
 )
 BODY_OUT = 45  # numbers of each body in `out`
-GN = 14  # place of g_n among the numbers of a frame, see `basins.frames`
-TANK_OUT = 24  # numbers in `out` of what rides on bodies, see `mechanism.tanks`
+GN = 14  # index of g_n among the numbers of a frame, see `basins.frames`
+TANK_OUT = 24  # numbers in `out` of each basin on a body, see `mechanism.basin_inertia`
 RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # first entries of `out`
 OUT_HEAD = 5
-NEVER = -1e300  # in ARRIVES: no jump is on its way to where something acts at once
-FELT, ASKED = 1, 2  # how heavy a stretch is: its body feels it; and someone asks what joints hold
+NEVER = -1e300  # in ARRIVES: no jump travels to a node that responds instantly
+FELT, ASKED = 1, 2  # load of a stretch: forces move its body; or the joint load is an output
 
 PROBE = np.dtype(
     [
         ("kind", "i8"),
         ("index", "i8"),  # of the node, pipe, valve, column, mass, push, piston or basin
-        ("side", "i8"),  # -1 and 1: the pipe's ends; 0: inside; CELL_FIELD: which, as its physics numbers them
-        ("cell", "i8"),  # first of the cells that are read; of a basin, offset of their numbers in `integers`
-        ("count", "i8"),  # how many
+        ("side", "i8"),  # -1 and 1: ends of the pipe; 0: inside; CELL_FIELD: number of the field in its physics
+        ("cell", "i8"),  # first cell that is read; for a basin offset of the cell numbers in `integers`
+        ("count", "i8"),  # number of these cells
         ("weights", "i8"),  # offset of their weights in `floats`
         ("scale", "f8"),
         ("offset", "f8"),
         ("head", "i8"),  # laws log and table: 1 a head, 2 a velocity
         ("mass", "f8"),  # laws log and table: mass per length of the profile there [kg/m]
         ("scalar", "i8"),
-        ("mark", "i8"),  # the pipe that boils where this pressure is below vapour pressure; -1: none
+        ("mark", "i8"),  # pipe to be marked when this pressure is below vapour pressure; -1: none
     ],
     align=True,
 )
 PRESSURE, LEVEL, PIPE_PRESSURE, PIPE_FLOW, VALVE_FLOW, COLUMN_FLOW, SPOOL_FLOW = 0, 1, 2, 3, 4, 5, 6  # probe kinds
 POSITION, VELOCITY, FORCE, PISTON_POSITION, PISTON_VELOCITY, DEVICE_VALUE = 7, 8, 9, 10, 11, 12
 NODE_SCALAR, PIPE_SCALAR = 13, 14
-CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # of basins
-GIVEN_FLOW = 18  # of a patch that a given velocity passes
-WALL_VALUE = 19  # of a wall that moves
-BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # `side` says which, see `mechanism.observe`
-SURFACE_VALUE = 24  # of water in modes
+CELL_FIELD, PATCH_FLOW, CELL_SCALAR = 15, 16, 17  # probes of basins
+GIVEN_FLOW = 18  # of a patch with given velocity
+WALL_VALUE = 19  # of a moving wall
+BODY_VALUE, POINT_VALUE, PIN_VALUE, BUSHING_VALUE = 20, 21, 22, 23  # quantity in `side`, see `mechanism.body_probes`
+SURFACE_VALUE = 24  # of a surface described by modes
 PIPE_FORCE = 25  # on a whole pipe
 
 BASIN = np.dtype(
