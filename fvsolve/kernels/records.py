@@ -479,59 +479,59 @@ PIPE_FORCE = 25  # on a whole pipe
 BASIN = np.dtype(
     [
         ("kind", "i8"),  # code of its physics, see `basins.kinds`
-        ("deep", "i8"),  # 1: its first quantity is a depth over that in `plan`, in which amounts of scalars are spread
-        ("given", "i8"),  # 1: flows through its faces are those of a given velocity, in `plane`; others are in `work`
+        ("deep", "i8"),  # 1: its first quantity is a depth above that in `plan`, which carries scalars
+        ("given", "i8"),  # 1: flows through its faces follow a given velocity, in `plane`; others are in `work`
         ("scheme", "i8"),
         ("limiter", "i8"),  # on rectangles
-        ("wide", "f8"),  # on any mesh: how far values at sides of cells may go beyond those around
-        ("n", "i8"),  # cells
-        ("nx", "i8"),  # of a rectangle's columns and rows; 0 on any other mesh
+        ("wide", "f8"),  # limiter of meshes: how far values at sides of cells may exceed those of neighbours
+        ("n", "i8"),  # number of cells
+        ("nx", "i8"),  # columns and rows of a rectangle; 0 for other meshes
         ("ny", "i8"),
-        ("faces", "i8"),  # of a mesh, the last ones the boundary's
-        ("outer", "i8"),  # how many of them these are
-        ("y", "i8"),  # first state: of one quantity after the other, a row of cells
-        ("spacing", "i8"),  # offsets in `plane`: 1 / widths of columns, then of rows [1/m]
-        ("plan", "i8"),  # what is fixed, rows of cells
-        ("area", "i8"),  # of cells [m2]
-        ("reflect", "i8"),  # what comes back of waves, a value for each face of the boundary
-        ("outer_given", "i8"),  # how many values these are: 0 for walls everywhere
-        ("through", "i8"),  # flows inward through faces of the boundary; -1 where none is open; see `plane.behind`
-        ("unused", "i8"),  # offsets in `work`: rates that only tell what passes it
-        ("mesh", "i8"),  # numbers of a mesh, in `plane` and
-        ("links", "i8"),  # in `integers`
-        ("work", "i8"),  # of `work`
+        ("faces", "i8"),  # number of faces of a mesh, the last ones on the boundary
+        ("outer", "i8"),  # number of faces on the boundary
+        ("y", "i8"),  # first state; quantities follow each other, a row of cells each
+        ("spacing", "i8"),  # offset in `plane` of 1 / widths of columns, then of rows [1/m]
+        ("plan", "i8"),  # offset in `plane` of constant data, rows of cells
+        ("area", "i8"),  # offset in `plane` of areas of cells [m2]
+        ("reflect", "i8"),  # offset in `plane` of reflected fractions of waves, a value for each face of the boundary
+        ("outer_given", "i8"),  # number of these values: 0 if the whole boundary is wall
+        ("through", "i8"),  # offset in `work` of inflows through faces of the boundary; -1 if none is open
+        ("unused", "i8"),  # offset in `work` of rates that are computed only for flows through the boundary
+        ("mesh", "i8"),  # offset in `plane` of numbers of a mesh
+        ("links", "i8"),  # offset in `integers` of numbers of a mesh
+        ("work", "i8"),  # offset of its part of `work`
         ("thickness", "f8"),  # [m]
-        ("speed", "f8"),  # of waves in a liquid at rest [m/s]
+        ("speed", "f8"),  # wave speed in a liquid at rest [m/s]
         ("density", "f8"),  # of a liquid at rest [kg/m3]
-        ("table", "i8"),  # of its waves under law table, in `plane`
-        ("small", "f8"),  # what is too small to mean anything, squared
-        ("carried", "i8"),  # first state of scalars, depth times value, one after the other; -1 for none
-        ("lost", "i8"),  # first of its cells among the losses of a scalar
-        ("flows", "i8"),  # through faces: of columns, then of rows, or of a mesh; -1 where nobody asks
-        ("outside", "i8"),  # in `work`: of each scalar, values beyond the boundary
-        ("toil", "i8"),  # and what scalars are carried in
+        ("table", "i8"),  # offset in `plane` of the table of its waves under law table
+        ("small", "f8"),  # square of a negligible value
+        ("carried", "i8"),  # first state of scalars, depth times value, scalar after scalar; -1 for none
+        ("lost", "i8"),  # offset of its cells among the losses of a scalar
+        ("flows", "i8"),  # offset of flows through faces: of columns, then of rows, or of a mesh; -1 if not needed
+        ("outside", "i8"),  # offset in `work` of values of each scalar beyond the boundary
+        ("toil", "i8"),  # offset in `work` of work arrays for scalars
         ("fastest", "f8"),  # rate of a given velocity [1/s]
-        ("period", "f8"),  # of its turning back [s]; 0 for none
+        ("period", "f8"),  # period of the reversal of a given velocity [s]; 0 for none
         ("friction", "i8"),  # NO_DRAG, MANNING or DARCY
-        ("roughness", "f8"),  # Manning's n, or a factor
-        ("held", "f8"),  # bound of the rate of friction [1/s]; infinity where steps need not follow it
-        ("damped", "i8"),  # 1 where steps are divided by friction, and so need not follow it
-        ("unsplit", "f8"),  # what counts as rate of its cells over that of the kernels
+        ("roughness", "f8"),  # Manning's n, or a friction factor
+        ("held", "f8"),  # bound of the rate of friction [1/s]; infinity if it does not limit steps
+        ("damped", "i8"),  # 1 if rates are divided by 1 + h r of friction, which then does not limit steps
+        ("unsplit", "f8"),  # rate of its cells for the step limit over the rate from the kernels
         ("rest", "f8"),  # p - p_ambient + rho g z of the profile, the same in all cells [Pa]
-        ("wall", "i8"),  # first of its walls that move, and
-        ("walls", "i8"),  # how many these are; with any, its states are contents, see `basins.walls`
-        ("drawn", "i8"),  # offsets in `plane`: areas of cells as drawn; else those of cells now
-        ("stretch", "i8"),  # area of cells over that as drawn; of a grid then of its columns or rows
-        ("lines", "i8"),  # speeds of lines, of a mesh of its corners [m/s]
-        ("thrust", "i8"),  # and in `work`: on faces of the boundary, see `free_surface.grid`
-        ("turn", "i8"),  # 0 where lines along x move, 1 where those along y do
-        ("body", "i8"),  # that it rides on; -1 for none
-        ("heavy", "i8"),  # 1 where that body feels it: forces move it, or someone asks what its joint holds
-        ("frame", "i8"),  # in `plane`: where and how it stands there, and how its axes move; see `basins.frames`
-        ("corners", "i8"),  # of a mesh: how many, and offsets in `plane`:
-        ("places", "i8"),  # of these, then centres of cells, see `moving_meshes`
-        ("sides", "i8"),  # speeds of sides along their normals, by block, side of four and cell [m/s]
-        ("ends", "i8"),  # and in `integers`: corners of sides and cells, see `moving_meshes`
+        ("wall", "i8"),  # first of its moving walls
+        ("walls", "i8"),  # number of its moving walls; with any, its states are contents, see `basins.walls`
+        ("drawn", "i8"),  # offset in `plane` of areas of cells as drawn; `area` is that of present areas
+        ("stretch", "i8"),  # offset in `plane` of present over drawn areas; of a grid for its columns or rows
+        ("lines", "i8"),  # offset in `plane` of speeds of grid lines, or of corners of a mesh [m/s]
+        ("thrust", "i8"),  # offset in `work` of forces on faces of the boundary, see `free_surface.grid`
+        ("turn", "i8"),  # 0 if grid lines move along x, 1 if along y
+        ("body", "i8"),  # body that carries it; -1 for none
+        ("heavy", "i8"),  # 1 if its load acts on that body: forces move the body, or the joint load is an output
+        ("frame", "i8"),  # offset in `plane` of the position and motion of its axes; see `basins.frames`
+        ("corners", "i8"),  # number of corners of a mesh
+        ("places", "i8"),  # offset in `plane` of positions of corners, then of centres of cells, see `moving_meshes`
+        ("sides", "i8"),  # offset in `plane` of normal speeds of sides, by block, side of four and cell [m/s]
+        ("ends", "i8"),  # offset in `integers` of corners of sides and cells, see `moving_meshes`
     ],
     align=True,
 )
@@ -540,19 +540,17 @@ PATCHES = np.dtype(
     [
         ("basin", "i8"),
         ("node", "i8"),
-        ("first", "i8"),  # of its cells in `integers`
-        ("count", "i8"),
-        ("sizes", "i8"),  # in `plane`: area of these [m2] and length of its faces [m], now
-        (
-            "ring",
-            "i8",
-        ),  # of its faces' numbers in `integers`, as the boundary has them; of cells behind these after them
-        ("faces", "i8"),  # how many these are
-        ("normals", "i8"),  # in `plane`: outward normals along x, along y, and length over area of cells, of each; with
-        # walls that move these as drawn besides
-        ("open", "i8"),  # 1 where it is no wall and no link joins: what passes is the boundary's
-        ("moves", "i8"),  # 1 where it is a wall that moves
-        ("values", "i8"),  # of schedules of what comes in, in `integers`, one a scalar; -1: its initial value
+        ("first", "i8"),  # offset of its cells in `integers`
+        ("count", "i8"),  # number of its cells
+        ("sizes", "i8"),  # offset in `plane` of the present area of these [m2] and length of its faces [m]
+        ("ring", "i8"),  # offset in `integers` of its face numbers on the boundary, then of the cells behind the faces
+        ("faces", "i8"),  # number of its faces
+        # Offset in `plane` of outward normals along x, along y, and length over area of cells, for each face; with
+        # moving walls also those as drawn.
+        ("normals", "i8"),
+        ("open", "i8"),  # 1 if it is not a wall and joins no link: its flow is that of the boundary
+        ("moves", "i8"),  # 1 if it is a moving wall
+        ("values", "i8"),  # offset in `integers` of schedules of inflow values, for each scalar; -1: its initial value
     ],
     align=True,
 )
@@ -560,33 +558,41 @@ PATCHES = np.dtype(
 WALL = np.dtype(
     [
         ("basin", "i8"),
-        ("node", "i8"),  # its patch as a place
+        ("node", "i8"),  # node of its patch
         ("y", "i8"),  # offset of its travel since the start [m]
-        ("mass", "i8"),  # that it goes with, or
-        ("body", "i8"),  # whose prismatic joint takes it along, or
-        ("toward", "f8"),  # 1 where that travels as the wall does, -1 where the other way
-        ("schedule", "i8"),  # of its travel; -1 for none
-        ("weights", "i8"),  # in `plane`: how far lines go with it, then by how much cells stretch per travel [1/m]
-        ("faces", "i8"),  # in `integers`: its faces' numbers, as the boundary has them
-        ("count", "i8"),  # how many these are
-        ("lengths", "i8"),  # in `plane`: of these [m]
-        ("outward", "f8"),  # 1 where its travel counts outward, -1 inward
-        ("rest", "f8"),  # force that the profile puts on it [N]
+        ("mass", "i8"),  # mass that moves with it
+        ("body", "i8"),  # or body whose prismatic joint moves it
+        ("toward", "f8"),  # 1 if mass or body travels in the direction of the wall, -1 if in the opposite
+        ("schedule", "i8"),  # or schedule of its travel; -1 for none
+        (
+            "weights",
+            "i8",
+        ),  # offset in `plane` of travel of lines over its travel, then stretch of cells per travel [1/m]
+        ("faces", "i8"),  # offset in `integers` of its face numbers on the boundary
+        ("count", "i8"),  # number of its faces
+        ("lengths", "i8"),  # offset in `plane` of lengths of its faces [m]
+        ("outward", "f8"),  # 1 if its travel is positive outward, -1 inward
+        ("rest", "f8"),  # force of the profile on it [N]
     ],
     align=True,
 )
 
 SCALAR = np.dtype(
     [
-        ("y", "i8"),  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes that store
-        ("places", "i8"),  # offset in `integers`, one a node: where its amount is in y, or the schedule of its value
+        ("y", "i8"),  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
+        (
+            "places",
+            "i8",
+        ),  # offset in `integers`, an entry for each node: offset of its amount in y, or schedule of its value
         ("diffusivity", "f8"),
         ("decay", "f8"),  # [1/s]
-        ("ambient", "f8"),  # what it decays to
-        ("loss", "i8"),  # first of its rows in the ledger of what decays, and how many: none without decay, one, or
-        ("losses", "i8"),  # one a state, where steps are implicit: their Jacobian wants rows that hang on few states
-        ("initial", "f8"),  # what flows in where nothing else is said
-        ("least", "f8"),  # bounds of all values that there can be
+        ("ambient", "f8"),  # value to which it decays
+        ("loss", "i8"),  # first of its rows in the ledger of decay
+        # Number of these rows: 0 without decay, 1, or a row for each state if steps are implicit, because rows of the
+        # Jacobian must depend on few states.
+        ("losses", "i8"),
+        ("initial", "f8"),  # inflow value if no other is given
+        ("least", "f8"),  # bounds of all possible values
         ("greatest", "f8"),
     ],
     align=True,
@@ -595,7 +601,7 @@ SCALAR = np.dtype(
 CLOCK = np.dtype(
     [
         ("limit", "f8"),  # end of the segment: schedules take their left limit from here on [s]
-        ("step", "f8"),  # that is given; 0 where steps follow what they meet [s]
+        ("step", "f8"),  # fixed step; 0 for adaptive steps [s]
     ],
     align=True,
 )
@@ -628,8 +634,8 @@ RECORDS = {
     "walls": WALL,
     "delays": DELAY,
 }
-# Of a model, which nobody writes; of one run, which writes them; behind a handle, with addresses of functions: of
-# pieces, a row a job, and of devices, a row a law.
+# `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
+# functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.
 Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane", "pieces"))
 Written = namedtuple(
     "Written",
@@ -639,13 +645,13 @@ Written = namedtuple(
     ),
 )  # fmt: skip
 Called = namedtuple("Called", (*Tables._fields, *Written._fields, "calls", "hooks"))
-MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are no records float64[:]
-INTEGERS = ("integers", "bands", "joint", "sums", "sharp", "calls", "hooks")  # but int64
+MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are not records are float64[:]
+INTEGERS = ("integers", "bands", "joint", "sums", "sharp", "calls", "hooks")  # these are int64
 
 
 @functools.cache
 def table_types() -> Called:
-    """Numba's types of the tables behind a handle."""
+    """Numba types of the tables behind a handle."""
     from numba import from_dtype, types
 
     def of(name):
