@@ -66,10 +66,11 @@ def face_value(st, a, k, ahead):
 def face_state(st, floats, profile, pipe, i, k, ahead, p, v, dp, dv):
     """(pressure, velocity, True if both are those of the profile) at face i, reconstructed from cell k - 1.
 
-    The profile is added to the deviation, with two exceptions: where this would bring the gas pressure below half of
-    that in the cell, and at an end of the pipe, where a cavity lies at the face and no liquid whose weight or friction
-    could compress it. A face has at most twice the content of a cell with gas, so that no more flows out than there is.
     k : number of the cell in p, v, dp, dv, which start with the cell beyond the end
+
+    The profile is added to the deviation, with two exceptions. The first: this would bring the gas pressure below half
+    of that in the cell. The second: a cavity lies at an end of the pipe, where no liquid has weight or friction to
+    compress it. A face has at most twice the content of a cell with gas, so that no more flows out than there is.
     """
     dp_face, dv_face = face_value(st, dp, k, ahead), face_value(st, dv, k, ahead)
     undisturbed = dp_face == 0.0 and dv_face == 0.0

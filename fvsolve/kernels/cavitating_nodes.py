@@ -32,9 +32,10 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
     """(state of an end, its velocity, slope of the velocity over p_node): h(p) + v^2 / 2 = h(p_node).
 
     v_in, v : velocities towards the node
+    still : True if the node is a vessel at rest
 
-    The pressure of the end is that of the node, and v^2 / 2 is lost, if the flow runs into the node at more than half
-    the speed of sound, or into a vessel at rest (`still`).
+    Where the flow runs into the node at more than half the speed of sound, or into a vessel at rest, the pressure of
+    the end is that of the node: v^2 / 2 is lost.
     """
     floor, target, side = st["floor"], enthalpy(st, floats, p_node), side_at(st, floats, pipe, p_node)
     change, rise = jump(st, floats, pipe, inside, side)

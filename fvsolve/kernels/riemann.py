@@ -71,9 +71,9 @@ def jump(st, floats, pipe, side, to):
         return (to[2] - side[2]) * 0.5 * (1.0 / side[3] + 1.0 / to[3]), area / to[3]
     if to[0] < side[0]:
         return -thinned(st, floats, pipe, to, side), area / to[3]
-    force, expansion = to[2] - side[2], 1.0 / side[1] - 1.0 / to[1]
-    change = sqrt(force * expansion)
-    return change, 0.5 * area * (expansion + force / (to[3] * to[3])) / change
+    force, contraction = to[2] - side[2], 1.0 / side[1] - 1.0 / to[1]
+    change = sqrt(force * contraction)
+    return change, 0.5 * area * (contraction + force / (to[3] * to[3])) / change
 
 
 @njit
