@@ -205,7 +205,8 @@ def agree(t, y, dydt, out, handle):
 def share(sums, spans, handle):
     """Gather the sums of all bands in each band.
 
-    spans : see `steppers.step`; the first `joint[COMMON_SPANS]` of them are the same in all bands, written by band 0
+    spans : see `steppers.step_operations`; the first `joint[COMMON_SPANS]` of them are the same in all bands and are
+    written by band 0
     """
     joint = open_tables(handle).joint
     if joint[TELL] != 0:

@@ -1,8 +1,8 @@
 """Fused step of the upwind scheme and the Euler method under the linear density law.
 
-The loop of `steppers.loop` passes over all cells separately for rates, sums, envelope and the search for NaN. Here a
-block of cells is advanced and compared with the envelope while it lies in the cache. The operations and their order are
-equal, so the results agree to the bit.
+The loop of `steppers.time_loop` passes over all cells separately for rates, sums, envelope and the search for NaN. Here
+a block of cells is advanced and compared with the envelope while it lies in the cache. The operations and their order
+are equal, so the results agree to the bit.
 """
 
 from fvsolve.jit import njit

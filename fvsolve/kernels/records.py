@@ -104,7 +104,7 @@ PIPE = np.dtype(  # columns read by delay lines come first, in as few cache line
         (
             "strain",
             "i8",
-        ),  # offset in y of the lagged w, w the sum of both waves; a row of cells for each element [kg/s]
+        ),  # offset in y of the lagged w, w the sum of both waves, a row of cells for each element [kg/s]
         ("face", "i8"),  # offset in `profile` of mass per length at faces
         ("flux", "i8"),  # offset in `profile` of momentum flux at faces
         ("center", "i8"),  # offset in `profile` of mass per length at centres; with scalars under the linear law too
@@ -126,7 +126,7 @@ DELAY = np.dtype(  # delay line: stretches of equal travel time, friction in the
         ("tau", "f8"),  # travel time of a stretch [s]
         ("hold", "f8"),  # age of the waves that are read: tau, or the longest step for a shorter stretch [s]
         ("now", "f8"),  # fraction that arrives instantly in a shorter stretch, 1 - tau / hold; else 0
-        ("ring", "i8"),  # number of entries of `past` before its own, see `kernels.delay_lines.history`
+        ("ring", "i8"),  # number of entries of `past` before its own, see `kernels.delay_lines.wave_history`
         ("room", "i8"),  # number of entries of each stretch
         ("passes", "f8"),  # fraction of a small change of flow transmitted by the friction in the middle of a stretch
         ("places", "i8"),  # number of places of fields and envelopes
@@ -564,10 +564,7 @@ WALL = np.dtype(
         ("body", "i8"),  # or body whose prismatic joint moves it
         ("toward", "f8"),  # 1 if mass or body travels in the direction of the wall, -1 if in the opposite
         ("schedule", "i8"),  # or schedule of its travel; -1 for none
-        (
-            "weights",
-            "i8",
-        ),  # offset in `plane` of travel of lines over its travel, then stretch of cells per travel [1/m]
+        ("weights", "i8"),  # offset in `plane`: travel of lines over its travel, then stretch of cells per travel [1/m]
         ("faces", "i8"),  # offset in `integers` of its face numbers on the boundary
         ("count", "i8"),  # number of its faces
         ("lengths", "i8"),  # offset in `plane` of lengths of its faces [m]
@@ -580,10 +577,7 @@ WALL = np.dtype(
 SCALAR = np.dtype(
     [
         ("y", "i8"),  # offset in y of its amounts per length [kg/m], pipe by pipe, then of those in nodes with storage
-        (
-            "places",
-            "i8",
-        ),  # offset in `integers`, an entry for each node: offset of its amount in y, or schedule of its value
+        ("places", "i8"),  # offset in `integers`, by node: offset of its amount in y, or schedule of its value
         ("diffusivity", "f8"),
         ("decay", "f8"),  # [1/s]
         ("ambient", "f8"),  # value to which it decays

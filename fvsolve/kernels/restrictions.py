@@ -59,7 +59,7 @@ def root_step(tables, k, g, m, drop, denser):
     target = g * drop
     chord = max(abs(m) + sqrt(abs(target)), LEAST * sqrt(g))
     upstream = valve["from_node"] if target >= 0.0 else valve["to_node"]
-    if inner_row(tables.nodes, upstream) >= 0:  # its density grows with its pressure
+    if inner_row(tables.nodes, upstream) >= 0:  # the upstream density grows with the pressure
         g += abs(target) / tables.settings[0]["beta"]
     return (target - abs(m) * m) / chord, g / chord
 
