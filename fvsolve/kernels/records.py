@@ -101,10 +101,7 @@ PIPE = np.dtype(  # columns read by delay lines come first, in as few cache line
         ("memory", "i8"),  # offset in y of the lagged flows, a row of cells for each term [kg/s]
         ("elements", "i8"),  # number of Kelvin-Voigt elements of the wall; 0 for none
         ("element", "i8"),  # offset in `floats` of pairs: loss of both waves per lag of w [1/s], rate of the lag [1/s]
-        (
-            "strain",
-            "i8",
-        ),  # offset in y of the lagged w, w the sum of both waves, a row of cells for each element [kg/s]
+        ("strain", "i8"),  # offset in y of the lagged w = r + l, a row of cells for each element [kg/s]
         ("face", "i8"),  # offset in `profile` of mass per length at faces
         ("flux", "i8"),  # offset in `profile` of momentum flux at faces
         ("center", "i8"),  # offset in `profile` of mass per length at centres; with scalars under the linear law too
