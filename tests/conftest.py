@@ -1,18 +1,104 @@
-"""What the tests share: pictures stay off screen, and no test leaves anything that the next one meets."""
+"""Fixtures of all tests, the choice between quick tests and all tests, and what every test restores.
+
+`pytest` without paths runs the quick tests: all but those that `tests/durations.json` lists as slow. `pytest --full`
+and `pytest PATH` run every test. `tests/quick.py` writes the list from a recording. Under NUMBA_DISABLE_JIT=1 `pytest`
+runs the small set of quick tests that the file lists as uncompiled.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
+import zlib
+from pathlib import Path
 
+import hypothesis
 import pytest
+from hypothesis_profiles import NEW, fix_constants
+from tally import Tally
 
 from fvsolve.steppers.tableau import METHODS
 
 os.environ.setdefault("MPLBACKEND", "Agg")
-signal.signal(signal.SIGINT, signal.default_int_handler)  # which jobs in the background of a shell do not heed
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: its threads only get in each other's way
+signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore the signal
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: more threads are slower
+LISTS = json.loads((Path(__file__).parent / "durations.json").read_text(encoding="utf-8"))
+UNCOMPILED = (
+    frozenset(LISTS["uncompiled"]) if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") else frozenset()
+)
+TIER, TALLY, UNCOVERED = pytest.StashKey[str](), pytest.StashKey[Tally](), pytest.StashKey[list]()
+SELECTIONS = ("quick", "keyword", "markexpr", "lf", "deselect", "collectonly")  # options that leave out tests
+fix_constants()
+
+
+def pytest_addoption(parser):
+    parser.addoption("--full", action="store_true", help="run all tests, not only the quick tests")
+    parser.addoption("--quick", action="store_true", help="run only the quick tests of the paths given")
+    parser.addoption("--rest", action="store_true", help="run all tests but the quick tests")
+
+
+def pytest_configure(config):
+    worker = getattr(config, "workerinput", None)
+    config.stash[TIER] = worker["tier"] if worker else tier(config)
+    hypothesis.settings.load_profile("quick" if config.stash[TIER] == "quick" else "full")
+    config.stash[TALLY] = Tally()
+    config.stash[UNCOVERED] = []
+
+
+def tier(config) -> str:
+    """Tests to run: "quick", "rest" (all others, and those that draw more inputs than the quick tests) or "full"."""
+    for name in ("quick", "rest", "full"):
+        if config.getoption(name):
+            return name
+    return "quick" if config.args_source is config.ArgsSource.TESTPATHS else "full"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node):
+    node.workerinput["tier"] = node.config.stash[TIER]
+
+
+def pytest_collection_modifyitems(config, items):
+    drawing = {item for item in items if getattr(getattr(item, "function", None), "hypothesis", None)}
+    for item in drawing if not NEW else ():
+        hypothesis.seed(zlib.crc32(item.originalname.encode()))(item.function)
+    quick = {item for item in items if (item.nodeid in UNCOMPILED if UNCOMPILED else item.nodeid not in LISTS["slow"])}
+    chosen = {"quick": quick, "rest": {*items} - quick | drawing, "full": {*items}}[config.stash[TIER]]
+    config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
+    items[:] = [item for item in items if item in chosen]
+
+
+def pytest_sessionstart(session):
+    session.config.stash[TALLY].start()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node, error):
+    node.config.stash[TALLY].add(getattr(node, "workeroutput", {}).get("tally", {}))
+
+
+def pytest_sessionfinish(session, exitstatus):
+    config = session.config
+    if hasattr(config, "workeroutput"):
+        config.workeroutput["tally"] = config.stash[TALLY].plain()
+    elif (
+        config.stash[TIER] == "quick"
+        and not UNCOMPILED
+        and not exitstatus
+        and not any(config.getoption(name, None) for name in SELECTIONS)
+    ):
+        config.stash[UNCOVERED] = config.stash[TALLY].missing()
+        if config.stash[UNCOVERED]:
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if config.stash[UNCOVERED]:
+        terminalreporter.section("not covered by the quick tests", red=True)
+        for line in config.stash[UNCOVERED]:
+            terminalreporter.line(line)
 
 
 @pytest.fixture
@@ -24,24 +110,24 @@ def fvs(monkeypatch, capsys):
         monkeypatch.setattr(sys, "argv", ["fvsolve", *map(str, arguments)])
         with pytest.raises(SystemExit) as left:
             main()
-        said = capsys.readouterr()
-        assert "Traceback" not in said.err + said.out
-        return left.value.code or 0, said.out, said.err
+        printed = capsys.readouterr()
+        assert "Traceback" not in printed.err + printed.out
+        return left.value.code or 0, printed.out, printed.err
 
     return call
 
 
 @pytest.fixture(scope="session")
 def cluster():
-    """Two processes of Dask's."""
+    """Two processes of Dask."""
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as made:
-        yield made
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as local:
+        yield local
 
 
 @pytest.fixture(autouse=True)
 def alone(request):
-    """In any order: a test's methods go with it; folder, environment and its module's tables stay as they were."""
+    """Remove methods that a test adds; fail a test that changes folder, environment or tables of its module."""
     methods, before = dict(METHODS), surroundings(request.module)
     yield
     METHODS.clear()
@@ -50,8 +136,11 @@ def alone(request):
 
 
 def surroundings(module) -> tuple:
-    """What a test may read and a test before it could have written."""
+    """State outside a test that another test may read."""
     tables = {
-        name: repr(one) for name, one in vars(module).items() if isinstance(one, (dict, list, set)) and name[0] != "_"
+        name: repr(value)
+        for name, value in vars(module).items()
+        if isinstance(value, (dict, list, set)) and name[0] != "_"
     }
-    return os.getcwd(), {name: one for name, one in os.environ.items() if name != "PYTEST_CURRENT_TEST"}, tables
+    variables = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
+    return os.getcwd(), variables, tables

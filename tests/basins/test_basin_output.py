@@ -122,7 +122,6 @@ def test_probes_between_centres_are_bilinear_in_what_frames_hold():
             assert found[f"pool.{field}@{x},{y}"] == approx(want[field], rel=1e-12, abs=1e-13), field
 
 
-@pytest.mark.slow
 def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
     """On triangles and quadrilaterals of a file, each in a cell of its own."""
     path = write(tmp_path / "block.msh", *shaken())
@@ -376,7 +375,6 @@ def dam(tmp_path, monkeypatch):
     return "dam"
 
 
-@pytest.mark.slow
 def test_view_draws_contours_and_magnitudes(dam, fvs):
     plain = open(drawn(fvs, dam, "--out", "a.png"), "rb").read()
     lines = open(drawn(fvs, dam, "--contours", "5", "--out", "b.png"), "rb").read()

@@ -57,7 +57,6 @@ def test_errors_of_a_smooth_slosh_fall_at_the_order_of_the_scheme():
     assert found.plain()["rows"][1]["set"]["nodes.pool.cells"] == [80, 40]
 
 
-@pytest.mark.slow
 def test_a_finer_run_judges_as_rows_judge_each_other():
     case = alone(pool((20, 10), SLOSH), 1.2)
     by_rows, finer = order(case, levels=5), order(case, levels=3, against="finer")

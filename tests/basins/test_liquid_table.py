@@ -127,7 +127,6 @@ def of_log(rest: float, rho: float = RHO, c: float = C) -> np.ndarray:
     return Waves(Fluid("x", "table", 300.0, rest, rho, bulk, None, p[0], table, ""), rest).table()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("reflect", [1.0, 0.3, -1.0])
 def test_a_table_of_the_log_law_is_the_log_law(scheme, reflect):
@@ -138,7 +137,6 @@ def test_a_table_of_the_log_law_is_the_log_law(scheme, reflect):
     assert same == approx(rate, rel=1e-7)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scheme", [rec.UPWIND, rec.MUSCL])
 def test_so_it_is_on_triangles(scheme, tmp_path):
     field = test_faces.triangles(tmp_path, 10, 8)
@@ -158,7 +156,6 @@ def test_at_rest_nothing_moves_and_a_mirror_image_has_the_same_bits():
     assert np.array_equal(sign * turned[:, :, ::-1], box.rates(state, table)[0])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", ["grid", "faces", "triangles"])
 def test_a_basin_is_relieved_into_the_network_and_all_of_it_is_booked(path, tmp_path):
     """What leaves is Torricelli's flow at the density and pressure of the patch."""

@@ -164,7 +164,6 @@ def test_files_that_do_not_do_are_refused_with_the_line(tmp_path, text, words):
     assert words in str(refused.value) and "velocity.csv" in str(refused.value)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", ["grid", "faces"])
 def test_steps_follow_a_velocity_that_stands_for_a_moment(path, tmp_path):
     """A bump swirled forth and back comes home the better the more cells, however steps fall about the turn."""

@@ -6,8 +6,9 @@ import tomllib
 from case.test_case_file import SCENE, two_tanks
 from case.test_faults import CHAMBER, TANK
 from case.test_placing import placed
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 from truth import folders
 
 from fvsolve.case import Case, load
@@ -25,9 +26,6 @@ SEEDS += [placed(bends=[1800.0], **DESIGN)] * 3  # more is said there than elsew
 SEEDS += [tomllib.loads(path.read_text(encoding="utf-8")) for path in CASES]
 SEEDS = [{**seed, "fluid": SEEDS[0]["fluid"]} for seed in SEEDS]  # CoolProp is not what is tried here
 
-SETTINGS = settings(
-    max_examples=150, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True, database=None
-)
 WORDS = st.sampled_from(
     """0 bar|-1 barg|3 kg|20 C|1e999 m|5 m|2 m3/h|gate|lake|main|a|valve.flow||.|@
     |gate.pressure@0.5|main.head@0.5
@@ -105,7 +103,7 @@ def case_or_faults(source, set=None):
     return case
 
 
-@SETTINGS
+@examples(150)
 @given(spoiled())
 def test_a_spoiled_dict_is_a_case_or_faults(given_case):
     case = case_or_faults(given_case)
@@ -113,7 +111,7 @@ def test_a_spoiled_dict_is_a_case_or_faults(given_case):
         assert load(tomllib.loads(case.resolved())) == case
 
 
-@SETTINGS
+@examples(150)
 @given(case=spoiled())
 def test_a_spoiled_file_is_a_case_or_faults(tmp_path, case):
     path = tmp_path / "case.toml"
@@ -126,7 +124,7 @@ def test_a_spoiled_file_is_a_case_or_faults(tmp_path, case):
     assert found is None or found.name == "case"
 
 
-@SETTINGS
+@examples(150)
 @given(text=st.text(), cut=st.integers(0, len(SCENE)), drop=st.integers(0, 12))
 def test_a_file_with_noise_is_a_case_or_faults(tmp_path, text, cut, drop):
     path = tmp_path / "case.toml"
@@ -134,7 +132,7 @@ def test_a_file_with_noise_is_a_case_or_faults(tmp_path, text, cut, drop):
     case_or_faults(path)
 
 
-@SETTINGS
+@examples(150)
 @given(data=st.binary(max_size=60))
 def test_a_file_of_bytes_is_faults(tmp_path, data):
     path = tmp_path / "case.toml"
@@ -142,13 +140,13 @@ def test_a_file_of_bytes_is_faults(tmp_path, data):
     assert case_or_faults(path) is None
 
 
-@SETTINGS
+@examples(150)
 @given(seed=st.sampled_from(SEEDS), key=st.lists(KEYS, min_size=1, max_size=4), value=VALUES | st.text())
 def test_any_setting_is_a_case_or_faults(seed, key, value):
     case_or_faults(seed, set={".".join(key): value})
 
 
-@SETTINGS
+@examples(150)
 @given(data=st.binary(max_size=80) | st.text(max_size=80).map(lambda text: f"t,s\n{text}".encode("utf-8", "replace")))
 def test_any_schedule_file_is_a_schedule_or_faults(tmp_path, data):
     (tmp_path / "x.csv").write_bytes(data)
@@ -156,7 +154,7 @@ def test_any_schedule_file_is_a_schedule_or_faults(tmp_path, data):
     case_or_faults(tmp_path / "case.toml", set={"links.valve.opening": {"file": "x.csv"}})
 
 
-@SETTINGS
+@examples(150)
 @given(spoiled())
 def test_every_key_of_a_text_has_its_line(given_case):
     text = write(given_case)

@@ -16,7 +16,6 @@ from fvsolve.studies.outcome import grown
 SPACE = {"upwind": 1, "linear-upwind": 2, "fromm": 2, "central": 2, "upwind3": 3, "upwind5": 5, "muscl": 2, "weno5": 5}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "p"), SPACE.items())
 def test_every_scheme_shows_its_order_against_the_exact_solution(scheme, p):
     cells = {1: 160, 5: 40}.get(p, 80)

@@ -20,7 +20,6 @@ def warm(*words: str, **environment: str):
     return subprocess.run(command, env=os.environ | environment, capture_output=True, text=True)
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(not jit.COMPILING, reason="JIT is off")
 def test_what_has_been_warmed_is_compiled_no_more():
     """What another test compiles meanwhile lies in the same folder: one time in three at least there is nothing."""

@@ -97,7 +97,6 @@ def differences(path, hour, where, shortest=0.0):
     return lost, off, made
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name, hour", NETWORKS, ids=[f"{name}-{hour}" for name, hour in NETWORKS])
 def test_steady_heads_and_flows_are_epanets(name, hour, tmp_path):
     lost, off, _ = differences(SHIPPED / f"{name}.inp", hour, tmp_path)

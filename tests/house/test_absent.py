@@ -88,7 +88,6 @@ def test_other_laws_compile_no_more_for_two_tanks(law, compiling):
     assert files(fvsolve.build(fvsolve.load(case))) & ALL == set()
 
 
-@pytest.mark.slow
 def test_each_room_is_compiled_where_it_is_used(compiling):
     assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"leap"}
     found = files(fvsolve.build(fvsolve.load(tanks(method="implicit-euler", step=0.1))))
@@ -106,7 +105,6 @@ def test_each_room_is_compiled_where_it_is_used(compiling):
     assert files(arm) & BODIES == BODIES - {"pins", "bushings"} and not files(arm) & PIPES
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_a_scene_without_pipes_has_the_rates_that_it_has_beside_a_pipe(law):
     """Two tanks alone, and with a pipe at rest between two equal reservoirs of another part of the scene."""
@@ -148,7 +146,6 @@ def pool(physics: str, links: bool, law: str = "linear", **numerics) -> dict:
     return case if physics == "liquid" else case | {"scalars": {"dye": {}}}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("physics", "law"), [("transport", "linear"), ("free-surface", "linear"), ("liquid", "log")])
 def test_a_basin_alone_has_the_rates_that_it_has_beside_a_link(physics, law):
     alone, both = (fvsolve.build(fvsolve.load(pool(physics, links, law))) for links in (False, True))
@@ -166,7 +163,6 @@ def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
     assert weno5 & (network | fifth) == fifth | {"limiters"}
 
 
-@pytest.mark.slow
 def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():
     loop = Loop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
     loop.begin(10.0, 1e308)

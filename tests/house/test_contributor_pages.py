@@ -53,7 +53,6 @@ def test_the_tests_that_the_pages_run_are_there(command):
     assert all((TOP / file).exists() for file in files)
 
 
-@pytest.mark.slow
 def test_two_tanks_without_jit_are_the_same_bytes(beside):
     """As the page says of debugging."""
     written = []

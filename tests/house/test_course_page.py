@@ -23,11 +23,6 @@ STATEMENTS = {  # without a number, in sections 2 to 5: words that a heading has
     "L-stability", "Padé",
 }  # fmt: skip
 NOT_YET = "not modelled yet"
-SLOW = {  # what they run, or compile: bodies, basins, studies
-    "(6) The global error", "(13) Stability of a step", "Rotational ports", "(63) Acceleration of a point",
-    "(65) (66) The shares of an acceleration", "(68) Equations of motion of a rigid body",
-    "(69) (70) Energy in place of forces", "(71) A volume that moves as it likes", "(76) A volume that stands",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -64,12 +59,9 @@ ENTRIES = entries()
 
 
 def of(*keys: str) -> list:
-    """Entries that have a field, or Python, slow ones marked."""
+    """Entries that have one of these fields, or Python."""
     some = [one for one in ENTRIES if any(key in one.fields or (key == "python" and one.python) for key in keys)]
-    return [
-        pytest.param(one, id=one.title, marks=[pytest.mark.slow] if one.title in SLOW and "where" not in keys else [])
-        for one in some
-    ]
+    return [pytest.param(one, id=one.title) for one in some]
 
 
 def test_every_equation_has_one_entry_in_their_order():

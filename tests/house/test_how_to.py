@@ -24,7 +24,6 @@ def test_every_page_is_in_the_index():
     assert linked == {path.stem for path in PAGES} and len(PAGES) == 6
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
 def test_a_page_does_what_it_says(page, fvs, tmp_path, monkeypatch):
     """A block with the name of a file goes to its end, commands run in order, and the next block without a language is

@@ -268,7 +268,6 @@ def test_a_study_says_what_is_wrong_with_what_it_is_given():
             studies.sweep_positive_real(bad, 0.0, 1.0)
 
 
-@pytest.mark.slow
 def test_every_door_says_what_it_wants(model, tmp_path, monkeypatch):
     """Anything at every argument of every door is taken, or refused by a text of ours."""
     monkeypatch.chdir(tmp_path)

@@ -49,7 +49,6 @@ def test_rates_of_one_town_do_not_hang_on_another_by_one_bit(law):
         assert np.array_equal(both.rhs(0.0, y)[at], alone.rhs(0.0, y[at]))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("law", FLUIDS)
 def test_more_pumps_than_places_all_pump(law):
     """H(q) = 4/3 H_r s^2 - 1/3 H_r (q / q_r)^2 between two lakes, at full and at 0.6 of the speed."""

@@ -262,7 +262,6 @@ def test_without_an_event_nothing_moves_by_one_bit():
     assert not np.any(model.rhs(0.0, np.zeros(model.y_size)))
 
 
-@pytest.mark.slow
 def test_the_numbers_dissipate_while_a_cavity_opens_and_closes():
     found = energy(CASE, {"links.main.cells": 40})
     assert found.verdict == "the numbers dissipate"

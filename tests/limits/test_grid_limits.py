@@ -9,8 +9,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 from truth import folders
 
 from fvsolve.cli import main
@@ -82,7 +83,6 @@ def test_every_answer_is_proved():
     assert all(one.proved for one in found)
 
 
-@pytest.mark.slow
 def test_some_limits_are_set_by_the_longest_waves_and_no_short_run_shows_them():
     found = {(one.scheme, one.method): one for one in advection_limits(None, DISTINCT)}
     longest = {pair for pair, one in found.items() if one.wave == "longest"}
@@ -203,7 +203,7 @@ numbers = st.integers(-12, 12).map(lambda n: Fraction(n, 12))
 METHODS_FOR_ANY = ["euler", "ssp-rk2", "rk4", "dormand-prince", "implicit-euler", "radau-iia-3", "lobatto-iiic-2"]
 
 
-@settings(max_examples=40, deadline=None, derandomize=True, phases=[Phase.generate])
+@examples(40, phases=[Phase.generate])
 @given(st.tuples(numbers, numbers, numbers, numbers), st.sampled_from(METHODS_FOR_ANY))
 def test_ranges_of_any_weights_are_those_that_sampling_shows(four, method):
     weights = (*four[:2], 1 - sum(four), *four[2:])
@@ -229,7 +229,7 @@ def test_a_square_that_touches_zero_at_a_corner_is_not_negative():
     assert negative_point([[0, 1], [1, 0]], Fraction(0), Fraction(3)) is None  # x + y
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.lists(st.lists(st.integers(-5, 5), min_size=4, max_size=4), min_size=3, max_size=4), st.integers(0, 40))
 def test_a_point_that_is_found_is_negative_and_where_none_is_there_is_none(g, lift):
     g = [list(row) for row in g]

@@ -64,7 +64,6 @@ def test_the_limit_of_a_damped_swing_is_that_of_its_eigenvalues(method):
             assert before[0].limit == pytest.approx(limit, rel=2e-2) and before[0].place.startswith("load.")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("given, rate", [({"decay": 400.0}, 400.0), ({"diffusivity": 1e4}, 4e4 / 100.0)])
 def test_what_a_pipe_carries_has_the_limit_of_the_real_axis(given, rate):
     """rk4 holds to h s = -2.7853: 6.963 ms, where decay takes 400 1/s, and the shortest wave of 1e4 m2/s too."""
@@ -105,7 +104,6 @@ def test_friction_that_brakes_quicker_than_waves_cross_a_cell_is_foretold(scheme
         assert result.ok is not grows and grown is grows
 
 
-@pytest.mark.slow
 def test_friction_that_remembers_has_a_limit_of_its_own():
     """Zielke's terms by a step of their own: met to 3 %."""
     nodes, links = {"a": reservoir(step(0.01, 1e6, 2e6)), "b": reservoir(5e5)}, {}
@@ -203,7 +201,6 @@ def test_implicit_steps_that_are_too_long_are_told_though_nothing_grows(parts, v
     assert result.ok is (False not in verdict) and (wrong > 0.1 or result.ok) and (wrong < 0.05 or not result.ok)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", ["trapezoid", "radau-iia-3"])
 def test_a_parabola_is_right_by_two_steps_of_second_order_and_nothing_is_said(method):
     result, wrong = draining(method, 2)
@@ -218,7 +215,6 @@ WASHED = [
 ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method, courant, verdict", WASHED)
 def test_waves_that_implicit_steps_wash_out_are_told(method, courant, verdict):
     """What a demand drew comes to rest at once: pressures there go to and fro by rho a u for ever, every 2 s."""
@@ -261,7 +257,6 @@ def test_chatter_about_a_drop_of_zero_that_is_too_small_to_matter_is_left_in_pea
     assert result["one.level"][-1] == pytest.approx(2.5, abs=1e-5)
 
 
-@pytest.mark.slow
 def test_two_bladders_and_a_column_are_told_by_check_that_euler_never_holds():
     nodes = {
         name: {"type": "accumulator", "volume": volume, "precharge": 4.877e5, "initial_pressure": pressure}
@@ -283,7 +278,6 @@ def test_growth_that_a_run_is_too_short_to_show_is_no_growth():
     assert math.log(mode.grows) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2) and mode.own and mode.followed
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("implicit", [False, True])
 @pytest.mark.parametrize("seeds", [range(0, 12), range(12, 24), range(24, 36)])
 def test_the_verdict_is_that_of_the_truth_in_scenes_at_random(seeds, implicit):

@@ -82,7 +82,6 @@ def test_each_kind_of_key_of_the_shipped_cases_gives_the_model_of_a_fresh_readin
     assert len(done) > 150
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [path.stem for path in sorted(CASES.glob("*.toml")) if path.stem not in LARGE])
 def test_every_key_of_every_shipped_case_gives_the_model_of_a_fresh_reading(name):
     assert compare(name, raw_case(name), set(), every=True) == []

@@ -225,7 +225,6 @@ NINE = [  # Streeter and Wylie 1967: from, to, length [m], diameter [mm], Hazen-
 ]
 
 
-@pytest.mark.slow
 def test_the_nine_pipes_of_streeter_and_wylie_follow_the_characteristics():
     """Every length is a whole number of metres and every wave speed 1200 m/s: one metre is an exact grid."""
     supply, shut = AMBIENT + RHO * GRAVITY * 191.0, 0.5

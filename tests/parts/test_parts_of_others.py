@@ -147,7 +147,6 @@ def test_drawn_from_the_other_end_it_carries_as_much_the_other_way(home):
         assert float(apart) < rounding, (law, method, apart)
 
 
-@pytest.mark.slow
 def test_an_edit_of_its_law_counts_and_a_second_start_compiles_nothing(home):
     def least() -> float:
         told = json.loads(command(home, "run", "mill.toml", "--json", "--force"))

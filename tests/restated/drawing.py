@@ -1,32 +1,11 @@
-"""Scenes drawn by hypothesis: networks, settings, basins. Knows the keys; knows no answer.
-
-FVSOLVE_EXAMPLES=1000 draws that many scenes a claim, for a long run.
-"""
+"""Scenes drawn by hypothesis: networks, settings, basins."""
 
 from __future__ import annotations
 
-import os
+import random
 
-from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from truth.scenes import WATER, chamber, inflow, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
-
-
-def drawn(examples: int):
-    """Settings of a claim: the same few scenes every time, or as many others as are asked for.
-
-    Hypothesis draws numbers that stand in the modules that are loaded, so other code may give other scenes.
-
-    What fails is made small, and printed with a line that reproduces it.
-    """
-    asked = os.environ.get("FVSOLVE_EXAMPLES")
-    return settings(
-        max_examples=int(asked or examples),
-        derandomize=not asked,
-        deadline=None,
-        print_blob=True,
-        suppress_health_check=list(HealthCheck),
-    )
 
 
 def between(low: float, high: float) -> st.SearchStrategy[float]:
@@ -34,6 +13,7 @@ def between(low: float, high: float) -> st.SearchStrategy[float]:
     return st.floats(low, high).map(lambda x: float(f"{x:.4g}"))
 
 
+SEEDS = st.integers(0, 2**32 - 1)
 SCHEMES = ["upwind", "muscl", "upwind5", "weno5", "fromm", "linear-upwind", "upwind3", "central"]
 LIMITERS = ["minmod", "van-leer", "monotonized-central"]
 BY_COURANT = ["ssp-rk3", "rk4", "ssp-rk10-4"]
@@ -66,6 +46,17 @@ def numerics(draw) -> dict:
     if kind == "implicit":
         return given | {"method": draw(st.sampled_from(IMPLICIT)), "courant": draw(between(0.5, 4.0))}
     return given | {"method": draw(st.sampled_from(BY_ERROR)), "rtol": draw(st.sampled_from([1e-4, 1e-6]))}
+
+
+def shuffled(names, seed: int) -> list[str]:
+    """Names in an order that a seed decides."""
+    return random.Random(seed).sample(list(names), len(names))
+
+
+def some_of(names: list[str], seed: int) -> set[str]:
+    """At least one name, chosen by a seed."""
+    order = shuffled(names, seed)
+    return set(order[: 1 + seed % len(order)])
 
 
 def pipes(start: str, end: str) -> st.SearchStrategy[dict]:

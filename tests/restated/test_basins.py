@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 from truth.scenes import WATER, reservoir, scene, step, valve
 
 import fvsolve
-from restated.drawing import between, drawn
+from restated.drawing import between
 from restated.telling import alike, told
 
 LENGTH, WIDTH = 8.0, 4.0  # exact in binary, as the points of probes are
@@ -90,7 +91,7 @@ def basins(draw) -> dict:
 
 
 @pytest.mark.parametrize("mirror", SIDES)
-@drawn(10)
+@examples(10)
 @given(drawing=basins())
 def test_in_a_mirror_or_turned(mirror, drawing):
     """Formulas are evaluated at mirrored points, which rounds: to round-off."""
@@ -116,7 +117,7 @@ def test_in_a_mirror_or_turned(mirror, drawing):
     alike(one, told(basin(mirror, drawing)), within, name, sign)
 
 
-@drawn(10)
+@examples(10)
 @given(drawing=basins(), frames=st.integers(1, 7))
 def test_again_and_with_frames(drawing, frames):
     """The same arithmetic: the same bits, by a model that has run too."""

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 from truth.scenes import GRAVITY, WATER
 
 import fvsolve
 from fvsolve.case.text import write
 from restated import sayings
-from restated.drawing import IMPLICIT, drawn, networks
+from restated.drawing import IMPLICIT, SEEDS, networks, shuffled, some_of
 from restated.telling import IN_PARTS, alike, told
 
 EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
@@ -37,7 +38,7 @@ def near(case: dict) -> float:
     return 10 * case["numerics"].get("rtol", 0.1 * ROUND)
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_run_again(case):
     """The same arithmetic: the same bits, by a model of its own and by one that has run."""
@@ -49,7 +50,7 @@ def test_run_again(case):
         alike(first, told(model))
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_other_rows(case):
     """Rows are read between steps and do not shorten them: common ones agree to the bit, as 1/32 s is exact."""
@@ -63,13 +64,13 @@ def test_other_rows(case):
         assert {t: found[t] for t in wanted} == wanted
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks(), frames=st.integers(1, 9))
 def test_other_frames(case, frames):
     alike(told(case), told(sayings.changed(case, "output", fields=frames)))
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_other_names(case):
     """Names are indices in the order of the file: nothing but they changes, also where they sort otherwise."""
@@ -80,21 +81,20 @@ def test_other_names(case):
     alike(told(case), told(sayings.renamed(case, call)), name=lambda probe: sayings.called(probe, call))
 
 
-@drawn(6)
-@given(case=networks(), data=st.data())
-def test_other_order(case, data):
+@examples(6)
+@given(case=networks(), seed=SEEDS)
+def test_other_order(case, seed):
     """Sums over the links of a place are taken in another order."""
-    nodes = data.draw(st.permutations(list(case["nodes"])))
-    links = data.draw(st.permutations(list(case["links"])))
+    nodes, links = shuffled(case["nodes"], seed), shuffled(case["links"], seed)
     alike(told(case), told(sayings.reordered(case, nodes, links)), near(case))
 
 
-@drawn(6)
-@given(case=networks(), data=st.data())
-def test_links_drawn_from_the_other_end(case, data):
+@examples(6)
+@given(case=networks(), seed=SEEDS)
+def test_links_drawn_from_the_other_end(case, seed):
     """Cells and faces are the same, counted from the other end: fluxes change sign."""
     able = [name for name, link in case["links"].items() if link["type"] in sayings.STRAIGHT]
-    chosen = data.draw(st.sets(st.sampled_from(able), min_size=1))
+    chosen = some_of(able, seed)
 
     def sign(probe, values):
         return -values if ".flow" in probe and probe.split(".")[1] in chosen else values
@@ -105,14 +105,14 @@ def test_links_drawn_from_the_other_end(case, data):
     alike(told(case), told(sayings.swapped(case, chosen)), near(case), name, sign)
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks(), height=st.sampled_from([16.0, 1000.0, -3.7]))
 def test_everything_higher(case, height):
     """Only differences of elevation drive; these are rounded by the height."""
     alike(told(case), told(sayings.raised(case, height)), near(case))
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks(laws=("linear",)))
 def test_without_profiles(case):
     """Under the linear law flows, and pressures at nodes, do not know of them; along pipes the weight below is all."""
@@ -129,7 +129,7 @@ def test_without_profiles(case):
     alike(told(sayings.straight(case)), told(case), near(case), change=change)
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_limits_and_points_that_are_watched_change_nothing(case):
     """What is followed for its extremes alone is read off states, never written into them."""
@@ -142,14 +142,14 @@ def test_limits_and_points_that_are_watched_change_nothing(case):
         assert [one.ok for one in watched.result.verdicts] == [True, True, True]
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_other_units(case):
     """The factors of units round once."""
     alike(told(case), told(sayings.in_other_units(case)), near(case))
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_two_copies_with_a_shut_valve_between(case):
     """Norms over twice as many states and systems of twice the size round otherwise."""
@@ -159,14 +159,14 @@ def test_two_copies_with_a_shut_valve_between(case):
     alike(one, both, near(case), name=lambda probe: sayings.called(probe, lambda part: f"{part}-too"))
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks(), wait=st.sampled_from([64.0, 1000.0]))
 def test_at_a_later_time(case, wait):
     """Times are rounded by their size, and with them lengths of steps and what schedules say."""
     alike(told(case), told(sayings.later(case, wait)), 1e3 * near(case), later=wait)
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks(laws=("linear", "log")))
 def test_a_denser_fluid(case):
     """Twice the density, stiffness, viscosity and pressures: twice the pressures. A factor of two rounds nothing."""
@@ -177,7 +177,7 @@ def test_a_denser_fluid(case):
     alike(told(sayings.denser(case, 1.0)), told(sayings.denser(case, 2.0)), near(case), change=twice)
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_a_demand_is_an_inflow_backwards(case):
     """The same junction by another name."""
@@ -185,7 +185,7 @@ def test_a_demand_is_an_inflow_backwards(case):
     alike(told(case), told(sayings.drawn_backwards(case)))
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_the_resolved_file(case):
     """Every default said, every number printed to its last digit."""
@@ -196,7 +196,7 @@ def test_the_resolved_file(case):
     alike(told(case), told(resolved))
 
 
-@drawn(6)
+@examples(6)
 @given(case=networks())
 def test_a_file_and_settings(case, tmp_path_factory):
     """What the file says otherwise and `set` puts right."""

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 from truth.scenes import junction, lake, pipe, ramp, scene, valve
 
 from fvsolve.parts import KINDS
 from fvsolve.steppers import METHODS
-from restated.drawing import drawn, numerics, probes
+from restated.drawing import numerics, probes
 from restated.parts import LINKS, NODES
 from restated.telling import told
 
@@ -77,7 +78,7 @@ PARTS = [("links", kind) for kind in LINKS] + [("nodes", kind) for kind in NODES
 
 
 @pytest.mark.parametrize("table, kind", PARTS)
-@drawn(4)
+@examples(4)
 @given(data=st.data(), settings=numerics())
 def test_driven_one_way_then_the_other_the_ledger_closes(table, kind, data, settings):
     """The lake above falls below the other one, and rises; what is not refused runs to its end."""
@@ -97,7 +98,7 @@ def test_driven_one_way_then_the_other_the_ledger_closes(table, kind, data, sett
 
 
 @pytest.mark.parametrize("table, kind", PARTS)
-@drawn(4)
+@examples(4)
 @given(data=st.data(), settings=numerics())
 def test_at_rest_it_stays_at_rest(table, kind, data, settings):
     """Equal heads all round, and a part that neither gives nor takes: no flow anywhere, and no pressure moves.

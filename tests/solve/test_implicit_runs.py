@@ -171,7 +171,6 @@ fvsolve.run(sys.argv[1], out=sys.argv[2])
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "numerics",
     [{"method": name, "rtol": 3e-7} for name in ("radau-iia-5", "esdirk-4", "rodas-5p", "auto")],

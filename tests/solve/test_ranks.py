@@ -62,7 +62,7 @@ def drawn(path: Path) -> dict[str, bytes]:
     return {name: np.concatenate(parts).tobytes() for name, parts in found.items()}
 
 
-@pytest.mark.parametrize("many", [2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("many", [2, 3])
 def test_ranks_give_the_bits_of_one_process(tmp_path, many):
     cases = {name: SCENES[name] | {"output": SCENES[name]["output"] | {"fields": 2}} for name in NAMES}
     alone = {name: fvsolve.run(case, out=tmp_path / "one" / name) for name, case in cases.items()}  # compiled once
@@ -101,7 +101,6 @@ def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_
     assert np.array_equal(two["dye"], one["dye"])
 
 
-@pytest.mark.slow
 def test_a_run_of_three_ranks_is_resumed_by_two_and_by_one(tmp_path):
     case = water(end=0.6, step=1e-4)
     whole = fvsolve.run(case, out=tmp_path / "whole")

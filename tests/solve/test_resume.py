@@ -64,7 +64,6 @@ def same_files(one: Path, other: Path) -> None:
             assert (one / name).read_bytes() == (other / name).read_bytes(), name
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     "numerics",
     [{"courant": 0.5}, {"method": "bogacki-shampine", "rtol": 1e-7}],

@@ -104,7 +104,6 @@ def test_newton_finds_every_stage(build, numerics):
     assert result.summary["newton_failures"] == 0
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("build, numerics", SCENES, ids=said)
 def test_parts_listed_the_other_way_round_take_the_same_steps(build, numerics):
     case = build(**numerics)

@@ -14,7 +14,6 @@ from fvsolve.steppers.methods import METHODS
 from fvsolve.steppers.ode import integrate
 
 
-@pytest.mark.slow
 def test_a_function_that_numba_refuses_gives_the_same_steps():
     def python_only(t, y):
         return [{"a": v}["a"] * complex(-1, 0).real for v in y]

@@ -7,8 +7,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 
 from fvsolve.steppers import METHODS, analyse
 from fvsolve.steppers.numbers.polynomial import Polynomial
@@ -203,7 +204,7 @@ def test_json_says_none_for_infinity():
 number = st.fractions(min_value=-1, max_value=2, max_denominator=6)
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(st.lists(number, min_size=4, max_size=4), number)
 def test_decisions_agree_with_samples_for_any_two_stage_method(a, b):
     rows = "\n".join(f"{sum(row)} | {row[0]} {row[1]}" for row in (a[:2], a[2:]))

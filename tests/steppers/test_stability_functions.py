@@ -8,8 +8,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, analyse, global_error, local_error, pade, seen_frequency, stability_function
@@ -140,7 +141,7 @@ def test_an_unknown_name_suggests_the_nearest():
 number = st.fractions(min_value=-2, max_value=2, max_denominator=12)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     st.integers(1, 4).flatmap(
         lambda s: st.lists(st.lists(number, min_size=s, max_size=s), min_size=s + 1, max_size=s + 1)

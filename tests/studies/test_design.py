@@ -82,7 +82,6 @@ def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_p
     assert not (tmp_path / "out" / "report.html").exists()
 
 
-@pytest.mark.slow
 def test_processes_and_errors_change_no_verdict(study, tmp_path) -> None:
     one = design.study(study, tmp_path / "one")
     study.write_text(STUDY.replace("case =", "error = true\ncase ="))
@@ -142,7 +141,6 @@ def test_all_that_is_wrong_of_a_study_comes_at_once_by_line(study) -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.slow
 def test_a_study_without_limits_holds_none(fvs, study, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "main.toml").write_text(write(throttled() | {"limits": {}}))

@@ -64,7 +64,6 @@ def test_rows_of_stability_are_the_same(line):
     assert plain(together) == plain(alone)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("study", "asked"),
     [

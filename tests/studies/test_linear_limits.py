@@ -43,7 +43,6 @@ def ran(monkeypatch, capsys, tmp_path, *arguments):
     return capsys.readouterr().err
 
 
-@pytest.mark.slow
 def test_of_20000_states_the_slowest_poles_and_the_outputs_are_found_soon():
     found = linearise(line(10000, ["end.pressure", "main.flow@0.5"]))
     assert found.c.shape == (2, 20000) and np.count_nonzero(found.c[0]) < 20

@@ -194,7 +194,6 @@ def test_the_quickest_change_is_the_range_over_the_steepest_slope():
     assert change_time(fvsolve.build(fvsolve.load(still))) == math.inf
 
 
-@pytest.mark.slow
 def test_the_command_names_the_cheapest(fvs, tmp_path):
     code, out, _ = fvs("chart", "gradual-closure", "--models", "--target", "0.05", "--json")
     said = json.loads(out)

@@ -61,7 +61,6 @@ def test_reading_at_a_point_does_not_cap_the_order(scheme, p, probe):
     assert slow[0] / slow[-1] > 2.0 ** (3 * (p - 0.3))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("scheme", "p"), [("upwind3", 3), ("upwind5", 5)])
 def test_a_source_is_fed_in_at_the_order_of_the_scheme(scheme, p):
     """In max: the error is largest at the ends; inside it falls by one order more for a while."""
@@ -103,7 +102,6 @@ def test_a_start_alone_is_judged_by_a_finer_run():
     assert found.kind == "finer" and found.fits["pressure"]["L1"].order == approx(3.0, abs=0.2)
 
 
-@pytest.mark.slow
 def test_time_alone_is_judged_on_the_grid_unless_the_exact_solution_is_asked_for():
     grid = order(case(20), methods="ssp-rk3", exact=driven, source=drive, refine="time", levels=4)
     assert grid.kind == "finer" and grid.fits["pressure"]["L2"].order == approx(3.0, abs=0.1)

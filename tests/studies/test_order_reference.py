@@ -80,7 +80,6 @@ def test_where_no_reference_will_do_each_row_is_judged_by_the_next():
     assert all(row.errors["pressure"]["max"] < 1e-4 for row in found.rows[:-1])
 
 
-@pytest.mark.slow
 def test_richardson_finds_the_errors_and_the_order_without_a_reference():
     case = pulses.case(30, points=pulses.FEW)
     exact = order(case, schemes="upwind3", levels=5)
@@ -91,7 +90,6 @@ def test_richardson_finds_the_errors_and_the_order_without_a_reference():
     assert found.rows[-1].errors == {} and found.fits["pressure"]["L1"].marks[-1] == "finest"
 
 
-@pytest.mark.slow
 def test_refining_space_alone_shows_the_error_of_the_step_as_a_floor():
     case = pulses.case(20, courant=0.9)
     found = order(case, schemes="upwind5", methods="euler", refine="space", levels=5)
@@ -188,7 +186,6 @@ def test_richardson_gives_no_number_that_its_differences_cannot_show(cells, leve
         assert "three differences" in found.fits["pressure"]["L1"].reason
 
 
-@pytest.mark.slow
 def test_errors_by_richardson_are_the_true_ones_where_the_order_is_sure():
     case = pulses.case(160, points=pulses.FEW)
     exact, found = (order(case, schemes="upwind", levels=5, against=way) for way in ("exact", "richardson"))

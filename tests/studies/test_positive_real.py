@@ -8,8 +8,9 @@ from fractions import Fraction as F
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 from pytest import approx
 
 from fvsolve.errors import FvsolveError
@@ -287,7 +288,7 @@ def test_half_planes_are_counted_where_rows_of_routh_degenerate(name):
     assert (found.right, found.axis, found.left) == wanted
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(
     st.lists(st.integers(-3, 3), max_size=3),
     st.lists(st.tuples(st.integers(-2, 2), st.integers(1, 4)), max_size=3),
@@ -325,14 +326,14 @@ def network(steps):
     return found
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(st.lists(elements, min_size=1, max_size=7))
 def test_every_ladder_of_passive_elements_is_positive_real(steps):
     found = positive_real(*network(steps))
     assert found, found.reason
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.lists(st.tuples(values, st.fractions(0, 9, max_denominator=9)), min_size=1, max_size=4), values)
 def test_a_lossless_foster_form_less_a_grain_of_resistance_is_not(tanks, inductance):
     found = ([inductance, 0], [1])
@@ -343,7 +344,7 @@ def test_a_lossless_foster_form_less_a_grain_of_resistance_is_not(tanks, inducta
     assert not lower and lower.bands[0].least == approx(-1e-25)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(st.lists(elements, min_size=2, max_size=6), values)
 def test_a_network_less_a_little_more_than_its_least_real_part_is_not(steps, shift):
     n, d = network(steps)
@@ -357,7 +358,7 @@ def test_a_network_less_a_little_more_than_its_least_real_part_is_not(steps, shi
         assert positive_real(*found)
 
 
-@settings(max_examples=120, deadline=None)
+@examples(120)
 @given(
     st.lists(st.integers(-4, 6), min_size=1, max_size=5),
     st.lists(st.tuples(st.integers(1, 5), st.integers(0, 5)), min_size=1, max_size=2),

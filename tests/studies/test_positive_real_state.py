@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis_profiles import examples
 from pytest import approx
 
 from fvsolve.errors import FvsolveError
@@ -109,7 +110,7 @@ def test_hidden_unstable_poles_are_told():
     assert seen.positive_real is False and seen.unstable == (approx(2.0),)
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(
     st.lists(st.integers(-4, 6), min_size=1, max_size=5),
     st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=2, unique=True),
@@ -157,7 +158,7 @@ def test_a_line_on_its_lossless_axis_wants_to_be_taken_right_of_its_poles():
             line_positive_real(LineImpedance(Z0, T, reflection), shift=0.0)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.floats(-1, 1), st.floats(1e-3, 1), st.floats(0, 10), st.floats(1e-3, 3))
 def test_the_bound_of_the_slope_holds_between_any_two_frequencies(g, shift, low, width):
     line = LineImpedance(1.0, 1.0, g)

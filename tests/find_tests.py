@@ -1,0 +1,69 @@
+"""Find the tests that run a module of the package.
+
+    python tests/find_tests.py fvsolve/steady.py              tests, and how many lines of the module each runs
+    python tests/find_tests.py fvsolve/steady.py --line 120   tests that run a line
+    python tests/find_tests.py --record                       record anew: ten minutes on two cores
+
+The recording has two parts, by coverage.py: the quick tests, for Python; and a small set of quick tests without
+compiling, for what is compiled else (`"uncompiled"` in `tests/durations.json`).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+TOP = Path(__file__).parents[1]
+RECORDINGS = {"python": {}, "compiled": {"NUMBA_DISABLE_JIT": "1"}}  # name -> environment of its tests
+
+
+def path_of(name: str) -> Path:
+    return TOP / ".pytest_cache" / f"coverage-{name}"
+
+
+def record() -> None:
+    """Run the tests of both parts with a context for each test."""
+    options = ["-q", "-n", "2", "--dist", "worksteal", "--cov=fvsolve", "--cov-context=test", "--cov-report="]
+    for name, environment in RECORDINGS.items():
+        path_of(name).parent.mkdir(exist_ok=True)
+        environment = os.environ | environment | {"COVERAGE_FILE": str(path_of(name))}
+        subprocess.run([sys.executable, "-m", "pytest", *options], cwd=TOP, env=environment, check=False)
+
+
+def tests_of(module: Path, line: int | None) -> Counter:
+    """Number of lines of a module that each test runs, beyond those of its import."""
+    from coverage import CoverageData
+
+    count: Counter = Counter()
+    for name in RECORDINGS:
+        if path_of(name).exists():
+            data = CoverageData(str(path_of(name)))
+            data.read()
+            for number, contexts in data.contexts_by_lineno(str(module)).items():
+                if line in (None, number):
+                    count.update({context.split("|")[0] for context in contexts} - {""})
+    return count
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("module", nargs="?", help="path of a module")
+    parser.add_argument("--line", type=int, metavar="N", help="number of a line of the module")
+    parser.add_argument("--record", action="store_true", help="run the tests and record")
+    options = parser.parse_args()
+    if options.record:
+        record()
+    if options.module is None:
+        return
+    if not any(path_of(name).exists() for name in RECORDINGS):
+        sys.exit("no recording. Try: python tests/find_tests.py --record")
+    for test, lines in tests_of(Path(options.module).resolve(), options.line).most_common():
+        print(f"{lines:5d}  {test}")
+
+
+if __name__ == "__main__":
+    main()

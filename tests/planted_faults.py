@@ -1,0 +1,187 @@
+"""Plant small faults in the package, and count how many the quick tests and all tests find.
+
+    python tests/planted_faults.py [--full] [--only TEXT] [--jobs 2]
+
+A fault is a sign, an index or a factor of 1.01. Each is planted alone in a copy of the repository. The quick tests of
+the folder run first, then all quick tests; with --full a fault that these miss meets all tests. A fault that stops the
+import of fvsolve would be found by any test, and is an error of this list.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+TOP = Path(__file__).parents[1]
+QUICK_NEEDED, ALL_NEEDED = 36, 40
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Replacement of a text that stands once in a file of the package.
+
+    path : below fvsolve
+    """
+
+    path: str
+    old: str
+    new: str
+
+    def planted(self, text: str) -> str:
+        """Text of the file with the fault; raises ValueError where the old text does not stand once in it."""
+        if text.count(self.old) != 1:
+            raise ValueError(f"fvsolve/{self.path}: {self.old!r} stands {text.count(self.old)} times, expected once")
+        return text.replace(self.old, self.new)
+
+
+FAULTS = [
+    Fault(
+        "steady.py",
+        "result.potential[edge.i] - result.potential[edge.j]",
+        "result.potential[edge.j] - result.potential[edge.i]",
+    ),
+    Fault("limits/ends.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
+    Fault("model/hydraulics.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"),
+    Fault("draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
+    Fault("mesh/measures.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
+    Fault("steppers/ros.py", "1.0 / (later - t) if later > t", "-1.0 / (later - t) if later > t"),
+    Fault("steppers/analysis/trees.py", "return nodes * math.prod(", "return (nodes + 1) * math.prod("),
+    Fault("steppers/numbers/sturm.py", "x - ratio * y for x, y", "x + ratio * y for x, y"),
+    Fault("report/cycles.py", "return self.cycles * (", "return 1.01 * self.cycles * ("),
+    Fault("kernels/pipes.py", "dl[i] = k * (fl[i + 1] - fl[i])", "dl[i] = 1.01 * k * (fl[i + 1] - fl[i])"),
+    Fault("kernels/friction.py", "force = loss * (size * flow)", "force = 1.01 * loss * (size * flow)"),
+    Fault(
+        "kernels/density/log.py",
+        'st["reference"] + q / (1.0 / st["beta"] + compliance)',
+        'st["reference"] + q / (1.0 / st["beta"] - compliance)',
+    ),
+    Fault("kernels/delay/lines.py", "per = 1.0 / (1.0 - beta * beta)", "per = 1.0 / (1.0 + beta * beta)"),
+    Fault("kernels/unsteady/barotropic.py", "reference * (0.5 * u - flow / m0)", "reference * (0.505 * u - flow / m0)"),
+    Fault("kernels/mechanism/room.py", "rz * fx - rx * fz", "rz * fx + rx * fz"),
+    Fault("kernels/creep/energy.py", "return per * taken, per * rate", "return per * taken, 1.01 * per * rate"),
+    Fault("units/__init__.py", "value_si - ambient", "value_si + ambient"),
+    Fault("case/sloshing.py", "return 0.25 * np.pi * a * a if", "return 0.2525 * np.pi * a * a if"),
+    Fault("fluid/oils.py", "(hot - cold)) - 0.7)", "(hot - cold)) - 0.707)"),
+    Fault("studies/peaks.py", "v[at - 1] - 2.0 * v[at] + v[at + 1]", "v[at - 1] + 2.0 * v[at] + v[at + 1]"),
+    Fault(
+        "studies/energy/booking.py",
+        "change[self.supplied].sum() - change[self.rates].sum()",
+        "change[self.supplied].sum() + change[self.rates].sum()",
+    ),
+    Fault(
+        "studies/failure/verdict.py", "turns = change[1:] * change[:-1] < 0.0", "turns = change[1:] * change[:-1] > 0.0"
+    ),
+    Fault(
+        "studies/accuracy/fit.py",
+        "np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])",
+        "np.log(e[:-1] / e[1:]) / np.log(1.01 * h[:-1] / h[1:])",
+    ),
+    Fault("studies/stability/carried.py", "scaled @ found + x * v", "scaled @ found - x * v"),
+    Fault("studies/linear/linearise.py", "(value - one.offset) / one.scale", "(value + one.offset) / one.scale"),
+    Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
+    Fault(
+        "output/lines.py",
+        'self.along("u", fields), self.along("v", fields)',
+        'self.along("u", fields), self.along("u", fields)',
+    ),
+    Fault("cli/models.py", "gain = richest.seconds / cheapest.seconds", "gain = cheapest.seconds / richest.seconds"),
+    Fault("basins/frames_load.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
+    Fault(
+        "basins/liquid/faces.py",
+        "m, pressure = forward - backward, c0 * (forward + backward)\n        mass",
+        "m, pressure = forward - backward, 1.01 * c0 * (forward + backward)\n        mass",
+    ),
+    Fault(
+        "basins/transport/lower_velocity.py",
+        "return speed * size / np.pi * np.sin(x) ** 2",
+        "return 1.01 * speed * size / np.pi * np.sin(x) ** 2",
+    ),
+    Fault("basins/free_surface/patches.py", "dydt[o + i] += flow * weight(", "dydt[o + i] -= flow * weight("),
+    Fault("parts/sizes.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
+    Fault(
+        "parts/accumulator/law.py",
+        "rho * (n * p * soft * (room - volume) + volume)",
+        "rho * (n * p * soft * (room - volume) - volume)",
+    ),
+    Fault("parts/tank/lower.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
+    Fault("parts/pump/law_curve.py", "rest = drop + weight * head", "rest = drop + 1.01 * weight * head"),
+    Fault("run/comparison.py", "compare.t + compare.shift", "compare.t - compare.shift"),
+    Fault("epanet/words.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
+    Fault("solve/summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),
+    Fault("exact/laminar_line.py", "self.length - found if self.reversed", "found if self.reversed"),
+]
+
+
+def copied(folder: Path) -> Path:
+    """Copy of the files that git lists."""
+    names = subprocess.run(
+        ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"],
+        cwd=TOP,
+        capture_output=True,
+        check=True,
+    ).stdout.decode()
+    for name in filter(None, names.split("\0")):
+        if (TOP / name).exists():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(TOP / name, folder / name)
+    return folder
+
+
+def tests_fail(folder: Path, jobs: int, *options: str) -> str:
+    """Name of the first test that fails, empty if all pass."""
+    environment = os.environ | {"PYTHONPATH": str(folder), "MPLBACKEND": "Agg", "PYVISTA_OFF_SCREEN": "true"}
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-n", str(jobs), "--dist", "worksteal", *options]
+    found = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    if found.returncode not in (0, 1, 5):
+        raise RuntimeError(f"pytest ended with {found.returncode}: {found.stdout[-2000:]}{found.stderr[-2000:]}")
+    lines = [line for line in found.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return lines[0].split(" - ")[0] if found.returncode == 1 and lines else ""
+
+
+def near(fault: Fault) -> str:
+    """Folder of tests of the folder of the package in which a fault stands."""
+    folder = TOP / "tests" / fault.path.split("/")[0]
+    return f"tests/{folder.name}" if folder.is_dir() else "tests/schemes"
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("--full", action="store_true", help="run all tests on faults that the quick tests miss")
+    asked.add_argument("--only", default="", metavar="TEXT", help="only faults whose path contains this text")
+    asked.add_argument("--jobs", type=int, default=2, metavar="N", help="number of processes of a test run (default 2)")
+    options = asked.parse_args()
+    quick = every = count = 0
+    with tempfile.TemporaryDirectory(prefix="fvsolve-faults-") as name:
+        folder = copied(Path(name))
+        for fault in FAULTS:
+            if options.only not in fault.path:
+                continue
+            path, start = folder / "fvsolve" / fault.path, time.perf_counter()
+            text = path.read_text(encoding="utf-8")
+            path.write_text(fault.planted(text), encoding="utf-8")
+            first = tests_fail(folder, options.jobs, "--quick", near(fault)) or tests_fail(folder, options.jobs)
+            by = "quick" if first else ""
+            if not first and options.full:
+                first = tests_fail(folder, options.jobs, near(fault)) or tests_fail(folder, options.jobs, "--full")
+                by = "full" if first else ""
+            path.write_text(text, encoding="utf-8")
+            count, quick, every = count + 1, quick + (by == "quick"), every + bool(by)
+            print(
+                f"{by or 'MISSED':6s} {time.perf_counter() - start:5.0f} s  {fault.path}: {fault.new}  {first}",
+                flush=True,
+            )
+    print(f"{count} faults: quick tests find {quick}, expected {QUICK_NEEDED}")
+    if options.full:
+        print(f"all tests find {every}, expected {ALL_NEEDED}")
+    sys.exit(not options.only and (quick < QUICK_NEEDED or (options.full and every < ALL_NEEDED)))
+
+
+if __name__ == "__main__":
+    main()

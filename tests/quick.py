@@ -1,0 +1,179 @@
+"""Choose the quick tests: record what each test costs, and write the others to `tests/durations.json`.
+
+    python tests/quick.py [--seconds 480] [--recording FOLDER]
+
+A test costs its own processor time and its share of compiling: the time to compile a function, divided by the number of
+quick tests that call it. The dearest test goes, again and again, until the rest takes the time that is given. A test
+stays that alone runs a part, scheme, method, density law, command or shipped case.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections import Counter, defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+LIST = Path(__file__).parent / "durations.json"
+FOLDER = "FVSOLVE_RECORDING"  # variable that names the folder in which worker processes record
+
+
+@dataclass
+class Cost:
+    """Cost of a test: its own seconds, functions that it calls, and names that it covers as `kind name`."""
+
+    own: float
+    functions: frozenset[str]
+    names: frozenset[str]
+
+
+class Recorder:
+    """Plugin of pytest that writes a line for each test of a worker process."""
+
+    def __init__(self, path: Path) -> None:
+        self.file = path.open("a", buffering=1, encoding="utf-8")
+        self.called: set[str] = set()
+        self.seconds: dict[str, float] = {}
+        self.nested: list[float] = []
+        self._watch()
+
+    def _watch(self) -> None:
+        from fvsolve import jit
+
+        code, call, compiled = jit.Function.code, jit.Function.__call__, jit.Function._compiled
+
+        def watched_code(function, letters, *more, **options):
+            self.called.add(f"{function.__module__}.{function.__qualname__}({letters})")
+            return code(function, letters, *more, **options)
+
+        def watched_call(function, *values):
+            self.called.add(f"{function.__module__}.{function.__qualname__}")
+            return call(function, *values)
+
+        def watched_compiled(function, key, *more):
+            start = processor_seconds()
+            self.nested.append(0.0)
+            try:
+                return compiled(function, key, *more)
+            finally:
+                spent, inner = processor_seconds() - start, self.nested.pop()
+                self.seconds[f"{function.__module__}.{function.__qualname__}({key.lstrip('.')})"] = spent - inner
+                if self.nested:
+                    self.nested[-1] += spent
+
+        jit.Function.code, jit.Function.__call__, jit.Function._compiled = watched_code, watched_call, watched_compiled
+
+    @pytest.hookimpl(wrapper=True, tryfirst=True)
+    def pytest_runtest_protocol(self, item, nextitem):
+        from conftest import TALLY
+
+        tally = item.config.stash[TALLY]
+        before, tally.names = tally.names, defaultdict(set)
+        self.called.clear()
+        self.seconds.clear()
+        start = processor_seconds()
+        try:
+            return (yield)
+        finally:
+            names = [f"{kind} {name}" for kind, some in tally.names.items() for name in some]
+            row = {"test": item.nodeid, "seconds": processor_seconds() - start, "compiled": self.seconds,
+                   "called": sorted(self.called), "names": sorted(names)}  # fmt: skip
+            self.file.write(json.dumps(row) + "\n")
+            tally.names = before
+
+
+def processor_seconds() -> float:
+    """Processor time of this process and of its finished children [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
+
+
+def pytest_configure(config) -> None:
+    worker = getattr(config, "workerinput", {}).get("workerid", "main")
+    config.pluginmanager.register(Recorder(Path(os.environ[FOLDER]) / f"{worker}.json"))
+
+
+def record(folder: Path) -> None:
+    """Run all tests from a cold cache, and record each."""
+    with tempfile.TemporaryDirectory(prefix="fvsolve-cache-") as cache:
+        environment = os.environ | {FOLDER: str(folder), "FVSOLVE_CACHE": cache, "PYTHONPATH": str(LIST.parent)}
+        command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", "--full", "-p", "quick"]
+        subprocess.run(command, cwd=LIST.parents[1], env=environment, check=False)
+
+
+def costs(rows: list[dict]) -> tuple[dict[str, Cost], dict[str, float]]:
+    """Cost of each test, and seconds to compile each function."""
+    compiled: dict[str, float] = defaultdict(float)
+    for row in rows:
+        for name, seconds in row["compiled"].items():
+            compiled[name] = max(compiled[name], seconds)
+    return {
+        row["test"]: Cost(
+            max(0.0, row["seconds"] - sum(row["compiled"].values())),
+            frozenset(name for name in row["called"] if name in compiled) | frozenset(row["compiled"]),
+            frozenset(row["names"]),
+        )
+        for row in rows
+    }, dict(compiled)
+
+
+def needed(tests: dict[str, Cost]) -> set[str]:
+    """The cheapest tests that cover each name: the rarest name first."""
+    covers: dict[str, list[str]] = defaultdict(list)
+    for test, cost in tests.items():
+        for name in cost.names:
+            covers[name].append(test)
+    chosen: set[str] = set()
+    for name in sorted(covers, key=lambda name: (len(covers[name]), name)):
+        if not chosen.intersection(covers[name]):
+            chosen.add(min(covers[name], key=lambda test: (tests[test].own, test)))
+    return chosen
+
+
+def quick(tests: dict[str, Cost], compiled: dict[str, float], seconds: float) -> dict[str, float]:
+    """Tests to leave out, with the cost for which each was left out [s]."""
+    kept, out, fixed = dict(tests), {}, needed(tests)
+    while True:
+        users = Counter(name for cost in kept.values() for name in cost.functions)
+        if sum(cost.own for cost in kept.values()) + sum(compiled[name] for name in users) <= seconds:
+            return out
+        share = {name: compiled[name] / count for name, count in users.items()}
+        whole = {test: cost.own + sum(share[name] for name in cost.functions) for test, cost in kept.items()}
+        free = [test for test in kept if test not in fixed]
+        if not free:
+            return out
+        for test in sorted(free, key=whole.get, reverse=True)[: max(1, len(free) // 200)]:
+            out[test] = whole[test]
+            del kept[test]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=480.0, help="processor time of the quick tests (default 480)")
+    parser.add_argument("--recording", type=Path, metavar="FOLDER", help="read a recording, or write one here")
+    options = parser.parse_args()
+    folder = options.recording or Path(tempfile.mkdtemp(prefix="fvsolve-recording-"))
+    folder.mkdir(parents=True, exist_ok=True)
+    if not any(folder.glob("*.json")):
+        record(folder)
+    lines = [line for path in sorted(folder.glob("*.json")) for line in path.read_text(encoding="utf-8").splitlines()]
+    tests, compiled = costs([json.loads(line) for line in lines])
+    out = quick(tests, compiled, options.seconds)
+    slow = {test: round(cost, 2) for test, cost in sorted(out.items())}
+    LIST.write_text(json.dumps({"seconds": options.seconds, "slow": slow}, indent=1) + "\n", encoding="utf-8")
+    own = sum(cost.own for cost in tests.values())
+    print(
+        f"{len(tests)} tests take {own:.0f} s and {sum(compiled.values()):.0f} s of compiling {len(compiled)} functions"
+    )
+    print(f"{len(tests) - len(out)} are quick; {len(out)} are in {LIST.name}; recording: {folder}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""Count of parts, schemes, methods, commands and shipped cases that the tests of a session ran."""
+
+from __future__ import annotations
+
+import functools
+from collections import defaultdict
+from importlib import import_module
+
+from truth import folders
+
+
+class Tally:
+    """Names that were run, by kind; filled by hooks in this process, merged from workers of pytest-xdist."""
+
+    def __init__(self) -> None:
+        self.names: dict[str, set[str]] = defaultdict(set)
+
+    def start(self) -> None:
+        """Record each run, each stepper and each command of this process."""
+        from fvsolve import cli
+        from fvsolve.solve.solve import Run
+        from fvsolve.steppers.stepper import Stepper
+
+        Run.go = self._after(Run.go, self._run)
+        Stepper.__init__ = self._after(Stepper.__init__, lambda stepper, method, *_: self._add("method", method.name))
+        cli._wanted = self._after(cli._wanted, lambda command: self._add("command", *command))
+
+    def add(self, plain: dict[str, list[str]]) -> None:
+        for kind, names in plain.items():
+            self.names[kind].update(names)
+
+    def plain(self) -> dict[str, list[str]]:
+        return {kind: sorted(names) for kind, names in self.names.items()}
+
+    def missing(self) -> list[str]:
+        """One line for each kind of which a name was not run."""
+        lines = {kind: sorted(names - self.names[kind]) for kind, names in expected().items()}
+        return [f"{kind}: {', '.join(names)}" for kind, names in lines.items() if names]
+
+    def _add(self, kind: str, *names: str) -> None:
+        self.names[kind].update(names)
+
+    def _run(self, run) -> None:
+        case, names = run.model.case, {part: name for name, part in parts().items()}
+        self._add("part", *(names[type(part)] for part in (*case.nodes.values(), *case.links.values())))
+        self._add("scheme", case.numerics.scheme)
+        self._add("law", case.fluid.law)
+        if case.path is not None and case.path.resolve().parent == folders.CASES.resolve():
+            self._add("shipped case", case.path.stem)
+
+    def _after(self, function, record):
+        @functools.wraps(function)
+        def recorded(*args, **kwargs):
+            result = function(*args, **kwargs)
+            record(*args)
+            return result
+
+        return recorded
+
+
+def parts() -> dict[str, type]:
+    from fvsolve.parts import KINDS
+
+    return {name: part for kinds in KINDS.values() for name, part in kinds.items()}
+
+
+def expected() -> dict[str, set[str]]:
+    """Every part, scheme, method, law, command and shipped case, by kind."""
+    from fvsolve import cli
+    from fvsolve.cli.app import app
+    from fvsolve.fluid.laws import LAWS
+    from fvsolve.schemes import SCHEMES
+    from fvsolve.steppers.tableau import METHODS
+
+    for module in cli.COMMANDS:
+        import_module(f"fvsolve.cli.{module}")
+    return {
+        "part": set(parts()),
+        "scheme": set(SCHEMES),
+        "method": {method.name for method in METHODS.values()},
+        "law": set(LAWS),
+        "command": {command.name or command.callback.__name__ for command in app.registered_commands},
+        "shipped case": {path.stem for path in folders.CASES.glob("*.toml")},
+    }
