@@ -160,7 +160,7 @@ def clock_of(past, newest):
 
 @njit(forceinline=True)
 def stencil(past, clock, t):
-    """(entry k, weights of entries k - 2 .. k + 3) for the smooth part at t; none is newer than the newest of `clock`."""
+    """(entry k, weights of entries k - 2 .. k + 3) for the smooth part at t, up to the newest entry of `clock`."""
     newest, latest, per_step, even = clock[0], clock[1], clock[2], clock[3]
     place = (t - latest) * per_step
     if place <= -even:
