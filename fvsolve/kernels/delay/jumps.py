@@ -54,7 +54,7 @@ def shorter_lines(tables):
 
 @njit(forceinline=True)
 def enough(past, tables, pipe):
-    """Size below which a jump joins the smooth part: a share of the greater of greatest jump and greatest wave [kg/s]."""
+    """Size below which a jump joins the smooth part: a share of the greatest jump or greatest wave [kg/s]."""
     least = tables.settings[0]["jumps"] * max(past[GREATEST], past[SWING])
     return max(least, NOISE * 0.5e5) * pipe["admittance"]
 

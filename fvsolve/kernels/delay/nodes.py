@@ -118,7 +118,7 @@ def let_arrive(past, places, tables, t):
 
 @njit
 def earliest(past, places, tables, t):
-    """(line, stretch, wave, offset) of the jump that arrives first at an end of a line, up to t; line -1 if none does."""
+    """(line, stretch, wave, offset) of the jump that arrives first at an end of a line by t; line -1 without a jump."""
     best, result = t + same_time(past), (-1, 0, 0, -1)
     for number in range(tables.delays.size):
         line = tables.delays[number]
@@ -172,7 +172,7 @@ def pass_at_ends(past, places, own, t, y, out, handle):
 
 @njit
 def leave(past, places, tables, y, state, number, q, wave, time, size, times):
-    """Pass a jump on from stretch q of a line in the direction of a wave; return False if nodes must be solved for it."""
+    """Pass a jump on from stretch q of a line, in the direction of a wave; False if nodes must be solved for it."""
     line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
     onward, side = q + 1 if wave == 0 else q - 1, 1 if wave == 0 else 0
     if size == 0.0:

@@ -59,7 +59,7 @@ def base_values(t, y, state, handle):
 
 @njit
 def note_side(t, time, y, state, handle):
-    """Update extremes by the state on a side of a jump that arrives at `time`; state : at t, with jumps up to `time`."""
+    """Update extremes by the state beside a jump that arrives at `time`; state : at t, with jumps up to `time`."""
     tables = open_tables(handle)
     past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes
     first, second, third, fourth, fifth = rooms_of(tables)

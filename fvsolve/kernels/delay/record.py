@@ -32,7 +32,7 @@ from fvsolve.kernels.records import ARRIVED as LET_ARRIVE
 
 @njit
 def record_lines(t, y, out, handle, values):
-    """Store the waves sent into all lines, pass on jumps that have arrived, update envelopes; after an accepted step."""
+    """After an accepted step, store the waves sent into lines, pass on arrived jumps and update envelopes."""
     tables = open_tables(handle)
     past = tables.past
     k, places, status = int(past[COUNT]), places_of(past), out[STATUS]
