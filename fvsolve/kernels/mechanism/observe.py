@@ -77,7 +77,7 @@ def acceleration_at(out, here, at, x, y, z):
 
 @njit
 def joint_load(out, tables, i):
-    """(force, torque about the origin) of the joint on body i: inertial minus applied loads of body i and its branch, (68)."""
+    """(force, torque about its origin) of the joint on body i, from (68) of body i and all bodies that it carries."""
     bodies, first = tables.bodies, row_of(tables, i)
     fx = fy = fz = tx = ty = tz = 0.0
     for j in range(i, bodies.size):

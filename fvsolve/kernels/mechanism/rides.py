@@ -21,7 +21,10 @@ THIN = 1e-6  # thickness of a layer added at the surface to test if fluid has we
 
 @njit
 def set_axes(tables, out, i, wide, spin):
-    """Write g - a_o, W, W' and velocity of body i in its own axes to scratch; a_o, W' at out[row + wide], [row + spin]."""
+    """Write g - a_o, W, W' and velocity of body i in its own axes to scratch.
+
+    wide, spin : offsets of a_o and W' in the row of the body
+    """
     here, motion = row_of(tables, i), tables.scratch
     b, w, e, v = here + wide, here + SPIN, here + spin, here + VELOCITY
     down = -tables.settings[0]["gravity"]
