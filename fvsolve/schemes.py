@@ -35,9 +35,9 @@ class Scheme:
     shorter : scheme for pipes of fewer than `LEAST_CELLS` cells; plane : scheme for basins on rectangles
     cavities : True if the scheme can treat the edge of a cavity; stencils of other schemes reach across it
     extra_cells : cells read at an end where a wave leaves, in addition to its polynomial
-    end_factors : factors on the rate of a pipe of 1, 2, 3, ... cells because of its ends: 0.9, or 0.9 times the limit of
-    a long pipe if that is less, over the Courant number above which ssp-rk3 is unstable between an open and a shut end
-    (tests/limits/test_ends.py); at least 1
+    end_factors : factors on the rate of a pipe of 1, 2, 3, ... cells because of its ends: 0.9, or 0.9 times the limit
+    of a long pipe if that is less, over the Courant number above which ssp-rk3 is unstable between an open and a shut
+    end (tests/limits/test_ends.py); at least 1
     """
 
     name: str
