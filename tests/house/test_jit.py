@@ -134,7 +134,10 @@ def test_code_of_other_sources_is_named(package):
 @pytest.mark.parametrize(
     "changes, named",
     {
-        "another machine": ({"target": "znver9-01234567"}, r"contains code compiled for znver9-01234567; this machine is \S+"),
+        "another machine": (
+            {"target": "znver9-01234567"},
+            r"contains code compiled for znver9-01234567; this machine is \S+",
+        ),
         "a helper that is gone": (
             {"wanted": ["numba_gone"]},
             r"code of fvsolve.steppers.loop.loop cannot be loaded: numba \S+ has no numba_gone",
