@@ -2,7 +2,7 @@
 
 Mass that leaves a cell carries h(p) - h(p_ambient) + g z - v^2 / 2 [J/kg], with the enthalpy h. In the additional
 volume of the bore it is liquid of the reference density and carries P / rho. The elements dissipate and store their
-share of P (`creep_energy.py`). The difference is a property of the density law, at most a fraction p / K of the
+share of P (`wall_energy.py`). The difference is a property of the density law, at most a fraction p / K of the
 energy that passes. It has its own row.
 """
 

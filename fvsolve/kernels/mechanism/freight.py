@@ -305,7 +305,7 @@ def put_load(out, here, load, sign):
 
 @njit
 def load_all(y, dydt, out, tables, least, sign, wide, spin):
-    """Add (sign +1) or subtract (sign -1) the loads of all networks on bodies whose `heavy` code is at least `least`.
+    """Add (sign +1) or subtract (sign -1) the loads of all networks on bodies whose `loads_body` code is at least `least`.
 
     wide, spin : offsets in a body row of the acceleration of its origin and of its angular acceleration
     """
@@ -329,6 +329,6 @@ def load_all(y, dydt, out, tables, least, sign, wide, spin):
 
 @njit
 def load_networks(t, y, dydt, out, handle):
-    """Add the fluid loads to all bodies that need them (`heavy` at least 1), computed for q'' = 0."""
+    """Add the fluid loads to all bodies that need them (`loads_body` at least 1), computed for q'' = 0."""
     if dydt.size > 0:
         load_all(y, dydt, out, open_tables(handle), FELT, 1.0, BIAS, SPIN_BIAS)

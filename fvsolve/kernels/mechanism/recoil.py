@@ -51,7 +51,7 @@ def follow_pipe(y, dydt, out, tables, k):
 def follow_networks(t, y, dydt, out, handle):
     """Add the inertial forces of the accelerations of bodies, minus those for q'' = 0, to the rates of flow.
 
-    Where joint loads are requested (`heavy` 2), the fluid loads are computed again with the new rates.
+    Where joint loads are requested (`loads_body` 2), the fluid loads are computed again with the new rates.
     """
     tables = open_tables(handle)
     pipes, columns, segments = tables.pipes, tables.columns, tables.rides
