@@ -2,8 +2,8 @@
 
 An element of gain g and rate n has a state u that follows w. It stores g u^2 / (2 n) and dissipates g (w - u)^2, both
 divided by rho A and per length. The sum of dissipation and storage rate is w times the mass flow into the element.
-The work against P of the profile is stored too, P = p - p_ambient + rho g z as in `linear_energy.py`, with the reference
-density. The rows of a pipe are `creep` and `rate` (power), and its elastic energy (storage).
+The work against P of the profile is stored too, P = p - p_ambient + rho g z as in `linear_energy.py`, with the
+reference density. The rows of a pipe are `creep` and `rate` (power), and its elastic energy (storage).
 """
 
 from fvsolve.jit import njit

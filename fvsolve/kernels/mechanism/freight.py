@@ -305,7 +305,7 @@ def put_load(out, here, load, sign):
 
 @njit
 def load_all(y, dydt, out, tables, least, sign, wide, spin):
-    """Add (sign +1) or subtract (sign -1) the loads of all networks on bodies whose `loads_body` code is at least `least`.
+    """Add (sign +1) or subtract (sign -1) the loads of all networks with a code `loads_body` of at least `least`.
 
     wide, spin : offsets in a body row of the acceleration of its origin and of its angular acceleration
     """

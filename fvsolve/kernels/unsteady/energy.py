@@ -2,8 +2,8 @@
 
 A term of gain g and rate n has a state z that follows the flow M. It stores g z^2 / (2 n) and dissipates g (M - z)^2,
 both divided by rho A and per length. The sum of dissipation and storage rate is M times the drag of the term. The rows
-are as in `linear_energy.py`: `friction` and `rate` of a pipe, and its kinetic energy. Under the laws log and table M is rho A
-times the velocity, at the reference density.
+are as in `linear_energy.py`: `friction` and `rate` of a pipe, and its kinetic energy. Under the laws log and table M is
+rho A times the velocity, at the reference density.
 """
 
 from fvsolve.jit import njit
