@@ -1,12 +1,12 @@
-"""Hydraulic transients by finite volumes. Knows the public names and where they live; imports none of them."""
+"""Hydraulic transients by finite volumes; public names, each imported from its module on first use."""
 
 import sys
 
-LEAST = 3, 11  # version of Python
+LEAST = 3, 11  # oldest supported version of Python
 if sys.version_info < LEAST:
     raise ImportError(
-        f"fvsolve needs Python {LEAST[0]}.{LEAST[1]} or later; {sys.executable} is {sys.version.split()[0]}. Make the "
-        "environment with a later one: python3.12 -m venv .venv"
+        f"fvsolve needs Python {LEAST[0]}.{LEAST[1]} or later; {sys.executable} is {sys.version.split()[0]}. Create "
+        "the environment with a later version: python3.12 -m venv .venv"
     )
 
 from fvsolve.names import offer  # noqa: E402

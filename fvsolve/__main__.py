@@ -1,4 +1,4 @@
-"""`python -m fvsolve`."""
+"""Entry point of `python -m fvsolve`."""
 
 from fvsolve.cli import main
 

@@ -1,4 +1,4 @@
-"""Kinds of what public functions are given, checked at the door. Knows kinds; knows no meaning."""
+"""Checks of the arguments of public functions by kinds: numbers, names, arrays, paths."""
 
 from __future__ import annotations
 
@@ -17,80 +17,81 @@ from fvsolve.units import show
 
 
 class Kind(NamedTuple):
-    """What an argument may be: a test, and what is wanted in words."""
+    """Kind of an argument: a test, and the expected value in words."""
 
     holds: Callable[[Any], bool]
     wanted: str
 
 
-def is_number(given: Any) -> bool:
-    """A finite real number; true and false are none."""
-    return isinstance(given, Real) and not isinstance(given, (bool, np.bool_)) and math.isfinite(given)
+def is_number(value: Any) -> bool:
+    """True if the argument is a finite real number and not a bool."""
+    return isinstance(value, Real) and not isinstance(value, (bool, np.bool_)) and math.isfinite(value)
 
 
-def is_row(given: Any, holds: Callable[[Any], bool]) -> bool:
-    """A list or tuple of what `holds`; text is none."""
-    return isinstance(given, Sequence) and not isinstance(given, (str, bytes)) and all(holds(one) for one in given)
+def is_row(value: Any, holds: Callable[[Any], bool]) -> bool:
+    """True if the argument is a list or tuple whose items all pass the test `holds`; text does not count."""
+    return isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and all(holds(item) for item in value)
 
 
-def is_name(given: Any) -> bool:
-    return (isinstance(given, str) and given != "") or hasattr(given, "stages")  # a tableau of the caller's
+def is_name(value: Any) -> bool:
+    return (isinstance(value, str) and value != "") or hasattr(value, "stages")  # a tableau of the caller
 
 
-def is_array(given: Any, kinds: str, least: int, most: int, finite: bool = True) -> bool:
-    """Numbers of these kinds of numpy ("f", "c", ...), in `least` to `most` dimensions."""
+def is_array(value: Any, kinds: str, least: int, most: int, finite: bool = True) -> bool:
+    """True for numbers of these numpy kinds ("f", "c", ...) in an array of `least` to `most` dimensions."""
     try:
-        found = np.asarray(given)
-    except (TypeError, ValueError):  # rows of different lengths, objects that refuse
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # rows of different lengths, objects without conversion
         return False
-    return found.dtype.kind in kinds and least <= found.ndim <= most and bool(not finite or np.isfinite(found).all())
+    return array.dtype.kind in kinds and least <= array.ndim <= most and bool(not finite or np.isfinite(array).all())
 
 
 def made(kind: type) -> Kind:
-    """What is a thing of ours."""
-    return Kind(lambda given: isinstance(given, kind), f"a {kind.__name__}")
+    """Kind of the instances of a class of fvsolve."""
+    return Kind(lambda value: isinstance(value, kind), f"a {kind.__name__}")
 
 
-TABLE = Kind(lambda given: isinstance(given, Mapping), 'a table, for example {"links.main.cells": 400}')
+TABLE = Kind(lambda value: isinstance(value, Mapping), 'a dict, for example {"links.main.cells": 400}')
 PATH = Kind(
-    lambda given: isinstance(given, (str, os.PathLike)) and str(given) != "" and "\0" not in str(given), "a path"
+    lambda value: isinstance(value, (str, os.PathLike)) and str(value) != "" and "\0" not in str(value),
+    "a path",
 )
 CALL = Kind(callable, "a function")
-FLAG = Kind(lambda given: isinstance(given, (bool, np.bool_)), "True or False")
+FLAG = Kind(lambda value: isinstance(value, (bool, np.bool_)), "True or False")
 NUMBER = Kind(is_number, "a finite number")
-POSITIVE = Kind(lambda given: is_number(given) and given > 0, "a positive number")
-COUNT = Kind(lambda given: isinstance(given, Integral) and is_number(given), "a whole number")
-AMOUNT = Kind(lambda given: COUNT.holds(given) and given >= 0, "a whole number from 0 on")
-THREADS = Kind(lambda given: COUNT.holds(given) and given > 0, "a whole number from 1 on")
-ROW = Kind(lambda given: is_row(given, lambda one: True), "a list")
-NUMBERS = Kind(lambda given: is_row(given, is_number), "a list of finite numbers")
-SERIES = Kind(lambda given: is_array(given, "fiu", 1, 1), "a row of finite numbers")
-MATRIX = Kind(lambda given: is_array(given, "fiu", 2, 2), "rows of finite numbers")
-POINT = Kind(lambda given: is_array(given, "fiuc", 0, 0), "a finite complex number")
-COMPLEX = Kind(lambda given: is_array(given, "fiuc", 0, 1), "a finite complex number, or a row of them")
-TEXT = Kind(lambda given: isinstance(given, str) and given != "", "a name")
+POSITIVE = Kind(lambda value: is_number(value) and value > 0, "a positive number")
+COUNT = Kind(lambda value: isinstance(value, Integral) and is_number(value), "a whole number")
+AMOUNT = Kind(lambda value: COUNT.holds(value) and value >= 0, "a whole number, 0 or more")
+THREADS = Kind(lambda value: COUNT.holds(value) and value > 0, "a whole number, 1 or more")
+ROW = Kind(lambda value: is_row(value, lambda item: True), "a list")
+NUMBERS = Kind(lambda value: is_row(value, is_number), "a list of finite numbers")
+SERIES = Kind(lambda value: is_array(value, "fiu", 1, 1), "a 1-D array of finite numbers")
+MATRIX = Kind(lambda value: is_array(value, "fiu", 2, 2), "a 2-D array of finite numbers")
+POINT = Kind(lambda value: is_array(value, "fiuc", 0, 0), "a finite complex number")
+COMPLEX = Kind(lambda value: is_array(value, "fiuc", 0, 1), "a finite complex number, or a 1-D array of them")
+TEXT = Kind(lambda value: isinstance(value, str) and value != "", "a name")
 NAME = Kind(is_name, "a name")
-NAMES = Kind(lambda given: is_name(given) or is_row(given, is_name), "names")
+NAMES = Kind(lambda value: is_name(value) or is_row(value, is_name), "a name or a list of names")
 
 
 def door(**kinds: Kind) -> Callable:
-    """A function whose arguments of these names are of these kinds, or what they are by default; else FvsolveError."""
+    """Decorate a function: its arguments of these names must be of these kinds or their defaults; else FvsolveError."""
 
-    def guarded(function: Callable) -> Callable:
+    def decorate(function: Callable) -> Callable:
         signature = inspect.signature(function)
-        order, defaults = [*signature.parameters], {name: one.default for name, one in signature.parameters.items()}
+        order, defaults = [*signature.parameters], {name: p.default for name, p in signature.parameters.items()}
 
         @functools.wraps(function)
-        def checked(*given, **named):
-            if len(given) > len(order) or not named.keys() <= defaults.keys():
-                signature.bind(*given, **named)  # says what is wrong of it
-            for name, value in (*zip(order, given, strict=False), *named.items()):
+        def checked(*arguments, **keywords):
+            if len(arguments) > len(order) or not keywords.keys() <= defaults.keys():
+                signature.bind(*arguments, **keywords)  # raises a TypeError with the reason
+            for name, value in (*zip(order, arguments, strict=False), *keywords.items()):
                 kind = kinds.get(name)
                 if kind is not None and value is not defaults[name] and not kind.holds(value):
-                    said = f"{name} = {show(value)}" + (" cannot be called" if kind is CALL else "")
-                    raise FvsolveError(f"{said}; wanted {kind.wanted}")
-            return function(*given, **named)
+                    text = f"{name} = {show(value)}" + (" cannot be called" if kind is CALL else "")
+                    raise FvsolveError(f"{text}; expected {kind.wanted}")
+            return function(*arguments, **keywords)
 
         return checked
 
-    return guarded
+    return decorate

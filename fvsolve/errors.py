@@ -1,4 +1,4 @@
-"""What can go wrong, in words. Knows how a fault is worded; knows nothing of what it is about."""
+"""Error classes, faults and notices, and functions that word them."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-# Control characters, marks of direction, ends of lines that are no "\n", halves of letters.
-LONGEST = 200  # letters of a name that are compared with others
+LONGEST = 200  # length of a name above which it is not compared with others
+# Control characters, direction marks, line ends other than "\n", halves of surrogate pairs.
 UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault of a case file: the key path, what was found and wanted, and the line in the file."""
+    """Fault of a case file: key path, message with the found and the expected value, line in the file."""
 
     place: str
     message: str
@@ -29,11 +29,11 @@ class Fault:
 
 @dataclass(frozen=True)
 class Notice:
-    """What is legal but to be known: one of the `warnings` of a case or a run.
+    """Notice of a case or a run: a legal but remarkable situation, an item of its `warnings`.
 
-    kind : "start", "mesh", "step-limit", "step-error", "growth", "ledger", "range", ...; place : part or section,
-    "nodes.a"; key : of it, or None; value, limit : numbers that are compared, SI, or None; ok : False where the numbers
-    of a run are wrong
+    kind : "start", "mesh", "step-limit", "step-error", "growth", "ledger", "range", ...
+    place : part or section, such as "nodes.a"; key : key of that part, or None
+    value, limit : compared numbers in SI units, or None; ok : False if the results of the run are wrong
     """
 
     kind: str
@@ -48,17 +48,17 @@ class Notice:
         return self.text
 
     def plain(self) -> dict:
-        """As JSON says it."""
+        """Dictionary of its fields, for JSON."""
         return {"kind": self.kind, "place": self.place, "key": self.key, "value": self.value, "limit": self.limit,
                 "ok": self.ok, "text": self.text}  # fmt: skip
 
 
 class FvsolveError(Exception):
-    """Base of every error fvsolve raises on purpose; `str` is what a person reads."""
+    """Base class of all errors that fvsolve raises deliberately; `str` gives the message for the user."""
 
 
 class CaseError(FvsolveError):
-    """A case that cannot be read: all its faults at once, in the order of the file."""
+    """Invalid case: all its faults at once, in the order of the file."""
 
     def __init__(self, faults: Iterable[Fault], file: str = "case"):
         self.faults = sorted(faults, key=lambda fault: (fault.override, fault.line or 0))
@@ -73,7 +73,7 @@ class CaseError(FvsolveError):
 
 @contextmanager
 def gathered(faults: list[Fault], place: str = "") -> Iterator[None]:
-    """Adds what goes wrong within to the faults, an error of values at the place, all of a case; then goes on."""
+    """Catch the errors of the body and append them to `faults`: all of a CaseError, other errors at `place`."""
     try:
         yield
     except CaseError as error:
@@ -83,11 +83,11 @@ def gathered(faults: list[Fault], place: str = "") -> Iterator[None]:
 
 
 class MeshError(CaseError):
-    """A mesh that cannot be had as asked: all its faults at once; `file` is its file, or "rectangle"."""
+    """Invalid mesh: all its faults at once; `file` is the mesh file, or "rectangle"."""
 
 
 class FluidError(FvsolveError):
-    """A fluid that cannot be had as asked; `key` is the key of `[fluid]` that is to blame."""
+    """Invalid fluid; `key` is the faulty key of `[fluid]`."""
 
     def __init__(self, key: str, message: str):
         self.key = key
@@ -99,35 +99,35 @@ class FluidError(FvsolveError):
 
 
 class RunError(FvsolveError):
-    """A run that cannot start or go on: a finished run in the way, a restart that does not fit, ..."""
+    """Run that cannot start or continue: an existing run directory, an unsuitable restart file, ..."""
 
 
 def visible(text: str) -> str:
-    """Text that steers no terminal: what cannot be seen stands as its escape, but for ends of lines and tabs."""
-    return UNSEEN.sub(lambda one: one[0].encode("unicode_escape").decode(), text)
+    """Text that is safe for terminals: invisible characters are replaced by escapes, except line ends and tabs."""
+    return UNSEEN.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
-    """The valid name that was probably meant by `name`, or None."""
+    """Valid name that is most similar to `name`, or None."""
     if len(name) > LONGEST:
         return None
-    names = [one for one in dict.fromkeys(names) if len(one) <= LONGEST]
+    names = [valid for valid in dict.fromkeys(names) if len(valid) <= LONGEST]
     folded = {other.casefold().replace("_", "-"): other for other in names}
     close = difflib.get_close_matches(name.casefold().replace("_", "-"), folded, n=1, cutoff=0.6)
     return folded[close[0]] if close else None
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """'; did you mean "opening"?' where a valid name is near, else the empty string."""
+    """'; did you mean "opening"?' if a similar valid name exists, else the empty string."""
     close = nearest(name, names)
     return f'; did you mean "{close}"?' if close else ""
 
 
-FEW = 2  # more names are not worth hiding
+FEW = 2  # names above the limit of a listing that are still listed
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
-    """The names in one line, sorted, each once, cut where there are many."""
+    """Names in a line, sorted, without duplicates; of many names the first `limit` and their total number."""
     names = sorted({*names})
     if len(names) <= limit + FEW:
         return ", ".join(names)

@@ -1,9 +1,9 @@
-"""The package's one `njit`, and the folder its caches live in. Knows numba's cache; knows no physics.
+"""Compilation of functions by `njit`, and the folder of compiled code.
 
-Numba looks only at the file that holds a jitted function, so an edit in *another* file that it calls
-would go unnoticed and the old machine code would run. Here every function is cached in a folder named
-by the hash of every source that compiled code can depend on, within it by the machine, and site-packages stays clean.
-What is called, by Python or by address, is kept a second time where numba is not needed to load it (`store`).
+Numba checks only the file of a compiled function. After an edit in another file that it calls, the old machine code
+would run. Here each function is cached in a folder named by the hash of all sources that compiled code can depend on,
+in a subfolder for the machine; site-packages stays unchanged. Functions called by Python or by address are stored a
+second time, in a form that is loaded without numba (`store`).
 """
 
 from __future__ import annotations
@@ -31,28 +31,28 @@ from fvsolve.store import Code
 
 __all__ = ["Intrinsic", "add_sources", "beside", "cache_folder", "inner", "njit", "once", "source_hash"]
 
-ROOM = 65536  # bytes that a folder must take to be one for caches
+ROOM = 65536  # bytes that are written to test if a folder can hold caches
 DIGEST = hashlib.sha256().digest_size
-PATIENCE = 60.0  # for a process that compiles beside this one [s]
-KEPT = 3  # generations of compiled code kept beside the present one
+PATIENCE = 60.0  # longest wait for a second process that compiles [s]
+KEPT = 3  # generations of compiled code kept in addition to the present one
 
 PACKAGE = Path(__file__).resolve().parent
-# What compiled code can depend on: the rooms that compile and, by contract, all they may import; of parts the laws, of
-# basins all but declarations and what lowers them.
+# Sources that compiled code can depend on: packages and modules with compiled functions and, by import contract, all
+# that they may import; of `parts` the law files, of `basins` all files without a prefix of `UNCOMPILED_PREFIXES`.
 ROOMS = ("kernels", "steppers", "jit", "store", "units", "errors")
-PYTHON = ("part", "lower")  # what names of files of basins begin with that compile nothing
-OUTSIDE: dict[Path, str] = {}  # folders whose sources may be compiled and cached too, and where below the code folder
-MAKING = threading.RLock()  # held while compiled functions are made
-LOADED: dict[str, bytes] = {}  # machine code that numba has taken from its cache, by the function's symbol
-SETTING = threading.Lock()  # held while numba is told of a folder
+PYTHON = ("part", "lower")  # prefixes of files of `basins` without compiled functions
+OUTSIDE: dict[Path, str] = {}  # other folders with compiled functions -> their folder below the code folder
+MAKING = threading.RLock()  # locked while functions are compiled
+LOADED: dict[str, bytes] = {}  # machine code that numba has loaded from its cache, by the symbol of the function
+SETTING = threading.Lock()  # locked while numba's cache folder is set
 COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
 @functools.cache
 def cache_folder() -> Path:
-    """Folder for everything that fvsolve may compute again: compiled code and fluid properties.
+    """Folder of cached data: compiled code and fluid properties.
 
-    `FVSOLVE_CACHE` if set, else the user's cache folder, else (not writable) one below the temporary folder.
+    `FVSOLVE_CACHE` if set, else the cache folder of the user; if not writable, a folder below the temporary folder.
     """
     for folder in (_wanted_folder(), Path(tempfile.gettempdir()) / f"fvsolve-cache-{_user()}"):
         if _writable(folder):
@@ -62,12 +62,12 @@ def cache_folder() -> Path:
 
 @functools.cache
 def source_hash() -> str:
-    """Sixteen hexadecimal digits that change with any source of `ROOMS`: sha256 over names and bytes."""
+    """Hash of all sources of compiled code, sixteen hexadecimal digits: sha256 over names and bytes."""
     return _digest(PACKAGE, _sources())
 
 
 def add_sources(folder: Path) -> None:
-    """Let functions of modules in a folder outside the package be cached too, in a folder named by all its sources."""
+    """Allow caching of functions of modules in a folder outside the package, under the hash of all its sources."""
     folder = Path(folder).resolve()
     OUTSIDE[folder] = f"outside/{_digest(folder, sorted(folder.rglob('*.py')))}"
 
@@ -81,13 +81,13 @@ def _digest(top: Path, paths) -> str:
 
 
 def njit(function: Callable | None = None, /, **options: Any) -> Callable:
-    """`numba.njit` as the package wants it: `error_model="numpy"`, cached in a folder named by the sources.
+    """Decorate a function for compilation by `numba.njit` with `error_model="numpy"` and caching by source hash.
 
     Arrays are not reference counted (`_nrt=False`): each count is an atomic operation, and with the tables of a
-    model they cost microseconds a step. So compiled code allocates nothing; a function that must says `_nrt=True`.
-    While one runs that Python has called, other threads of Python do (`nogil=True`).
-    Used bare or with numba's own options. With `NUMBA_DISABLE_JIT=1` the plain function comes back.
-    Only functions of `ROOMS` and of folders that were added are cached: no hash sees other files.
+    model the counts cost microseconds per step. So compiled code allocates no memory; a function that must allocate
+    sets `_nrt=True`. The GIL is released during a call from Python (`nogil=True`).
+    Use it bare or with options of numba. With `NUMBA_DISABLE_JIT=1` it returns the plain function.
+    Only functions of `SOURCE_ROOTS` and of added folders are cached, because the hash does not cover other files.
     """
     if function is None:
         return functools.partial(njit, **options)
@@ -97,29 +97,29 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
 
 
 class Function:
-    """A function that compiled code calls, and Python too; its machine code comes from the store, else from numba.
+    """Function for calls from compiled code and from Python; its machine code comes from the store, else from numba.
 
-    `.py_func` is the plain one; numba, loaded only where something is to be compiled, sees its dispatcher (`.numba`).
+    `.py_func` is the plain function, `.numba` its numba dispatcher; numba is imported only if something is compiled.
     """
 
     def __init__(self, function: Callable, options: dict[str, Any]) -> None:
         functools.update_wrapper(self, function)
         self.py_func, self.options = function, options
-        self.targetoptions = {"nopython": True, "boundscheck": None} | options  # which numba looks for by that name
+        self.targetoptions = {"nopython": True, "boundscheck": None} | options  # numba reads this attribute
         self.__code__, self.__defaults__ = function.__code__, function.__defaults__
-        self.codes: dict[str, Code] = {}  # by kinds of arguments, behind a dot without doors
-        self.of_numbers: dict[tuple, Callable] = {}  # what Python calls, by types of arguments that are numbers all
+        self.codes: dict[str, Code] = {}  # by signature; after a dot for code without wrappers
+        self.of_numbers: dict[tuple, Callable] = {}  # callables by types of arguments, all of them numbers
         self.declared: Declared | None = None
 
     @functools.cached_property
     def folder(self) -> str | None:
-        """Below the code folder, where its machine code is kept; None where no hash sees its source."""
+        """Folder of its machine code below the code folder; None if no hash covers its source."""
         home = Path(self.__code__.co_filename).resolve()
         return "" if home in _sources() else next((OUTSIDE[f] for f in home.parents if f in OUTSIDE), None)
 
     @functools.cached_property
     def numba(self):
-        """Numba's own function."""
+        """Dispatcher of numba for this function."""
         with MAKING:
             return _dispatcher()(self.py_func, self.folder is not None, self.folder or "", **self.targetoptions)
 
@@ -133,34 +133,34 @@ class Function:
         return _named, (self.__module__, self.__qualname__)
 
     def declare(self, letters: str, kinds: Callable[[str], tuple]) -> Declared:
-        """Compile for arguments of these kinds, and for no others that Python gives.
+        """Compile for a single signature; calls from Python accept no other.
 
-        kinds(letters) : numba's types of them
+        letters : signature; kinds(letters) : numba types of the arguments
         """
         if self.declared is None:
             self.declared = Declared(self, letters, self.code(letters, lambda: kinds(letters)))
         return self.declared
 
     def address(self, letters: str, kinds: Callable[[str], tuple]) -> int:
-        """Where compiled code finds it, compiled for arguments of these kinds."""
+        """Address for calls from compiled code, compiled for a signature."""
         return self.code(letters, lambda: kinds(letters), doors=False).address
 
-    def __call__(self, *given: Any) -> Any:
+    def __call__(self, *arguments: Any) -> Any:
         if self.declared is not None:
-            return self.declared(*given)
-        if (python := self.of_numbers.get(kinds := tuple(map(type, given)))) is not None:
-            return python(*given)
+            return self.declared(*arguments)
+        if (python := self.of_numbers.get(kinds := tuple(map(type, arguments)))) is not None:
+            return python(*arguments)
         try:
-            letters = "".join(map(letter_of, given))
-        except KeyError:  # of a kind that has no letter
-            return self.numba(*given)
-        python = self.code(letters, lambda: tuple(map(_numba().typeof, given))).python
+            letters = "".join(map(letter_of, arguments))
+        except KeyError:  # a type without letter
+            return self.numba(*arguments)
+        python = self.code(letters, lambda: tuple(map(_numba().typeof, arguments))).python
         if LETTERS.keys() >= set(kinds):
             self.of_numbers[kinds] = python
-        return python(*given)
+        return python(*arguments)
 
     def code(self, letters: str, kinds: Callable[[], tuple], doors: bool = True) -> Code:
-        """Its machine code for arguments of these kinds, with doors for Python and C or for compiled code alone."""
+        """Machine code for a signature; doors : with wrappers for calls from Python and C, else without."""
         key = letters if doors else f".{letters}"
         if key not in self.codes:
             with MAKING:
@@ -185,7 +185,7 @@ class Function:
         return code_of(compiled, doors)
 
     def _path(self, key: str) -> Path | None:
-        """The file of the store; None of what is made anew by each call of a function, and has no name of its own."""
+        """File in the store; None for closures and local functions, which have no unique name."""
         if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.LINKS:
             return None
         digest = hashlib.sha256(self._who(key).encode()).hexdigest()[:12]
@@ -197,93 +197,93 @@ class Function:
 
 
 def _named(module: str, name: str) -> Any:
-    """What a module has by a name."""
+    """Attribute of a module."""
     return getattr(importlib.import_module(module), name)
 
 
 def code_of(compiled, doors: bool = True) -> Code:
-    """What numba has compiled, as it is called."""
+    """Addresses and Python entry point of a function compiled by numba."""
     find, names = compiled.library.get_pointer_to_function, compiled.fndesc
     pointer = find(names.llvm_cfunc_wrapper_name) if doors else 0
     return Code(find(names.llvm_func_name), pointer, compiled.entry_point if doors else None, compiled)
 
 
 class Declared:
-    """A compiled function of one signature, as Python calls it and as compiled code takes it as an argument.
+    """Compiled function of a single signature, for calls from Python and as an argument of compiled functions.
 
-    `.address` is where C finds it. What it raises there is lost: such functions say what went wrong by what they write.
+    `.address` is its address for C. Exceptions are lost in such calls: these functions report errors in their output.
     """
 
     def __init__(self, function: Any, letters: str, code: Code) -> None:
         self.function, self.code, self.address, self.python = function, code, code.pointer, code.python
         self.arrays = [(i, letter) for i, letter in enumerate(letters) if letter in ARRAYS]
 
-    def __call__(self, *given: Any) -> Any:
-        for i, letter in self.arrays:  # which machine code does not look at
-            found = letter_of(given[i]) if type(given[i]) is np.ndarray else type(given[i]).__name__
-            if found != letter:
-                wanted = "{} of {} axes".format(*ARRAYS[letter])
-                raise TypeError(f"argument {i} is {found}; wanted an array by rows, to be written, of {wanted}")
-        return self.python(*given)
+    def __call__(self, *arguments: Any) -> Any:
+        for i, letter in self.arrays:  # machine code does not check them
+            actual = letter_of(arguments[i]) if type(arguments[i]) is np.ndarray else type(arguments[i]).__name__
+            if actual != letter:
+                expected = "{} with {} dimension(s)".format(*ARRAYS[letter])
+                raise TypeError(f"argument {i} is {actual}; expected a writable C-contiguous array of {expected}")
+        return self.python(*arguments)
 
 
 @functools.cache
 def plain_kinds() -> dict:
-    """Letter -> numba's type of a number, or of an array of numbers."""
+    """Letter -> numba type of a number, or of an array of numbers."""
     types = _numba().types
     kinds = {"t": types.float64, "i": types.int64, "b": types.boolean, "c": types.complex128}
     return kinds | {letter: types.Array(getattr(types, kind), axes, "C") for letter, (kind, axes) in ARRAYS.items()}
 
 
 def declared(function: Callable, letters: str, kinds: Callable[[str], tuple]) -> Callable:
-    """A function compiled for arguments of these kinds and no others; itself where JIT is off."""
+    """Compile a function for a single signature; return it unchanged if compilation is disabled."""
     return function.declare(letters, kinds) if isinstance(function, Function) else function
 
 
 LETTERS = {float: "t", np.float64: "t", int: "i", np.int64: "i", bool: "b", np.bool_: "b", complex: "c"}
 ARRAYS = {"v": ("float64", 1), "w": ("float64", 2), "h": ("int64", 1), "s": ("int64", 2), "z": ("complex128", 1)}
 LETTER = {(np.dtype(kind).char, axes): letter for letter, (kind, axes) in ARRAYS.items()}
-WRITTEN, COLUMNS = 0x501, 2  # flags of arrays: contiguous by rows, aligned, to be written; contiguous by columns
+WRITTEN, COLUMNS = 0x501, 2  # numpy flags: C-contiguous, aligned and writable; Fortran-contiguous
 
 
-def letter_of(given: Any) -> str:
-    """The kind of an argument, as `kernels.calls` spells it, in brackets where it has no letter there; KeyError."""
-    if type(given) is not np.ndarray:
-        if isinstance(given, tuple):
-            return f"({type(given).__qualname__} {''.join(map(letter_of, given))})"
-        return f"[{_spelt(given.dtype)}]" if type(given) is np.void else LETTERS[type(given)]
-    kind, flags = given.dtype, given.flags.num
-    if flags & WRITTEN == WRITTEN and (letter := LETTER.get((kind.char, given.ndim))) is not None:
+def letter_of(argument: Any) -> str:
+    """Signature of an argument in the letters of `kernels.calls`; in brackets for other arrays; else KeyError."""
+    if type(argument) is not np.ndarray:
+        if isinstance(argument, tuple):
+            return f"({type(argument).__qualname__} {''.join(map(letter_of, argument))})"
+        return f"[{_spelt(argument.dtype)}]" if type(argument) is np.void else LETTERS[type(argument)]
+    kind, flags = argument.dtype, argument.flags.num
+    if flags & WRITTEN == WRITTEN and (letter := LETTER.get((kind.char, argument.ndim))) is not None:
         return letter
-    return f"[{_spelt(kind)} {given.ndim} {flags & (WRITTEN | COLUMNS)}]"
+    return f"[{_spelt(kind)} {argument.ndim} {flags & (WRITTEN | COLUMNS)}]"
 
 
 @functools.cache
 def _spelt(kind: np.dtype) -> str:
-    """A dtype in a few letters; records by their fields and where they lie."""
-    said = f"{kind.descr} {kind.itemsize} {kind.alignment}" if kind.names else ""
-    return hashlib.sha256(said.encode()).hexdigest()[:12] if said else kind.str
+    """Short text of a dtype; for records a hash of names and offsets of their fields."""
+    text = f"{kind.descr} {kind.itemsize} {kind.alignment}" if kind.names else ""
+    return hashlib.sha256(text.encode()).hexdigest()[:12] if text else kind.str
 
 
 def once(function: Callable) -> Callable:
-    """`functools.cache` of what compiles: threads that ask for the same at one time wait for it, and get the same."""
-    found = functools.cache(function)
+    """`functools.cache` for functions that compile: concurrent calls of threads wait and get the same result."""
+    cached = functools.cache(function)
 
     @functools.wraps(function)
-    def asked(*given: Any) -> Any:
+    def locked(*arguments: Any) -> Any:
         with MAKING:
-            return found(*given)
+            return cached(*arguments)
 
-    return asked
+    return locked
 
 
 def inner(function: Callable) -> Callable:
-    """`njit` for what compiled code calls from one place: arrays cost nothing to pass."""
+    """`njit` with forced inlining, for functions called from a single place: passing arrays costs nothing."""
     return njit(function, forceinline=True)
 
 
 class Intrinsic:
-    """`numba.extending.intrinsic`, made where compiled code first asks for it: until then numba is not loaded."""
+    """`numba.extending.intrinsic`, created at first use by compiled code; numba is not imported before."""
 
     def __init__(self, define: Callable) -> None:
         functools.update_wrapper(self, define)
@@ -297,60 +297,63 @@ class Intrinsic:
         from numba.core.typing.templates import builtin_registry
         from numba.extending import intrinsic
 
-        made = intrinsic(self.define)
-        return next(kind for value, kind in reversed(builtin_registry.globals) if value is made)
+        intrinsic_function = intrinsic(self.define)
+        return next(kind for value, kind in reversed(builtin_registry.globals) if value is intrinsic_function)
 
 
 def cold() -> bool:
-    """Whether nothing of this version has been compiled on this machine yet."""
+    """True if nothing of this version has been compiled on this machine yet."""
     return COMPILING and not any(code_folder().glob(f"*{store.SUFFIX}"))
 
 
 def elsewhere() -> str:
-    """What compiled code lies in the cache and is of no use here, in words; "" of none."""
+    """Text about compiled code in the cache that cannot be used here; "" if there is none."""
     own = code_folder()
-    there = {path.parent for path in cache_folder().glob(f"code/*/*/*{store.SUFFIX}")}
-    machines = sorted(path.name for path in there if path.parent == own.parent and path != own)
-    others = sorted({path.parent.name for path in there} - {own.parent.name})
+    folders = {path.parent for path in cache_folder().glob(f"code/*/*/*{store.SUFFIX}")}
+    machines = sorted(path.name for path in folders if path.parent == own.parent and path != own)
+    others = sorted({path.parent.name for path in folders} - {own.parent.name})
     if machines:
-        return f"{own.parent} holds code for {', '.join(machines)}, and this machine is {own.name}"
+        return f"{own.parent} contains code compiled for {', '.join(machines)}; this machine is {own.name}"
     if others:
-        return f"{own.parent.parent} holds code of other sources, {', '.join(others)}, and these are {own.parent.name}"
+        return (
+            f"{own.parent.parent} contains code compiled from other sources ({', '.join(others)}); "
+            f"the present sources are {own.parent.name}"
+        )
     return ""
 
 
 @contextlib.contextmanager
 def beside(code: str, cached: str):
-    """While the body compiles, a second process runs `code` to compile something else, so a cold start takes half.
+    """Context in which a second process runs `code` to compile other functions; halves the time of a cold start.
 
-    cached : a function that it compiles; where the store has it nothing is left to do.
-    Whatever the second process fails to leave there, the caller compiles itself.
+    cached : name of a function that it compiles; if the store contains this function, no process is started. Functions
+    that the second process does not compile are compiled by the caller.
     """
     if not COMPILING or (os.cpu_count() or 1) < 2 or any(code_folder().glob(f"{cached}-*{store.SUFFIX}")):
         yield
         return
     path = os.pathsep.join([str(PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
     quiet = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
-    second = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": path}, **quiet)
+    process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | {"PYTHONPATH": path}, **quiet)
     try:
         yield
         with contextlib.suppress(subprocess.TimeoutExpired):
-            second.wait(PATIENCE)
+            process.wait(PATIENCE)
     finally:
-        second.kill()
+        process.kill()
 
 
 @functools.cache
 def _sources() -> tuple[Path, ...]:
-    rooms = [path for room in ROOMS for path in (PACKAGE / room).rglob("*.py")]
-    modules = [path for room in ROOMS if (path := PACKAGE / f"{room}.py").is_file()]
+    packages = [path for root in ROOMS for path in (PACKAGE / root).rglob("*.py")]
+    modules = [path for root in ROOMS if (path := PACKAGE / f"{root}.py").is_file()]
     basins = [path for path in (PACKAGE / "basins").rglob("*.py") if not path.name.startswith(PYTHON)]
-    return tuple(sorted([*rooms, *modules, *(PACKAGE / "parts").rglob("law*.py"), *basins]))
+    return tuple(sorted([*packages, *modules, *(PACKAGE / "parts").rglob("law*.py"), *basins]))
 
 
 @functools.cache
 def _numba():
-    """Numba itself, imported where something is to be compiled, its notice about first-class functions silenced."""
+    """The module numba, imported when something is compiled; its warning about first-class functions is disabled."""
     import numba
     from numba.core.errors import NumbaExperimentalFeatureWarning
 
@@ -360,10 +363,10 @@ def _numba():
 
 @functools.cache
 def _dispatcher() -> type:
-    """Numba's class of compiled functions, each with a second one that compiled code calls in its place.
+    """Dispatcher class of numba, extended by a second dispatcher for calls from compiled code.
 
-    Numba gives every function two doors, by which Python and C call it; with twenty arrays to unpack they are more code
-    than the function. What compiled code calls has none, which saves a fifth of all compiling.
+    Numba adds two wrappers to each function, for calls from Python and from C. With twenty arrays to unpack they are
+    larger than the function. Functions for compiled code have no wrappers, which saves a fifth of the compile time.
     """
     numba = _numba()
     from numba.core.registry import CPUDispatcher
@@ -386,7 +389,7 @@ def _dispatcher() -> type:
 
         @functools.cached_property
         def within(self) -> CPUDispatcher:
-            """The same without doors, made when compiled code first asks for it."""
+            """Dispatcher without wrappers, created at first use by compiled code."""
             if bare.items() <= self.options.items():
                 return self
             return Dispatcher(self.py_func, self.cache, f"{self.folder}/within".strip("/"), **self.options | bare)
@@ -395,7 +398,7 @@ def _dispatcher() -> type:
         def _numba_type_(self):
             return numba.types.Dispatcher(self.within)
 
-        def _reduce_class(self) -> type:  # of a function that is an argument, which names it in a file of the cache
+        def _reduce_class(self) -> type:  # written to cache files for functions passed as arguments
             return CPUDispatcher
 
     return Dispatcher
@@ -403,23 +406,23 @@ def _dispatcher() -> type:
 
 @functools.cache
 def _kept_file() -> type:
-    """Numba's files of one function, of which a damaged one is as one that is not there, and a full disk no end."""
+    """Cache file class of numba that treats a damaged file as missing and does not fail on a full disk."""
     from numba.core.caching import IndexDataCacheFile, dumps
 
-    class Kept(IndexDataCacheFile):
+    class CacheFile(IndexDataCacheFile):
         def _load_index(self) -> dict:
             try:
                 return super()._load_index()
-            except Exception:  # whatever pickle makes of half a file
+            except Exception:  # any error of pickle in an incomplete file
                 return {}
 
         def _load_data(self, name: str) -> Any:
-            digest, data = (found := Path(self._data_path(name)).read_bytes())[:DIGEST], found[DIGEST:]
+            digest, data = (content := Path(self._data_path(name)).read_bytes())[:DIGEST], content[DIGEST:]
             if hashlib.sha256(data).digest() != digest:
-                raise OSError(f"{name} is damaged")  # for numba to compile anew
-            found = pickle.loads(data)
-            (_, _, (LOADED[found[1].llvm_func_name], _)), *_ = found  # which LLVM takes and gives no more
-            return found
+                raise OSError(f"{name} is damaged")  # numba then compiles it again
+            content = pickle.loads(data)
+            (_, _, (LOADED[content[1].llvm_func_name], _)), *_ = content  # LLVM does not return it later
+            return content
 
         def _save_data(self, name: str, data: Any) -> None:
             data = dumps(data)
@@ -432,22 +435,22 @@ def _kept_file() -> type:
             except OSError as error:
                 _cannot_keep(error.strerror or str(error))
 
-    return Kept
+    return CacheFile
 
 
 @functools.cache
-def _cannot_keep(why: str) -> None:
-    text = f"{cache_folder()}: compiled code cannot be kept: {why}; every start compiles it again until it can"
-    warnings.warn(f"{text}, or until FVSOLVE_CACHE names another folder", RuntimeWarning, stacklevel=2)
+def _cannot_keep(reason: str) -> None:
+    text = f"{cache_folder()}: compiled code cannot be saved: {reason}; each start compiles it again"
+    warnings.warn(f"{text}. Free space there, or set FVSOLVE_CACHE to another folder", RuntimeWarning, stacklevel=2)
 
 
 @functools.cache
 def code_folder() -> Path:
-    """The folder of code of these sources for this machine; of other sources the oldest are deleted."""
+    """Folder of code compiled from these sources for this machine; the oldest folders of other sources are deleted."""
     folder = cache_folder() / "code" / source_hash()
     own = folder / store.target()["name"]
     own.mkdir(parents=True, exist_ok=True)
-    with contextlib.suppress(OSError):  # a full disk is told where code is to be kept
+    with contextlib.suppress(OSError):  # a full disk is reported when code is saved
         store.describe(own)
     os.utime(folder)
     _prune(folder)
@@ -455,7 +458,7 @@ def code_folder() -> Path:
 
 
 def _prune(present: Path) -> None:
-    """Delete all but the newest generations beside `present`; another process may be doing the same."""
+    """Delete all but the newest other generations; another process may do the same at this time."""
     others = []
     for path in present.parent.iterdir():
         try:
@@ -485,7 +488,7 @@ def _writable(folder: Path) -> bool:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(bytes(ROOM))  # which a full disk refuses
+            file.write(bytes(ROOM))  # fails on a full disk
         return True
     except OSError:
         return False

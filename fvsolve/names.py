@@ -1,4 +1,4 @@
-"""Public names of a package, fetched when they are first asked for. Knows where they live; imports nothing before."""
+"""Public names of a package, imported on first use."""
 
 from __future__ import annotations
 
@@ -8,26 +8,27 @@ from importlib import import_module
 from types import ModuleType
 
 
-def offer(package: str, homes: Mapping[str, str]) -> list[str]:
-    """Let a package offer names from modules, name -> module within it, or beside it as `.room.module`.
+def offer(package: str, modules: Mapping[str, str]) -> list[str]:
+    """Make names available as attributes of a package; return the sorted names, for `__all__`.
 
-    Returns the sorted names, for `__all__`. A function is not hidden by the module of its own name that it lives in.
+    modules : name -> module in the package, or `.other.module` for a module of a neighbouring package. A function stays
+    visible after the import of a module of the same name.
     """
 
-    class Offering(ModuleType):
+    class LazyModule(ModuleType):
         def __getattr__(self, name: str) -> object:
-            if name not in homes:
+            if name not in modules:
                 raise AttributeError(f"module {package!r} has no attribute {name!r}")
-            value = getattr(import_module(f".{homes[name]}", package), name)
+            value = getattr(import_module(f".{modules[name]}", package), name)
             super().__setattr__(name, value)
             return value
 
         def __setattr__(self, name: str, value: object) -> None:
-            if not (name in homes and isinstance(value, ModuleType)):
+            if not (name in modules and isinstance(value, ModuleType)):
                 super().__setattr__(name, value)
 
         def __dir__(self) -> list[str]:
-            return sorted({*vars(self), *homes})
+            return sorted({*vars(self), *modules})
 
-    sys.modules[package].__class__ = Offering
-    return sorted(homes)
+    sys.modules[package].__class__ = LazyModule
+    return sorted(modules)

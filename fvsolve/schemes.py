@@ -1,7 +1,7 @@
-"""Schemes and limiters as data: what each makes of the averages of cells at a face. Knows numbers; computes no field.
+"""Schemes and limiters as data: weights of cell averages in the value at a face.
 
-A linear scheme is one entry here, and nothing else: order, reach, ends and limits are derived from its weights. What is
-limited has a kernel besides (`kernels.reconstruction`, `kernels.limiters`), and is its twin where all is smooth.
+A linear scheme is a single entry here: order, reach, ends and step limits are derived from its weights. A limited
+scheme has a kernel too (`kernels.reconstruction`, `kernels.limiters`); in smooth solutions it equals its linear twin.
 """
 
 from __future__ import annotations
@@ -11,32 +11,33 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-CELLS = range(-2, 3)  # that a linear scheme may weigh, from the one before the face
-ROOM = 5  # cells below which a pipe has none for a scheme of five
+CELLS = range(-2, 3)  # cells that a linear scheme may use, relative to the cell upstream of the face
+ROOM = 5  # number of cells that a pipe needs for a scheme with a stencil of five
 Weights = tuple[Fraction, ...]
 
 
 class Reach(NamedTuple):
-    """How many cells a scheme looks at, for a wave that runs forward."""
+    """Numbers of cells that a scheme reads, for a wave that runs forward."""
 
     behind: int  # cells before a cell, in its rate
     ahead: int  # cells after it
     entering: int  # cells under the polynomial beyond an end, where the wave enters
-    leaving: int  # and where it leaves
+    leaving: int  # cells under the polynomial beyond an end, where the wave leaves
 
 
 @dataclass(frozen=True)
 class Scheme:
-    """How the value at a face comes from averages of cells on the side that a wave comes from.
+    """Reconstruction of the value at a face from averages of upstream cells.
 
-    family : the kernel; weights : of cells u-2 .. u+2 in the value at the face after u, where it is linear
-    twin : the linear scheme that a limited one is where all is smooth; shorter : the one that pipes of fewer than
-    `ROOM` cells take; plane : the one that carries basins on rectangles
-    cavities : whether it bears the edge of a cavity, over which the others reach
-    more : cells that it reads at an end where a wave leaves, beyond its polynomial
-    quicker : how much quicker than its inside a pipe of 1, 2, 3, ... cells is, for its ends: 0.9, or 0.9 times the
-    limit on a long pipe where that is less, over the Courant number at which ssp-rk3 grows in it between open and shut
-    ends (tests/limits/test_ends.py), where that is more than one
+    family : the kernel
+    weights : of cells u-2 .. u+2 in the value at the face after cell u; None for a limited scheme
+    twin : linear scheme that a limited scheme equals in smooth solutions
+    shorter : scheme for pipes of fewer than `LEAST_CELLS` cells; plane : scheme for basins on rectangles
+    cavities : True if the scheme can treat the edge of a cavity; stencils of other schemes reach across it
+    extra_cells : cells read at an end where a wave leaves, in addition to its polynomial
+    end_factors : factors on the rate of a pipe of 1, 2, 3, ... cells because of its ends: 0.9, or 0.9 times the limit
+    of a long pipe if that is less, over the Courant number above which ssp-rk3 is unstable between an open and a shut
+    end (tests/limits/test_ends.py); at least 1
     """
 
     name: str
@@ -48,56 +49,56 @@ class Scheme:
     cavities: bool = False
     more: int = 0
     own_quicker: tuple[float, ...] = ()
-    branches: tuple[tuple[str, Weights], ...] = ()  # what it is where its switches stand still; muscl asks its limiter
+    branches: tuple[tuple[str, Weights], ...] = ()  # linear schemes for fixed switches; for muscl see its limiter
 
     @property
     def limited(self) -> bool:
-        """Whether its weights go with the solution."""
+        """True if its weights depend on the solution."""
         return self.weights is None
 
     @property
     def smooth(self) -> Scheme:
-        """The linear scheme that it is where all is smooth: itself, or its twin."""
+        """Linear scheme that it equals in smooth solutions: itself, or its twin."""
         return SCHEMES[self.twin] if self.limited else self
 
     @cached_property
     def degree(self) -> int:
-        """The degree of polynomials whose value at the face it gives exactly from their averages."""
+        """Highest degree of polynomials whose value at the face follows exactly from their cell averages."""
         degree = 0
         while self.exact(degree + 1):
             degree += 1
         return degree
 
     def exact(self, degree: int) -> bool:
-        """Whether it gives x^degree at x = 1 from averages over cells [k, k + 1]."""
+        """True if it gives x^degree at x = 1 exactly from averages over cells [k, k + 1]."""
         power = degree + 1
         averages = (Fraction((k + 1) ** power - k**power, power) for k in CELLS)
         return sum(w * average for w, average in zip(self.smooth.weights, averages, strict=True)) == 1
 
     @property
     def order(self) -> int:
-        """Of its error in dx, where all is smooth."""
+        """Order of its error in dx in smooth solutions."""
         return self.degree + 1
 
     @cached_property
     def reach(self) -> Reach:
-        """What the rates of a pipe's cells look at."""
+        """Numbers of cells that the rate of a cell depends on."""
         used = [k for k, w in zip(CELLS, self.smooth.weights, strict=True) if w != 0]
         return Reach(1 - min(used), max(0, *used), self.degree, self.degree + 1 + self.more)
 
     @property
     def quicker(self) -> tuple[float, ...]:
-        """As of its twin."""
+        """Factors on the rate of a short pipe because of its ends: those of its linear scheme."""
         return self.smooth.own_quicker
 
     def on(self, rectangle: bool) -> Scheme:
-        """The scheme that carries basins on a rectangle, or on a mesh of any cells."""
-        one = SCHEMES[self.plane]
-        return one if rectangle or one.degree <= 1 else SCHEMES["muscl"]
+        """Scheme for basins on a rectangle, or on an unstructured mesh."""
+        scheme = SCHEMES[self.plane]
+        return scheme if rectangle or scheme.degree <= 1 else SCHEMES["muscl"]
 
 
 def weighed(denominator: int, *weights: int) -> Weights:
-    """Weights as fractions."""
+    """Fractions of integer weights and their common denominator."""
     return tuple(Fraction(w, denominator) for w in weights)
 
 
@@ -120,17 +121,17 @@ LIMITED = {name: one for name, one in SCHEMES.items() if one.limited}
 
 
 def quicker(scheme: str, cells: int) -> float:
-    """Factor on the rate of a pipe's cells that its ends ask for; 1 where the pipe is long."""
+    """Factor on the rate of the cells of a pipe because of its ends; 1 for a long pipe."""
     factors = SCHEMES[scheme].quicker
     return factors[cells - 1] if cells <= len(factors) else 1.0
 
 
 class Limiter(NamedTuple):
-    """A function of `kernels.limiters`, which has the codes in this order.
+    """Limiter of `kernels.limiters`, whose codes are in this order.
 
-    tangents : (by the difference behind, by the one ahead) of its slope, where it has some and its switches stand still
-    wide : on meshes of any cells, where slopes are least squares, how far values at sides may go beyond those around:
-    1 for not at all, or as linear fields want on shaken meshes
+    tangents : (derivative of its slope by the difference behind, by the difference ahead) for each nonzero branch
+    overshoot : on unstructured meshes with least-squares slopes, bound of the values at sides relative to those of
+    neighbouring cells: 1 for no overshoot, more as linear fields need on distorted meshes
     """
 
     tangents: tuple[tuple[Fraction, Fraction], ...]
@@ -138,15 +139,15 @@ class Limiter(NamedTuple):
 
     @property
     def branches(self) -> dict[str, Weights]:
-        """What muscl is where its switches stand still: linear schemes, or twice the slope behind or ahead."""
+        """Weights of muscl for fixed switches, by name: linear schemes, or twice the slope behind or ahead."""
         half = [(Fraction(), Fraction()), *((a / 2, b / 2) for a, b in self.tangents)]
-        found = [(NONE, -a, 1 + a - b, b, NONE) for a, b in half]
-        known = {one.weights: name for name, one in LINEAR.items()}
-        return {known.get(w, "twice behind" if w[1] else "twice ahead"): w for w in found}
+        schemes = [(NONE, -a, 1 + a - b, b, NONE) for a, b in half]
+        known = {scheme.weights: name for name, scheme in LINEAR.items()}
+        return {known.get(w, "twice behind" if w[1] else "twice ahead"): w for w in schemes}
 
     @property
     def steepest(self) -> Fraction:
-        """Its greatest slope over the smaller difference."""
+        """Greatest ratio of its slope to the smaller difference."""
         return max(max(pair) for pair in self.tangents)
 
 
@@ -159,5 +160,5 @@ LIMITERS = {
 
 
 def branches(scheme: str, limiter: str) -> dict[str, Weights]:
-    """The linear schemes that a limited one is where its switches stand still, by name."""
+    """Weights of the linear schemes that a limited scheme equals for fixed switches, by name."""
     return LIMITERS[limiter].branches if scheme == "muscl" else dict(SCHEMES[scheme].branches)

@@ -1,4 +1,4 @@
-"""How objects show themselves at a prompt and in a notebook: a line, a table, a picture. Draws nothing itself."""
+"""Display of results at a prompt and in a notebook: a line, a table, a plot."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any, ClassVar
 
 from fvsolve.doors import PATH, door
 
-SHOWN = 12  # rows of a table in a notebook; `.frame()` has them all
+SHOWN = 12  # rows of a table in a notebook; `.frame()` contains all rows
 
 
 class Shown:
-    """What has a line (`said`), a table (`listed`) and a picture (`picture`, "module:function" that draws it)."""
+    """Base class of results with a summary line, a table and a plot (`picture`, "module:function" that draws it)."""
 
     picture: ClassVar[str] = ""
 
     def said(self) -> str:
-        """What it is, in some words."""
+        """Summary in some words."""
         raise NotImplementedError
 
     def listed(self) -> Mapping[str, Sequence[Any]]:
-        """Its table, by columns, in the units it has."""
+        """Columns of the table by name, in the units of the result."""
         raise NotImplementedError
 
     def frame(self):
-        """Its table as a pandas DataFrame; FvsolveError where pandas is not installed."""
+        """Table as a pandas DataFrame; FvsolveError if pandas is not installed."""
         from fvsolve.errors import FvsolveError
 
         try:
@@ -37,7 +37,7 @@ class Shown:
 
     @door(path=PATH)
     def plot(self, path=None):
-        """Its picture as a matplotlib Figure, also written to `path` where one is given."""
+        """Plot as a matplotlib Figure, also written to `path` if given."""
         module, _, name = self.picture.partition(":")
         return kept(getattr(import_module(module), name)(self), path)
 
@@ -54,17 +54,17 @@ class Shown:
 
 
 def save(figure, path) -> None:
-    """Write a figure; a .png drawn once, where `savefig` draws a figure with a layout twice, to the same bytes."""
+    """Write a figure. A .png is drawn once; `savefig` would draw a figure with a layout twice, to the same bytes."""
     write = figure.canvas.print_png if str(path).endswith(".png") else figure.savefig
     write(path)
 
 
 def kept(figure, path):
-    """A figure, also written to `path` where one is given; FvsolveError where that cannot be."""
+    """Return a figure, also written to `path` if given; FvsolveError if that fails."""
     try:
         if path is not None:
             save(figure, path)
-    except (OSError, ValueError) as error:  # no such folder, no such kind of picture
+    except (OSError, ValueError) as error:  # no such folder, unknown file type
         from fvsolve.errors import FvsolveError
 
         raise FvsolveError(f"{path}: the picture cannot be written: {error}") from error

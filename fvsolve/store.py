@@ -1,7 +1,7 @@
-"""Machine code on disk, and how it is called where numba is not loaded. Knows llvmlite; knows no function's meaning.
+"""Machine code on disk, loaded by llvmlite without numba.
 
-A file holds one function for one kind of arguments: a relocatable object as numba made it, and what its symbols are.
-Files lie in a folder named by what machine code depends on beside sources: the target.
+A file contains a function for a single signature: the relocatable object compiled by numba, and its symbols. Its folder
+is named by the target: all that machine code depends on apart from the sources.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from typing import Any, NamedTuple
 
 DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".code"
-LINKS = sys.platform != "win32"  # where LLVM's linker knows the objects that numba makes
-# Variables of numba's that change no code; all others are part of the target.
+LINKS = sys.platform != "win32"  # LLVM's linker can link numba's objects there
+# Environment variables of numba that do not change code; all others are part of the target.
 HARMLESS = re.compile(r"NUMBA_(CACHE|CHROME|COLOR|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"
                       r"FORCE_CUDA|FULL|HIGHLIGHT|NUM_|NRT_STATS|PARALLEL_DIAG|THREADING|TRACE)")  # fmt: skip
-NUMBERS = itertools.count()  # of libraries, whose names are taken once
+NUMBERS = itertools.count()  # for unique names of libraries
 
 
 class Code(NamedTuple):
-    """A function in memory: where compiled code calls it, where C calls it, what Python calls; 0 or None without."""
+    """Function in memory: address for compiled code, address for C (or 0), callable for Python (or None)."""
 
     address: int
     pointer: int
     python: Callable | None
-    kept: Any  # alive as long as it may be called
+    kept: Any  # owner of the memory, kept alive as long as the function
 
 
 @functools.cache
 def target() -> dict[str, str]:
-    """What machine code depends on beside sources: processor, versions, numba's settings; `name` names them all.
+    """Properties that machine code depends on apart from sources: processor, versions, settings of numba.
 
-    name : of the folder, the processor's and eight digits
+    name : name of the folder, made of the processor and eight digits of the hash of all properties
     """
     import llvmlite
     import numpy
@@ -52,9 +52,9 @@ def target() -> dict[str, str]:
 
     try:
         features = binding.get_host_cpu_features().flatten()
-    except RuntimeError:  # as numba does
+    except RuntimeError:  # as in numba
         features = ""
-    said = {
+    settings = {
         "processor": binding.get_host_cpu_name(),
         "features": features,
         "system": binding.get_process_triple(),
@@ -65,43 +65,43 @@ def target() -> dict[str, str]:
         "settings": " ".join(sorted(f"{name}={value}" for name, value in os.environ.items()
                                     if name.startswith("NUMBA_") and not HARMLESS.match(name))),
     }  # fmt: skip
-    digest = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:8]
-    return said | {"name": f"{said['processor']}-{digest}"}
+    digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:8]
+    return settings | {"name": f"{settings['processor']}-{digest}"}
 
 
 @functools.cache
 def numba_version() -> str:
-    """As numba says it, without loading it."""
+    """Version of numba, read without importing it."""
     folder = numba_folder()
     text = (folder / "_version.py").read_text(encoding="utf-8") if folder else ""
-    found = re.search(r'version"?\s*[:=]\s*["\']([^"\']+)', text)
-    return found[1] if found else sys.modules["numba"].__version__ if "numba" in sys.modules else "unknown"
+    match = re.search(r'version"?\s*[:=]\s*["\']([^"\']+)', text)
+    return match[1] if match else sys.modules["numba"].__version__ if "numba" in sys.modules else "unknown"
 
 
 def numba_folder() -> Path | None:
-    """Where numba is installed."""
-    found = importlib.util.find_spec("numba")
-    return Path(found.origin).parent if found and found.origin else None
+    """Folder in which numba is installed."""
+    spec = importlib.util.find_spec("numba")
+    return Path(spec.origin).parent if spec and spec.origin else None
 
 
 def describe(folder: Path) -> None:
-    """Say in a folder of a target what target it is, once."""
+    """Write the properties of the target to its folder, once."""
     path = folder / "target.json"
     if not path.exists():
         _replace(path, json.dumps(target(), indent=1).encode())
 
 
-def write(path: Path, who: str, compiled, code: bytes, doors: bool) -> None:
-    """Keep what numba has compiled, with its `doors` for Python and C or without; OSError where that cannot be."""
+def write(path: Path, identity: str, compiled, code: bytes, doors: bool) -> None:
+    """Save a function compiled by numba; doors : with wrappers for Python and C. OSError if it cannot be written."""
     names = compiled.fndesc
     symbols = {"address": names.llvm_func_name}
     if doors:
-        if compiled.environment.consts:  # Python's objects, which no file holds
+        if compiled.environment.consts:  # Python objects, which a file cannot contain
             return
         symbols |= {"pointer": names.llvm_cfunc_wrapper_name, "python": names.llvm_cpython_wrapper_name}
         symbols["environment"] = names.env_name
-    wanted = [name for name in helpers() if name.encode() in code]
-    head = {"function": who, "target": target()["name"], "symbols": symbols, "wanted": wanted}
+    needed = [name for name in helpers() if name.encode() in code]
+    head = {"function": identity, "target": target()["name"], "symbols": symbols, "wanted": needed}
     data = json.dumps(head).encode() + b"\n" + code
     path.parent.mkdir(parents=True, exist_ok=True)
     _replace(path, hashlib.sha256(data).digest() + data)
@@ -117,29 +117,29 @@ def _replace(path: Path, data: bytes) -> None:
         raise
 
 
-def read(path: Path, who: str) -> Code | None:
-    """What a file holds, ready to be called; None where there is none, or none that can be, which a warning tells."""
+def read(path: Path, identity: str) -> Code | None:
+    """Load a function from a file; None if there is no file, or if it cannot be used, with a warning."""
     try:
-        found = path.read_bytes()
+        content = path.read_bytes()
     except OSError:
         return None
-    digest, data = found[:DIGEST], found[DIGEST:]
+    digest, data = content[:DIGEST], content[DIGEST:]
     if hashlib.sha256(data).digest() != digest:
-        return None  # damaged: as if it were not there
-    head, _, object_code = data.partition(b"\n")
-    said = json.loads(head)
-    if said["target"] != target()["name"]:
-        _refuse(f"{path.parent} holds code for {said['target']}, and this machine is {target()['name']}; it is "
+        return None  # damaged: treated as missing
+    header, _, object_code = data.partition(b"\n")
+    head = json.loads(header)
+    if head["target"] != target()["name"]:
+        _refuse(f"{path.parent} contains code compiled for {head['target']}; this machine is {target()['name']}; it is "
                 "compiled again")  # fmt: skip
         return None
-    if said["function"] != who:
+    if head["function"] != identity:
         return None
-    lacks = [name for name in said["wanted"] if name not in helpers()]
-    if not lacks:
-        with contextlib.suppress(RuntimeError):  # LLVM says on standard error what it does not find
-            return _linked(said["symbols"], said["wanted"], object_code, who)
-    why = f"numba {numba_version()} has no {', '.join(lacks)}" if lacks else "it calls what is not here"
-    _refuse(f"{path}: code of {who.split()[0]} cannot be loaded: {why}; it is compiled again")
+    missing = [name for name in head["wanted"] if name not in helpers()]
+    if not missing:
+        with contextlib.suppress(RuntimeError):  # LLVM writes missing symbols to standard error
+            return _linked(head["symbols"], head["wanted"], object_code, identity)
+    reason = f"numba {numba_version()} has no {', '.join(missing)}" if missing else "it calls what is not loaded"
+    _refuse(f"{path}: code of {identity.split()[0]} cannot be loaded: {reason}; it is compiled again")
     return None
 
 
@@ -148,23 +148,23 @@ def _refuse(text: str) -> None:
     warnings.warn(text, RuntimeWarning, stacklevel=2)
 
 
-def _linked(symbols: dict[str, str], wanted: list[str], object_code: bytes, who: str) -> Code:
-    """Machine code in memory, in a library of its own: no symbol of it meets another's."""
+def _linked(symbols: dict[str, str], needed: list[str], object_code: bytes, identity: str) -> Code:
+    """Link machine code in a library of its own, so that symbols of different functions do not conflict."""
     from llvmlite import binding
 
     built = binding.JITLibraryBuilder().add_object_img(object_code).add_current_process()
     for symbol in symbols.values():
         built.export_symbol(symbol)
-    for name in wanted:
+    for name in needed:
         built.import_symbol(name, helpers()[name])
-    library = built.link(linker(), f"{who} {next(NUMBERS)}")
+    library = built.link(linker(), f"{identity} {next(NUMBERS)}")
     python = None
     if "python" in symbols:
         own = extension("_dynfunc")
         environment = own.Environment({})
         ctypes.c_void_p.from_address(library[symbols["environment"]]).value = id(environment)
         python = own.make_function(
-            sys.modules[__name__], who.split()[0], who, library[symbols["python"]], environment, (library,)
+            sys.modules[__name__], identity.split()[0], identity, library[symbols["python"]], environment, (library,)
         )
     pointer = library[symbols["pointer"]] if "pointer" in symbols else 0
     return Code(library[symbols["address"]], pointer, python, library)
@@ -172,7 +172,7 @@ def _linked(symbols: dict[str, str], wanted: list[str], object_code: bytes, who:
 
 @functools.cache
 def linker():
-    """LLVM's linker of this process."""
+    """Linker of LLVM for this process."""
     from llvmlite import binding
 
     binding.initialize_native_target()
@@ -183,23 +183,23 @@ def linker():
 
 @functools.cache
 def helpers() -> dict[str, int]:
-    """Addresses of what machine code of numba's calls in numba and Python: all that is not found by name."""
+    """Addresses of functions and objects of numba and Python that machine code uses and that are not found by name."""
     import builtins
 
-    found = {"_Py_NoneStruct": id(None)}
+    addresses = {"_Py_NoneStruct": id(None)}
     for module in (extension("_helperlib"), extension("_dynfunc")):
-        found |= {f"numba_{name}": address for name, address in module.c_helpers.items()}
-    faults = (one for one in vars(builtins).values() if isinstance(one, type) and issubclass(one, BaseException))
-    return found | {f"PyExc_{one.__name__}": id(one) for one in faults}
+        addresses |= {f"numba_{name}": address for name, address in module.c_helpers.items()}
+    exceptions = (e for e in vars(builtins).values() if isinstance(e, type) and issubclass(e, BaseException))
+    return addresses | {f"PyExc_{e.__name__}": id(e) for e in exceptions}
 
 
 @functools.cache
 def extension(name: str):
-    """One of numba's own compiled modules, without numba."""
+    """Compiled extension module of numba, loaded without importing numba."""
     full = f"numba.{name}"
     if full in sys.modules:
         return sys.modules[full]
-    path = next(one for end in EXTENSION_SUFFIXES if (one := numba_folder() / f"{name}{end}").is_file())
+    path = next(candidate for end in EXTENSION_SUFFIXES if (candidate := numba_folder() / f"{name}{end}").is_file())
     loader = ExtensionFileLoader(full, str(path))
     module = importlib.util.module_from_spec(importlib.util.spec_from_file_location(full, path, loader=loader))
     loader.exec_module(module)

@@ -113,7 +113,7 @@ def test_integrate_refuses_what_is_no_equation(f, y0, wanted):
 
 @pytest.mark.parametrize("name", ["rk4", "gauss-2", "rodas-5p", "auto", "", " spaced "])
 def test_no_tableau_takes_the_place_of_a_method_that_is_there(name):
-    with pytest.raises(FvsolveError, match="is not free" if name else "wanted a name"):
+    with pytest.raises(FvsolveError, match="is not free" if name else "expected a name"):
         fvsolve.tableau(name, "0 |\n--+--\n | 1")
     assert name not in METHODS or METHODS[name].order > 1
 

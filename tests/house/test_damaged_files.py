@@ -67,7 +67,7 @@ def test_compiled_code_that_is_damaged_is_compiled_anew(ending, harm, tmp_path):
 def test_a_full_disk_costs_only_time_and_the_folder_is_named(tmp_path):
     said, err = compiled(tmp_path, "100")
     assert said == ["42.0", "0\n"]
-    assert f"{tmp_path}: compiled code cannot be kept: File too large" in err and "FVSOLVE_CACHE" in err
+    assert f"{tmp_path}: compiled code cannot be saved: File too large" in err and "FVSOLVE_CACHE" in err
 
 
 FULL = """

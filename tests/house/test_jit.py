@@ -128,13 +128,16 @@ def test_code_of_other_sources_is_named(package):
     old = python(package, "from fvsolve import jit; print(jit.source_hash())")[0]
     (package / "units.py").write_text("NEW = 1\n")
     told = " ".join(python(package, "from fvsolve import jit; print(jit.elsewhere())"))
-    assert f"holds code of other sources, {old}, and these are " in told
+    assert f"contains code compiled from other sources ({old}); the present sources are " in told
 
 
 @pytest.mark.parametrize(
     "changes, named",
     {
-        "another machine": ({"target": "znver9-01234567"}, r"holds code for znver9-01234567, and this machine is \S+"),
+        "another machine": (
+            {"target": "znver9-01234567"},
+            r"contains code compiled for znver9-01234567; this machine is \S+",
+        ),
         "a helper that is gone": (
             {"wanted": ["numba_gone"]},
             r"code of fvsolve.steppers.loop.loop cannot be loaded: numba \S+ has no numba_gone",

@@ -170,7 +170,7 @@ def test_faults_are_those_of_a_fresh_run():
 
 
 def test_what_is_no_model_and_no_table_is_named():
-    with pytest.raises(FvsolveError, match="model = .*; wanted a Model"):
+    with pytest.raises(FvsolveError, match="model = .*; expected a Model"):
         fvsolve.vary(fvsolve.load("valve-closure"), {"links.valve.area": 1.0})
-    with pytest.raises(FvsolveError, match="wanted a table, for example"):
+    with pytest.raises(FvsolveError, match="expected a dict, for example"):
         fvsolve.vary(fvsolve.build(fvsolve.load("valve-closure", SMALL)), ["links.valve.area"])

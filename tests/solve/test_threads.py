@@ -281,7 +281,7 @@ def test_what_one_thread_steps_is_said(name):
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True, None])
 def test_a_number_of_threads_that_is_none_is_named(threads):
-    with pytest.raises(FvsolveError, match="threads = .*wanted a whole number from 1 on"):
+    with pytest.raises(FvsolveError, match="threads = .*expected a whole number, 1 or more"):
         fvsolve.run(water(), threads=threads)
 
 

@@ -187,5 +187,5 @@ def test_a_negative_resistance_is_not_positive_real():
 
 @pytest.mark.parametrize("slope, high, shift", [(math.nan, 1, 0), (math.inf, 1, 0), (-1, 1, 0), (1, 0, 0), (1, 1, -1)])
 def test_a_sweep_without_a_bound_or_a_range_is_refused(slope, high, shift):
-    with pytest.raises(FvsolveError, match="wanted|bounded"):
+    with pytest.raises(FvsolveError, match="expected|bounded"):
         sweep_positive_real(lambda s: s, slope, high, shift)

@@ -1,1 +1,1 @@
-"""Walls that give way in time; loaded and compiled by scenes that have them alone."""
+"""Viscoelastic pipe walls; imported and compiled only for scenes that contain such walls."""

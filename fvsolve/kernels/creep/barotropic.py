@@ -1,7 +1,8 @@
-"""Walls that creep under the density laws log, table and mixture. Knows what pressure a mass per length makes.
+"""Creep of viscoelastic pipe walls under the density laws log, table and mixture.
 
-What elements follow is w = (A / a) (p - p0), p0 of the profile, a the speed at the reference: r + l under the linear
-law. The bore that has grown holds liquid of the reference density, which it takes off the mass of its cell alone.
+The Kelvin-Voigt elements follow w = (A / a) (p - p0). p0 is the pressure of the profile, a the wave speed at the
+reference state; under the linear law w = r + l. The additional volume of the bore holds liquid of the reference
+density. Its mass is subtracted from the mass of the same cell only.
 """
 
 from fvsolve.jit import njit
@@ -14,20 +15,20 @@ from fvsolve.kernels.pipes import GAUSS
 
 @njit
 def pressed(st, floats, profile, pipe, r, l, w):
-    """w = (A / a) (p - p0) [kg/s], averaged over cells by two Gauss points."""
+    """Write w = (A / a) (p - p0) [kg/s], averaged over each cell by two Gauss points."""
     n, c, least = r.size, pipe["speed"], DRY * st["rho"] * pipe["area"]
     for i in range(n):
         low, high = max(i - 1, 0), min(i + 1, n - 1)
-        lean = GAUSS / max(high - low, 1) * ((r[high] + l[high]) - (r[low] + l[low])) / c
+        dm_gauss = GAUSS / max(high - low, 1) * ((r[high] + l[high]) - (r[low] + l[low])) / c
         m0, dm = profile[pipe["center"] + i], (r[i] + l[i]) / c
-        p = pressure_of_mass(st, floats, pipe, max(m0 + (dm + lean), least))
-        p += pressure_of_mass(st, floats, pipe, max(m0 + (dm - lean), least))
+        p = pressure_of_mass(st, floats, pipe, max(m0 + (dm + dm_gauss), least))
+        p += pressure_of_mass(st, floats, pipe, max(m0 + (dm - dm_gauss), least))
         w[i] = pipe["admittance"] * (0.5 * p - pressure_of_mass(st, floats, pipe, m0))
 
 
 @njit
 def creep_walls_barotropic(t, y, dydt, out, handle):
-    """Creep of the walls of all pipes, taken off rates, where there are any."""
+    """Subtract the wall creep of all pipes from the rates of both waves; write the rates of the elements."""
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):

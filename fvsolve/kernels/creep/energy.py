@@ -1,8 +1,9 @@
-"""Power and stored energy of walls that creep, added to those of their pipe. Knows elements; knows no density law.
+"""Power and stored energy of viscoelastic walls, added to the rows of their pipes.
 
-An element of gain g and rate n whose u follows w stores g u^2 / (2 n) and takes g (w - u)^2, both over rho A and per
-length; together they are w times what comes off it. What it does against P of the profile, P = p - p_ambient + rho g z
-as in `energy.py`, rho that of the reference, is stored too. Rows of a pipe: `creep` and `rate`; its elastic energy.
+An element of gain g and rate n has a state u that follows w. It stores g u^2 / (2 n) and dissipates g (w - u)^2, both
+divided by rho A and per length. The sum of dissipation and storage rate is w times the mass flow into the element.
+The work against P of the profile is stored too, P = p - p_ambient + rho g z as in `linear_energy.py`, with the
+reference density. The rows of a pipe are `creep` and `rate` (power), and its elastic energy (storage).
 """
 
 from fvsolve.jit import njit
@@ -13,7 +14,7 @@ from fvsolve.kernels.handle import open_tables
 
 @njit
 def creep_power(st, floats, pipe, w, y, dydt):
-    """(power taken, rate of storage) of all elements of a pipe [W], but what they do against the profile."""
+    """Dissipation and rate of storage of all elements of a pipe [W], without the work against the profile."""
     n, width, taken, rate = w.size, width_of(st, w.size), 0.0, 0.0
     for k in range(pipe["elements"]):
         gain, at = floats[pipe["element"] + 2 * k], pipe["strain"] + k * n
@@ -31,7 +32,7 @@ def creep_power(st, floats, pipe, w, y, dydt):
 
 @njit
 def creep_energy(st, floats, pipe, y):
-    """Change of what all elements of a pipe store since the profile, but what they do against it [J]."""
+    """Change of the energy stored in all elements of a pipe since the profile, without work against the profile [J]."""
     n, width, sum_ = pipe["cells"], width_of(st, pipe["cells"]), 0.0
     for k in range(pipe["elements"]):
         at = pipe["strain"] + k * n
@@ -44,7 +45,10 @@ def creep_energy(st, floats, pipe, y):
 
 @njit(forceinline=True)
 def grown(st, floats, pipe, i, g, y):
-    """What all elements have taken, or take, at a Gauss point of cell i, over w [kg/s] of a pressure."""
+    """Sum over all elements of g u / n at a Gauss point of cell i [kg/s]; of rates, its time derivative.
+
+    Multiplied by dx / speed it is the mass of reference density in the additional volume of the bore.
+    """
     n, width, sum_ = pipe["cells"], width_of(st, pipe["cells"]), 0.0
     for k in range(pipe["elements"]):
         at = pipe["strain"] + k * n
@@ -55,7 +59,10 @@ def grown(st, floats, pipe, i, g, y):
 
 @njit
 def against(st, floats, pipe, node, y):
-    """What elements store against P of the profile [J], or its rate [W] of rates; node : at the pipe's `from` end."""
+    """Energy stored in elements as work against P of the profile [J], or its rate [W] where y are rates.
+
+    node : node at the `from` end of the pipe
+    """
     start, fall = (node["pressure"] - st["ambient"]) + height_pressure(st, node), pipe["drag"] / pipe["area"]
     sum_ = 0.0
     for i in range(pipe["cells"]):
@@ -67,7 +74,7 @@ def against(st, floats, pipe, node, y):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """What the walls of all pipes take, into their rows of power."""
+    """Add the power of the walls of all pipes to the power rows of the pipes."""
     tables = open_tables(handle)
     st, pipes, at = tables.settings[0], tables.pipes, NODE * tables.nodes.size
     for i in range(pipes.size):
@@ -84,7 +91,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """What the walls of all pipes hold, into their rows of stored energy."""
+    """Add the energy stored in the walls of all pipes to the storage rows of the pipes."""
     tables = open_tables(handle)
     st, floats, pipes, nodes = tables.settings[0], tables.floats, tables.pipes, tables.nodes
     for i in range(pipes.size):

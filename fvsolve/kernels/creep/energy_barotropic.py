@@ -1,8 +1,9 @@
-"""Power and stored energy of walls that creep under the laws log, table and mixture. Knows the tables.
+"""Power and stored energy of viscoelastic walls under the density laws log, table and mixture.
 
-What comes off a cell carries h(p) - h(p_ambient) + g z - v^2 / 2, h [J/kg], and is in the bore as liquid of the
-reference density, P / rho. Elements take and store what they do of P (`energy.py`); the difference is of the law, a
-part p / K of what passes and less, and has a row of its own.
+Mass that leaves a cell carries h(p) - h(p_ambient) + g z - v^2 / 2 [J/kg], with the enthalpy h. In the additional
+volume of the bore it is liquid of the reference density and carries P / rho. The elements dissipate and store their
+share of P (`wall_energy.py`). The difference is a property of the density law, at most a fraction p / K of the
+energy that passes. It has its own row.
 """
 
 from fvsolve.jit import njit
@@ -17,7 +18,7 @@ from fvsolve.kernels.handle import open_tables
 
 @njit(forceinline=True)
 def lifted(st, profile, pipe, z, i, g):
-    """g z at a Gauss point of cell i [J/kg]; z : height of the pipe's `from` end [m]."""
+    """Gravity potential g z at a Gauss point of cell i [J/kg]; z : height of the `from` end of the pipe [m]."""
     return st["gravity"] * (z + rise_to(profile, pipe, (i + 0.5 + PLACES[g]) * pipe["dx"]))
 
 
@@ -30,7 +31,7 @@ def beginning(st, floats, profile, pipe, z, i, g):
 
 @njit
 def against_barotropic(st, floats, profile, pipe, z, y):
-    """What elements store against P of the profile [J], or its rate [W] of rates."""
+    """Energy stored in elements as work against P of the profile [J], or its rate [W] where y are rates."""
     sum_ = 0.0
     for i in range(pipe["cells"]):
         for g in range(3):
@@ -40,7 +41,7 @@ def against_barotropic(st, floats, profile, pipe, z, y):
 
 @njit
 def law_power(st, floats, profile, pipe, z, w, y, dydt):
-    """What liquid that leaves a cell carries, less what it is in the bore [W]."""
+    """Energy flow of the mass that leaves the cells into the bore, minus its energy there [W]."""
     n, o, width, sum_ = w.size, pipe["y"], width_of(st, w.size), 0.0
     r, l = y[o : o + n], y[o + n : o + 2 * n]
     for i in range(n):
@@ -57,7 +58,7 @@ def law_power(st, floats, profile, pipe, z, w, y, dydt):
 
 @njit
 def add_power_barotropic(t, y, dydt, out, handle, power):
-    """What the walls of all pipes take, and what the law leaves, into their rows of power."""
+    """Add the power of the walls of all pipes, and the difference of the density law, to the power rows."""
     tables = open_tables(handle)
     st, pipes, nodes, at = tables.settings[0], tables.pipes, tables.nodes, NODE * tables.nodes.size
     floats, profile = tables.floats, tables.profile
@@ -76,7 +77,7 @@ def add_power_barotropic(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored_barotropic(t, y, dydt, out, handle, stored):
-    """What the walls of all pipes hold, into their rows of stored energy."""
+    """Add the energy stored in the walls of all pipes to the storage rows of the pipes."""
     tables = open_tables(handle)
     st, floats, pipes, nodes = tables.settings[0], tables.floats, tables.pipes, tables.nodes
     for i in range(pipes.size):

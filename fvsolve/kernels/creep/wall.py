@@ -1,10 +1,11 @@
-"""What the wall of a pipe gives way by in time, under the linear law. Knows pipes and their elements; knows no node.
+"""Viscoelastic pipe walls (Kelvin-Voigt elements) under the linear density law.
 
-A Kelvin-Voigt element of compliance J and time tau strains as d eps/dt = (J sigma - eps) / tau, sigma = c D p / (2 e)
-at the hoop, and the bore grows by 2 eps A (Covas et al. 2005). With w = r + l, which is the pressure times A / a, and
-u = 2 rho a eps A / G, G = c D K J / e, K = rho a^2: du/dt = (w - u) / tau, and what the bore takes up, G du/dt, comes
-half off the rate of each wave. All are deviations from the profile, with whose pressure the strain is in balance.
-Storage G u^2 / 2, dissipation G (w - u)^2 / tau, both over rho A: passive, for no J is negative.
+An element of compliance J and time constant tau has the strain d eps/dt = (J sigma - eps) / tau. The hoop stress is
+sigma = c D p / (2 e), and the bore grows by 2 eps A (Covas et al. 2005). Let w = r + l, the pressure times A / a, and
+u = 2 rho a eps A / G with G = c D K J / e and K = rho a^2. Then du/dt = (w - u) / tau. The mass flow into the bore,
+G du/dt, is subtracted in equal halves from the rates of both waves. All values are deviations from the profile, whose
+pressure is in equilibrium with its strain. Storage G u^2 / 2, dissipation G (w - u)^2 / tau, both divided by rho A:
+the wall is passive, for no J is negative.
 """
 
 from fvsolve.jit import njit
@@ -21,7 +22,10 @@ def total(r, l, w):
 
 @njit
 def give_way(pipe, floats, w, y, dydt, taken):
-    """Elements of a pipe follow w, and what they take comes half off the rate of each wave."""
+    """Write the rates of the elements of a pipe; subtract half of the mass flow into them from the rate of each wave.
+
+    w : float64[cells]  sum of both waves [kg/s]; taken : float64[cells]  work array
+    """
     n, o, at = w.size, pipe["y"], pipe["strain"]
     for i in range(n):
         taken[i] = 0.0
@@ -36,7 +40,7 @@ def give_way(pipe, floats, w, y, dydt, taken):
 
 @njit
 def creep_walls(t, y, dydt, out, handle):
-    """Creep of the walls of all pipes, taken off rates, where there are any."""
+    """Subtract the wall creep of all pipes from the rates of both waves; write the rates of the elements."""
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):

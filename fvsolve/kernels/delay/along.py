@@ -1,7 +1,8 @@
-"""Both waves anywhere along a delay line, for probes, fields and envelopes. Knows its history; changes nothing.
+"""Forward and backward waves at any place of a delay line, for probes, fields and envelopes.
 
-At a share x of a stretch r(t, x) = sent(t - x tau) - x delta and l(t, x) = sent(t - (1 - x) tau) + (1 - x) delta, with
-delta of its middle when what passes x now was there, or is yet to be: at both ends that is what arrives there.
+At a share x of a stretch r(t, x) = sent(t - x tau) - x delta and l(t, x) = sent(t - (1 - x) tau) + (1 - x) delta.
+Here delta is the friction loss in the middle of the stretch, at the time when the wave at x passes the middle. At both
+ends the formulas give the arriving waves.
 """
 
 from fvsolve.jit import njit
@@ -30,9 +31,12 @@ from fvsolve.kernels.records import PIPE_FLOW, PIPE_PRESSURE
 
 
 @njit
-def sent(t, out, tables, which, q, wave, at):
-    """Wave that is sent into stretch q of a line at a time `at` <= t, which may be one of the step that ends at t."""
-    past, line = tables.past, tables.delays[which]
+def sent(t, out, tables, number, q, wave, at):
+    """Wave sent into stretch q of a line at a time `at` <= t, which may lie in the step that ends at t [kg/s].
+
+    wave : 0 forward, 1 backward
+    """
+    past, line = tables.past, tables.delays[number]
     newest = int(past[COUNT]) - 1
     if newest < 0:
         return 0.0
@@ -44,7 +48,7 @@ def sent(t, out, tables, which, q, wave, at):
     value = (both[1] if wave == 1 else both[0]) + jumps_until(past, places, jumps, until)
     if at <= last or t <= last:
         return value
-    if q == (line["stretches"] - 1 if wave == 1 else 0):  # by what its node sends now
+    if q == (line["stretches"] - 1 if wave == 1 else 0):  # interpolated to the wave that its node sends now
         now = out[tables.layout[0]["ends"] + 4 * line["pipe"] + 3 * wave]
         return value + (now - value) * (at - last) / (t - last)
     pipe, before = tables.pipes[line["pipe"]], q + 1 if wave == 1 else q - 1
@@ -54,32 +58,32 @@ def sent(t, out, tables, which, q, wave, at):
 
 
 @njit
-def waves_at(t, out, tables, which, share):
-    """(forward, backward) wave [kg/s] at a share of the length of a line from `from`."""
-    line = tables.delays[which]
-    pipe, many = tables.pipes[line["pipe"]], line["stretches"]
-    q = min(int(share * many), many - 1)
-    x, tau = share * many - q, line["tau"]
-    r = sent(t, out, tables, which, q, 0, t - x * tau)
-    l = sent(t, out, tables, which, q, 1, t - (1.0 - x) * tau)
+def waves_at(t, out, tables, number, share):
+    """(forward, backward) wave [kg/s] at a share of the length of a line, measured from its `from` end."""
+    line = tables.delays[number]
+    pipe, stretches = tables.pipes[line["pipe"]], line["stretches"]
+    q = min(int(share * stretches), stretches - 1)
+    x, tau = share * stretches - q, line["tau"]
+    r = sent(t, out, tables, number, q, 0, t - x * tau)
+    l = sent(t, out, tables, number, q, 1, t - (1.0 - x) * tau)
     then = t - max(x, 1.0 - x) * tau
-    near = r if x >= 0.5 else sent(t, out, tables, which, q, 0, then)
-    far = l if x < 0.5 else sent(t, out, tables, which, q, 1, then)
+    near = r if x >= 0.5 else sent(t, out, tables, number, q, 0, then)
+    far = l if x < 0.5 else sent(t, out, tables, number, q, 1, then)
     delta = rubbed(pipe, line, near, far)
     return r - x * delta, l + (1.0 - x) * delta
 
 
 @njit
-def along_line(t, out, tables, which, r, l):
-    """Both waves in the middle of the cells that a line is told by."""
+def along_line(t, out, tables, number, r, l):
+    """Write both waves [kg/s] at the centres of r.size equal parts of a line."""
     n = r.size
     for j in range(n):
-        r[j], l[j] = waves_at(t, out, tables, which, (j + 0.5) / n)
+        r[j], l[j] = waves_at(t, out, tables, number, (j + 0.5) / n)
 
 
 @njit
 def sketched(past, places, clock, ring, mask, jumps, wave, t):
-    """Wave that was sent into a stretch at t, by lines between entries of a ring; jumps : their head."""
+    """Wave sent into a stretch at t [kg/s], by linear interpolation between entries; jumps : offset of their head."""
     last, latest, often, even = clock[0], clock[1], clock[2], clock[3]
     place = (t - latest) * often
     if place > -even:
@@ -87,7 +91,7 @@ def sketched(past, places, clock, ring, mask, jumps, wave, t):
         k, x = last + back - 1, place - back + 1.0
     else:
         k, x = between(past, last, t)
-        if k < ZEROS and x == 0.0:  # before all
+        if k < ZEROS and x == 0.0:  # before the first entry
             return jumps_until(past, places, jumps, t + clock[4])
     a, b = ring + 2 * (k & mask) + wave, ring + 2 * ((k + 1) & mask) + wave
     return past[a] + x * (past[b] - past[a]) + jumps_until(past, places, jumps, t + clock[4])
@@ -95,15 +99,18 @@ def sketched(past, places, clock, ring, mask, jumps, wave, t):
 
 @njit(forceinline=True)
 def sketch(t, past, places, clock, line, share):
-    """`waves_at` the time t of the last entry, as envelopes want it: by lines, delta that of what arrives."""
-    many, tau = line["stretches"], line["tau"]
-    q = min(int(share * many), many - 1)
-    x, s = share * many - q, line["stretch"] + q
+    """Both waves as in `waves_at` at the time t of the last entry, by linear interpolation; used for envelopes.
+
+    The friction loss delta is that of the waves which arrive at t.
+    """
+    stretches, tau = line["stretches"], line["tau"]
+    q = min(int(share * stretches), stretches - 1)
+    x, s = share * stretches - q, line["stretch"] + q
     ring, mask = ring_of(places, line, q)
     delta, jumps = past[places[0] + ARRIVALS * s + 2], jumps_at(places, s, 0)
     steps = tau * clock[2]
     if steps + 2.0 < clock[3] and past[jumps + MANY] + past[jumps + HEADS + MANY] == 0.0:
-        ahead, back = x * steps, (1.0 - x) * steps  # steps ago
+        ahead, back = x * steps, (1.0 - x) * steps  # age of both waves [steps]
         i, j = int(ahead), int(back)
         a, b = ring + 2 * ((clock[0] - i) & mask), ring + 2 * ((clock[0] - i - 1) & mask)
         c, d = ring + 2 * ((clock[0] - j) & mask) + 1, ring + 2 * ((clock[0] - j - 1) & mask) + 1
@@ -116,14 +123,14 @@ def sketch(t, past, places, clock, line, share):
 
 
 @njit
-def along_lines(t, out, handle, which, r, l):
-    """The same, of one line by its number."""
-    along_line(t, out, open_tables(handle), which, r, l)
+def along_lines(t, out, handle, number, r, l):
+    """Write both waves [kg/s] at the centres of r.size equal parts of a line, given by its number."""
+    along_line(t, out, open_tables(handle), number, r, l)
 
 
 @njit
 def observe_lines(t, y, out, handle, values):
-    """Probes within delay lines."""
+    """Write the values of probes within delay lines."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):

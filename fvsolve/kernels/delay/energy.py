@@ -1,12 +1,13 @@
-"""What delay lines store and what takes it, by what was sent into them. Knows their history; changes nothing.
+"""Stored energy, friction power and rate of storage of delay lines, from the waves sent into them.
 
-Along a stretch stands what was sent into it at ages u of 0 .. tau, the forward wave at u c from its beginning, the
-backward one at u c from its end, behind its middle less (backward: plus) the delta of the meeting there. In units of
-1 / (rho A) per length it stores R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the profile of flow M0 and q0 = Y P0, which
-falls by drag0. So what flows in at the ends is stored, or taken: sum of l (drag(M) - drag0) M of the middles and drag0
-times the integral of M. That is friction, sum of l drag(M) M, and what the midpoint rule makes of a profile that falls.
-A short line stores the share 1 - beta of what was sent in a step h, and takes beta (1 - beta) c (s - s_h)^2 of either
-wave.
+A stretch contains the waves sent into it at ages u of 0 .. tau: the forward wave at u c from its beginning, the
+backward wave at u c from its end. Behind the middle the forward wave is smaller by delta, the friction loss there; the
+backward wave is larger by delta. In units of 1 / (rho A) per length the stretch stores
+R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the profile of flow M0 and q0 = Y P0, and q0 falls by drag0. So the power
+that enters at the ends is stored or taken: sum of l (drag(M) - drag0) M of the middles, plus drag0 times the integral
+of M. The power taken is the friction, sum of l drag(M) M, and the error of the midpoint rule for a falling profile.
+A line shorter than a step h stores the share 1 - beta of the waves sent in h, and takes beta (1 - beta) c (s - s_h)^2
+of each wave.
 """
 
 import numpy as np
@@ -31,45 +32,45 @@ from fvsolve.kernels.delay.history import (
 from fvsolve.kernels.delay.lines import rubbed
 from fvsolve.kernels.friction import drag
 
-PLACES = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)  # Gauss points of a cell, or of a time, in widths from its centre
+PLACES = np.array([-0.5, 0.0, 0.5]) * np.sqrt(0.6)  # Gauss points of a cell or interval, in widths from its centre
 SHARES = np.array([5.0, 8.0, 5.0]) / 18.0
 
 
 @njit
-def waves_sent(t, out, tables, which, q, at):
-    """Both waves that were sent into stretch q of a line at a time `at` <= t [kg/s]."""
+def waves_sent(t, out, tables, number, q, at):
+    """Both waves sent into stretch q of a line at a time `at` <= t [kg/s]."""
     past, newest = tables.past, int(tables.past[COUNT]) - 1
     if newest >= 0 and (at <= time_of(past, newest) or t <= time_of(past, newest)):
-        return read_both(past, places_of(past), clock_of(past, newest), tables.delays[which], q, at)
-    return sent(t, out, tables, which, q, 0, at), sent(t, out, tables, which, q, 1, at)
+        return read_both(past, places_of(past), clock_of(past, newest), tables.delays[number], q, at)
+    return sent(t, out, tables, number, q, 0, at), sent(t, out, tables, number, q, 1, at)
 
 
 @njit
 def time_before(past, places, line, q, t, least):
-    """The latest time before t, not before `least`, at which waves into stretch q may have taken another course."""
-    found, queue, before = least, int(past[QUEUE]), t - same_time(past)
+    """The latest time before t, not before `least`, at which a wave sent into stretch q may have a kink or jump [s]."""
+    latest, queue, before = least, int(past[QUEUE]), t - same_time(past)
     k, x = between(past, int(past[COUNT]) - 1, before)
     k += x == 1.0
     if k >= ZEROS and time_of(past, k) < before:
-        found = max(found, time_of(past, k))
+        latest = max(latest, time_of(past, k))
     for wave in range(2):
         at = jumps_at(places, line["stretch"] + q, wave)
         times = queue_at(places, queue, at)
         for i in range(int(past[at + MANY])):
-            when = past[times + (int(past[at + FIRST]) + i) % queue]
-            if when < before:
-                found = max(found, when)
-    return found
+            time = past[times + (int(past[at + FIRST]) + i) % queue]
+            if time < before:
+                latest = max(latest, time)
+    return latest
 
 
 @njit
-def stretch_integrals(t, out, tables, which, q):
-    """Integrals over stretch q: of R - L [kg m/s], and of what either wave stores, times rho A."""
-    past, line, st = tables.past, tables.delays[which], tables.settings[0]
+def stretch_integrals(t, out, tables, number, q):
+    """Integrals over stretch q of R - L [kg m/s] and of the energy stored in each wave, times rho A."""
+    past, line, st = tables.past, tables.delays[number], tables.settings[0]
     pipe, places, hold, share = tables.pipes[line["pipe"]], places_of(past), line["hold"], 1.0 - line["now"]
     first, flow = tables.nodes[pipe["from_node"]], pipe["flow"]
     height = st["rho"] * st["gravity"] * (first["elevation"] - st["datum"])
-    fall = pipe["drag"] * line["tau"]  # of q0 along a stretch
+    fall = pipe["drag"] * line["tau"]  # decrease of q0 along a stretch
     top = pipe["admittance"] * ((first["pressure"] - st["ambient"]) + height) - fall * q
     net, ahead, back = 0.0, 0.0, 0.0
     end, oldest, middle = t, t - hold + same_time(past), t - 0.5 * hold
@@ -77,7 +78,7 @@ def stretch_integrals(t, out, tables, which, q):
         begin = time_before(past, places, line, q, end, middle if end > middle + same_time(past) else t - hold)
         for g in range(3):
             at = end + (PLACES[g] - 0.5) * (end - begin)
-            r, l = waves_sent(t, out, tables, which, q, at)
+            r, l = waves_sent(t, out, tables, number, q, at)
             x, w = (t - at) / hold, SHARES[g] * (end - begin) * (pipe["speed"] * share)
             if share == 1.0 and at < middle:
                 delta = rubbed(pipe, line, r, l)
@@ -90,25 +91,28 @@ def stretch_integrals(t, out, tables, which, q):
 
 
 @njit
-def line_energy(t, out, tables, which, rows):
-    """Change of what a line stores since the profile [J]: in the forward wave, in the backward one."""
-    line, rows[0], rows[1] = tables.delays[which], 0.0, 0.0
+def line_energy(t, out, tables, number, rows):
+    """Change of the energy stored in a line since the profile [J]; rows[0] forward wave, rows[1] backward wave."""
+    line, rows[0], rows[1] = tables.delays[number], 0.0, 0.0
     per = 1.0 / (tables.settings[0]["rho"] * tables.pipes[line["pipe"]]["area"])
     for q in range(line["stretches"]):
-        _, ahead, back = stretch_integrals(t, out, tables, which, q)
+        _, ahead, back = stretch_integrals(t, out, tables, number, q)
         rows[0] += per * ahead
         rows[1] += per * back
 
 
 @njit
-def line_power(t, out, tables, which, rows):
-    """Friction, and the rate of what is stored [W], of one line into whose ends rows[0] flows."""
-    line = tables.delays[which]
+def line_power(t, out, tables, number, rows):
+    """Write friction power, 0 and rate of storage of a line [W] into rows[1:4].
+
+    rows[0] : power that enters at the ends of the line
+    """
+    line = tables.delays[number]
     pipe, beta, at = tables.pipes[line["pipe"]], line["now"], tables.layout[0]["ends"] + 4 * line["pipe"]
     per, length = 1.0 / (tables.settings[0]["rho"] * pipe["area"]), pipe["speed"] * line["tau"]
     friction, taken = 0.0, 0.0
     for q in range(line["stretches"]):
-        r, l = waves_sent(t, out, tables, which, q, t - (line["hold"] if beta > 0.0 else 0.5 * line["tau"]))
+        r, l = waves_sent(t, out, tables, number, q, t - (line["hold"] if beta > 0.0 else 0.5 * line["tau"]))
         delta = rubbed(pipe, line, r, l)
         flow = pipe["flow"] + (r - l - delta)
         pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
@@ -116,7 +120,7 @@ def line_power(t, out, tables, which, rows):
         taken += length * (pull - pipe["drag"]) * flow
         mean = 0.0
         if pipe["drag"] != 0.0:
-            mean = stretch_integrals(t, out, tables, which, q)[0] / length
+            mean = stretch_integrals(t, out, tables, number, q)[0] / length
         if beta > 0.0:
             ahead, back = out[at] - r, out[at + 3] - l
             mean += beta * (out[at] - out[at + 3]) - delta

@@ -1,38 +1,38 @@
-"""What was sent into delay lines, by time, and how it is read back. Knows times and waves; knows no nodes.
+"""History of the waves sent into delay lines: ring buffers, lists of jumps, interpolation in time.
 
-A wave is a smooth part u, kept at accepted times, and jumps, each with its time: w(t) = u(t) + sum of jumps up to t.
-So nothing is interpolated across a jump. u is read by Lagrange's polynomial through up to six entries around, as many
-before as behind (in the newest interval one more before), so that no wave is magnified; entries that a step has not yet
-accepted are never read.
+A wave is the sum of a smooth part u, stored at accepted times, and of jumps, each with its time:
+w(t) = u(t) + sum of jumps up to t. So no interpolation crosses a jump. u is read by the Lagrange polynomial through up
+to six entries, as many before t as after it (in the newest interval one more before), so that no wave is amplified.
+Entries of a step that is not accepted yet are never read.
 
-past = [head, times of entries, what arrives at the ends of stretches at a time, of each stretch heads of the jumps of
-both waves: sum of those that have arrived, which is the first, how many there are, how many of them have arrived in the
-last step; times, sizes and sums so far of these jumps; and at last of each stretch a ring of entries (u forward, u
-backward), as long as its own delay asks for]. So a step through a large network touches little: the ends of rings, and
-heads.
+past = [header; times of entries; arriving waves and friction loss of each stretch; heads of the jumps of both waves of
+each stretch; times, sizes and running sums of these jumps; ring of entries (u forward, u backward) of each stretch, as
+long as its delay needs]. A head holds the sum of the jumps removed from the list, the index of the first jump, the
+number of jumps, and how many of them have arrived. So a step through a large network touches little memory: the ends
+of rings, and heads.
 """
 
 from fvsolve.jit import njit
 
 HEAD = 24
-COUNT, CAPACITY, QUEUE, STRETCHES = 0, 1, 2, 3  # entries so far, room for times, for jumps of a wave
-WIDER = 4  # rings are so many times as long as at first
-STEP, EVEN = 5, 6  # length of the last step [s], and how many were of that length
-STEP_BEFORE, EVEN_BEFORE = 7, 8  # both without the last entry
-GREATEST, CROWDED, LIVE = 9, 10, 11  # the greatest jump [Pa], the greatest that found no room, how many there are now
-KNOWN_TIME, KNOWN_COUNT = 12, 13  # of the arrivals that are kept
-MENDED = 14  # time of the last state that was put right [s]
-NEXT = 15  # when a jump arrives next where something acts at once [s]: before it has arrived no reading counts it
-HELD = 16  # 1 while only jumps that have been passed on are counted
-MOST_LIVE = 18  # the most jumps that were on their way at once
-SWING = 17  # the greatest wave so far, as a deviation from the profile [Pa]
+COUNT, CAPACITY, QUEUE, STRETCHES = 0, 1, 2, 3  # entries so far, capacity for times, for jumps of a wave, stretches
+WIDER = 4  # factor by which rings are longer than at first
+STEP, EVEN = 5, 6  # length of the last step [s], number of last steps of that length
+STEP_BEFORE, EVEN_BEFORE = 7, 8  # values of STEP and EVEN before the last entry
+GREATEST, CROWDED, LIVE = 9, 10, 11  # greatest jump [Pa], greatest jump that did not fit [Pa], number of jumps now
+KNOWN_TIME, KNOWN_COUNT = 12, 13  # time and number of entries for which the stored arrivals hold
+MENDED = 14  # time of the last corrected state [s]
+NEXT = 15  # arrival of the next jump at a node that acts at once [s]; before this time no reading includes it
+HELD = 16  # 1 while readings include only jumps that have been passed on
+MOST_LIVE = 18  # greatest number of jumps travelling at one time
+SWING = 17  # greatest wave so far, deviation from the profile [Pa]
 INFINITE = 1e300  # time [s]
-ZEROS = 8  # entries before the first, of the profile
-SUM, FIRST, MANY, ARRIVED, HEADS = 0, 1, 2, 3, 4  # of the jumps of a wave
-ARRIVALS = 3  # of a stretch: backward wave at its beginning, forward one at its end, delta
-APART = 8  # numbers between rings, a cache line: or entries of one time would all fall into the same few of a cache
-SAME, ROUNDING = 1e-9, 1e-14  # of a step, and of a time at least: times that are as good as one
-RATIO = 1.9  # of neighbouring steps, above which a polynomial through them is a line: so it is where a step was cut
+ZEROS = 8  # entries of the profile (zeros) before the first entry
+SUM, FIRST, MANY, ARRIVED, HEADS = 0, 1, 2, 3, 4  # head of the jumps of a wave, and its size
+ARRIVALS = 3  # values per stretch: backward wave at its beginning, forward wave at its end, delta
+APART = 8  # numbers between rings, one cache line: without them entries of the same time would share a few cache sets
+SAME, ROUNDING = 1e-9, 1e-14  # tolerance of equal times: fraction of a step, and at least of the time
+RATIO = 1.9  # ratio of neighbouring steps above which interpolation is linear; it occurs where a step was shortened
 
 
 @njit(forceinline=True)
@@ -43,41 +43,41 @@ def time_of(past, k):
 
 @njit(forceinline=True)
 def places_of(past):
-    """Where there begin: (arrivals, heads of jumps, jumps, rings), and how many times as long as at first these are."""
-    many, arrivals = int(past[STRETCHES]), HEAD + int(past[CAPACITY])
-    heads = arrivals + ARRIVALS * many
-    jumps = heads + 2 * HEADS * many
-    return arrivals, heads, jumps, jumps + 6 * int(past[QUEUE]) * many, int(past[WIDER])
+    """(offsets of arrivals, heads of jumps, jumps and rings in `past`, factor of the present length of rings)."""
+    stretches, arrivals = int(past[STRETCHES]), HEAD + int(past[CAPACITY])
+    heads = arrivals + ARRIVALS * stretches
+    jumps = heads + 2 * HEADS * stretches
+    return arrivals, heads, jumps, jumps + 6 * int(past[QUEUE]) * stretches, int(past[WIDER])
 
 
 @njit(forceinline=True)
 def ring_of(places, line, q):
-    """(where the entries of stretch q of a line begin, mask of their numbers)."""
-    room = places[4] * line["room"]
-    return places[3] + 2 * (places[4] * line["ring"] + q * room) + APART * (line["stretch"] + q), room - 1
+    """(offset of the entries of stretch q of a line, bit mask for entry numbers)."""
+    length = places[4] * line["room"]
+    return places[3] + 2 * (places[4] * line["ring"] + q * length) + APART * (line["stretch"] + q), length - 1
 
 
 @njit(forceinline=True)
 def jumps_at(places, s, wave):
-    """Where the head of the jumps of a wave of stretch s lies."""
+    """Offset of the head of the jumps of a wave of stretch s."""
     return places[1] + HEADS * (2 * s + wave)
 
 
 @njit(forceinline=True)
 def queue_at(places, queue, at):
-    """Where the times of jumps lie whose head is at a place; sizes and sums follow."""
+    """Offset of the times of the jumps whose head is at `at`; sizes and running sums follow."""
     return places[2] + 3 * queue * ((at - places[1]) // HEADS)
 
 
 @njit(forceinline=True)
 def same_time(past):
-    """Difference of times that is none [s]."""
+    """Tolerance below which two times count as equal [s]."""
     return max(SAME * past[STEP], ROUNDING * abs(time_of(past, int(past[COUNT]) - 1)))
 
 
 @njit(forceinline=True)
 def newest_before(past, t):
-    """The newest entry before t: what a step may read that ends there."""
+    """Number of the newest entry before t, which a step that ends at t may read."""
     k = int(past[COUNT]) - 1
     while k > ZEROS and time_of(past, k) >= t - same_time(past):
         k -= 1
@@ -86,7 +86,7 @@ def newest_before(past, t):
 
 @njit(forceinline=True)
 def six(x):
-    """Weights of entries -2 .. 3 at x in [0, 1)."""
+    """Lagrange weights of entries -2 .. 3 at x in [0, 1)."""
     a, b, d, e, f = x + 2.0, x + 1.0, x - 1.0, x - 2.0, x - 3.0
     ab, de, ef = a * b, d * e, e * f
     return (
@@ -97,20 +97,20 @@ def six(x):
 
 @njit(forceinline=True)
 def four(x):
-    """Weights of entries -1 .. 2 at x in [0, 1), as those of six."""
+    """Lagrange weights of entries -1 .. 2 at x in [0, 1), padded to six."""
     b, d, e = x + 1.0, x - 1.0, x - 2.0
     return 0.0, x * d * e / -6.0, b * d * e / 2.0, b * x * e / -2.0, b * x * d / 6.0, 0.0
 
 
 @njit(forceinline=True)
 def three(x):
-    """Weights of entries -1 .. 1 at x in [0, 1), as those of six: in the newest interval, which has none behind it."""
+    """Lagrange weights of entries -1 .. 1 at x in [0, 1), padded to six; for the newest interval."""
     return 0.0, 0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0), 0.0, 0.0
 
 
 @njit
 def between(past, newest, t):
-    """(entry k, share of the way to the next) where t lies; before the first entry that of the profile."""
+    """(entry k, share of the way to entry k + 1) at time t; before the first entry that of the profile."""
     low, high = max(ZEROS, int(past[COUNT]) - int(past[CAPACITY]) + ZEROS), newest
     if t >= time_of(past, high):
         return high - 1, 1.0
@@ -127,7 +127,7 @@ def between(past, newest, t):
 
 @njit
 def uneven(past, newest, t):
-    """(entry before t, weights) where steps differ: a cubic through four entries, or a line where they differ much."""
+    """(entry before t, weights) for unequal steps: cubic through four entries, or linear where steps differ much."""
     low, x = between(past, newest, t)
     line = (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
     if low < ZEROS:
@@ -148,9 +148,9 @@ def uneven(past, newest, t):
 
 @njit(forceinline=True)
 def clock_of(past, newest):
-    """What every reading asks for: (newest entry, its time, 1 / step, how many steps were of this length, SAME).
+    """Data for readings: (newest entry, its time, 1 / step, number of equal steps, tolerance of equal times).
 
-    It is the same whether an entry behind the newest is there already or not.
+    The result does not depend on whether an entry after `newest` exists already.
     """
     step, even = past[STEP], past[EVEN]
     if newest != int(past[COUNT]) - 1:
@@ -160,27 +160,27 @@ def clock_of(past, newest):
 
 @njit(forceinline=True)
 def stencil(past, clock, t):
-    """(entry k, weights of entries k - 2 .. k + 3) of a smooth part at t, none of them behind the newest of a clock."""
-    newest, latest, often, even = clock[0], clock[1], clock[2], clock[3]
-    place = (t - latest) * often
+    """(entry k, weights of entries k - 2 .. k + 3) for the smooth part at t, up to the newest entry of `clock`."""
+    newest, latest, per_step, even = clock[0], clock[1], clock[2], clock[3]
+    place = (t - latest) * per_step
     if place <= -even:
         return uneven(past, newest, t)
-    whole = int(place) - 1 if place < int(place) else int(place)
-    k, x = newest + whole, place - whole
+    steps = int(place) - 1 if place < int(place) else int(place)
+    k, x = newest + steps, place - steps
     if k >= newest:
         return newest, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    if k + 3 <= newest and whole - 2 >= -even:
+    if k + 3 <= newest and steps - 2 >= -even:
         return k, six(x)
-    if k + 2 <= newest and whole - 1 >= -even:
+    if k + 2 <= newest and steps - 1 >= -even:
         return k, four(x)
     if k + 2 <= newest:
         return uneven(past, newest, t)
-    return k, three(x) if whole - 1 >= -even else (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
+    return k, three(x) if steps - 1 >= -even else (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
 
 
 @njit(forceinline=True)
 def both_waves(past, at, mask, k, w):
-    """Smooth parts of both waves of a stretch by weights of entries k - 2 .. k + 3; at : where its entries begin."""
+    """Smooth parts of both waves of a stretch by weights of entries k - 2 .. k + 3; at : offset of its entries."""
     a, b, c = at + 2 * ((k - 2) & mask), at + 2 * ((k - 1) & mask), at + 2 * (k & mask)
     d, e, f = at + 2 * ((k + 1) & mask), at + 2 * ((k + 2) & mask), at + 2 * ((k + 3) & mask)
     r = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
@@ -191,14 +191,14 @@ def both_waves(past, at, mask, k, w):
 
 @njit(forceinline=True)
 def turn(i, queue):
-    """Place in a ring of jumps that lies i behind another."""
+    """Index i wrapped to the length of a ring of jumps."""
     return i if i < queue else i - queue
 
 
 @njit
-def first_after(past, queue, times, first, many, t):
+def first_after(past, queue, times, first, count, t):
     """Number of the first jump of a list that was sent after t."""
-    low, high = 0, many
+    low, high = 0, count
     while low < high:
         middle = (low + high) // 2
         if past[times + turn(first + middle, queue)] > t:
@@ -210,7 +210,7 @@ def first_after(past, queue, times, first, many, t):
 
 @njit(forceinline=True)
 def sum_of_first(past, places, at, count):
-    """Sum of the jumps of a wave before the list and of the first ones in it; at : their head."""
+    """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it; at : their head."""
     if count == 0:
         return past[at + SUM]
     queue = int(past[QUEUE])
@@ -219,29 +219,29 @@ def sum_of_first(past, places, at, count):
 
 @njit
 def some_jumps(past, places, at, t):
-    """Sum of the jumps of a wave up to t, of which it has some; at : their head."""
-    many, queue, first = int(past[at + MANY]), int(past[QUEUE]), int(past[at + FIRST])
+    """Sum of the jumps of a wave up to t, where its list is not empty; at : offset of their head."""
+    count, queue, first = int(past[at + MANY]), int(past[QUEUE]), int(past[at + FIRST])
     times = queue_at(places, queue, at)
-    if past[times + turn(first + many - 1, queue)] <= t:
-        return sum_of_first(past, places, at, many)
-    return sum_of_first(past, places, at, first_after(past, queue, times, first, many, t))
+    if past[times + turn(first + count - 1, queue)] <= t:
+        return sum_of_first(past, places, at, count)
+    return sum_of_first(past, places, at, first_after(past, queue, times, first, count, t))
 
 
 @njit(forceinline=True)
 def jumps_until(past, places, at, t):
-    """Sum of the jumps of a wave up to t; at : their head."""
+    """Sum of the jumps of a wave up to t; at : offset of their head."""
     return some_jumps(past, places, at, t) if past[at + MANY] > 0.0 else past[at + SUM]
 
 
 @njit(forceinline=True)
 def passed_jumps(past, places, at):
-    """Sum of the jumps of a wave that have been passed on where they arrive; at : their head."""
+    """Sum of the jumps of a wave that have been passed on where they arrive; at : offset of their head."""
     return sum_of_first(past, places, at, int(past[at + ARRIVED]))
 
 
 @njit(forceinline=True)
 def arrived_until(past, places, clock, at, t, tau):
-    """Sum of the jumps of a wave that have arrived by t, after a travel time tau; at : their head."""
+    """Sum of the jumps of a wave that have arrived by t, after a travel time tau; at : offset of their head."""
     if past[HELD] > 0.0:
         return passed_jumps(past, places, at)
     return jumps_until(past, places, at, min(t + clock[4], past[NEXT] - clock[4]) - tau)
@@ -249,7 +249,7 @@ def arrived_until(past, places, clock, at, t, tau):
 
 @njit(forceinline=True)
 def read_both(past, places, clock, line, q, t):
-    """Both waves that were sent into stretch q of a line at t [kg/s], from its beginning and from its end."""
+    """Both waves sent into stretch q of a line at t [kg/s]: from its beginning and from its end."""
     at, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t)
     r, l = both_waves(past, at, mask, k, w)
@@ -259,9 +259,9 @@ def read_both(past, places, clock, line, q, t):
 
 @njit
 def push_jump(past, places, at, t, size):
-    """Note a jump of a wave; what is too many joins the smooth part."""
-    queue, first, many = int(past[QUEUE]), int(past[at + FIRST]), int(past[at + MANY])
-    i, times = many, queue_at(places, queue, at)
+    """Insert a jump into the list of a wave; False where the list is full, then the jump joins the smooth part."""
+    queue, first, count = int(past[QUEUE]), int(past[at + FIRST]), int(past[at + MANY])
+    i, times = count, queue_at(places, queue, at)
     while i > 0 and past[times + turn(first + i - 1, queue)] > t + same_time(past):
         i -= 1
     before = times + turn(first + i - 1, queue) if i > 0 else times
@@ -269,14 +269,14 @@ def push_jump(past, places, at, t, size):
         past[before + queue] += size
         add_up(past, places, at, i - 1)
         return True
-    if many == queue:
+    if count == queue:
         return False
-    for j in range(many, i, -1):
+    for j in range(count, i, -1):
         here, there = times + turn(first + j, queue), times + turn(first + j - 1, queue)
         past[here], past[here + queue] = past[there], past[there + queue]
     here = times + turn(first + i, queue)
     past[here], past[here + queue] = t, size
-    past[at + MANY] = many + 1.0
+    past[at + MANY] = count + 1.0
     past[LIVE] += 1.0
     past[MOST_LIVE] = max(past[MOST_LIVE], past[LIVE])
     add_up(past, places, at, i)
@@ -285,7 +285,7 @@ def push_jump(past, places, at, t, size):
 
 @njit
 def add_up(past, places, at, begin):
-    """Sums of the jumps of a wave, from that of a number on; at : their head."""
+    """Update the running sums of the jumps of a wave from jump `begin` on; at : offset of their head."""
     queue, first = int(past[QUEUE]), int(past[at + FIRST])
     total, times = sum_of_first(past, places, at, begin), queue_at(places, queue, at)
     for j in range(begin, int(past[at + MANY])):
@@ -296,7 +296,7 @@ def add_up(past, places, at, begin):
 
 @njit
 def forget_jumps(past, places, at, t):
-    """Take those that have arrived, and were sent before t, out of the list."""
+    """Remove the jumps that have arrived and were sent before t from the list."""
     queue = int(past[QUEUE])
     times = queue_at(places, queue, at)
     while past[at + ARRIVED] > 0.0 and past[times + int(past[at + FIRST])] < t:
@@ -309,7 +309,7 @@ def forget_jumps(past, places, at, t):
 
 @njit
 def begin_entry(past, t):
-    """Make room for an entry at t; returns its number."""
+    """Begin an entry at t; return its number."""
     mask, k = int(past[CAPACITY]) - 1, int(past[COUNT])
     if k == 0:
         past[COUNT], past[EVEN], past[STEP] = ZEROS + 1.0, 1e18, 1e-300
@@ -331,7 +331,7 @@ def begin_entry(past, t):
 
 @njit(forceinline=True)
 def write(past, places, line, q, k, wave, value):
-    """Keep the smooth part of a wave as entry k."""
+    """Store the smooth part of a wave as entry k; value : whole wave [kg/s]."""
     at, mask = ring_of(places, line, q)
     jumps = jumps_until(past, places, jumps_at(places, line["stretch"] + q, wave), INFINITE)
     past[at + 2 * (k & mask) + wave] = value - jumps

@@ -1,7 +1,7 @@
-"""Jumps of delay lines: which are kept as such, and how friction and the joints of stretches pass them on.
+"""Jumps in delay lines: detection, storage, and passage through friction and the joints of stretches.
 
-What a schedule, a valve or an event changes at once is a jump; one below `numerics.accuracy` joins the smooth part.
-Friction in the middle of a stretch turns back what it takes more with the jump than without it.
+An instantaneous change by a schedule, a valve or an event is a jump. A jump below `numerics.accuracy` joins the smooth
+part. Friction in the middle of a stretch reflects the difference of the friction losses with and without the jump.
 """
 
 from fvsolve.jit import njit
@@ -40,7 +40,7 @@ from fvsolve.kernels.delay.lines import arrive, arrive_all, rubbed, rubs
 from fvsolve.kernels.records import AMENDED, STATUS
 
 NAN = float("nan")
-NOISE = 1e-13  # of half a bar's wave: a jump that is rounding
+NOISE = 1e-13  # fraction of a wave of half a bar below which a change is rounding
 
 
 @njit(forceinline=True)
@@ -54,28 +54,28 @@ def shorter_lines(tables):
 
 @njit(forceinline=True)
 def enough(past, tables, pipe):
-    """Least jump of a wave that is kept as a jump, a share of the greatest jump and of the greatest wave [kg/s]."""
+    """Size below which a jump joins the smooth part: a share of the greatest jump or greatest wave [kg/s]."""
     least = tables.settings[0]["jumps"] * max(past[GREATEST], past[SWING])
     return max(least, NOISE * 0.5e5) * pipe["admittance"]
 
 
 @njit
 def keep(past, places, s, wave, t, size, pipe):
-    """A jump that enters stretch s is kept as one, if there is room for it."""
+    """Store a jump that enters stretch s; where its list is full, record the size that did not fit."""
     if not push_jump(past, places, jumps_at(places, s, wave), t, size):
         past[CROWDED] = max(past[CROWDED], abs(size) / pipe["admittance"])
 
 
 @njit
 def send(past, places, tables, s, wave, t, size, pipe):
-    """A jump enters stretch s; a small one joins the smooth part."""
+    """Store a jump that enters stretch s, unless it is small: then it joins the smooth part."""
     if abs(size) > enough(past, tables, pipe):
         keep(past, places, s, wave, t, size, pipe)
 
 
 @njit(forceinline=True)
 def first_left(past, places, s, wave):
-    """Place of the first jump of a wave of stretch s that has not been passed on, -1 without one."""
+    """Offset of the first jump of a wave of stretch s that has not been passed on; -1 where there is none."""
     at, queue = jumps_at(places, s, wave), int(past[QUEUE])
     if not past[at + ARRIVED] < past[at + MANY]:
         return -1
@@ -102,8 +102,8 @@ def turned_back(past, places, tables, line, pipe, q, wave, size, t):
 def pass_at_joints(past, places, tables, t):
     """Pass on all jumps that leave stretches within lines by t."""
     queue = int(past[QUEUE])
-    for which in range(tables.delays.size):
-        line, pipe = tables.delays[which], tables.pipes[tables.delays[which]["pipe"]]
+    for number in range(tables.delays.size):
+        line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
         for q in range(1, line["stretches"] - 1):
             for wave in range(2):
                 s = line["stretch"] + q
@@ -120,7 +120,7 @@ def pass_at_joints(past, places, tables, t):
 
 @njit
 def arrive_at_joints(past, places, tables, t):
-    """Compute the waves that arrive at t at the joints of stretches and at the ends of lines, into past."""
+    """Write the waves that arrive at t at the joints of stretches and at the ends of lines into `past`."""
     arrive_all(past, tables, t)
     clock = clock_of(past, newest_before(past, t))
     for i in range(tables.delays.size):
@@ -131,9 +131,9 @@ def arrive_at_joints(past, places, tables, t):
 
 @njit
 def meet_short_lines(past, places, tables, t):
-    """Whole waves that arrive at the ends of lines shorter than a step, in place of those at p' = 0.
+    """Complete the arriving waves of lines shorter than a step, which so far hold for p' = 0 at their ends.
 
-    t : of the last entry, which says what is sent at once.
+    t : time of the last entry, whose waves give the part that arrives at once
     """
     newest = int(past[COUNT]) - 1
     clock = clock_of(past, newest)
@@ -154,7 +154,7 @@ def meet_short_lines(past, places, tables, t):
 
 @njit(forceinline=True)
 def sent_so_far(past, places, line, q, side, k):
-    """Wave that was sent into stretch q of a line by entry k, its jumps with it [kg/s]."""
+    """Wave sent into stretch q of a line by entry k, with its jumps [kg/s]."""
     ring, mask = ring_of(places, line, q)
     jumps = jumps_at(places, line["stretch"] + q, side)
     return past[ring + 2 * (k & mask) + side] + jumps_until(past, places, jumps, INFINITE)
@@ -162,7 +162,7 @@ def sent_so_far(past, places, line, q, side, k):
 
 @njit
 def changes(past, places, tables, k, out):
-    """True if nodes send other waves than entry k says, beyond rounding."""
+    """True if the waves that nodes send differ from those of entry k by more than rounding."""
     for i in range(tables.delays.size):
         line = tables.delays[i]
         pipe, at = tables.pipes[line["pipe"]], tables.layout[0]["ends"] + 4 * line["pipe"]
@@ -175,27 +175,26 @@ def changes(past, places, tables, k, out):
 
 @njit
 def note_jumps(past, places, tables, t, y, out, short):
-    """At the time of the last entry: what differs from it is a jump, where it is large enough, else the entry.
+    """Store the differences between the present waves and the last entry: large ones as jumps, small ones in the entry.
 
-    short : whether nodes are closed as a jump meets them that lines shorter than a step join: then the state is to be
-    looked at again
+    short : True if nodes joined by lines shorter than a step are solved again; then the state is corrected
     """
-    k, ends, found = int(past[COUNT]) - 1, tables.layout[0]["ends"], out
+    k, ends, state = int(past[COUNT]) - 1, tables.layout[0]["ends"], out
     if short:
-        found = tables.spare[: tables.layout[0]["size"]]
+        state = tables.spare[: tables.layout[0]["size"]]
         arrive_all(past, tables, t)
         meet_short_lines(past, places, tables, t)
         past[KNOWN_TIME], past[KNOWN_COUNT] = t, past[COUNT]
-        run(CLOSE, t, y, y[:0], found, tables.sharp)
+        run(CLOSE, t, y, y[:0], state, tables.sharp)
         past[KNOWN_TIME] = NAN
-    for notes in range(2):  # the greatest first
+    for stage in range(2):  # first the greatest jump, which the limit in `least_jump` needs
         for i in range(tables.delays.size):
             line = tables.delays[i]
             pipe, at = tables.pipes[line["pipe"]], ends + 4 * line["pipe"]
             for side in range(2):
-                q, new = line["stretches"] - 1 if side == 1 else 0, found[at + 3 * side]
+                q, new = line["stretches"] - 1 if side == 1 else 0, state[at + 3 * side]
                 old = sent_so_far(past, places, line, q, side, k)
-                if notes == 0:
+                if stage == 0:
                     past[GREATEST] = max(past[GREATEST], abs(new - old) / pipe["admittance"])
                     continue
                 if abs(new - old) > enough(past, tables, pipe):

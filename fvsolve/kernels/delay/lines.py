@@ -1,10 +1,10 @@
-"""Delay lines in a scene's right-hand side, under the linear density law. Knows the tables; closes no node.
+"""Delay lines in the right-hand side, under the linear density law.
 
-Along a stretch both waves travel unchanged to its middle, where friction takes delta = tau / 2 (drag(M) - drag0) from
-the forward wave and gives it to the backward one, M being the flow there: so M + delta = M0 + r - l of what was sent
-tau ago (the midpoint rule along the way; passive, as friction is). A line that is shorter than the longest step h
-delivers the share 1 - tau / h of what is sent at once, the rest after h: its mean delay is tau, it magnifies no wave,
-and its ends know each other, p' as between two admittances Y tau / (2 h - tau) and a conductance between them.
+Both waves travel unchanged along a stretch to its middle. There friction takes delta = tau / 2 (drag(M) - drag0) from
+the forward wave and adds it to the backward wave. M is the flow in the middle, M + delta = M0 + r - l of the waves sent
+tau ago (midpoint rule along the path; passive, as friction is). A line shorter than the longest step h delivers the
+share 1 - tau / h of a sent wave at once and the rest after h. Its mean delay is tau, and it amplifies no wave. Its ends
+are coupled at once: p' is that of two admittances Y tau / (2 h - tau) with a conductance between them.
 """
 
 from fvsolve.jit import njit
@@ -29,17 +29,17 @@ from fvsolve.kernels.friction import EXPONENT, drag, power_of_square
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_NONE, FRICTION_ROUGH
 
-ENOUGH = 1e-6  # of a flow that Newton leaves
-ROUGH = 0.2  # of its slope, by which that of a factor that hangs on the flow is off
-MOST = 60
+ENOUGH = 1e-6  # relative error of the flow at which Newton stops
+ROUGH = 0.2  # relative error of the slope where the friction factor depends on the flow
+MOST = 60  # iterations
 
 
 @njit(forceinline=True)
 def drag_and_slope(pipe, flow):
-    """(drag [kg/s2], d drag / d flow [1/s]), the slope of a factor that hangs on the flow as if it did not."""
+    """(drag [kg/s2], d drag / d flow [1/s]); the slope ignores that the friction factor depends on the flow."""
     size = abs(flow)
     if pipe["friction"] == FRICTION_HAZEN:
-        loss, rough, p = pipe["loss"], pipe["rough"], power_of_square(size * size)  # and rounds as `drag` does
+        loss, rough, p = pipe["loss"], pipe["rough"], power_of_square(size * size)  # same rounding as in `drag`
         return loss * (size * flow) + rough * (p * flow), 2.0 * loss * size + (1.0 + EXPONENT) * rough * p
     force = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
     return force, 2.0 * abs(force) / size if size > 0.0 else 0.0
@@ -47,13 +47,13 @@ def drag_and_slope(pipe, flow):
 
 @njit(forceinline=True)
 def rubs(pipe):
-    """True if friction takes something of a wave."""
+    """True if friction changes the waves."""
     return not (pipe["friction"] == FRICTION_NONE and pipe["drag"] == 0.0)
 
 
 @njit(forceinline=True)
 def rubbed(pipe, line, r, l):
-    """delta [kg/s] where waves r and l meet in the middle of a stretch, by Newton: what takes it is monotone."""
+    """Friction loss delta [kg/s] in the middle of a stretch, where waves r and l meet, by Newton; it is monotone."""
     if not rubs(pipe):
         return 0.0
     kappa, x, flow, drag0 = 0.5 * line["tau"], r - l, pipe["flow"], pipe["drag"]
@@ -63,7 +63,7 @@ def rubbed(pipe, line, r, l):
         force, slope = drag_and_slope(pipe, flow + m)
         step = (m + kappa * (force - drag0) - x) / (1.0 + kappa * slope)
         m -= step
-        left = abs(step) * kappa * slope  # by how much the slope was another on the way: what remains
+        left = abs(step) * kappa * slope  # remaining error, from the change of the slope within the step
         if not left * (abs(step) + rough * abs(flow + m)) > least * abs(flow + m):
             break
     return x - m
@@ -71,9 +71,9 @@ def rubbed(pipe, line, r, l):
 
 @njit(forceinline=True)
 def arrive(past, places, clock, line, pipe, q, t):
-    """What arrives at the ends of stretch q of a line at t, into its place in past.
+    """Write the waves that arrive at the ends of stretch q of a line at t, and the friction loss, into `past`.
 
-    Of a short line both waves are those at p' = 0 at its ends; jumps travel through it as through any other.
+    In a line shorter than a step both waves hold for p' = 0 at its ends. Jumps travel through it as through any line.
     """
     ring, mask = ring_of(places, line, q)
     k, w = stencil(past, clock, t - line["hold"])
@@ -94,7 +94,10 @@ def arrive(past, places, clock, line, pipe, q, t):
 
 @njit
 def arrive_all(past, tables, t):
-    """What arrives at the ends of all lines at t; nodes are closed several times at one time, which is read once."""
+    """Write the waves that arrive at the ends of all lines at t.
+
+    Nodes are solved several times at one time; the waves are read only once.
+    """
     if past[KNOWN_TIME] == t and past[KNOWN_COUNT] == past[COUNT]:
         return
     places, clock = places_of(past), clock_of(past, newest_before(past, t))
@@ -110,7 +113,7 @@ def arrive_all(past, tables, t):
 
 @njit
 def offer_lines(t, y, dydt, out, handle):
-    """Waves that leave delay lines into out[ends], and what they carry into their nodes into out[net]."""
+    """Write the waves that leave delay lines into out[ends], and add their flow into nodes to out[net]."""
     tables = open_tables(handle)
     past, layout, lines = tables.past, tables.layout[0], tables.delays
     started, place, ends, net = past[COUNT] > 0.0, places_of(past)[0], layout["ends"], layout["net"]
@@ -129,9 +132,9 @@ def offer_lines(t, y, dydt, out, handle):
 
 @njit
 def answer_lines(t, y, dydt, out, handle):
-    """Waves that the nodes send into delay lines: Y p' less what arrives, which in short lines they decide too.
+    """Waves that nodes send into delay lines: Y p' less the arriving waves; d/dt of the mass in the lines [kg/s].
 
-    And d/dt of what lines hold [kg/s]: what flows in at both ends.
+    In lines shorter than a step the arriving waves depend on p'. d/dt of the mass is the flow in at both ends.
     """
     tables = open_tables(handle)
     layout, lines = tables.layout[0], tables.delays
@@ -155,11 +158,11 @@ def answer_lines(t, y, dydt, out, handle):
 
 @njit
 def couple_clusters(t, y, dydt, out, handle):
-    """Nodes that short lines join and no valve: p' by the inverse of their admittances."""
+    """Solve nodes joined by lines shorter than a step and by no valve: p' by the inverse of their admittance matrix."""
     tables = open_tables(handle)
     layout, integers, work = tables.layout[0], tables.integers, tables.scratch
-    for which in range(tables.clusters.size):
-        cluster = tables.clusters[which]
+    for number in range(tables.clusters.size):
+        cluster = tables.clusters[number]
         if cluster["inverse"] < 0:
             continue
         n, first = cluster["nodes"], cluster["first_node"]

@@ -1,8 +1,8 @@
-"""States that a jump changes within a step, put right when it has been taken. Knows the tables; passes nothing on.
+"""Correction of states that a jump changes within a step, after the step is taken.
 
-The rates of a state change when a jump arrives, and the step's weights book that too briefly or too long: what they
-miss is added, so that a jump is right to second order. A lake's supply is the method's, and so is what a line holds but
-for what is given to stores.
+The rates of a state change when a jump arrives. The weights of the step count the new rate for too short or too long a
+time. The missing part is added, so that a jump is correct to second order. The supply of a lake, and the mass in lines
+except the mass given to stores, are those of the method.
 """
 
 from math import exp, expm1
@@ -17,35 +17,36 @@ NAN = float("nan")
 
 
 @njit(forceinline=True)
-def missed_by(past, tables, t, when, sent):
-    """How long what begins within the step that ends at t has been there, and how long its weights book it [s].
+def missed_by(past, tables, t, time, sent):
+    """(time since a change within the step that ends at t, time that the weights of the step count it) [s].
 
-    Stages before it know nothing of it, those behind it that it was always there; none knows what was sent since.
+    Stages before the change do not include it. Stages after it include it as if it had always been there. No stage
+    includes a jump that was sent since the last entry.
     """
     if sent > time_of(past, int(past[COUNT]) - 1) + same_time(past):
-        return t - when, 0.0
+        return t - time, 0.0
     before, settings = time_of(past, int(past[COUNT]) - 1), tables.settings[0]
-    h, booked, at, many = t - before, 0.0, settings["weights"], settings["stages"]
-    for i in range(many):
-        if before + tables.floats[at + many + i] * h >= when - same_time(past):
+    h, booked, at, stages = t - before, 0.0, settings["weights"], settings["stages"]
+    for i in range(stages):
+        if before + tables.floats[at + stages + i] * h >= time - same_time(past):
             booked += tables.floats[at + i]
-    return t - when, h * booked
+    return t - time, h * booked
 
 
 @njit(forceinline=True)
-def brought(missed, rate):
-    """Time that is missed [s], of what gives way at a rate [1/s]: a store soon pushes back what comes.
+def brought(times, rate):
+    """Time that the weights of the step miss [s], reduced because a store soon balances the inflow, at `rate` [1/s].
 
-    Else a jump into one that fills in less than a step would be mended by more than it brings.
+    Without the reduction a jump into a store that fills within a step would be corrected by more than it brings.
     """
-    since, booked = missed
+    since, booked = times
     late = since - booked
     return late if rate * abs(late) < 1e-12 else -exp(-rate * booked) * expm1(-rate * late) / rate
 
 
 @njit(forceinline=True)
 def stores(tables, i):
-    """Whether node i stores what flows into it, now."""
+    """True if node i stores its inflow now."""
     node = tables.nodes[i]
     if node["kind"] == FIXED or node["kind"] == JUNCTION or node["kind"] == PATCH:
         return False
@@ -55,46 +56,46 @@ def stores(tables, i):
 
 @njit(forceinline=True)
 def quickness(tables, out, i, j):
-    """Rate at which store i takes the pressure of the waves at node j [1/s]."""
+    """Rate at which store i adopts the pressure of the waves at node j [1/s]."""
     return stiffness_of(tables.nodes, tables.layout[0], out, i) * tables.nodes[j]["admittance"]
 
 
 @njit(forceinline=True)
-def mend(past, tables, y, out, pipe, i, flow, missed):
-    """Give a store what a flow out of a line that began within the step has brought, and take it from the line."""
+def mend(past, tables, y, out, pipe, i, flow, times):
+    """Add the mass of a flow out of a line that began within the step to a store, and subtract it from the line."""
     if flow != 0.0 and stores(tables, i):
-        mass = flow * brought(missed, quickness(tables, out, i, i))
+        mass = flow * brought(times, quickness(tables, out, i, i))
         y[tables.nodes[i]["y"]] += mass
         y[pipe["y"]] -= mass
         past[MENDED] = NAN
 
 
 @njit
-def mend_columns(past, tables, y, i, change, missed):
-    """Give rigid columns at node i the speed that a jump of its pressure [Pa] has brought them."""
+def mend_columns(past, tables, y, i, change, times):
+    """Add the speed that a pressure jump [Pa] at node i has given to rigid columns."""
     columns = tables.columns
     for k in range(columns.size):
         side = (columns[k]["from_node"] == i) - (columns[k]["to_node"] == i)
         if side != 0 and change != 0.0:
             share, admittance = columns[k]["area"] / columns[k]["length"], tables.nodes[i]["admittance"]
             rate = share / admittance if admittance > 0.0 else 0.0
-            y[columns[k]["y"]] += side * change * share * brought(missed, rate)
+            y[columns[k]["y"]] += side * change * share * brought(times, rate)
             past[MENDED] = NAN
 
 
 @njit
-def mend_behind(past, tables, y, spare, out, missed):
-    """Give stores behind valves, and rigid columns, what a jump at nodes closed by valves has brought them.
+def mend_behind(past, tables, y, spare, out, times):
+    """Correct stores behind valves, and rigid columns, for a jump at nodes that are solved with valves.
 
-    What stores get is taken from the lines that feed them.
+    The mass added to stores is subtracted from the lines that feed them.
 
-    spare, out : before and behind the jump
+    spare, out : state before and after the jump
     """
     layout, valves, nodes = tables.layout[0], tables.valves, tables.nodes
     pressure, given, fed = layout["pressure"], 0.0, 0.0
     if tables.columns.size > 0:
         for i in range(nodes.size):
-            mend_columns(past, tables, y, i, out[pressure + i] - spare[pressure + i], missed)
+            mend_columns(past, tables, y, i, out[pressure + i] - spare[pressure + i], times)
     for k in range(valves.size):
         flow = out[layout["valve"] + k] - spare[layout["valve"] + k]
         for side in range(2):
@@ -102,13 +103,13 @@ def mend_behind(past, tables, y, spare, out, missed):
             if side == 1:
                 i, j, flow = j, i, -flow
             if flow != 0.0 and stores(tables, i):
-                gain = -flow * brought(missed, quickness(tables, out, i, j))
+                gain = -flow * brought(times, quickness(tables, out, i, j))
                 y[nodes[i]["y"]] += gain
                 given += gain
                 past[MENDED] = NAN
     if given == 0.0:
         return
-    for turn in range(2):  # from every line as it feeds them
+    for stage in range(2):  # sum of the flows out of lines; then each line's share
         for k in range(tables.delays.size):
             pipe = tables.pipes[tables.delays[k]["pipe"]]
             at = layout["ends"] + 4 * tables.delays[k]["pipe"]
@@ -117,7 +118,7 @@ def mend_behind(past, tables, y, spare, out, missed):
                     continue
                 come = out[at + 1 + side] - spare[at + 1 + side]
                 leaves = come - (out[at + 3 * side] - spare[at + 3 * side])
-                if turn == 0:
+                if stage == 0:
                     fed += leaves
                 elif fed != 0.0:
                     y[pipe["y"]] -= given * leaves / fed

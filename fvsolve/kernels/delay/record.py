@@ -1,4 +1,4 @@
-"""Record of an accepted state in delay lines: what nodes send, jumps that have arrived, envelopes."""
+"""Update of delay lines after an accepted state: waves sent by nodes, jumps that have arrived, envelopes."""
 
 from fvsolve.jit import njit
 from fvsolve.kernels.delay.along import sketch
@@ -32,7 +32,7 @@ from fvsolve.kernels.records import ARRIVED as LET_ARRIVE
 
 @njit
 def record_lines(t, y, out, handle, values):
-    """After an accepted step: keep what was sent into all lines, pass on jumps that have arrived, widen envelopes."""
+    """After an accepted step, store the waves sent into lines, pass on arrived jumps and update envelopes."""
     tables = open_tables(handle)
     past = tables.past
     k, places, status = int(past[COUNT]), places_of(past), out[STATUS]
@@ -45,7 +45,7 @@ def record_lines(t, y, out, handle, values):
         return
     if k > 0 and t <= time_of(past, k - 1) + same_time(past):
         record_again(past, places, tables, t, y, out)
-    elif k == 0:  # what is sent from the start on, as from rest, is a jump: nothing was before
+    elif k == 0:  # a wave sent at the start is a jump: before, all waves were zero
         begin_entry(past, t)
         note_jumps(past, places, tables, t, y, out, shorter_lines(tables))
     else:
@@ -63,7 +63,7 @@ def record_lines(t, y, out, handle, values):
 
 @njit
 def record_again(past, places, tables, t, y, out):
-    """The time of the last entry: behind a kink or an event, or with its state put right."""
+    """Record a state at the time of the last entry: after a kink or an event, or with its state corrected."""
     k = int(past[COUNT]) - 1
     last = time_of(past, k)
     if past[MENDED] == last:
@@ -76,7 +76,7 @@ def record_again(past, places, tables, t, y, out):
 
 @njit
 def record_step(past, places, tables, t, y, out, handle):
-    """A new entry, once the jumps that have arrived since the last one are passed on."""
+    """Write a new entry, after the jumps that have arrived since the last entry are passed on."""
     before = time_of(past, int(past[COUNT]) - 1)
     arrive_at_joints(past, places, tables, t)
     live = past[LIVE] > 0.0
@@ -84,9 +84,9 @@ def record_step(past, places, tables, t, y, out, handle):
         forget_all(past, places, tables.delays, before)
         pass_at_joints(past, places, tables, t)
         passed = pass_at_ends(past, places, tables, t, y, out, handle)
-        if passed and shorter_lines(tables):  # nodes know nothing yet of jumps that came and went
+        if passed and shorter_lines(tables):  # jumps that have already passed are missing in the node pressures
             past[MENDED] = NAN
-        arrive_at_joints(past, places, tables, t)  # again, where nodes were closed without a jump
+        arrive_at_joints(past, places, tables, t)  # again: nodes were solved without the jumps in between
     entry, ends = begin_entry(past, t), tables.layout[0]["ends"]
     if past[MENDED] != past[MENDED]:
         past[MENDED], out[STATUS] = t, AMENDED
@@ -109,9 +109,9 @@ NAN = float("nan")
 
 
 @njit(forceinline=True)
-def widen_line(t, places, clock, tables, which):
-    """Envelopes along a line at the time of the last entry, and when it first falls below vapour pressure."""
-    line, envelope = tables.delays[which], tables.envelope
+def widen_line(t, places, clock, tables, number):
+    """Update the envelope along a line at the time of the last entry, and its first time below vapour pressure."""
+    line, envelope = tables.delays[number], tables.envelope
     n, cell = line["places"], tables.pipes[line["pipe"]]["cell"]
     r, l, low, high = tables.scratch[:n], tables.scratch[n : 2 * n], 0, 0
     for j in range(n):
@@ -125,7 +125,7 @@ def widen_line(t, places, clock, tables, which):
 
 @njit
 def widen_all(t, places, tables):
-    """Envelopes along all lines."""
+    """Update the envelopes along all lines."""
     clock = clock_of(tables.past, int(tables.past[COUNT]) - 1)
     for i in range(tables.delays.size):
         widen_line(t, places, clock, tables, i)
@@ -133,7 +133,7 @@ def widen_all(t, places, tables):
 
 @njit
 def write_ends(past, places, tables, entry, out):
-    """Keep what nodes send once more."""
+    """Write the waves that nodes send into an entry once more."""
     for i in range(tables.delays.size):
         line, at = tables.delays[i], tables.layout[0]["ends"] + 4 * tables.delays[i]["pipe"]
         write(past, places, line, 0, entry, 0, out[at])
@@ -142,7 +142,7 @@ def write_ends(past, places, tables, entry, out):
 
 @njit
 def forget_all(past, places, delays, before):
-    """Take out of all lists what had arrived before a time, and is not asked for any more."""
+    """Remove from all lists the jumps that had arrived before a time and are not read any more."""
     for i in range(delays.size):
         line = delays[i]
         for s in range(line["stretch"], line["stretch"] + line["stretches"]):

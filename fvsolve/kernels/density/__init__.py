@@ -1,7 +1,7 @@
-"""Density laws and what follows from them: enthalpy, mass per length, the momentum that pressure carries.
+"""Density laws log, table and mixture: density, enthalpy, mass per length, pressure force and wave speed of a pipe.
 
-Here are the questions; each law answers all of them in a file of its own, and `by_law` picks it. `linear` is none of
-them: its kernels hold pressures, and are 20 times as fast. Knows one place; knows no cells.
+Each function calls the function of the same name of the law that the scene uses (`dispatch_law`); each law has its own
+file. The law `linear` is not among them: its kernels use pressures as states and are 20 times as fast.
 """
 
 from fvsolve.jit import inner, njit
@@ -10,19 +10,20 @@ from fvsolve.kernels.records import LAW_LOG, LAW_MIXTURE, LAW_TABLE
 
 
 @inner
-def by_law(log, table, mixture, nobody, st, floats, *given):
-    """The answer of the law that a scene has; of a code that is none's, nobody's: NaN.
+def by_law(of_log, of_table, of_mixture, of_unknown, st, floats, *arguments):
+    """Call the function of the law that a scene uses; for an unknown code the result is NaN.
 
-    Answers are named by their file: numba would keep the address of a bare name, and what does is not cached.
+    Functions are passed as module attributes: numba would store the address of a bare name, and a function with such
+    an address is not cached.
     """
     code = st["law"]
     if code == LAW_LOG:
-        return log(st, floats, *given)
+        return of_log(st, floats, *arguments)
     if code == LAW_TABLE:
-        return table(st, floats, *given)
+        return of_table(st, floats, *arguments)
     if code == LAW_MIXTURE:
-        return mixture(st, floats, *given)
-    return nobody(st, floats, *given)
+        return of_mixture(st, floats, *arguments)
+    return of_unknown(st, floats, *arguments)
 
 
 @njit
@@ -46,29 +47,29 @@ def enthalpy(st, floats, p):
 @njit
 def pressure_of_enthalpy(st, floats, h):
     """Pressure [Pa] at which `enthalpy` is h."""
-    ask = log.pressure_of_enthalpy, table.pressure_of_enthalpy, mixture.pressure_of_enthalpy, nobody.number
-    return by_law(*ask, st, floats, h)
+    functions = log.pressure_of_enthalpy, table.pressure_of_enthalpy, mixture.pressure_of_enthalpy, nobody.number
+    return by_law(*functions, st, floats, h)
 
 
 @njit
 def pressure_of_log(st, floats, compliance, q):
     """Pressure [Pa] at which ln(rho / rho_ref) + ln(A / A_ref) is q; compliance of the wall, 0 for a vessel [1/Pa]."""
-    ask = log.pressure_of_log, table.pressure_of_log, mixture.pressure_of_log, nobody.number
-    return by_law(*ask, st, floats, compliance, q)
+    functions = log.pressure_of_log, table.pressure_of_log, mixture.pressure_of_log, nobody.number
+    return by_law(*functions, st, floats, compliance, q)
 
 
 @njit
 def pressure_of_mass(st, floats, pipe, m):
-    """Pressure [Pa] of a pipe that holds m [kg/m]."""
-    ask = log.pressure_of_mass, table.pressure_of_mass, mixture.pressure_of_mass, nobody.number
-    return by_law(*ask, st, floats, pipe, m)
+    """Pressure [Pa] of a pipe that contains m [kg/m]."""
+    functions = log.pressure_of_mass, table.pressure_of_mass, mixture.pressure_of_mass, nobody.number
+    return by_law(*functions, st, floats, pipe, m)
 
 
 @njit
 def mass_of_pressure(st, floats, pipe, p):
     """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
-    ask = log.mass_of_pressure, table.mass_of_pressure, mixture.mass_of_pressure, nobody.numbers
-    return by_law(*ask, st, floats, pipe, p)
+    functions = log.mass_of_pressure, table.mass_of_pressure, mixture.mass_of_pressure, nobody.numbers
+    return by_law(*functions, st, floats, pipe, p)
 
 
 @njit
@@ -85,9 +86,9 @@ def thrust(st, floats, pipe, p):
 
 @njit
 def force_of_mass(st, floats, pipe, m):
-    """`thrust` at the pressure of a pipe that holds m [kg/m], often asked [N]."""
-    ask = log.force_of_mass, table.force_of_mass, mixture.force_of_mass, nobody.number
-    return by_law(*ask, st, floats, pipe, m)
+    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]; called often."""
+    functions = log.force_of_mass, table.force_of_mass, mixture.force_of_mass, nobody.number
+    return by_law(*functions, st, floats, pipe, m)
 
 
 @njit
@@ -98,9 +99,9 @@ def impedance(st, floats, pipe, p):
 
 @njit
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) [m/s]: what a simple wave takes off the velocity."""
-    ask = log.velocity_change, table.velocity_change, mixture.velocity_change, nobody.number
-    return by_law(*ask, st, floats, pipe, p_from, p_to)
+    """Integral of dp / (rho c) [m/s]: decrease of the velocity in a simple wave."""
+    functions = log.velocity_change, table.velocity_change, mixture.velocity_change, nobody.number
+    return by_law(*functions, st, floats, pipe, p_from, p_to)
 
 
 @njit

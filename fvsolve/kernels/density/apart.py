@@ -1,4 +1,4 @@
-"""What keeps machine code of a law in one place: the ladder stays small enough to be part of its callers."""
+"""Prevent LLVM from inlining a density law, so that the dispatch function stays small enough to be inlined itself."""
 
 from fvsolve.jit import COMPILING, Intrinsic, njit
 
@@ -6,7 +6,7 @@ if COMPILING:
 
     @Intrinsic
     def outside(typingctx):
-        """Keep LLVM from copying the function around this call into its callers: halves what it adds to compiling."""
+        """Prevent LLVM from inlining the function that contains this call; halves its share of the compile time."""
         from numba.core import types
 
         def generate(context, builder, kind, args):
@@ -17,12 +17,13 @@ if COMPILING:
 else:
 
     def outside():
-        """Nothing, without numba."""
+        """Do nothing, without numba."""
 
 
 def part(function):
-    """`njit` for what the questions of this folder alone call: no door to Python.
+    """`njit` for functions that only functions of this folder call: without wrappers for Python and C.
 
-    Inlining is told, since numba takes it over from whichever caller compiles first, and `outside` forbids it.
+    `forceinline` is set explicitly: numba otherwise takes it from the first caller that compiles the function, and
+    `prevent_inlining` forbids it.
     """
     return njit(function, forceinline=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)

@@ -1,4 +1,4 @@
-"""The law `log`: p = p_ref + beta ln(rho / rho_ref), the integral of (80). Knows one place; knows no cells."""
+"""Density law `log`: p = p_ref + beta ln(rho / rho_ref), the integral of (80)."""
 
 from math import expm1, log, log1p
 
@@ -38,7 +38,7 @@ def pressure_of_log(st, floats, compliance, q):
 
 @inner
 def pressure_of_mass(st, floats, pipe, m):
-    """Pressure [Pa] of a pipe that holds m [kg/m]."""
+    """Pressure [Pa] of a pipe that contains m [kg/m]."""
     return pressure_of_log(st, floats, pipe["compliance"], log(swelling.filled(st, pipe, m)))
 
 
@@ -63,7 +63,7 @@ def thrust(st, floats, pipe, p):
 
 @inner
 def force_of_mass(st, floats, pipe, m):
-    """`thrust` at the pressure of a pipe that holds m [kg/m]: the momentum that its pressure carries [N]."""
+    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]: momentum flux by pressure."""
     return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 

@@ -1,11 +1,12 @@
-"""Liquid with free gas, and vapour where the law has a floor: one barotropic law. Knows one place; knows no cells.
+"""Density law `mixture`: liquid with free gas, and vapour if the law has a floor, as a single barotropic law.
 
-With x = p - floor > 0 the pressure of the gas, and all volumes over the liquid's at the reference pressure,
+x = p - floor > 0 is the pressure of the gas. Volumes are divided by the volume of liquid at the reference pressure:
 
     rho_ref / rho = 1 - (p - p_ref) / beta + gas (x^-k - x^(1-k) / saturation),   k = 1 / (gas exponent),
 
-free gas as long as x < saturation (it dissolves by Henry's law; infinite for none). The wall's area is linear,
-A = A_ref (1 + compliance (p - p_ref)), so that with k = 1 pressure over mass is the root of a quadratic.
+There is free gas while x < saturation (it dissolves by Henry's law; an infinite saturation means no dissolution).
+The area is linear in pressure, A = A_ref (1 + compliance (p - p_ref)). So with k = 1 the pressure of a given mass is
+the root of a quadratic.
 """
 
 from math import exp, log, sqrt
@@ -16,7 +17,7 @@ from fvsolve.kernels.density.apart import outside, part
 
 @part
 def free_gas(st, x):
-    """(volume of free gas over the liquid's, its fall with pressure [1/Pa]) at a pressure x of the gas [Pa]."""
+    """(volume of free gas over that of liquid, its decrease with pressure [1/Pa]) at a pressure x of the gas [Pa]."""
     if x >= st["saturation"]:
         return 0.0, 0.0
     k, share = st["gas_power"], x / st["saturation"]
@@ -26,7 +27,7 @@ def free_gas(st, x):
 
 @part
 def relative_volume(st, p):
-    """(rho_ref / rho, its fall with pressure [1/Pa])."""
+    """(rho_ref / rho, its decrease with pressure [1/Pa])."""
     outside()
     size, fall = free_gas(st, p - st["floor"])
     return 1.0 - (p - st["reference"]) / st["beta"] + size, 1.0 / st["beta"] + fall
@@ -34,7 +35,7 @@ def relative_volume(st, p):
 
 @part
 def gas_work(st, x):
-    """Integral of the volume of free gas over pressure [Pa], but for a constant."""
+    """Integral of the volume of free gas over pressure [Pa], apart from a constant."""
     k, at, s = st["gas_power"], min(x, st["saturation"]), st["saturation"]
     if k == 1.0:
         return st["gas"] * (log(at) - at / s)
@@ -65,7 +66,7 @@ def enthalpy(st, floats, p):
 
 @part
 def pressure_of_enthalpy(st, floats, h):
-    """Pressure [Pa] at which `enthalpy` is h, by Newton on p, or on ln x where that would pass the floor."""
+    """Pressure [Pa] at which `enthalpy` is h, by Newton on p, or on ln x where a step would pass the floor."""
     outside()
     floor, beta = st["floor"], st["beta"]
     lift = h * st["rho"]
@@ -93,9 +94,10 @@ def gas_root(st, compliance, share, slope, rest):
 
 @part
 def pressure_of_share(st, compliance, share):
-    """Pressure [Pa] of a pipe that holds `share` times rho_ref A_ref [-]; compliance 0 for a vessel.
+    """Pressure [Pa] of a pipe that contains `share` times rho_ref A_ref [-]; compliance 0 for a vessel.
 
-    Where the gas is not isothermal, its tangent in 1 / x stands for it, until the root stays: the gas is concave there.
+    If the gas is not isothermal, its tangent in 1 / x replaces it, and the root is iterated until it is constant. This
+    converges because the volume of gas is concave in 1 / x.
     """
     outside()
     floor, gas, saturation = st["floor"], st["gas"], st["saturation"]
@@ -111,20 +113,20 @@ def pressure_of_share(st, compliance, share):
         size, fall = free_gas(st, min(x, saturation * (1.0 - 1e-15)))
         before, slope = x, fall * x * x
         x = min(gas_root(st, compliance, share, slope, size - slope / x), saturation)
-        if abs(x - before) <= 1e-15 * (x + 1.0 / (share * (1.0 / st["beta"] + fall))):  # what rounding leaves
+        if abs(x - before) <= 1e-15 * (x + 1.0 / (share * (1.0 / st["beta"] + fall))):  # rounding
             break
     return x + floor
 
 
 @inner
 def pressure_of_log(st, floats, compliance, q):
-    """Pressure [Pa] at which ln(rho / rho_ref) and the wall's own, ln(A / A_ref), are q together."""
+    """Pressure [Pa] at which ln(rho / rho_ref) + ln(A / A_ref) is q; A is the area of the wall."""
     return pressure_of_share(st, compliance, exp(q))
 
 
 @inner
 def pressure_of_mass(st, floats, pipe, m):
-    """Pressure [Pa] of a pipe that holds m [kg/m]."""
+    """Pressure [Pa] of a pipe that contains m [kg/m]."""
     return pressure_of_share(st, pipe["compliance"], m / (st["rho"] * pipe["area"]))
 
 
@@ -159,7 +161,7 @@ def mass_of_pressure(st, floats, pipe, p):
 
 @inner
 def force_of_mass(st, floats, pipe, m):
-    """`thrust` at the pressure of a pipe that holds m [kg/m]: the momentum that its pressure carries [N]."""
+    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]: momentum flux by pressure."""
     return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 
@@ -171,7 +173,8 @@ def impedance(st, floats, pipe, p):
     return sqrt(st["rho"] / (fall + size * pipe["compliance"] / wall_stretch(st, pipe["compliance"], p)))
 
 
-# Places in (0, 1) and shares of Gauss' eight points, the upper four; the others lie opposite (Abramowitz, Stegun 25.4).
+# Abscissas in (0, 1) and weights of the upper four of eight Gauss points; the lower four are symmetric (Abramowitz and
+# Stegun 25.4).
 PLACES = (0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363)
 SHARES = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763)
 
@@ -189,7 +192,7 @@ def velocity_panel(st, floats, pipe, p_from, p_to):
 
 @part
 def velocity_change(st, floats, pipe, p_from, p_to):
-    """Integral of dp / (rho c) [m/s], in panels that end where all gas is dissolved; one ratio of 2 a panel."""
+    """Integral of dp / (rho c) [m/s] in panels: x at most doubles in a panel, and all gas is dissolved at an end."""
     outside()
     low, high = min(p_from, p_to), max(p_from, p_to)
     sign = 1.0 if p_to >= p_from else -1.0

@@ -1,4 +1,4 @@
-"""What a code says that is no law's: nothing that is a number."""
+"""Results for an unknown density law code: NaN."""
 
 from math import nan
 
@@ -6,10 +6,10 @@ from fvsolve.jit import inner
 
 
 @inner
-def number(st, floats, *given):
+def number(st, floats, *arguments):
     return nan
 
 
 @inner
-def numbers(st, floats, *given):
+def numbers(st, floats, *arguments):
     return nan, nan

@@ -1,4 +1,4 @@
-"""The profile of a pipe that its drag holds. Knows one pipe; knows no node."""
+"""Steady profile of a pipe with friction, and its weight along the slope."""
 
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.density import density, enthalpy, mass_of_pressure, pressure_of_enthalpy
@@ -6,7 +6,7 @@ from fvsolve.kernels.density import density, enthalpy, mass_of_pressure, pressur
 
 @inner
 def rise_to(profile, pipe, x):
-    """How far a pipe rises [m] from its `from` end over a distance x along it."""
+    """Rise [m] of a pipe from its `from` end over a distance x along it."""
     if pipe["rise"] < 0:
         return pipe["slope"] * x
     share = x / (0.5 * pipe["dx"])
@@ -17,7 +17,7 @@ def rise_to(profile, pipe, x):
 
 @njit
 def lean(st, profile, pipe, r, l, dr, dl):
-    """Weight along a pipe with a profile, - m' g dz/dx, into d/dt of both waves of its cells."""
+    """Add the weight along a pipe of variable slope, - m' g dz/dx, to d/dt of both waves of its cells."""
     at, weight = pipe["rise"], st["gravity"] / (pipe["dx"] * pipe["speed"])
     for i in range(r.size):
         force = -weight * (profile[at + 2 * i + 2] - profile[at + 2 * i]) * (r[i] + l[i])
@@ -27,7 +27,7 @@ def lean(st, profile, pipe, r, l, dr, dl):
 
 @njit
 def mass_of_head(st, floats, pipe, bernoulli, flow):
-    """Mass per length [kg/m] where h(p) + v^2 / 2 is `bernoulli` [J/kg], v = flow / m, below the speed of sound."""
+    """Mass per length [kg/m] at which h(p) + v^2 / 2 is `bernoulli` [J/kg], v = flow / m; the subsonic solution."""
     p = pressure_of_enthalpy(st, floats, bernoulli)
     m, dm = mass_of_pressure(st, floats, pipe, p)
     for _ in range(50):
@@ -42,10 +42,10 @@ def mass_of_head(st, floats, pipe, bernoulli, flow):
 
 @njit
 def profile_along(st, floats, profile, pipe, start, z, flow, faces, centers):
-    """Profile of a pipe that its drag holds: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2, by RK4 over half cells.
+    """Steady profile of a pipe with friction: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2, by RK4 over half cells.
 
-    start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there. Fills mass per length at faces and
-    centres [kg/m]; returns h + v^2/2 + g z at the other end.
+    start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there. Writes the mass per length at faces and
+    centres [kg/m]; returns h + v^2/2 + g z at the `to` end.
     """
     pull = pipe["drag"] * st["rho"] * pipe["area"]
     g, half, b = st["gravity"], 0.5 * pipe["dx"], start

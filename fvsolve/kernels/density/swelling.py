@@ -1,11 +1,13 @@
-"""What follows from ln(rho / rho_ref), and its slope, at a pressure: in a pipe whose wall swells by d ln(area) =
-compliance dp. Knows no law."""
+"""Mass, area and wave speed of a pipe with elastic wall, d ln(area) = compliance dp, from ln(rho / rho_ref).
+
+value, slope : ln(rho / rho_ref) and d ln rho / dp [1/Pa] at the pressure, by any density law
+"""
 
 from math import exp, expm1, sqrt
 
 from fvsolve.jit import inner
 
-FAR = 0.7745966692414834  # sqrt(3/5)
+FAR = 0.7745966692414834  # sqrt(3/5), outer abscissa of three Gauss points in [-1, 1]
 
 
 @inner
@@ -16,7 +18,7 @@ def density(st, value):
 
 @inner
 def filled(st, pipe, m):
-    """What a pipe that holds m [kg/m] holds over what it does at the reference."""
+    """Mass per length m [kg/m] over that at the reference pressure."""
     return m / (st["rho"] * pipe["area"])
 
 
@@ -50,7 +52,7 @@ def impedance(st, pipe, value, slope):
 
 @inner
 def over_three(half, middle, low, high):
-    """Integral of 1 / (rho c) over pressures, `half` to either side, from rho c at the three Gauss points [m/s]."""
+    """Integral of 1 / (rho c) over a pressure interval of width 2 `half`, from rho c at three Gauss points [m/s]."""
     total = 8.0 / middle
     total += 5.0 / low + 5.0 / high
     return half * total / 9.0

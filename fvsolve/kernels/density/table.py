@@ -1,4 +1,7 @@
-"""The law `table`: ln rho and enthalpy by cubic Hermite over pressure, straight beyond their ends. Knows one place."""
+"""Density law `table`: ln(rho / rho_ref) and enthalpy by cubic Hermite polynomials over pressure.
+
+ln(rho / rho_ref) is linear beyond both ends of the table.
+"""
 
 from math import exp, expm1, log
 
@@ -9,7 +12,7 @@ from fvsolve.kernels.density.apart import outside, part
 
 @njit(forceinline=True)
 def hermite(floats, values, slopes, k, s, step):
-    """Cubic through two values with two slopes, at s in [0, 1] of interval k."""
+    """Cubic polynomial through two values with two slopes, at s in [0, 1] of interval k."""
     r = 1.0 - s
     v0, v1 = floats[values + k], floats[values + k + 1]
     d0, d1 = floats[slopes + k] * step, floats[slopes + k + 1] * step
@@ -81,7 +84,7 @@ def pressure_of_log(st, floats, compliance, q):
 
 @inner
 def pressure_of_mass(st, floats, pipe, m):
-    """Pressure [Pa] of a pipe that holds m [kg/m]."""
+    """Pressure [Pa] of a pipe that contains m [kg/m]."""
     return pressure_of_log(st, floats, pipe["compliance"], log(swelling.filled(st, pipe, m)))
 
 
@@ -106,7 +109,7 @@ def thrust(st, floats, pipe, p):
 
 @inner
 def force_of_mass(st, floats, pipe, m):
-    """`thrust` at the pressure of a pipe that holds m [kg/m]: the momentum that its pressure carries [N]."""
+    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]: momentum flux by pressure."""
     return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
 
 

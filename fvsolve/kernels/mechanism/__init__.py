@@ -1,1 +1,1 @@
-"""Bodies in space: joints, forces at points, the mass matrix. Loaded and compiled by scenes that have bodies alone."""
+"""Multibody system: joints, forces at points, mass matrix; imported and compiled only for scenes that have bodies."""

@@ -1,8 +1,9 @@
-"""Bushings: force by the gap of two points, torque by the deviation (56) of two attitudes. Loaded by scenes with one.
+"""Bushings: spring-damper force by the gap of two points, and torque by the deviation (56) of two attitudes.
 
-In axes of the body of `from`: rho the place of `to`, less that of `from`; R~ = R R_d' with R the attitude of the body
-of `to` there and R_d that of the start. 2 eta eps is the skew part of R~, and eps.eps = (3 - trace R~) / 4. The force
-acts on both bodies where `to` is, so that what it does is force times d(rho)/dt.
+Imported only for scenes that have bushings. In axes of the body of `from`: rho is the position of `to` minus that of
+`from`; R~ = R R_d', with R the attitude of the body of `to` and R_d its attitude at the start. 2 eta eps is the skew
+part of R~, and eps.eps = (3 - trace R~) / 4. The force acts on both bodies at `to`, so that its power is force times
+d(rho)/dt.
 """
 
 from math import sqrt
@@ -18,7 +19,7 @@ from fvsolve.kernels.records import BUSHING_VALUE, RATE
 
 @njit(forceinline=True)
 def entry(out, tables, i, r, c):
-    """Entry of the attitude of a body, of the world (i < 0) of the identity."""
+    """Entry (r, c) of the attitude of body i; of the identity for the world (i < 0)."""
     if i < 0:
         return 1.0 if r == c else 0.0
     return out[row_of(tables, i) + ATTITUDE + 3 * r + c]
@@ -26,7 +27,7 @@ def entry(out, tables, i, r, c):
 
 @njit
 def gap_of(out, tables, bushing):
-    """Place of `to` less `from`, and its rate as the body of `from` sees it, in axes of the world: 6 numbers."""
+    """(position of `to` minus `from`, its rate relative to the body of `from`), in axes of the world: 6 numbers."""
     i = tables.points[bushing["from_point"]]["body"]
     x, y, z, u, v, w = point_at(out, tables, bushing["to_point"], PLACE)
     p, q, s, _, _, _ = point_at(out, tables, bushing["from_point"], PLACE)
@@ -40,7 +41,7 @@ def gap_of(out, tables, bushing):
 
 @njit
 def deviation(out, tables, bushing, r, c):
-    """Entry of R~ in the world, R_to R_d' R_from' with R_d the start's of `to` in axes of `from`."""
+    """Entry (r, c) of R~ in axes of the world, R_to R_d' R_from'; R_d : that of `to` in axes of `from` at the start."""
     i, j = tables.points[bushing["from_point"]]["body"], tables.points[bushing["to_point"]]["body"]
     total = 0.0
     for k in range(3):
@@ -51,7 +52,7 @@ def deviation(out, tables, bushing, r, c):
 
 @njit
 def twist(out, tables, bushing):
-    """2 eta eps in axes of the world, w~, and eps.eps: 7 numbers."""
+    """(2 eta eps, relative angular velocity w~, eps.eps), in axes of the world: 7 numbers."""
     x = 0.5 * (deviation(out, tables, bushing, 2, 1) - deviation(out, tables, bushing, 1, 2))
     y = 0.5 * (deviation(out, tables, bushing, 0, 2) - deviation(out, tables, bushing, 2, 0))
     z = 0.5 * (deviation(out, tables, bushing, 1, 0) - deviation(out, tables, bushing, 0, 1))
@@ -64,7 +65,7 @@ def twist(out, tables, bushing):
 
 @njit
 def loads(out, tables, bushing):
-    """(force, torque) on the body of `to`, in axes of the world."""
+    """(force [N], torque [N m]) on the body of `to`, in axes of the world."""
     x, y, z, u, v, w = gap_of(out, tables, bushing)
     a, b, c, p, q, s, _ = twist(out, tables, bushing)
     k, d, h, e = bushing["stiffness"], bushing["damping"], bushing["turn_stiffness"], bushing["turn_damping"]
@@ -73,7 +74,7 @@ def loads(out, tables, bushing):
 
 @njit
 def push_bushings(t, y, dydt, out, handle):
-    """Forces and torques of all bushings on their bodies."""
+    """Add the forces and torques of all bushings to their bodies."""
     tables = open_tables(handle)
     bushings = tables.bushings
     for k in range(bushings.size):
@@ -90,7 +91,7 @@ def push_bushings(t, y, dydt, out, handle):
 
 @njit
 def quicken_by_bushings(t, y, dydt, out, handle):
-    """Let steps see how quickly bushings answer, as lines in `matrix.quickest_body`."""
+    """Raise out[RATE], the rate that limits steps [1/s], for bushings; bound as in `mass_matrix.body_rate_limit`."""
     tables = open_tables(handle)
     bushings, work, n = tables.bushings, tables.scratch, tables.freedoms.size
     stiffness, damping = 0.0, 0.0
@@ -108,15 +109,15 @@ def quicken_by_bushings(t, y, dydt, out, handle):
             else:
                 lean_by(tables, j, x, y0, z, 0.0, 0.0, 0.0, 7 * n)
                 lean_by(tables, i, -x, -y0, -z, 0.0, 0.0, 0.0, 7 * n)
-            easy = ease(tables, 7 * n)
-            stiffness += easy * (bushing["stiffness"] if axis < 3 else bushing["turn_stiffness"])
-            damping += easy * (bushing["damping"] if axis < 3 else bushing["turn_damping"])
+            inverse_mass = ease(tables, 7 * n)
+            stiffness += inverse_mass * (bushing["stiffness"] if axis < 3 else bushing["turn_stiffness"])
+            damping += inverse_mass * (bushing["damping"] if axis < 3 else bushing["turn_damping"])
     out[RATE] = max(out[RATE], 0.5 * damping + sqrt(0.25 * damping * damping + stiffness))
 
 
 @njit
 def observe_bushings(t, y, out, handle, values):
-    """Gap [m], force [N] and torque [N m] of a bushing."""
+    """Write probe values of bushings: magnitude of gap [m], force [N] or torque [N m]."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):
@@ -133,7 +134,7 @@ def observe_bushings(t, y, out, handle, values):
 
 @njit
 def power_bushings(t, y, dydt, out, handle, power):
-    """Rows of bushings: rate of what they store, what they dissipate [W]."""
+    """Write the power rows of bushings: rate of stored energy, dissipation [W]."""
     tables = open_tables(handle)
     at = bushing_rows(tables, power)
     for k in range(tables.bushings.size):
@@ -149,7 +150,7 @@ def power_bushings(t, y, dydt, out, handle, power):
 
 @njit
 def stored_bushings(t, y, dydt, out, handle, stored):
-    """Rows of bushings: k gap^2 / 2 + 2 k eps.eps since the start [J]."""
+    """Write the storage rows of bushings: k gap^2 / 2 + 2 k_turn eps.eps since the start [J]."""
     tables = open_tables(handle)
     at = bushing_stores(tables, stored)
     for k in range(tables.bushings.size):

@@ -1,8 +1,8 @@
-"""Power and stored energy of bodies and of their joints. Knows the tables; adds nothing up over time.
+"""Power and stored energy of bodies and of their joints.
 
-Rows of `power` [W] a body, before those of devices and basins: rate of what it stores, what its joint dissipates, what
-drives its joint; of `stored` [J] its kinetic energy, m g z of its centre and k s^2 / 2 of its
-joint, since the start.
+Rows of `power` [W] of a body, before those of devices and basins: rate of stored energy, dissipation of its joint,
+power of its driven joint. Row of `stored` [J], change since the start: kinetic energy, m g z of the centre of mass and
+k s^2 / 2 of the joint.
 """
 
 from fvsolve.jit import njit
@@ -16,7 +16,7 @@ from fvsolve.kernels.records import FREE, PRISMATIC
 
 @njit
 def gained(body, out, here, gravity):
-    """d/dt of what a body stores: m v_c . a_c + w . J alpha + m g dz_c/dt [W]."""
+    """Rate of the kinetic and potential energy of a body: m v_c . a_c + w . J alpha + m g dz_c/dt [W]."""
     x, y, z, u, v, w = centre_of(body, out, here)
     a, b, c = acceleration_at(out, here, here + ACCELERATION, x, y, z)
     s = here + TURNING
@@ -26,7 +26,7 @@ def gained(body, out, here, gravity):
 
 @njit
 def sprung(body, y):
-    """(what the spring of its joint stores since the start [J], d/dt of that [W])."""
+    """(energy stored in the spring of the joint since the start [J], its rate [W])."""
     s, far = body["start"][0], y[body["y"]]
     return (
         body["stiffness"] * far * (s + 0.5 * far),
@@ -36,7 +36,7 @@ def sprung(body, y):
 
 @njit
 def driven(t, y, out, tables, i):
-    """Power that comes in by a driven joint [W]."""
+    """Power supplied by a driven joint [W]."""
     body = tables.bodies[i]
     rate = angle_of(body, t, y, tables)[1]
     x, y0, z = turned(out, row_of(tables, i) + ATTITUDE, body["axis"], 0)
@@ -48,7 +48,7 @@ def driven(t, y, out, tables, i):
 
 @njit
 def rubbed(body, y):
-    """What damping of a joint takes [W]."""
+    """Power dissipated by the damping of a joint [W]."""
     total, first = 0.0, 3 if body["joint"] == FREE else 0
     for k in range(first, body["freedoms"]):
         rate = body["speed"][k] + y[body["rate"] + k]
@@ -58,7 +58,7 @@ def rubbed(body, y):
 
 @njit
 def power_bodies(t, y, dydt, out, handle, power):
-    """Rows of bodies."""
+    """Write the power rows of bodies."""
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     at = body_rows(tables, power)
@@ -73,7 +73,7 @@ def power_bodies(t, y, dydt, out, handle, power):
 
 @njit
 def stored_bodies(t, y, dydt, out, handle, stored):
-    """Rows of bodies."""
+    """Write the storage rows of bodies."""
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     at = body_stores(tables, stored)

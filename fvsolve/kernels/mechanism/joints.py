@@ -1,9 +1,9 @@
-"""Where bodies are and how they move, as (t, y) tell: attitudes, places, velocities, weight. Solves nothing.
+"""Kinematics of bodies from (t, y): attitudes, positions, velocities, bias accelerations and weight.
 
-(45), (52), (59) to (67): a body's axes are its parent's, turned by its joint. Velocities and accelerations are carried
-along the tree as those that a body's axes have at o (see `room`), of which S q' of a joint is a sum: revolute (a, r x
-a), prismatic (0, a), a ball the three (R e, r x R e), free the centre's velocity in the world and R w. With
-V = V_parent + S q', A = A_parent + S q'' + V x S q' the acceleration at o, as in Featherstone, 2008, chapter 2.
+(45), (52), (59) to (67): the axes of a body are those of its parent, rotated by the joint. Velocities and accelerations
+along the tree are spatial vectors at the reference point o (`body_layout`), V = V_parent + S q'. Columns of S: revolute
+(a, r x a), prismatic (0, a), ball the three (R e, r x R e); a free body has the velocity of its centre in the world and
+R w. The acceleration at o is A = A_parent + S q'' + V x S q' (Featherstone 2008, chapter 2).
 """
 
 from math import cos, sin
@@ -34,7 +34,7 @@ from fvsolve.kernels.schedules import schedule_slopes, schedule_value
 
 @njit(forceinline=True)
 def angle_of(body, t, y, tables):
-    """Angle [rad] or travel [m] of a joint with one axis, its rate, and its acceleration where it is driven."""
+    """(angle [rad] or travel [m], rate, acceleration) of a joint with a single axis; acceleration 0 unless driven."""
     if body["schedule"] >= 0:
         rate, change = schedule_slopes(tables, body["schedule"], t)
         return schedule_value(tables, body["schedule"], t), rate, change
@@ -43,7 +43,7 @@ def angle_of(body, t, y, tables):
 
 @njit(forceinline=True)
 def times(a, i, b, j, c, k):
-    """C = A B of 3 x 3 matrices by rows."""
+    """Write C = A B of 3 x 3 matrices stored by rows at a[i], b[j] and c[k]."""
     for row in range(i, i + 9, 3):
         x, y, z = a[row], a[row + 1], a[row + 2]
         c[k] = x * b[j] + y * b[j + 3] + z * b[j + 6]
@@ -54,7 +54,7 @@ def times(a, i, b, j, c, k):
 
 @njit
 def turn_about(q, k, angle, axis):
-    """Rotation about an axis, (43)."""
+    """Write the rotation matrix about a unit axis, (43), to q[k]."""
     c, s, x, y, z = cos(angle), sin(angle), axis[0], axis[1], axis[2]
     rest = 1.0 - c
     put(q, k, c + x * x * rest, x * y * rest - z * s, x * z * rest + y * s)
@@ -64,7 +64,7 @@ def turn_about(q, k, angle, axis):
 
 @njit
 def turn_by(q, k, h, a, b, c):
-    """Rotation of Euler parameters over their length, (45): none that has drifted is another than a rotation."""
+    """Write the rotation matrix of normalised Euler parameters, (45), to q[k]: a rotation even if they have drifted."""
     s = 2.0 / (h * h + a * a + b * b + c * c)
     put(q, k, 1.0 - s * (b * b + c * c), s * (a * b - h * c), s * (a * c + h * b))
     put(q, k + 3, s * (a * b + h * c), 1.0 - s * (a * a + c * c), s * (b * c - h * a))
@@ -73,21 +73,21 @@ def turn_by(q, k, h, a, b, c):
 
 @njit(forceinline=True)
 def parameters(body, first, y):
-    """Euler parameters (eta, eps) of a joint, whose coordinates they are from `first` on."""
+    """Euler parameters (eta, eps) of a joint; first : index of the first among its coordinates."""
     at, e = body["y"] + first, body["start"]
     return e[first] + y[at], e[first + 1] + y[at + 1], e[first + 2] + y[at + 2], e[first + 3] + y[at + 3]
 
 
 @njit(forceinline=True)
 def rates(body, first, y):
-    """Three of a joint's velocities."""
+    """Three velocities of a joint from index `first` on."""
     at, v = body["rate"] + first, body["speed"]
     return v[first] + y[at], v[first + 1] + y[at + 1], v[first + 2] + y[at + 2]
 
 
 @njit
 def set_free(body, y, own):
-    """Attitude, place and motion of a free body; o is its centre of mass."""
+    """Write attitude, position and motion of a free body; o is its centre of mass."""
     turn_by(own, ATTITUDE, *parameters(body, 3, y))
     cx, cy, cz = turned(own, ATTITUDE, body["centre"], 0)
     at, x0 = body["y"], body["start"]
@@ -103,7 +103,7 @@ def set_free(body, y, own):
 
 @njit
 def hang(body, out, tables, own):
-    """Begin with what a body has of the one it is joined to: place of the joint, its axes in `scratch` from 9 on."""
+    """Write position and motion of a body as those of its parent at the joint, and the joint axes to scratch[9:18]."""
     work = tables.scratch
     if body["parent"] < 0:
         for k in range(9):
@@ -117,16 +117,16 @@ def hang(body, out, tables, own):
     up = out[at : at + BODY_OUT]
     times(up, ATTITUDE, body["attitude"], 0, work, 9)
     x, y, z = turned(up, ATTITUDE, body["at"], 0)
-    for k, far in ((0, x), (1, y), (2, z)):
-        own[PLACE + k] = up[PLACE + k] + far
-        own[ARM + k] = up[ARM + k] + far
+    for k, offset in ((0, x), (1, y), (2, z)):
+        own[PLACE + k] = up[PLACE + k] + offset
+        own[ARM + k] = up[ARM + k] + offset
         own[SPIN + k], own[STREAM + k] = up[SPIN + k], up[STREAM + k]
         own[SPIN_BIAS + k], own[APPARENT + k] = up[SPIN_BIAS + k], up[APPARENT + k]
 
 
 @njit
 def turn_joint(body, t, y, tables, own):
-    """A hinge: axes turned, S q' and, where it is driven, S q''."""
+    """Apply a revolute joint: rotate the axes; add S q' and, if the joint is driven, S q''."""
     angle, rate, change = angle_of(body, t, y, tables)
     turn_about(tables.scratch, 0, angle, body["axis"])
     times(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
@@ -138,7 +138,7 @@ def turn_joint(body, t, y, tables, own):
 
 @njit
 def slide_joint(body, t, y, tables, own):
-    """A slider: place moved, likewise."""
+    """Apply a prismatic joint: move the position; add S q' and, if the joint is driven, S q''."""
     travel, rate, change = angle_of(body, t, y, tables)
     keep_axes(tables, own)
     a, b, c = turned(own, ATTITUDE, body["axis"], 0)
@@ -152,14 +152,14 @@ def slide_joint(body, t, y, tables, own):
 
 @njit
 def keep_axes(tables, own):
-    """Axes are those of the joint."""
+    """Copy the joint axes to the attitude of the body."""
     for k in range(9):
         own[ATTITUDE + k] = tables.scratch[9 + k]
 
 
 @njit
 def move_by(own, wx, wy, wz, vx, vy, vz):
-    """Add S q' = (w, v) to a body's motion, and V x S q' to what velocities alone accelerate."""
+    """Add S q' = (w, v) to the motion of a body, and V x S q' to its bias acceleration."""
     for k, w, v in ((0, wx, vx), (1, wy, vy), (2, wz, vz)):
         own[SPIN + k] += w
         own[STREAM + k] += v
@@ -173,7 +173,7 @@ def move_by(own, wx, wy, wz, vx, vy, vz):
 
 @njit
 def set_joined(body, t, y, out, tables, own):
-    """Attitude, place and motion of a body from those of the one that it is joined to."""
+    """Write attitude, position and motion of a body from those of its parent."""
     hang(body, out, tables, own)
     if body["joint"] == REVOLUTE:
         turn_joint(body, t, y, tables, own)
@@ -190,7 +190,7 @@ def set_joined(body, t, y, out, tables, own):
 
 @njit
 def joint_acceleration(own, x, y, z, turns):
-    """Add the acceleration of a driven joint, S q''."""
+    """Add the acceleration S q'' of a driven joint; turns : 1 revolute, 0 prismatic."""
     if turns == 1:
         own[SPIN_BIAS] += x
         own[SPIN_BIAS + 1] += y
@@ -203,7 +203,10 @@ def joint_acceleration(own, x, y, z, turns):
 
 @njit(forceinline=True)
 def at_origin(out, here, wide, spin):
-    """Acceleration of a body's origin from that of its axes at o: a + alpha x r + w x v, v the origin's velocity."""
+    """Acceleration of the origin of a body from that at o: a + alpha x r + w x v; v : velocity of the origin.
+
+    wide : index of a; spin : offset of alpha in the row of the body
+    """
     ax, ay, az = cross(out, here + spin, out[here + ARM], out[here + ARM + 1], out[here + ARM + 2])
     v = here + VELOCITY
     bx, by, bz = cross(out, here + SPIN, out[v], out[v + 1], out[v + 2])
@@ -212,7 +215,7 @@ def at_origin(out, here, wide, spin):
 
 @njit
 def centre_of(body, out, here):
-    """Where the centre of mass lies from the body's origin, and its velocity, in axes of the world."""
+    """(position of the centre of mass from the origin, its velocity), in axes of the world: 6 numbers."""
     x, y, z = turned(out, here + ATTITUDE, body["centre"], 0)
     u, v, w = cross(out, here + SPIN, x, y, z)
     s = here + VELOCITY
@@ -221,7 +224,7 @@ def centre_of(body, out, here):
 
 @njit
 def kinematics(t, y, dydt, out, handle):
-    """All that (t, y) tell of bodies, with their weight as the first of their forces, and of lines between points."""
+    """Write attitude, position, motion and weight of all bodies, and the states of force elements, from (t, y)."""
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     for i in range(bodies.size):
@@ -243,5 +246,5 @@ def kinematics(t, y, dydt, out, handle):
 
 @njit
 def stretch_again(t, y, out, handle, g):
-    """The same before event functions, which no right-hand side precedes."""
+    """Call `kinematics` before event functions, which no right-hand side precedes."""
     kinematics(t, y, y[:0], out, handle)

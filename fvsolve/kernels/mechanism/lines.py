@@ -1,4 +1,4 @@
-"""Where pushes act on bodies: lines between points, forces there. Knows no law of a push and solves nothing."""
+"""Force elements between points of bodies: directions, elongations and their rates, application of forces."""
 
 from math import sqrt
 
@@ -22,7 +22,7 @@ from fvsolve.kernels.records import ABOUT, ALONG
 
 @njit
 def point_at(out, tables, k, base):
-    """(place, velocity) of point k, (59) and (67); place from o where `base` is ARM. A point of none is still."""
+    """(position, velocity) of point k, (59) and (67); position from o if `base` is ARM. The world is at rest."""
     if k < 0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     point = tables.points[k]
@@ -37,7 +37,7 @@ def point_at(out, tables, k, base):
 
 @njit
 def spin_of(out, tables, k):
-    """Angular velocity of the body of point k [rad/s]."""
+    """Angular velocity of the body of point k [rad/s]; 0 for the world."""
     if k < 0 or tables.points[k]["body"] < 0:
         return 0.0, 0.0, 0.0
     here = row_of(tables, tables.points[k]["body"]) + SPIN
@@ -46,7 +46,7 @@ def spin_of(out, tables, k):
 
 @njit(forceinline=True)
 def root_of(tables, k):
-    """Root of the body of point k; -1 of the world."""
+    """Root of the body of point k; -1 for the world."""
     if k < 0 or tables.points[k]["body"] < 0:
         return -1
     return tables.bodies[tables.points[k]["body"]]["root"]
@@ -54,7 +54,7 @@ def root_of(tables, k):
 
 @njit
 def stretch(out, tables):
-    """Of every line its direction, by how much it has grown since the start, and how fast it does."""
+    """Write direction, elongation since the start and rate of elongation of all force elements."""
     layout, lines = tables.layout[0], tables.lines
     for k in range(lines.size):
         line, at, to = lines[k], layout["along"] + 3 * k, layout["travel"] + 2 * lines[k]["push"]
@@ -82,7 +82,7 @@ def stretch(out, tables):
 
 @njit(forceinline=True)
 def press(out, tables, k, acts, x, y, z):
-    """Add a force, or a torque, at point k to its body's."""
+    """Add a force, or for `acts` ABOUT a torque, at point k to its body."""
     if k >= 0 and tables.points[k]["body"] >= 0:
         here = row_of(tables, tables.points[k]["body"])
         if acts == ABOUT:
@@ -93,7 +93,7 @@ def press(out, tables, k, acts, x, y, z):
 
 @njit
 def push_bodies(t, y, dydt, out, handle):
-    """Every push between points on their bodies: `to` forward along the line, `from` back."""
+    """Add the forces of all elements to their bodies: along the line at `to`, opposite at `from`."""
     tables = open_tables(handle)
     layout, lines = tables.layout[0], tables.lines
     for k in range(lines.size):

@@ -1,10 +1,10 @@
-"""Accelerations of bodies: M q'' = forces - bias, M by composite bodies, factored along the tree. Knows no joint's law.
+"""Accelerations of bodies, M q'' = forces - bias, by the composite rigid body algorithm, factored along the tree.
 
-Lagrange's equations (70) of a tree, as Newton's and Euler's (68) of its bodies projected on the columns S of the
-joints: M_jk = S_k . I_j S_j with I_j the inertia of all that hangs on joint j (Featherstone, 2008, chapter 6), a row of
-it being the freedoms between j and the root alone; M = L'L fills in nothing else. In `scratch`, freedoms first: S (6 a
-freedom), forces and then accelerations, a column, M; of bodies ten numbers of inertia about o (mass, mass times centre,
-xx yy zz xy xz yz) and six of force.
+Lagrange's equations (70) of a tree are the equations of Newton and Euler (68) of its bodies, projected on the columns S
+of the joints. M_jk = S_k . I_j S_j, with I_j the inertia of all bodies carried by joint j (Featherstone 2008, chapter
+6). A row of M contains only the freedoms between j and the root; the factor M = L'L has no further entries. Layout of
+`scratch`: S (6 numbers per freedom), forces and later accelerations, a work column, M; then per body ten numbers of
+inertia about o (mass, mass times centre, xx yy zz xy xz yz) and six of force.
 """
 
 from math import sqrt
@@ -36,12 +36,12 @@ from fvsolve.kernels.mechanism.room import (
 from fvsolve.kernels.mechanism.tanks import add_tanks
 from fvsolve.kernels.records import ABOUT, BODY_OUT, FREE, PRISMATIC, RATE, REVOLUTE
 
-INERTIA, LOAD = 10, 6
+INERTIA, LOAD = 10, 6  # numbers per body
 
 
 @njit(forceinline=True)
 def loads_at(tables):
-    """Where inertias, then forces of bodies stand in `scratch`."""
+    """(offset of the inertias, offset of the forces of bodies) in `scratch`."""
     freedoms, n = tables.freedoms, tables.freedoms.size
     rows = freedoms[n - 1]["row"] + freedoms[n - 1]["depth"] + 1 if n > 0 else 0
     first = 8 * n + rows
@@ -50,7 +50,7 @@ def loads_at(tables):
 
 @inner
 def columns(body, own, s):
-    """S of the freedoms of a joint: angular and linear velocity that each gives the axes at o; own : the body's row."""
+    """Write S of the freedoms of a joint: angular velocity and velocity at o of each; own : row of the body."""
     kind, x, y, z = body["joint"], own[ARM], own[ARM + 1], own[ARM + 2]
     first = 0
     if kind == FREE:
@@ -77,27 +77,27 @@ def columns(body, own, s):
 
 
 @inner
-def inertia_at(body, own, found):
-    """Ten numbers of a body about o: R J R' and what its mass adds."""
+def inertia_at(body, own, result):
+    """Write the inertia of a body about o, ten numbers: R J R' plus the terms of its mass."""
     m, inertia, r = body["mass"], body["inertia"], ATTITUDE
     gx, gy, gz = turned(own, r, body["centre"], 0)
     gx, gy, gz = gx + own[ARM], gy + own[ARM + 1], gz + own[ARM + 2]
-    found[0] = m
-    put(found, 1, m * gx, m * gy, m * gz)
+    result[0] = m
+    put(result, 1, m * gx, m * gy, m * gz)
     ax, ay, az = back_row(own, r, inertia)
     bx, by, bz = back_row(own, r + 3, inertia)
     cx, cy, cz = back_row(own, r + 6, inertia)
-    found[4] = ax * own[r] + ay * own[r + 1] + az * own[r + 2] + m * (gy * gy + gz * gz)
-    found[5] = bx * own[r + 3] + by * own[r + 4] + bz * own[r + 5] + m * (gx * gx + gz * gz)
-    found[6] = cx * own[r + 6] + cy * own[r + 7] + cz * own[r + 8] + m * (gx * gx + gy * gy)
-    found[7] = ax * own[r + 3] + ay * own[r + 4] + az * own[r + 5] - m * gx * gy
-    found[8] = ax * own[r + 6] + ay * own[r + 7] + az * own[r + 8] - m * gx * gz
-    found[9] = bx * own[r + 6] + by * own[r + 7] + bz * own[r + 8] - m * gy * gz
+    result[4] = ax * own[r] + ay * own[r + 1] + az * own[r + 2] + m * (gy * gy + gz * gz)
+    result[5] = bx * own[r + 3] + by * own[r + 4] + bz * own[r + 5] + m * (gx * gx + gz * gz)
+    result[6] = cx * own[r + 6] + cy * own[r + 7] + cz * own[r + 8] + m * (gx * gx + gy * gy)
+    result[7] = ax * own[r + 3] + ay * own[r + 4] + az * own[r + 5] - m * gx * gy
+    result[8] = ax * own[r + 6] + ay * own[r + 7] + az * own[r + 8] - m * gx * gz
+    result[9] = bx * own[r + 6] + by * own[r + 7] + bz * own[r + 8] - m * gy * gz
 
 
 @njit(forceinline=True)
 def back_row(own, r, inertia):
-    """A row of R times the inertia of a body in its own axes."""
+    """Row of R, at own[r], times the inertia matrix of a body in its own axes."""
     x, y, z = own[r], own[r + 1], own[r + 2]
     return (
         x * inertia[0] + y * inertia[3] + z * inertia[6],
@@ -108,7 +108,7 @@ def back_row(own, r, inertia):
 
 @njit(forceinline=True)
 def momentum(inertia, wx, wy, wz, vx, vy, vz):
-    """(torque or angular momentum about o, force or momentum) that an inertia has with (w, v), six numbers."""
+    """Inertia times (w, v): (angular momentum about o, momentum); with accelerations (torque, force); six numbers."""
     m, hx, hy, hz = inertia[0], inertia[1], inertia[2], inertia[3]
     xx, yy, zz, xy, xz, yz = inertia[4], inertia[5], inertia[6], inertia[7], inertia[8], inertia[9]
     return (
@@ -123,7 +123,7 @@ def momentum(inertia, wx, wy, wz, vx, vy, vz):
 
 @inner
 def bias(own, inertia, load):
-    """What a body's motion asks of its joint about o, less what pushes it: I A + V x* I V - forces."""
+    """Write the load about o that a joint must supply to its body for q'' = 0, I A + V x* I V - forces; six numbers."""
     w, v, a, c = SPIN, STREAM, SPIN_BIAS, APPARENT
     lx, ly, lz, px, py, pz = momentum(inertia, own[w], own[w + 1], own[w + 2], own[v], own[v + 1], own[v + 2])
     tx, ty, tz, fx, fy, fz = momentum(inertia, own[a], own[a + 1], own[a + 2], own[c], own[c + 1], own[c + 2])
@@ -138,11 +138,11 @@ def bias(own, inertia, load):
 
 @njit
 def fill(y, out, tables):
-    """S, M and the forces of all freedoms in `scratch`, the balance of the start taken off."""
+    """Write S, M and the forces of all freedoms to `scratch`; the balance of forces at the start is subtracted."""
     bodies, freedoms, work, paths = tables.bodies, tables.freedoms, tables.scratch, tables.integers
     n = freedoms.size
     first, loads = loads_at(tables)
-    for i in range(bodies.size):  # whose numbers are views: indices that are constants cost no more than they must
+    for i in range(bodies.size):  # views of rows: constant indices then compile to fast code
         here, at = row_of(tables, i), first + INERTIA * i
         own, inertia, load = out[here : here + BODY_OUT], work[at : at + INERTIA], work[loads + LOAD * i :]
         if bodies[i]["freedoms"] > 0:
@@ -155,14 +155,16 @@ def fill(y, out, tables):
         for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
             s, path, depth = work[6 * j :], paths[freedoms[j]["path"] :], freedoms[j]["depth"]
             row = work[8 * n + freedoms[j]["row"] :]
-            found = -(s[0] * load[0] + s[1] * load[1] + s[2] * load[2])
-            found -= s[3] * load[3] + s[4] * load[4] + s[5] * load[5]
+            force = -(s[0] * load[0] + s[1] * load[1] + s[2] * load[2])
+            force -= s[3] * load[3] + s[4] * load[4] + s[5] * load[5]
             if body["damping"] > 0.0:
                 k = body["rate"] + (j - body["freedom"])
-                found -= body["damping"] * (body["speed"][j - body["freedom"]] + y[k])
+                force -= body["damping"] * (body["speed"][j - body["freedom"]] + y[k])
             if body["stiffness"] > 0.0:
-                found -= body["stiffness"] * (body["start"][0] + y[body["y"]])
-            work[6 * n + j] = found - freedoms[j]["balance"]  # last, so that what is balanced leaves no bit
+                force -= body["stiffness"] * (body["start"][0] + y[body["y"]])
+            work[6 * n + j] = (
+                force - freedoms[j]["balance"]
+            )  # last: forces balanced at the start cancel without rounding
             tx, ty, tz, fx, fy, fz = momentum(inertia, s[0], s[1], s[2], s[3], s[4], s[5])
             for k in range(depth + 1):
                 c = work[6 * path[k] :]
@@ -180,9 +182,9 @@ def fill(y, out, tables):
 
 @njit
 def factor(tables):
-    """M = L'L in its own place, rows of freedoms from the leaves on; L has no entry that M has not.
+    """Factor M = L'L in place, row by row from the leaves; L has the sparsity of M.
 
-    On the diagonal stands 1 over that of L, which is what all who come later divide by.
+    The diagonal contains the reciprocal of that of L, because later solves divide by it.
     """
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     for j in range(n - 1, -1, -1):
@@ -199,7 +201,7 @@ def factor(tables):
 
 @njit
 def halve(tables, at):
-    """z with L' z = b, in the place of b at scratch[at]: |z|^2 = b' M^-1 b."""
+    """Solve L' z = b in place, b at scratch[at]; |z|^2 = b' M^-1 b."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     b = work[at : at + n]
     for j in range(n - 1, -1, -1):
@@ -212,7 +214,7 @@ def halve(tables, at):
 
 @njit
 def solve(tables, at):
-    """x with M x = b, in the place of b at scratch[at]."""
+    """Solve M x = b in place, b at scratch[at]."""
     freedoms, work, paths, n = tables.freedoms, tables.scratch, tables.integers, tables.freedoms.size
     halve(tables, at)
     b = work[at : at + n]
@@ -226,32 +228,32 @@ def solve(tables, at):
 
 @njit
 def spread(out, tables):
-    """Accelerations of all bodies from those of the freedoms, down the tree."""
+    """Write the accelerations of all bodies from those of the freedoms, from the root to the leaves."""
     bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
     loads = loads_at(tables)[1]
     for i in range(bodies.size):
-        body, at, given = bodies[i], row_of(tables, i), work[loads + LOAD * i :]
+        body, at, acceleration = bodies[i], row_of(tables, i), work[loads + LOAD * i :]
         own = out[at : at + BODY_OUT]
         if body["parent"] >= 0:
             up = work[loads + LOAD * body["parent"] :]
             for k in range(LOAD):
-                given[k] = up[k]
+                acceleration[k] = up[k]
         else:
             for k in range(LOAD):
-                given[k] = 0.0
+                acceleration[k] = 0.0
         for j in range(body["freedom"], body["freedom"] + body["freedoms"]):
             s, rate = work[6 * j :], work[6 * n + j]
             for k in range(LOAD):
-                given[k] += s[k] * rate
-        for k in range(3):  # for a while where what comes of it belongs
-            own[TURNING + k] = own[SPIN_BIAS + k] + given[k]
-            own[ACCELERATION + k] = own[APPARENT + k] + given[3 + k]
+                acceleration[k] += s[k] * rate
+        for k in range(3):  # acceleration at o for now; that of the origin is written below
+            own[TURNING + k] = own[SPIN_BIAS + k] + acceleration[k]
+            own[ACCELERATION + k] = own[APPARENT + k] + acceleration[3 + k]
         put(own, ACCELERATION, *at_origin(own, 0, ACCELERATION, TURNING))
 
 
 @njit
 def coordinate_rates(body, y, dydt):
-    """d/dt of a joint's coordinates: its velocities, of Euler parameters those of (44) with w in the body's axes."""
+    """Write d/dt of the coordinates of a joint: velocities, or rates of Euler parameters by (44), w in body axes."""
     at, first = body["y"], 0
     if body["joint"] == REVOLUTE or body["joint"] == PRISMATIC:
         dydt[at] = body["speed"][0] + y[body["rate"]]
@@ -268,7 +270,7 @@ def coordinate_rates(body, y, dydt):
 
 @njit
 def lean(out, tables, point, acts, x, y, z, at):
-    """Add to b at scratch[at] what a force, or a torque, of one at a point is to the freedoms that move it."""
+    """Add the generalised force of a unit force or torque (x, y, z) at a point to b at scratch[at]."""
     if point < 0 or tables.points[point]["body"] < 0:
         return
     i = tables.points[point]["body"]
@@ -283,7 +285,10 @@ def lean(out, tables, point, acts, x, y, z, at):
 
 @njit
 def lean_at(out, tables, i, px, py, pz, x, y, z, at):
-    """The same of a force on body i at a place of the world; on the world (i < 0) nothing."""
+    """Add the generalised force of a force (x, y, z) on body i at (px, py, pz) in the world to b at scratch[at].
+
+    Nothing is added for the world (i < 0).
+    """
     if i >= 0:
         here = row_of(tables, i)
         a, b, c = (
@@ -296,12 +301,12 @@ def lean_at(out, tables, i, px, py, pz, x, y, z, at):
 
 @njit
 def lean_by(tables, i, tx, ty, tz, fx, fy, fz, at):
-    """The same of a torque about o and a force on body i."""
+    """Add the generalised force of a torque about o and a force on body i to b at scratch[at]."""
     work, i = tables.scratch, carrier(tables, i)
     if i < 0:
         return
-    path, many = path_of(tables, i)
-    for k in range(many):
+    path, count = path_of(tables, i)
+    for k in range(count):
         j = tables.integers[path + k]
         s = 6 * j
         turn = work[s] * tx + work[s + 1] * ty + work[s + 2] * tz
@@ -310,7 +315,7 @@ def lean_by(tables, i, tx, ty, tz, fx, fy, fz, at):
 
 @njit
 def ease(tables, at):
-    """b' M^-1 b, of M factored and b at scratch[at]: how easily bodies give way to b."""
+    """b' M^-1 b with M factored and b at scratch[at], the inverse of the effective mass in the direction b."""
     work, total = tables.scratch, 0.0
     halve(tables, at)
     for j in range(tables.freedoms.size):
@@ -320,9 +325,9 @@ def ease(tables, at):
 
 @njit
 def quickest_body(out, tables):
-    """A bound of the rates [1/s] of bodies: c / 2 + sqrt(c^2 / 4 + k), k and c summed over pushes with b' M^-1 b.
+    """Upper bound of the rates of bodies [1/s]: c / 2 + sqrt(c^2 / 4 + k), k and c summed over forces with b' M^-1 b.
 
-    The trace of M^-1 K is above its greatest eigenvalue. What turns counts with its angular velocity.
+    The trace of M^-1 K exceeds its greatest eigenvalue. The bound is at least the greatest angular velocity.
     """
     rate, freedoms, work, lines = out[RATE], tables.freedoms, tables.scratch, tables.lines
     stiffness, damping, n, at = 0.0, 0.0, freedoms.size, 7 * freedoms.size
@@ -334,33 +339,33 @@ def quickest_body(out, tables):
             for j in range(tables.bodies[i]["freedom"], tables.bodies[i]["freedom"] + tables.bodies[i]["freedoms"]):
                 for m in range(n):
                     work[at + m] = 1.0 if m == j else 0.0
-                easy = ease(tables, at)
-                damping += tables.bodies[i]["damping"] * easy
-                stiffness += tables.bodies[i]["stiffness"] * easy
+                inverse_mass = ease(tables, at)
+                damping += tables.bodies[i]["damping"] * inverse_mass
+                stiffness += tables.bodies[i]["stiffness"] * inverse_mass
     for k in range(lines.size):
         line, u = lines[k], tables.layout[0]["along"] + 3 * k
-        spring, brake = held_by(out, tables, line["push"])
-        if spring == 0.0 and brake == 0.0:
+        spring, damper = held_by(out, tables, line["push"])
+        if spring == 0.0 and damper == 0.0:
             continue
         for m in range(n):
             work[at + m] = 0.0
         lean(out, tables, line["to_point"], line["acts"], out[u], out[u + 1], out[u + 2], at)
         lean(out, tables, line["from_point"], line["acts"], -out[u], -out[u + 1], -out[u + 2], at)
-        easy = ease(tables, at)
-        stiffness += spring * easy
-        damping += brake * easy
+        inverse_mass = ease(tables, at)
+        stiffness += spring * inverse_mass
+        damping += damper * inverse_mass
     return max(max(rate, sqrt(turns)), 0.5 * damping + sqrt(0.25 * damping * damping + stiffness))
 
 
 @njit
 def weigh(t, y, dydt, out, handle):
-    """Forces of freedoms and M alone, as the start asks for them."""
+    """Write the forces of freedoms and M only; used for the equilibrium at the start."""
     fill(y, out, open_tables(handle))
 
 
 @njit
 def state_rates(y, dydt, tables):
-    """Rates of the states of joints from the accelerations of their freedoms; none where dydt is empty."""
+    """Write the rates of the states of joints from the accelerations of their freedoms; nothing if dydt is empty."""
     bodies, work, n = tables.bodies, tables.scratch, tables.freedoms.size
     if dydt.size == 0:
         return
@@ -374,7 +379,7 @@ def state_rates(y, dydt, tables):
 
 @njit
 def accelerate(t, y, dydt, out, handle):
-    """Accelerations of all bodies under their forces, rates of their states."""
+    """Solve for the accelerations of all bodies under their forces; write them and the rates of the states."""
     tables = open_tables(handle)
     fill(y, out, tables)
     factor(tables)

@@ -1,6 +1,6 @@
-"""What probes read of bodies and of their points, from what `out` says of bodies. Changes nothing.
+"""Probe values of bodies and of their points, from the rows of bodies in `out`.
 
-Codes of what is read stand in the order of `BODY_QUANTITIES` and `POINT_QUANTITIES`, in axes of the world.
+A quantity is given by its index in `BODY_QUANTITIES` or `POINT_QUANTITIES`; vectors are in axes of the world.
 """
 
 from math import atan2, cos, hypot, sin, sqrt
@@ -32,8 +32,8 @@ BODY_QUANTITIES = (
     "kinetic_energy", "momentum_x", "momentum_y", "momentum_z", "angular_momentum_x", "angular_momentum_y",
     "angular_momentum_z",
 )  # fmt: skip
-LEVEL = 1e-12  # cosine of pitch below which roll and yaw turn about one line
-SHARES = ("", "_relative", "_coriolis", "_transversal", "_centripetal")  # of an acceleration, (65)
+LEVEL = 1e-12  # cosine of pitch below which roll and yaw rotate about the same axis
+SHARES = ("", "_relative", "_coriolis", "_transversal", "_centripetal")  # terms of an acceleration, (65)
 POINT_QUANTITIES = (
     *"xyz", "vx", "vy", "vz", *(f"a{axis}{share}" for share in SHARES for axis in "xyz"),
 )  # fmt: skip
@@ -48,7 +48,7 @@ def angular(body, out, here):
 
 @njit
 def spread_inertia(own, out, r, x, y, z):
-    """R J R' times a vector."""
+    """R J R' (x, y, z); own : J by rows, R at out[r]."""
     a, b, c = (
         out[r] * x + out[r + 3] * y + out[r + 6] * z,
         out[r + 1] * x + out[r + 4] * y + out[r + 7] * z,
@@ -60,7 +60,7 @@ def spread_inertia(own, out, r, x, y, z):
 
 @njit
 def kinetic(body, out, here):
-    """m v_c^2 / 2 + w J w / 2 [J]."""
+    """Kinetic energy m v_c^2 / 2 + w J w / 2 [J]."""
     _, _, _, u, v, w = centre_of(body, out, here)
     x, y, z = angular(body, out, here)
     return 0.5 * (body["mass"] * (u * u + v * v + w * w) + dot(out, here + SPIN, x, y, z))
@@ -68,7 +68,7 @@ def kinetic(body, out, here):
 
 @njit
 def acceleration_at(out, here, at, x, y, z):
-    """Acceleration of a point that lies at (x, y, z) from a body's origin and does not move in it, (65)."""
+    """Acceleration of a point fixed in a body at (x, y, z) from its origin, (65); at : index of that of the origin."""
     a, b, c = cross(out, here + TURNING, x, y, z)
     u, v, w = cross(out, here + SPIN, x, y, z)
     p, q, r = cross(out, here + SPIN, u, v, w)
@@ -77,7 +77,7 @@ def acceleration_at(out, here, at, x, y, z):
 
 @njit
 def joint_load(out, tables, i):
-    """(force, torque about its origin) by which its joint pushes body i: what all that hangs on it lacks, (68)."""
+    """(force, torque about its origin) of the joint on body i, from (68) of body i and all bodies that it carries."""
     bodies, first = tables.bodies, row_of(tables, i)
     fx = fy = fz = tx = ty = tz = 0.0
     for j in range(i, bodies.size):
@@ -114,10 +114,10 @@ def joint_load(out, tables, i):
 
 @njit
 def roll_pitch_yaw(out, r):
-    """Angles of (40), R = R_z(yaw) R_y(pitch) R_x(roll): roll is what is left of R once yaw is undone.
+    """(roll, pitch, yaw) of (40), R = R_z(yaw) R_y(pitch) R_x(roll); roll is computed from R_z(-yaw) R.
 
-    So they say R also next to a pitch of 90 degrees, where the entries that roll and yaw are read from vanish; there
-    only their sum or difference is known, yaw is 0 and roll has it all, as in `fvsolve.attitude`.
+    So the angles give R also near a pitch of 90 degrees, where the entries that give roll and yaw vanish. There only
+    their sum or difference is defined: yaw is set to 0, as in `fvsolve.rotations`.
     """
     level = hypot(out[r], out[r + 3])  # cos(pitch)
     yaw = atan2(out[r + 3], out[r]) if level > LEVEL else 0.0
@@ -128,7 +128,7 @@ def roll_pitch_yaw(out, r):
 
 @njit
 def euler_parameters(body, y, out, here):
-    """(eta, eps) of (44), of length 1: of a free body as its states go on, of others with eta not negative."""
+    """(eta, eps) of (44), normalised: those of the states of a free body; else computed from R, with eta >= 0."""
     if body["joint"] == FREE:
         h, a, b, c = parameters(body, 3, y)
         size = sqrt(h * h + a * a + b * b + c * c)
@@ -138,12 +138,12 @@ def euler_parameters(body, y, out, here):
     x, y0, z = out[r + 7] - out[r + 5], out[r + 2] - out[r + 6], out[r + 3] - out[r + 1]
     p, q, s = out[r + 1] + out[r + 3], out[r + 2] + out[r + 6], out[r + 5] + out[r + 7]
     h, a, b, c = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz  # 4 e^2
-    most = max(max(h, a), max(b, c))
-    if most == h:
+    greatest = max(max(h, a), max(b, c))
+    if greatest == h:
         a, b, c = x, y0, z
-    elif most == a:
+    elif greatest == a:
         h, b, c = x, p, q
-    elif most == b:
+    elif greatest == b:
         h, a, c = y0, p, s
     else:
         h, a, b = z, q, s
@@ -154,55 +154,55 @@ def euler_parameters(body, y, out, here):
 
 
 @njit
-def body_value(t, y, out, tables, i, which):
-    """A quantity of body i."""
+def body_value(t, y, out, tables, i, number):
+    """Quantity of body i, by its index in `BODY_QUANTITIES`."""
     body, here = tables.bodies[i], row_of(tables, i)
-    if which < 3:
-        return out[here + PLACE + which]
-    if which < 6:
-        return roll_pitch_yaw(out, here + ATTITUDE)[which - 3]
-    if which < 10:
-        return euler_parameters(body, y, out, here)[which - 6]
-    if which < 13:
-        return out[here + VELOCITY + which - 10]
-    if which < 16:
-        return out[here + SPIN + which - 13]
-    if which < 19:
-        return out[here + ACCELERATION + which - 16]
-    if which < 21:
-        return angle_of(body, t, y, tables)[which - 19] if body["joint"] <= PRISMATIC else 0.0
-    if which < 27:
-        return joint_load(out, tables, i)[which - 21]
-    if which == 27:
+    if number < 3:
+        return out[here + PLACE + number]
+    if number < 6:
+        return roll_pitch_yaw(out, here + ATTITUDE)[number - 3]
+    if number < 10:
+        return euler_parameters(body, y, out, here)[number - 6]
+    if number < 13:
+        return out[here + VELOCITY + number - 10]
+    if number < 16:
+        return out[here + SPIN + number - 13]
+    if number < 19:
+        return out[here + ACCELERATION + number - 16]
+    if number < 21:
+        return angle_of(body, t, y, tables)[number - 19] if body["joint"] <= PRISMATIC else 0.0
+    if number < 27:
+        return joint_load(out, tables, i)[number - 21]
+    if number == 27:
         return kinetic(body, out, here)
     x, y0, z, u, v, w = centre_of(body, out, here)
     u, v, w = body["mass"] * u, body["mass"] * v, body["mass"] * w
-    if which < 31:
-        return (u, v, w)[which - 28]
+    if number < 31:
+        return (u, v, w)[number - 28]
     lx, ly, lz = angular(body, out, here)
     x, y0, z = x + out[here + PLACE], y0 + out[here + PLACE + 1], z + out[here + PLACE + 2]
-    return (lx + y0 * w - z * v, ly + z * u - x * w, lz + x * v - y0 * u)[which - 31]
+    return (lx + y0 * w - z * v, ly + z * u - x * w, lz + x * v - y0 * u)[number - 31]
 
 
 @njit
-def point_value(out, tables, k, which):
-    """A quantity of point k.
+def point_value(out, tables, k, number):
+    """Quantity of point k, by its index in `POINT_QUANTITIES`.
 
-    The shares of its acceleration are those of (65) in the axes of what its body hangs on, and beside them stands the
-    acceleration of the origin there; of a body that hangs on the world, in its own.
+    The terms of its acceleration are those of (65) in the axes of the parent of its body; with the acceleration of the
+    origin of these axes they add up to the whole. For a body joined to the world the axes are its own.
     """
     moved = point_at(out, tables, k, PLACE)
-    if which < 6:
-        return moved[which]
+    if number < 6:
+        return moved[number]
     i = tables.points[k]["body"]
     if i < 0:
         return 0.0
     here = row_of(tables, i)
     x, y, z = turned(out, here + ATTITUDE, tables.points[k]["place"], 0)
-    found = acceleration_at(out, here, here + ACCELERATION, x, y, z)
-    axis, share = (which - 6) % 3, (which - 6) // 3
+    acceleration = acceleration_at(out, here, here + ACCELERATION, x, y, z)
+    axis, share = (number - 6) % 3, (number - 6) // 3
     if share == 0:
-        return found[axis]
+        return acceleration[axis]
     b = row_of(tables, tables.bodies[i]["parent"]) if tables.bodies[i]["parent"] >= 0 else here
     x, y, z = moved[0] - out[b + PLACE], moved[1] - out[b + PLACE + 1], moved[2] - out[b + PLACE + 2]
     dragged = cross(out, b + SPIN, x, y, z)
@@ -220,22 +220,22 @@ def point_value(out, tables, k, which):
     if share == 4:
         return centripetal[axis]
     rest = transversal[axis] + centripetal[axis] + coriolis[axis]
-    return found[axis] - out[b + ACCELERATION + axis] - rest if b != here else 0.0
+    return acceleration[axis] - out[b + ACCELERATION + axis] - rest if b != here else 0.0
 
 
 @njit
 def surface_value(y, tables, probe):
-    """Depth of water in modes: at rest, and by what their travels raise it."""
-    found = probe["offset"]
+    """Water depth of a sloshing model [m]: depth at rest plus the weighted displacements of its modal masses."""
+    depth = probe["offset"]
     for k in range(probe["count"]):
         body = tables.bodies[tables.integers[probe["cell"] + k]]
-        found += tables.floats[probe["weights"] + k] * (body["start"][0] + y[body["y"]])
-    return found
+        depth += tables.floats[probe["weights"] + k] * (body["start"][0] + y[body["y"]])
+    return depth
 
 
 @njit
 def observe_bodies(t, y, out, handle, values):
-    """Values of the probes that read bodies and their points."""
+    """Write the values of the probes of bodies, their points, and modal water surfaces."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):

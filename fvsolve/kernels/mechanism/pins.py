@@ -1,10 +1,10 @@
-"""Pins that close loops: multipliers of their rows, with Baumgarte's pull. Loaded by scenes that have one alone.
+"""Loop constraints (pins) by Lagrange multipliers with Baumgarte stabilisation; imported only for scenes with pins.
 
-A row says that n . rho stays, n a direction and rho the place of `to` in the axes of the body of `from`, so the same
-force acts on both bodies at one point, forth and back. With G q' its rate and Z' Z = G M^-1 G' (Z = L^-T G'), lambda =
--(Z' Z)^-1 (rows of the free accelerations + 2 pull G q' + pull^2 gap). Forces and places count from those of the start,
-which stand in the table: what was balanced there adds no bit. Behind what `kernels.mechanism.matrix` has in `scratch`:
-G, Z (a row of freedoms for each), Z' Z, lambda.
+A constraint row keeps n . rho constant: n is a direction, rho the position of `to` in the axes of the body of `from`.
+Equal and opposite forces act on both bodies at the same point. G q' is the rate of the rows, Z = L^-T G', and
+Z' Z = G M^-1 G'. lambda = -(Z' Z)^-1 (rows of the accelerations without pins + 2 pull G q' + pull^2 gap). Forces and
+positions are relative to those at the start, which are stored in the table: so a balanced start has no rounding errors.
+Layout of `scratch` after the data of `kernels.mechanism.mass_matrix`: G, Z (a row of freedoms each), Z' Z, lambda.
 """
 
 from math import sqrt
@@ -41,19 +41,19 @@ from fvsolve.kernels.records import PIN_VALUE, RATE
 
 @njit(forceinline=True)
 def pins_at(tables):
-    """Where G stands in `scratch`."""
+    """Offset of G in `scratch`."""
     return loads_at(tables)[1] + LOAD * tables.bodies.size
 
 
 @njit(forceinline=True)
 def body_of(tables, point):
-    """Body of a point; -1 for the world."""
+    """Number of the body of a point; -1 for the world."""
     return tables.points[point]["body"]
 
 
 @njit
 def direction(out, tables, pin, r):
-    """Direction r of a pin, as the world sees it now."""
+    """Present direction r of a pin in axes of the world."""
     i = body_of(tables, pin["from_point"])
     if i < 0:
         return pin["directions"][3 * r], pin["directions"][3 * r + 1], pin["directions"][3 * r + 2]
@@ -62,7 +62,7 @@ def direction(out, tables, pin, r):
 
 @njit
 def seen(out, tables, pin):
-    """Place, velocity and acceleration of `to` less those of the body of `from` there, (65): 9 numbers."""
+    """(gap, velocity, acceleration) of `to` relative to the body of `from`, (65), in axes of the world: 9 numbers."""
     i, j = body_of(tables, pin["from_point"]), body_of(tables, pin["to_point"])
     x, y, z, u, v, w = point_at(out, tables, pin["to_point"], PLACE)
     p, q, s, _, _, _ = point_at(out, tables, pin["from_point"], PLACE)
@@ -86,7 +86,7 @@ def seen(out, tables, pin):
 
 @njit
 def pull_apart(out, tables, pin, r, size):
-    """Add force `size` of row r to both bodies, where `to` is."""
+    """Add the force `size` of row r to both bodies, at `to`: positive on its body, negative on the other."""
     nx, ny, nz = direction(out, tables, pin, r)
     x, y, z, _, _, _ = point_at(out, tables, pin["to_point"], PLACE)
     for end, sign in ((pin["to_point"], size), (pin["from_point"], -size)):
@@ -99,12 +99,12 @@ def pull_apart(out, tables, pin, r, size):
 
 @njit
 def fill_rows(out, tables):
-    """G, Z, and in the place of lambda what each row lacks of its pull."""
+    """Write G, Z and, in place of lambda, the right-hand side of each row; return the number of rows."""
     pins, work, n, g = tables.pins, tables.scratch, tables.freedoms.size, pins_at(tables)
-    many = 0
+    rows = 0
     for k in range(pins.size):
-        many += pins[k]["rows"]
-    z, last = g + many * n, g + 2 * many * n + many * many
+        rows += pins[k]["rows"]
+    z, last = g + rows * n, g + 2 * rows * n + rows * rows
     row = 0
     for k in range(pins.size):
         pin = pins[k]
@@ -123,35 +123,35 @@ def fill_rows(out, tables):
             slip, pull = nx * u + ny * v + nz * w, pin["pull"]
             work[last + row] = -(nx * a + ny * b + nz * c + 2.0 * pull * slip + pull * pull * gap)
             row += 1
-    return many
+    return rows
 
 
 @njit
-def multipliers(tables, many):
-    """lambda, by Z' Z = C C' in its place."""
-    work, n, z = tables.scratch, tables.freedoms.size, pins_at(tables) + many * tables.freedoms.size
-    h, last = z + many * n, z + many * n + many * many
-    for i in range(many):
+def multipliers(tables, rows):
+    """Solve for lambda in place, by the Cholesky factor Z' Z = C C'."""
+    work, n, z = tables.scratch, tables.freedoms.size, pins_at(tables) + rows * tables.freedoms.size
+    h, last = z + rows * n, z + rows * n + rows * rows
+    for i in range(rows):
         for j in range(i + 1):
             total = 0.0
             for m in range(n):
                 total += work[z + i * n + m] * work[z + j * n + m]
             for m in range(j):
-                total -= work[h + i * many + m] * work[h + j * many + m]
-            work[h + i * many + j] = sqrt(total) if i == j else total / work[h + j * many + j]
-    for i in range(many):
+                total -= work[h + i * rows + m] * work[h + j * rows + m]
+            work[h + i * rows + j] = sqrt(total) if i == j else total / work[h + j * rows + j]
+    for i in range(rows):
         for m in range(i):
-            work[last + i] -= work[h + i * many + m] * work[last + m]
-        work[last + i] /= work[h + i * many + i]
-    for i in range(many - 1, -1, -1):
-        for m in range(i + 1, many):
-            work[last + i] -= work[h + m * many + i] * work[last + m]
-        work[last + i] /= work[h + i * many + i]
+            work[last + i] -= work[h + i * rows + m] * work[last + m]
+        work[last + i] /= work[h + i * rows + i]
+    for i in range(rows - 1, -1, -1):
+        for m in range(i + 1, rows):
+            work[last + i] -= work[h + m * rows + i] * work[last + m]
+        work[last + i] /= work[h + i * rows + i]
 
 
 @njit
 def gaps(t, y, dydt, out, handle):
-    """Gaps of the start into the places of forces, for `model.mechanism` to keep."""
+    """Write the gaps at the start in place of the forces, where `model.mechanism` reads them."""
     tables = open_tables(handle)
     pins, at = tables.pins, tables.layout[0]["pin"]
     for k in range(pins.size):
@@ -163,7 +163,7 @@ def gaps(t, y, dydt, out, handle):
 
 @njit
 def hold(t, y, dydt, out, handle):
-    """Forces that pins have at the start, as they act now."""
+    """Add the forces of pins at the start, along the present directions."""
     tables = open_tables(handle)
     pins = tables.pins
     for k in range(pins.size):
@@ -173,7 +173,7 @@ def hold(t, y, dydt, out, handle):
 
 @njit
 def accelerate_pinned(t, y, dydt, out, handle):
-    """Accelerations of all bodies under their forces and those of pins, rates of their states."""
+    """Solve for the accelerations of all bodies under their forces and those of pins; write rates of the states."""
     tables = open_tables(handle)
     pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
     hold(t, y, dydt, out, handle)
@@ -181,13 +181,13 @@ def accelerate_pinned(t, y, dydt, out, handle):
     factor(tables)
     solve(tables, 6 * n)
     spread(out, tables)
-    many = fill_rows(out, tables)
-    multipliers(tables, many)
+    rows = fill_rows(out, tables)
+    multipliers(tables, rows)
     g = pins_at(tables)
-    last = g + 2 * many * n + many * many
+    last = g + 2 * rows * n + rows * rows
     for m in range(n):
         total = 0.0
-        for i in range(many):
+        for i in range(rows):
             total += work[last + i] * work[g + i * n + m]
         work[7 * n + m] = total
     solve(tables, 7 * n)
@@ -207,7 +207,7 @@ def accelerate_pinned(t, y, dydt, out, handle):
 
 @njit
 def observe_pins(t, y, out, handle, values):
-    """Gap [m] of a pin, and its force [N]."""
+    """Write probe values of pins: magnitude of gap [m] or force [N]."""
     tables = open_tables(handle)
     probes, pins = tables.probes, tables.pins
     for k in range(probes.size):

@@ -1,7 +1,9 @@
-"""Fluid on bodies that forces move: what it feels of their accelerations once they are solved. Solves no body.
+"""Acceleration of contained fluid by its body, once the accelerations of bodies are solved.
 
-Rates of flow are found first with joints held; bodies feel what they throw back (`freight`) and, in their mass matrix,
-all that is carried less what slides (`laden`); then flow feels the accelerations. All by one Lagrangian (70).
+The coupling follows from the Lagrangian (70) of fluid and bodies. First the rates of flow are computed for
+q'' = 0, q'' being the accelerations of the freedoms of bodies. Then the bodies are solved with the fluid loads
+(`fluid_loads`) and with the fluid in the mass matrix, minus its sliding (`fluid_inertia`). Last, the accelerations of
+bodies act on the flow.
 """
 
 from fvsolve.jit import njit
@@ -23,50 +25,53 @@ from fvsolve.kernels.records import ASKED, LAW_LINEAR, RATE
 
 
 @njit
-def felt_along(out, tables, ride, way):
-    """What the acceleration of a body, beyond that with joints held, is along a way on it: C . a + Z . e."""
-    here = row_of(tables, tables.rides[ride]["body"])
+def felt_along(out, tables, segment, path):
+    """Acceleration of a body, minus that for q'' = 0, integrated along a flow path on it: C . a + Z . e [m2/s2]."""
+    here = row_of(tables, tables.rides[segment]["body"])
     a, e, b, c = here + ACCELERATION, here + TURNING, here + BIAS, here + SPIN_BIAS
     ax, ay, az = back(out, here + ATTITUDE, out[a] - out[b], out[a + 1] - out[b + 1], out[a + 2] - out[b + 2])
     ex, ey, ez = back(out, here + ATTITUDE, out[e] - out[c], out[e + 1] - out[c + 1], out[e + 2] - out[c + 2])
-    return way[0] * ax + way[1] * ay + way[2] * az + (way[3] * ex + way[4] * ey + way[5] * ez)
+    return path[0] * ax + path[1] * ay + path[2] * az + (path[3] * ex + path[4] * ey + path[5] * ez)
 
 
 @njit
 def follow_pipe(y, dydt, out, tables, k):
-    """Push the cells of a pipe, each by its mass over its length."""
-    pipe, (r, t, way) = tables.pipes[k], pipe_line(tables, k)
+    """Add the inertial force by the acceleration of its body to the waves of all cells of a pipe."""
+    pipe, (r, t, length) = tables.pipes[k], pipe_line(tables, k)
     n, o = pipe["cells"], pipe["y"]
-    felt = 0.5 * way / n / pipe["dx"] * felt_along(out, tables, pipe["ride"], turned_way(r, t))
+    push = 0.5 * length / n / pipe["dx"] * felt_along(out, tables, pipe["ride"], turned_way(r, t))
     linear = tables.settings[0]["law"] == LAW_LINEAR
     for i in range(n):
         m = mass_per_length(tables, pipe, i) + (0.0 if linear else (y[o + i] + y[o + n + i]) / pipe["speed"])
-        dydt[o + i] -= m * felt
-        dydt[o + n + i] += m * felt
+        dydt[o + i] -= m * push
+        dydt[o + n + i] += m * push
 
 
 @njit
 def follow_networks(t, y, dydt, out, handle):
-    """Let flow feel what the accelerations of bodies are beyond those with joints held."""
+    """Add the inertial forces of the accelerations of bodies, minus those for q'' = 0, to the rates of flow.
+
+    Where joint loads are requested (`loads_body` 2), the fluid loads are computed again with the new rates.
+    """
     tables = open_tables(handle)
-    pipes, columns, rides = tables.pipes, tables.columns, tables.rides
+    pipes, columns, segments = tables.pipes, tables.columns, tables.rides
     if dydt.size == 0 or tables.freedoms.size == 0:
         return
     load_all(y, dydt, out, tables, ASKED, -1.0, BIAS, SPIN_BIAS)
     for k in range(pipes.size):
-        if pipes[k]["ride"] >= 0 and carrier(tables, rides[pipes[k]["ride"]]["body"]) >= 0:
+        if pipes[k]["ride"] >= 0 and carrier(tables, segments[pipes[k]["ride"]]["body"]) >= 0:
             follow_pipe(y, dydt, out, tables, k)
     for k in range(columns.size):
         column = columns[k]
-        if column["ride"] >= 0 and carrier(tables, rides[column["ride"]]["body"]) >= 0:
-            felt = felt_along(out, tables, column["ride"], way_of(y, tables, column))
-            dydt[column["y"]] -= tables.settings[0]["rho"] * column["area"] / column["length"] * felt
+        if column["ride"] >= 0 and carrier(tables, segments[column["ride"]]["body"]) >= 0:
+            acceleration = felt_along(out, tables, column["ride"], way_of(y, tables, column))
+            dydt[column["y"]] -= tables.settings[0]["rho"] * column["area"] / column["length"] * acceleration
     load_all(y, dydt, out, tables, ASKED, 1.0, ACCELERATION, TURNING)
 
 
 @njit
 def quicken_by_pipes(t, y, dydt, out, handle):
-    """Let steps see how quickly waves brake light bodies: rho A c at both ends of a pipe, along it."""
+    """Raise out[RATE], the rate that limits steps [1/s], for bodies braked by waves: rho A c at both ends of a pipe."""
     tables = open_tables(handle)
     work, n, damping = tables.scratch, tables.freedoms.size, 0.0
     for k in range(tables.pipes.size):
@@ -74,10 +79,10 @@ def quicken_by_pipes(t, y, dydt, out, handle):
         i = tables.rides[pipe["ride"]]["body"] if pipe["ride"] >= 0 else -1
         if carrier(tables, i) < 0:
             continue
-        r, way, _ = pipe_line(tables, k)
+        r, direction, _ = pipe_line(tables, k)
         here = row_of(tables, i)
         x, y0, z = to_world(out, here, r[0], r[1], r[2])
-        a, b, c = to_world(out, here, way[0], way[1], way[2])
+        a, b, c = to_world(out, here, direction[0], direction[1], direction[2])
         for m in range(n):
             work[7 * n + m] = 0.0
         lean_at(out, tables, i, x + out[here + PLACE], y0 + out[here + PLACE + 1], z + out[here + PLACE + 2],

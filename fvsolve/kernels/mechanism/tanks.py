@@ -1,8 +1,8 @@
-"""What water in tanks adds to the mass matrix: along the normals of their beds alone. Knows moments; knows no flow.
+"""Contribution of the water of basins on bodies to the mass matrix: along the normals of their beds only.
 
-Row b of what basins say, from layout["tank"] + TANK_OUT b: moments of mass 1, x, y, xx, xy, yy in axes of the basin,
-these axes in the world, where its origin lies from o (`room`), and force and torque about its origin that it puts on
-its body with joints held, in its own axes. A basin that rides on nothing says zeros.
+Row b of basins, at layout["tank"] + TANK_OUT b: mass moments 1, x, y, xx, xy, yy in axes of the basin; these axes in
+the world; position of its origin from o (`body_layout`); force and torque about its origin on its body for q'' = 0, in
+its own axes. The row of a basin without body contains zeros.
 """
 
 from fvsolve.jit import njit
@@ -27,14 +27,14 @@ __all__ = ["ARM_OF", "EAST", "LOAD", "MOMENTS", "NORMAL", "NORTH", "TANK_OUT", "
 
 @njit
 def add_tanks(out, tables):
-    """Add J' N J to M in `scratch`, J the accelerations along the normal that freedoms give: n . (a + alpha x r)."""
+    """Add J' N J to M in `scratch`; J : acceleration n . (a + alpha x r) along the normal per freedom, N : moments."""
     work, freedoms, paths, n = tables.scratch, tables.freedoms, tables.integers, tables.freedoms.size
     for b in range(tables.basins.size):
         i, tank = carrier(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
         if i < 0:
             continue
-        path, many = path_of(tables, i)
-        for p in range(many):
+        path, count = path_of(tables, i)
+        for p in range(count):
             j = paths[path + p]
             row, (a, c, d) = 8 * n + freedoms[j]["row"], along_normal(out, work, tank, 6 * j)
             m = tank + MOMENTS
@@ -48,7 +48,7 @@ def add_tanks(out, tables):
 
 @njit(forceinline=True)
 def along_normal(out, work, tank, s):
-    """What a freedom gives along the normal at 1, x and y of a tank, its S at scratch[s]."""
+    """Coefficients of 1, x and y in the velocity along the normal of a basin by a freedom with S at scratch[s]."""
     wx, wy, wz = work[s], work[s + 1], work[s + 2]
     u, v, w = given(work, s, out[tank + ARM_OF], out[tank + ARM_OF + 1], out[tank + ARM_OF + 2])
     n, e, k = tank + NORMAL, tank + EAST, tank + NORTH
@@ -61,7 +61,7 @@ def along_normal(out, work, tank, s):
 
 @njit
 def weighs_more(out, tables, b):
-    """(force, torque about its body's origin) of water in basin b, beside those with joints held, once all moves."""
+    """(force, torque about the origin of its body) of the water in basin b, minus those for q'' = 0."""
     here, tank = row_of(tables, tables.basins[b]["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     r = tank + ARM_OF
     x, y, z = out[r] - out[here + ARM], out[r + 1] - out[here + ARM + 1], out[r + 2] - out[here + ARM + 2]

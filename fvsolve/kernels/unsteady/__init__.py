@@ -1,1 +1,1 @@
-"""Friction that remembers the past of the flow; loaded and compiled by scenes that have it alone."""
+"""Unsteady friction; imported and compiled only for scenes that use it."""

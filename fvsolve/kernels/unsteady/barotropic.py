@@ -1,6 +1,6 @@
-"""Unsteady friction under the density laws log and table. Knows what a changing density makes of the flow.
+"""Unsteady friction under the density laws log and table.
 
-What remembers is the velocity: u = (rho A)_ref M / m, so that v times the drag is a rate of storage and a loss.
+The terms follow the velocity, u = (rho A)_ref M / m. Then v times the drag is a rate of storage plus a dissipation.
 """
 
 from fvsolve.jit import njit
@@ -11,21 +11,21 @@ from fvsolve.kernels.unsteady.memory import follow_all, take_off
 
 @njit
 def velocity_change(pipe, profile, reference, r, l, change):
-    """change = deviation of reference M / m from the profile's [kg/s], averaged over cells by two Gauss points."""
+    """Write change = deviation of reference M / m from the profile [kg/s], cell averages by two Gauss points."""
     n, c, flow = r.size, pipe["speed"], pipe["flow"]
     for i in range(n):
         low, high = max(i - 1, 0), min(i + 1, n - 1)
-        lean = GAUSS / max(high - low, 1)
+        gauss = GAUSS / max(high - low, 1)
         m0, dm, dflow = profile[pipe["center"] + i], (r[i] + l[i]) / c, r[i] - l[i]
-        a = lean * ((r[high] - l[high]) - (r[low] - l[low]))
-        b = lean * ((r[high] + l[high]) - (r[low] + l[low])) / c
+        a = gauss * ((r[high] - l[high]) - (r[low] - l[low]))
+        b = gauss * ((r[high] + l[high]) - (r[low] + l[low])) / c
         u = (flow + (dflow + a)) / (m0 + (dm + b)) + (flow + (dflow - a)) / (m0 + (dm - b))
         change[i] = reference * (0.5 * u - flow / m0)
 
 
 @njit
 def remember_barotropic(t, y, dydt, out, handle):
-    """Unsteady friction of all pipes, added to rates, where there are any."""
+    """Add the unsteady friction of all pipes to the rates."""
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):

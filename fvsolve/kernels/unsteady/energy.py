@@ -1,8 +1,9 @@
-"""Power and stored energy of what unsteady friction remembers, added to those of its pipe. Knows the tables.
+"""Power and stored energy of unsteady friction, added to the rows of its pipe.
 
-A term of gain g and rate n that follows the flow M as z stores g z^2 / (2 n) and takes g (M - z)^2, both over rho A and
-per length; together they are M times its drag. Rows as in `energy.py`: `friction` and `rate` of a pipe, and its
-kinetic energy. Under the laws log and table M is rho A times the velocity at the reference density.
+A term of gain g and rate n has a state z that follows the flow M. It stores g z^2 / (2 n) and dissipates g (M - z)^2,
+both divided by rho A and per length. The sum of dissipation and storage rate is M times the drag of the term. The rows
+are as in `linear_energy.py`: `friction` and `rate` of a pipe, and its kinetic energy. Under the laws log and table M is
+rho A times the velocity, at the reference density.
 """
 
 from fvsolve.jit import njit
@@ -15,7 +16,7 @@ from fvsolve.kernels.unsteady.memory import difference
 
 @njit
 def followed(y, pipe, tables, change):
-    """Fill `change` with what the terms of a pipe follow, cell by cell: deviation from the profile's flow [kg/s]."""
+    """Fill `change` with the flow that the terms follow in each cell: deviation from the profile's flow [kg/s]."""
     st, n, o = tables.settings[0], pipe["cells"], pipe["y"]
     r, l = y[o : o + n], y[o + n : o + 2 * n]
     if st["law"] == LAW_LINEAR:
@@ -26,7 +27,7 @@ def followed(y, pipe, tables, change):
 
 @njit(forceinline=True)
 def begun(st, profile, pipe, i):
-    """What the terms follow in cell i of the profile [kg/s]."""
+    """Quantity that the terms follow, in cell i of the profile [kg/s]."""
     if st["law"] == LAW_LINEAR:
         return pipe["flow"]
     return pipe["flow"] * (st["rho"] * pipe["area"] / profile[pipe["center"] + i])
@@ -34,7 +35,7 @@ def begun(st, profile, pipe, i):
 
 @njit
 def memory_power(st, floats, profile, pipe, change, y, dydt):
-    """(power taken, rate of storage) of all terms of a pipe [W]."""
+    """Dissipation and rate of storage of all terms of a pipe [W]."""
     n, width = change.size, width_of(st, change.size)
     taken, rate = 0.0, 0.0
     for k in range(pipe["terms"]):
@@ -54,7 +55,7 @@ def memory_power(st, floats, profile, pipe, change, y, dydt):
 
 @njit
 def memory_energy(st, floats, profile, pipe, y):
-    """Change of what all terms of a pipe store since the profile [J]."""
+    """Change of the energy stored in all terms of a pipe since the profile [J]."""
     n, width, total = pipe["cells"], width_of(st, pipe["cells"]), 0.0
     for k in range(pipe["terms"]):
         at = pipe["memory"] + k * n
@@ -69,7 +70,7 @@ def memory_energy(st, floats, profile, pipe, y):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """What all pipes remember, into their rows of power."""
+    """Add the power of unsteady friction of all pipes to their power rows."""
     tables = open_tables(handle)
     st, pipes, at = tables.settings[0], tables.pipes, NODE * tables.nodes.size
     for i in range(pipes.size):
@@ -84,7 +85,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """What all pipes remember, into their rows of stored energy."""
+    """Add the energy stored by unsteady friction of all pipes to their storage rows."""
     tables = open_tables(handle)
     st, pipes, nodes = tables.settings[0], tables.pipes, tables.nodes
     for i in range(pipes.size):

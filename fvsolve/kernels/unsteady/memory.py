@@ -1,9 +1,10 @@
-"""What the past of a flow adds to the friction of the present one. Knows pipes and their terms; knows no density law.
+"""Unsteady friction by relaxation variables, under the linear density law.
 
-With a weighting function W(tau) = sum of m_k exp(-n_k tau), tau = nu t / R^2, the wall takes beside the quasi-steady
-drag (Zielke 1968) the sum over k of (4 nu / R^2) m_k (M - z_k) per length, and each z_k follows the flow,
-dz_k/dt = (n_k nu / R^2) (M - z_k). Linear in averages of cells, so exact for them. Storage (4 nu / R^2) m_k z_k^2 /
-(2 n_k nu / R^2), dissipation (4 nu / R^2) m_k (M - z_k)^2, both over rho A: passive where no m_k is negative.
+The weighting function is W(tau) = sum of m_k exp(-n_k tau), tau = nu t / R^2. In addition to the quasi-steady drag
+(Zielke 1968) the wall exerts the sum over k of (4 nu / R^2) m_k (M - z_k) per length. Each z_k follows the flow,
+dz_k/dt = (n_k nu / R^2) (M - z_k). The equations are linear in cell averages, so they are exact for them. Storage
+(4 nu / R^2) m_k z_k^2 / (2 n_k nu / R^2), dissipation (4 nu / R^2) m_k (M - z_k)^2, both divided by rho A: the friction
+is passive where no m_k is negative.
 """
 
 from fvsolve.jit import njit
@@ -12,7 +13,7 @@ from fvsolve.kernels.handle import open_tables
 
 @njit
 def follow(gain, rate, flow, z, dz, pull):
-    """One term: dz/dt = rate (flow - z), and gain (flow - z) added to `pull`."""
+    """Write dz/dt = rate (flow - z) of a single term and add gain (flow - z) to `pull`."""
     for i in range(z.size):
         lag = flow[i] - z[i]
         dz[i] = rate * lag
@@ -21,7 +22,10 @@ def follow(gain, rate, flow, z, dz, pull):
 
 @njit
 def follow_all(pipe, floats, flow, y, dydt, pull):
-    """All terms of a pipe; `flow` and `pull` are rows of its cells, the deviation of the flow and the drag [kg/s2]."""
+    """Write the rates of all terms of a pipe and their drag.
+
+    flow, pull : float64[cells]  deviation of the flow [kg/s], and drag [kg/s2]
+    """
     n, at = flow.size, pipe["memory"]
     for i in range(n):
         pull[i] = 0.0
@@ -33,7 +37,7 @@ def follow_all(pipe, floats, flow, y, dydt, pull):
 
 @njit
 def take_off(pull, dr, dl):
-    """Take a drag [kg/s2] off the rates of both waves."""
+    """Subtract a drag [kg/s2] from the rates of both waves."""
     for i in range(pull.size):
         s = 0.5 * pull[i]
         dr[i] -= s
@@ -49,7 +53,7 @@ def difference(r, l, flow):
 
 @njit
 def remember_linear(t, y, dydt, out, handle):
-    """Unsteady friction of all pipes under the linear law, added to rates, where there are any."""
+    """Add the unsteady friction of all pipes to the rates, under the linear law."""
     tables = open_tables(handle)
     pipes, floats, scratch = tables.pipes, tables.floats, tables.scratch
     for i in range(pipes.size):
