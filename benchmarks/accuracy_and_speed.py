@@ -1,16 +1,19 @@
 """The charts that choose the defaults: `fvsolve chart` over cases that stand for kinds of scenes. Writes docs/charts/.
 
-    python benchmarks/accuracy_and_speed.py [NAME...]
+    python benchmarks/accuracy_and_speed.py [--quick] [NAME...]
 
-Points are kept in build/charts, so that a run that was broken off goes on; delete the folder to measure again.
+Points are kept in build/charts, so that a run that was broken off goes on; delete the folder to measure again. With
+`--quick` points and pictures go to a temporary folder.
 """
 
 from __future__ import annotations
 
-import sys
+import tempfile
 from math import exp, log
 from pathlib import Path
 from time import perf_counter
+
+from measure import agree, parser
 
 from fvsolve.case import shipped
 from fvsolve.studies.accuracy.chart import Chart, chart
@@ -35,16 +38,19 @@ SCENES = {  # name -> (shipped case, keys, what it stands for)
     "chamber-chain": ("chamber-chain", {}, "no pipe, stiff"),
     "cylinder-servo": ("cylinder-servo", {}, "no pipe, stiff, a mass"),
 }
+QUICK = {  # name -> what of its chart is made by `--quick`
+    "closure-ramp": {"schemes": ["muscl"], "methods": ["ssp-rk3"], "cells": [40, 80]},
+}
 TARGETS = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
 
 
-def made(name: str) -> Chart:
-    """The chart of a scene, its picture written."""
+def made(name: str, points: Path, pictures: Path, **few) -> Chart:
+    """The chart of a scene, its picture written; few : of schemes, methods, cells and tolerances."""
     case, keys, about = SCENES[name]
-    found = chart(shipped.find(case), keys, out=POINTS / name)
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    picture = write(found, POINTS / name, title=f"{name}: {about}", dpi=80)[1]
-    (PICTURES / picture.with_stem(name).name).write_bytes(picture.read_bytes())
+    found = chart(shipped.find(case), keys, out=points / name, **few)
+    pictures.mkdir(parents=True, exist_ok=True)
+    picture = write(found, points / name, title=f"{name}: {about}", dpi=80)[1]
+    (pictures / picture.with_stem(name).name).write_bytes(picture.read_bytes())
     return found
 
 
@@ -113,12 +119,25 @@ def _mean(ratios: list[float]) -> float:
 
 def main() -> None:
     """All scenes, or those named."""
+    options = parser(__doc__)
+    options.add_argument("names", nargs="*", metavar="NAME", help=f"{', '.join(SCENES)}; all if none is named")
+    given = options.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        where = (Path(folder), Path(folder)) if given.quick else (POINTS, PICTURES)
+        tables(given.names or (QUICK if given.quick else SCENES), where, QUICK if given.quick else {})
+
+
+def tables(names, where: tuple[Path, Path], few: dict) -> None:
+    """Tables of scenes, and of what they imply together; where : folders of points and of pictures."""
     charts = {}
-    for name in sys.argv[1:] or SCENES:
+    for name in names:
         began = perf_counter()
-        charts[name] = found = made(name)
+        charts[name] = found = made(name, *where, **few.get(name, {}))
         front(name, found)
         front(name, found, "updates")
+        agree(
+            f"least error of {name}", min((one.trajectory for one in found.points if one.ok), default=float("nan")), 0.1
+        )
         if any(one.setting.scheme for one in found.points):
             overshoots(found)
         print(f"{perf_counter() - began:.1f} s", flush=True)

@@ -1,6 +1,6 @@
 """Ways to step an attitude: how far spinning tops end from where they should, what drifts, and where angles fail.
 
-python benchmarks/attitudes.py
+python benchmarks/attitudes.py [--quick]
 
 The truth of the tops is SciPy's DOP853 at 1e-13; of the turn past a pitch of 90 degrees a rotation about one axis (43).
 """
@@ -8,6 +8,7 @@ The truth of the tops is SciPy's DOP853 at 1e-13; of the turn past a pitch of 90
 from __future__ import annotations
 
 import numpy as np
+from measure import agree, parser
 from scipy.integrate import solve_ivp
 
 from fvsolve import attitude, integrate
@@ -78,16 +79,16 @@ def ends(weight, w, end, steps):
     yield of(stepped(f, y, end, steps, "gauss-4")[:4])
 
 
-def tops():
-    """Rows of the first table: name, steps, largest error of R by each way."""
-    for name, (weight, w, end, many) in TOPS.items():
+def tops(quick):
+    """Rows of the first table: name, steps, largest error of R by each way; if quick of one top for 1 s."""
+    for name, (weight, w, end, many) in {"heavy": (*TOPS["heavy"][:2], 1.0, (40,))}.items() if quick else TOPS.items():
         found = solve_ivp(by_parameters(weight), (0.0, end), [*START, *w], "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
         exact = attitude.of_euler_parameters(found[:4])
         for steps in many:
             yield name, steps, [float(np.abs(one - exact).max()) for one in ends(weight, w, end, steps)]
 
 
-def drifts(steps=4000, h=0.05):
+def drifts(steps, h=0.05):
     """Rows of the second: method, |e| - 1, relative changes of energy and moment of momentum of the torque-free top."""
     w = TOPS["torque-free"][1]
     for method in ("rk4", "gauss-4"):
@@ -97,13 +98,13 @@ def drifts(steps=4000, h=0.05):
         yield method, [float(a / b - 1.0) for a, b in sizes]
 
 
-def past_the_pole():
-    """Rows of the third: delta, and by steps of STEPS the largest error of R by angles and by parameters."""
+def past_the_pole(deltas, lengths):
+    """Rows of the third: delta, and by steps of these lengths the largest error of R by angles and by parameters."""
     end = 3.0
-    for delta in DELTAS:
+    for delta in deltas:
         start = attitude.about_x(delta)
         exact, errors = start @ attitude.of_axis(TURN, end), []
-        for h in STEPS:
+        for h in lengths:
             steps, e = round(end / h), attitude.euler_parameters(start)
             angles = stepped(lambda t, y: angle_rates(y, TURN), [delta, 0.0, 0.0], end, steps)
             e = stepped(lambda t, y: attitude.euler_parameters_rate(y, TURN), e, end, steps)
@@ -114,15 +115,19 @@ def past_the_pole():
 
 def main() -> None:
     """The three tables."""
+    quick = parser(__doc__).parse_args().quick
+    steps, deltas, lengths = (40, DELTAS[:1], STEPS[:1]) if quick else (4000, DELTAS, STEPS)
     print(f"largest error of R    steps  {'  '.join(f'{way:>14}' for way in WAYS)}")
-    for name, steps, errors in tops():
+    for name, steps, errors in tops(quick):
+        agree(f"error of R, {name} top", max(errors) if quick else 0.0, 5e-4)
         print(f"{name:<20}{steps:>7}  {'  '.join(f'{one:14.1e}' for one in errors)}")
-    print("\n4000 steps of 0.05 s, torque-free:  |e| - 1    energy  |moment of momentum|")
-    for method, found in drifts():
+    print(f"\n{steps} steps of 0.05 s, torque-free:  |e| - 1    energy  |moment of momentum|")
+    for method, found in drifts(steps):
         print(f"{method:<32}{found[0]:>11.1e}{found[1]:>10.1e}{found[2]:>14.1e}")
     print("\npast a pitch of 90 degrees: error of R by roll-pitch-yaw, by Euler parameters")
-    print(f"{'delta [rad]':<14}{''.join(f'h = {h:<20g}' for h in STEPS)}")
-    for delta, errors in past_the_pole():
+    print(f"{'delta [rad]':<14}{''.join(f'h = {h:<20g}' for h in lengths)}")
+    for delta, errors in past_the_pole(deltas, lengths):
+        agree(f"error of R past a pitch of 90 degrees, roll of {delta:g} rad", max(errors[1::2]), 1e-7)
         pairs = [f"{a:.0e}  {b:.0e}".ljust(24) for a, b in zip(errors[::2], errors[1::2], strict=True)]
         print(f"{delta:<14g}{''.join(pairs)}".rstrip())
 

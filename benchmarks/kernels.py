@@ -1,4 +1,4 @@
-"""Cell-steps per second of one acoustic pipe, beside a triad: `python benchmarks/kernels.py [cells ...]`.
+"""Cell-steps per second of one acoustic pipe, beside a triad: `python benchmarks/kernels.py [--quick] [cells ...]`.
 
 A cell-step is one cell over one whole step of the method, by the stepping loop of fvsolve.run: a pipe between a
 reservoir and a gate that shuts, without friction, with the envelope kept and NaN looked for; no rows in between.
@@ -9,7 +9,6 @@ for SSP-RK2 80: each stage in one pass over both fields (the loop makes several)
 
 from __future__ import annotations
 
-import argparse
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,6 +16,8 @@ from dataclasses import dataclass
 import networks
 import numba
 import numpy as np
+from measure import parser
+from planes_pyclaw import pyclaw, riemann
 
 from fvsolve.case import load
 from fvsolve.model import build
@@ -25,7 +26,7 @@ from fvsolve.solve.loop import NO_LIMIT, Loop
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)  # [cells]
 TRIAD_BYTES = 24  # per element: two read, one written (the line fetched before writing is not counted)
-BUDGET = 0.2  # [s] for one measurement
+BUDGET = 0.2  # for one measurement [s]
 
 
 @dataclass(frozen=True)
@@ -79,11 +80,9 @@ def stepping(scheme: str, limiter: str, method: str, courant: float) -> Callable
     return prepare
 
 
-def pyclaw() -> list[Subject]:
+def of_pyclaw() -> list[Subject]:
     """PyClaw's classic Fortran solver, if there: Lax-Wendroff with the MC limiter, periodic, Courant 0.9."""
-    try:
-        from clawpack import pyclaw, riemann
-    except ImportError:
+    if pyclaw is None:
         return []
 
     def prepare(cells: int) -> Callable[[int], None]:
@@ -118,16 +117,16 @@ def triad(a, b, c, s, times):
     return a[0]
 
 
-def rate(advance: Callable[[int], object], elements: int, repeats: int = 5) -> float:
+def rate(advance: Callable[[int], object], elements: int, repeats: int = 5, budget: float = BUDGET) -> float:
     """Elements per second, best of `repeats`, each long enough to be timed."""
     advance(1)
     times, wall = 1, 0.0
-    while wall < BUDGET / 10.0:
+    while wall < budget / 10.0:
         times *= 2
         start = time.perf_counter()
         advance(times)
         wall = time.perf_counter() - start
-    times = max(1, int(times * BUDGET / repeats / wall))
+    times = max(1, int(times * budget / repeats / wall))
     walls = []
     for _ in range(repeats):
         start = time.perf_counter()
@@ -136,32 +135,30 @@ def rate(advance: Callable[[int], object], elements: int, repeats: int = 5) -> f
     return times * elements / min(walls)
 
 
-def bandwidth(elements: int) -> float:
+def bandwidth(elements: int, budget: float = BUDGET) -> float:
     """What the triad moves [bytes/s] on arrays of this many elements."""
     a, b, c = np.zeros(elements), np.ones(elements), np.ones(elements)
-    return TRIAD_BYTES * rate(lambda times: triad(a, b, c, 0.0, times), elements)
+    return TRIAD_BYTES * rate(lambda times: triad(a, b, c, 0.0, times), elements, budget=budget)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("cells", nargs="*", type=int, default=SIZES)
-    sizes = parser.parse_args().cells
-    reached = {cells: bandwidth(2 * cells) for cells in sizes}
+    options = parser(__doc__)
+    options.add_argument("cells", nargs="*", type=int, help=f"numbers of cells; {SIZES} if none is given")
+    given = options.parse_args()
+    sizes, budget = given.cells or (SIZES[:1] if given.quick else SIZES), 0.01 if given.quick else BUDGET
+    reached = {cells: bandwidth(2 * cells, budget) for cells in sizes}
     print("| million per second |" + "".join(f" {cells:.0e} cells |" for cells in sizes))
     print("|---|" + "---|" * len(sizes))
     cells_of_triad = (
         f" {reached[cells] / TRIAD_BYTES / 1e6:.0f} ({reached[cells] / 1e9:.0f} GB/s) |" for cells in sizes
     )
     print("| triad, elements (twice the cells) |" + "".join(cells_of_triad))
-    peers = pyclaw()
-    for subject in schemes() + peers:
+    for subject in schemes() + of_pyclaw():
         row = f"| {subject.name} |"
         for cells in sizes:
-            speed = rate(subject.prepare(cells), cells)
+            speed = rate(subject.prepare(cells), cells, budget=budget)
             row += f" {speed / 1e6:.1f} ({speed * subject.bytes / reached[cells]:.0%} of triad) |"
         print(row, flush=True)
-    if not peers:
-        print("\nNo PyClaw row: clawpack does not import here (from PyPI it wants a Fortran compiler).")
 
 
 if __name__ == "__main__":

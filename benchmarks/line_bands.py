@@ -1,6 +1,6 @@
 """Bands of `fvsolve run --error` of random networks of delay lines, held against eight times their resolution.
 
-python benchmarks/line_bands.py [--seed 1] [--random 22]
+python benchmarks/line_bands.py [--quick] [--seed 1] [--random 22]
 
 Pipes of 3 to 900 m, with and without friction, between a lake and an end at which a valve or a demand stops at once or
 by a ramp; a check valve on the way in some; steps by Courant number, by length or by tolerance.
@@ -8,11 +8,11 @@ by a ramp; a check valve on the way in some; steps by Courant number, by length 
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 
 import numpy as np
+from measure import agree, parser
 
 from fvsolve.run import model_of, run
 from fvsolve.studies.levels import finer
@@ -74,11 +74,12 @@ def bands(given: dict) -> list[tuple[str, float, float]]:
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--random", type=int, default=22)
+    options = parser(__doc__)
+    options.add_argument("--seed", type=int, default=1, help="seed of the random networks; 1")
+    options.add_argument("--random", type=int, metavar="N", help="number of random networks; 22, by --quick 1")
     given, began, rows = options.parse_args(), time.perf_counter(), []
-    for k in range(given.random):
+    many = given.random or (1 if given.quick else 22)
+    for k in range(many):
         scene = network(np.random.default_rng([given.seed, k]))
         found = bands(scene)
         rows += found
@@ -88,9 +89,10 @@ def main() -> None:
     outside, known = sum(off > band for _, band, off in rows), [row for row in rows if math.isfinite(row[1])]
     wide = [band / off for _, band, off in known if off > 0.0]
     print(
-        f"{len(rows)} peaks of {given.random} networks: {outside} outside their band, {len(rows) - len(known)} "
+        f"{len(rows)} peaks of {many} networks: {outside} outside their band, {len(rows) - len(known)} "
         f"not known; band over difference, median {np.median(wide):.3g}; {time.perf_counter() - began:.0f} s"
     )
+    agree("peaks outside their band", outside, 0)
 
 
 if __name__ == "__main__":

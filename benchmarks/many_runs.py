@@ -1,15 +1,15 @@
 """Scenarios per second and core: fresh runs, models varied in place, rows of sweeps, what Dask costs; and their errors.
 
-python benchmarks/many_runs.py            valve-closure, 10 s, told at 20 places; CPU time, the mean of the quicker half
+python benchmarks/many_runs.py [--quick]  valve-closure, 10 s, told at 20 places; CPU time, the mean of the quicker half
 python benchmarks/many_runs.py --dask     the same rows on one process of a LocalCluster
 """
 
 from __future__ import annotations
 
-import sys
 import time
 
 import numpy as np
+from measure import agree, parser, peer_module
 
 from fvsolve import build, load, run, vary
 from fvsolve.studies.many import many
@@ -19,8 +19,8 @@ CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
 LINE = {"links.main.cells": 20, "numerics.line": "delay", "numerics.method": "euler", "output.fields": 0}
 DELAYS = (0.01, 0.05)  # steps of delay lines [s]: of the second errors are those of 20 cells
-FINE, PROBE = CELLS | {"links.main.cells": 2000}, "gate.pressure"
-TIMES, RUNS = 200, 2000
+FINE, PROBE = 2000, "gate.pressure"  # cells of the run that errors are taken from
+TIMES, RUNS, REPEATS = 200, 2000, 20
 
 
 def area(k: int) -> dict[str, float]:
@@ -55,7 +55,9 @@ def errors(result, fine) -> tuple[float, float]:
 def by(base: dict, name: str, goal: float | None, fine) -> None:
     """Ways to the same numbers."""
     model, rows = build(load(CASE, base)), RowMaker(CASE, base)
-    result = min((run(model) for _ in range(20)), key=lambda one: one.summary["seconds"])
+    result = min((run(model) for _ in range(REPEATS)), key=lambda one: one.summary["seconds"])
+    fresh, varied = (one.si(PROBE) for one in (run(CASE, base | area(0)), run(vary(model, area(0)))))
+    agree("a fresh run beside one in place [Pa]", np.abs(fresh - varied).max(), 1e-3)
     steps, seconds = result.summary["steps"], result.summary["seconds"]
     off = " and ".join(f"{one:.1e}" for one in errors(result, fine))
     print(f"{name}: {steps} steps, {1e3 * seconds:.2f} ms in them; error of the jump, rms and of the peak: {off}")
@@ -67,15 +69,16 @@ def by(base: dict, name: str, goal: float | None, fine) -> None:
 
 def dask() -> None:
     """Rows here, and on a worker of Dask's, by the CPU time of either process."""
-    from distributed import Client, LocalCluster
-
+    if not (distributed := peer_module("distributed", "distributed")):
+        return
     rows, points = RowMaker(CASE, CELLS), [area(k) for k in range(RUNS)]
     rows(points[0])
     began = time.process_time()
     for _ in many(rows, points):
         pass
     here = (time.process_time() - began) / RUNS
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster, Client(cluster) as client:
+    made = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0")
+    with made as cluster, distributed.Client(cluster) as client:
         for _ in many(RowMaker(CASE, CELLS), points[:50], dask=cluster.scheduler_address):
             pass  # which compiles there
         before, began = sum(client.run(time.process_time).values()), time.process_time()
@@ -91,9 +94,15 @@ def dask() -> None:
 
 def main() -> None:
     """All, or Dask alone."""
-    if "--dask" in sys.argv:
+    global FINE, TIMES, RUNS, REPEATS
+    options = parser(__doc__)
+    options.add_argument("--dask", action="store_true", help="rows on a worker of Dask's alone")
+    given = options.parse_args()
+    if given.quick:
+        FINE, TIMES, RUNS, REPEATS = 100, 2, 50, 1
+    if given.dask:
         return dask()
-    fine = run(build(load(CASE, FINE)))
+    fine = run(build(load(CASE, CELLS | {"links.main.cells": FINE})))
     by(CELLS, "20 cells, upwind5 and rk4", GOAL, fine)
     for step in DELAYS:
         by(LINE | {"numerics.step": step}, f"delay line, steps of {1e3 * step:.0f} ms", 2 * GOAL, fine)

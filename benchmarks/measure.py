@@ -1,16 +1,52 @@
-"""Runs of a solver at several settings: error, wall time, counts, printed. Knows no problem and no solver."""
+"""Options of all scripts, peers that may be missing, and runs of a solver at several settings, printed."""
 
 from __future__ import annotations
 
+import argparse
 import platform
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from time import perf_counter
+from types import ModuleType
 
 import numpy as np
 
-SLOW = 2.0  # [s] a run that takes longer is not repeated, and no finer one is tried
+QUICK, SKIPPED = "a quick run: its figures are no measurement", "rows skipped"  # which quick.py looks for
+SLOW = 2.0  # a run that takes longer is not repeated, and no finer one is tried [s]
+
+
+class Quick(argparse.Action):
+    """`--quick`, which says that figures are no measurement."""
+
+    def __call__(self, parser, namespace, values, option=None) -> None:
+        namespace.quick = True
+        print(QUICK, flush=True)
+
+
+def parser(about: str) -> argparse.ArgumentParser:
+    """Options of a script whose docstring is `about`; every script has `--quick`."""
+    made = argparse.ArgumentParser(description=about.splitlines()[0])
+    made.add_argument("--quick", action=Quick, nargs=0, default=False, help="small sizes, few repeats: 5 s if compiled")
+    return made
+
+
+def peer_module(name: str, wheel: str) -> ModuleType | None:
+    """Module of a peer; None, and a printed line, where its wheel is not installed or fails to import."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        missing = isinstance(error, ModuleNotFoundError) and error.name == name.partition(".")[0]
+        how = "is not installed" if missing else f"does not import ({str(error).partition(chr(10))[0]})"
+        print(f"{wheel} {how}: {SKIPPED}", flush=True)
+        return None
+
+
+def agree(what: str, difference: float, most: float) -> None:
+    """Exit with a message, unless a difference is `most` or less."""
+    if not difference <= most:
+        raise SystemExit(f"{what}: {difference:.3g}, expected at most {most:g}")
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,13 @@
 """Bodies beside pinocchio, MuJoCo and exudyn, and what the room of mechanisms compiles.
 
-python benchmarks/mechanisms.py            the three tables below
+python benchmarks/mechanisms.py            the first three of these tables, all by --quick smaller
 python benchmarks/mechanisms.py rates      accelerations of chains beside `pin.aba`, called from Python both [us]
 python benchmarks/mechanisms.py chain      a chain by rk4 beside MuJoCo's: error and CPU time of the steps
 python benchmarks/mechanisms.py arm        an arm on a cylinder beside exudyn's: CPU time at an error of 1e-5 rad
 python benchmarks/mechanisms.py compile    seconds that a first pendulum compiles, in an empty cache
 
 Best of several, the peers in turn with us. Errors of chain and arm are each solver's to its own finest run. Peers come
-by `python -m pip install pin mujoco exudyn`; where one is missing, its table is a sentence.
+by `python -m pip install pin mujoco exudyn`; where one is missing, its table is left out.
 """
 
 from __future__ import annotations
@@ -16,18 +16,21 @@ import os
 import subprocess
 import sys
 import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter, process_time
 
 import numba
 import numpy as np
 import peers_bodies
-from measure import machine
+from measure import agree, machine, parser, peer_module
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 SIZES, CALLS, ROUNDS = (1, 3, 6, 12, 30), 2000, 15
-FINEST, CLOSE = 64000, 1e-5  # steps of a chain; [rad]
+STEPS, FINEST, CLOSE = (1000, 4000, 16000), 64000, 1e-5  # of a chain; [rad]
+ARM = {  # settings of each solver, its finest
+    "fvsolve, rtol": ((1e-3, 1e-4, 1e-5, 1e-6, 1e-8), 1e-12),
+    "exudyn, steps": ((1000, 2000, 4000, 8000), 32000),
+}
 WHOLE = "import fvsolve; m = fvsolve.build(fvsolve.load({case!r})); m.rhs(0.0, m.start)"
 
 
@@ -57,7 +60,7 @@ def calls(call) -> float:
 
 
 def rates(bodies: dict):
-    """A call of the compiled rates of a chain, as a stepper makes it."""
+    """A call of the compiled rates of a chain, as a stepper makes it, so many calls, and where the rates are."""
     from truth.bodies import bodies as scene_of
 
     import fvsolve
@@ -75,7 +78,7 @@ def rates(bodies: dict):
         for _ in range(calls):
             rhs_at(at)(0.0, y, dydt, out, handle)
 
-    return slate, lambda: rhs(0.0, y, dydt, out, handle), lambda calls: many(calls, y, dydt, out, handle)
+    return slate, lambda: rhs(0.0, y, dydt, out, handle), lambda calls: many(calls, y, dydt, out, handle), dydt
 
 
 def beside(call, peer) -> tuple[float, float]:
@@ -91,10 +94,12 @@ def speed() -> None:
     print(f"{'bodies':>6} {'in a loop':>10} {'from Python':>12} {'pin.aba from Python':>20} {'ratios (goal 0.75)':>20}")
     for many in SIZES:
         bodies = chain(many)
-        slate, call, loop = rates(bodies)
+        slate, call, loop, dydt = rates(bodies)
         pin, peer, data, q, v, _ = pinocchio_of(bodies, 9.80665)
         tau = np.zeros(peer.nv)
         loop(10)
+        off = np.abs(dydt[1::2] - pin.aba(peer, data, q, v, tau)).max() / max(np.abs(data.ddq).max(), 10.0)
+        agree(f"accelerations of {many} bodies beside pinocchio's", off, 1e-11)
         inside = min(taken(lambda: loop(CALLS)) for _ in range(ROUNDS)) / CALLS  # noqa: B023
         own, peers = beside(lambda: calls(call), lambda: calls(lambda: pin.aba(peer, data, q, v, tau)))  # noqa: B023
         print(f"{many:6d} {inside:10.2f} {own:12.2f} {peers:20.2f} {inside / peers:13.2f} {own / peers:6.2f}")
@@ -123,12 +128,14 @@ def chains() -> None:
         f"{'steps':>6} {'error':>9} {'us a step':>10} {'MuJoCo error':>13} {'us a step':>10} {'ratio (goal 0.6)':>17}"
     )
     ours, theirs = own(FINEST)[0], peers_bodies.chain_in_mujoco(FINEST)[0]
-    for steps in (1000, 4000, 16000):
+    for steps in STEPS:
         mine, other = own(steps)[0], peers_bodies.chain_in_mujoco(steps)[0]
         a, b = beside(lambda: own(steps)[1], lambda: peers_bodies.chain_in_mujoco(steps)[1])  # noqa: B023
         wrong, peers = np.abs(mine - ours).max(), np.abs(other - theirs).max()
         print(f"{steps:6d} {wrong:9.1e} {1e6 * a / steps:10.2f} {peers:13.1e} {1e6 * b / steps:10.2f} {a / b:17.2f}")
-    print(f"both at their finest, {FINEST} steps: angles {np.abs(ours - theirs).max():.0e} rad apart")
+    apart = np.abs(ours - theirs).max()
+    print(f"both at their finest, {FINEST} steps: angles {apart:.0e} rad apart")
+    agree("angles of the chain beside MuJoCo's [rad]", apart, 1e-4)
 
 
 def arms() -> None:
@@ -138,27 +145,25 @@ def arms() -> None:
         rows, busy = solved(peers_bodies.arm_case(rtol))
         return rows[0], busy
 
-    times = [
-        at_error(name, solve, settings, finest)
-        for name, solve, settings, finest in (
-            ("fvsolve, rtol", own, (1e-3, 1e-4, 1e-5, 1e-6, 1e-8), 1e-12),
-            ("exudyn, steps", peers_bodies.arm_in_exudyn, (1000, 2000, 4000, 8000), 32000),
-        )
+    found = [
+        at_error(name, solve, *settings)
+        for (name, settings), solve in zip(ARM.items(), (own, peers_bodies.arm_in_exudyn), strict=True)
     ]
-    print(
-        f"at {CLOSE:g} rad {1e3 * times[0]:.2f} and {1e3 * times[1]:.2f} ms, ratio {times[0] / times[1]:.2f} (goal 0.2)"
-    )
+    (time, angles), (other, theirs) = found
+    print(f"at {CLOSE:g} rad {1e3 * time:.2f} and {1e3 * other:.2f} ms, ratio {time / other:.2f} (goal 0.2)")
+    agree("angle of the arm at the end beside exudyn's", abs(angles[-1] - theirs[-1]) / np.ptp(angles), 0.1)
 
 
-def at_error(name: str, solve, settings, finest) -> float:
-    """CPU time of a solver at an error of CLOSE [s], with a row a setting."""
+def at_error(name: str, solve, settings, finest) -> tuple[float, np.ndarray]:
+    """CPU time of a solver at an error of CLOSE [s], with a row a setting; its finest angles."""
     true, errors, least = solve(finest)[0], [], []
     for setting in settings:
         errors.append(np.abs(solve(setting)[0] - true).max())
         least.append(min(solve(setting)[1] for _ in range(ROUNDS)))
         print(f"{name} {setting:<8g} error {errors[-1]:.1e} rad {1e3 * least[-1]:7.2f} ms")
     good = np.argsort(errors)
-    return float(np.exp(np.interp(np.log(CLOSE), np.log(np.array(errors)[good]), np.log(np.array(least)[good]))))
+    errors, least = np.log(errors)[good], np.log(least)[good]
+    return float(np.exp(np.interp(np.log(CLOSE), errors, least))), true
 
 
 def compiling() -> None:
@@ -183,18 +188,22 @@ TABLES = {
 }
 
 
-def main(wanted: list[str]) -> None:
+def main() -> None:
     """Print the tables that are asked for, all but `compile` where none is."""
-    if "compile" in wanted:
+    global SIZES, CALLS, ROUNDS, STEPS, FINEST, ARM
+    options = parser(__doc__)
+    options.add_argument("what", nargs="*", help=f"{', '.join(TABLES)}, compile; all but compile if none is named")
+    given = options.parse_args()
+    if given.quick:
+        SIZES, CALLS, ROUNDS, STEPS, FINEST = (6,), 100, 1, (500,), 1000
+        ARM = {"fvsolve, rtol": ((1e-3, 1e-6), 1e-8), "exudyn, steps": ((500, 1000), 2000)}
+    if "compile" in given.what:
         compiling()
     for name, (table, module, wheel) in TABLES.items():
-        if not wanted or name in wanted:
+        if (not given.what or name in given.what) and peer_module(module, wheel):
             print(f"\n{name}: {machine('numba', wheel)}")
-            if find_spec(module) is None:
-                print(f"skipped, since {wheel} is not installed: python -m pip install {wheel}")
-            else:
-                table()
+            table()
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

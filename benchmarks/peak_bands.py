@@ -1,6 +1,6 @@
 """Bands of `fvsolve run --error` held against finer runs of all shipped cases, or of random mains.
 
-python benchmarks/peak_bands.py [CASE]...
+python benchmarks/peak_bands.py [--quick] [CASE]...
 python benchmarks/peak_bands.py --random 160 [--seed 0]
 
 Of every peak and claim the band, and how far it is from the run of four times the resolution (twice where there are
@@ -11,11 +11,11 @@ wide bands are beside the differences, of those above 5e-6 of their value, the l
 
 from __future__ import annotations
 
-import argparse
 import time
 from typing import NamedTuple
 
 import numpy as np
+from measure import agree, parser
 from random_mains import limits_near, random_main
 
 from fvsolve.case import load, shipped
@@ -80,7 +80,8 @@ def whole(result, name: str) -> tuple[float, float]:
     return peak.least, peak.greatest
 
 
-def tell(rows: list[Row], what: str) -> None:
+def tell(rows: list[Row], what: str) -> int:
+    """Print a table; the number of rows outside their band."""
     known = [row for row in rows if row.band is not None]
     misses = [row for row in known if row.off > row.band]
     for row in misses:
@@ -90,14 +91,17 @@ def tell(rows: list[Row], what: str) -> None:
     share = 100.0 * len(misses) / max(len(known), 1)
     print(f"{what}: {len(rows)}, {len(rows) - len(known)} without a band, {len(misses)} outside ({share:.2g} %)")
     print(f"  band over difference, quarters and median: {quarters}")
+    return len(misses)
 
 
 def main() -> None:
-    wanted = argparse.ArgumentParser()
-    wanted.add_argument("cases", nargs="*")
-    wanted.add_argument("--random", type=int, default=0, metavar="N")
-    wanted.add_argument("--seed", type=int, default=0, help="of the first main")
-    asked, began = wanted.parse_args(), time.process_time()
+    options = parser(__doc__)
+    options.add_argument("cases", nargs="*", metavar="CASE", help="shipped cases; all if none is named")
+    options.add_argument("--random", type=int, default=0, metavar="N", help="number of random mains instead; 0")
+    options.add_argument("--seed", type=int, default=0, help="seed of the first main; 0")
+    asked, began, outside = options.parse_args(), time.process_time(), 0
+    if asked.quick and not asked.random:
+        asked.random, asked.cases = 1, asked.cases or ["two-tanks"]
     if asked.random:
         made = []
         for seed in range(asked.seed, asked.seed + asked.random):
@@ -106,13 +110,14 @@ def main() -> None:
             except FvsolveError as error:
                 print(f"{seed}: {error}")
         peaks, places, turned = (sum(parts, []) for parts in zip(*made, strict=True))
-        tell(peaks, "peaks")
-        tell(places, "limits")
+        outside = tell(peaks, "peaks") + tell(places, "limits") + len(turned)
         print(f"verdicts turned: {len(turned)}", *turned, sep="\n  ")
-    else:
+    if asked.cases or not asked.random:
         names = asked.cases or list(shipped.names())
-        tell([row for name in names for row in of_shipped(name)], f"peaks and claims of {len(names)} cases")
+        outside += tell([row for name in names for row in of_shipped(name)], f"peaks and claims of {len(names)} cases")
     print(f"{time.process_time() - began:.0f} s of processor time")
+    if asked.quick:
+        agree("peaks, limits and claims outside their band", outside, 0)
 
 
 if __name__ == "__main__":

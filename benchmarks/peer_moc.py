@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 from time import process_time
 
 import numpy as np
-import rthym_moc
+from measure import peer_module
 
+rthym_moc = peer_module("rthym_moc", "rthym-moc")
 FOOT = 0.3048
 INCH = 0.0254
-GPM = rthym_moc.GPM_TO_CFS * FOOT**3  # [m3/s]
+GPM = (rthym_moc.GPM_TO_CFS if rthym_moc else np.nan) * FOOT**3  # [m3/s]
 OUT_OF_REACH = -1e9  # vapour pressure [psi]
 FAINT = 1e-6
 

@@ -9,18 +9,13 @@ from functools import partial
 
 import numba
 import numpy as np
-from measure import Solver
+from measure import Solver, peer_module
 from numba import types
 from pointer import pointer
 from scipy import sparse
 from scipy.integrate import odeint, solve_ivp
-from sksundae.cvode import CVODE
 
-try:
-    import numbalsoda
-except ImportError:
-    numbalsoda = None
-
+numbalsoda, sundae = peer_module("numbalsoda", "numbalsoda"), peer_module("sksundae.cvode", "scikit-sundae")
 MANY = 10**8  # steps allowed between two times
 
 
@@ -37,8 +32,10 @@ class Problem:
     band: tuple[int, int] | None = None
 
 
-def peers(problem: Problem) -> list[Solver]:
-    """All that are made for stiff problems."""
+def peers(problem: Problem, quick: bool) -> list[Solver]:
+    """All that are made for stiff problems; if quick one of each package."""
+    if quick:
+        return [*numbalsodas(problem, "LSODA"), *cvodes(problem)[:1], scipy_ivp(problem, "Radau")]
     found = [*numbalsodas(problem, "LSODA"), *cvodes(problem)]
     return found + [scipy_ivp(problem, name) for name in ("Radau", "BDF", "LSODA")] + [scipy_odeint(problem)]
 
@@ -59,10 +56,7 @@ def address(problem: Problem):
 
 def numbalsodas(problem: Problem, *names: str) -> list[Solver]:
     """Its LSODA (C++; it knows full matrices only) and DOP853 (Fortran), compiled f; none where it is not installed."""
-    if numbalsoda is None:
-        print(f"numbalsoda is not installed: its {' and '.join(names)} left out")
-        return []
-    return [numba_solver(problem, name) for name in names]
+    return [numba_solver(problem, name) for name in names] if numbalsoda else []
 
 
 def numba_solver(problem: Problem, name: str) -> Solver:
@@ -95,7 +89,9 @@ WRITE = types.float64[::1]
 
 
 def cvodes(problem: Problem) -> list[Solver]:
-    """CVODE's BDF, df/dy by its own differences and by compiled ones."""
+    """CVODE's BDF, df/dy by its own differences and by compiled ones; none where it is not installed."""
+    if sundae is None:
+        return []
     own = cvode_options(problem)
     other = own | {"jacfn": differences(problem)}
     return [
@@ -120,7 +116,7 @@ def cvode(problem: Problem, name: str, options: dict) -> Solver:
         rhs(t, numba.carray(pointer(y.ctypes.data), y.size, np.float64), yp)
 
     def solver(tolerance):
-        return CVODE(function, rtol=tolerance, atol=tolerance, max_num_steps=MANY, **options)
+        return sundae.CVODE(function, rtol=tolerance, atol=tolerance, max_num_steps=MANY, **options)
 
     def solve(tolerance):
         return solver(tolerance).solve(problem.t, problem.y0).y

@@ -4,13 +4,12 @@ speed: million cell-steps per second of each physics on grids of 64^2 to 1024^2 
 error: CPU time to an L1 error on a swirl there and back, a hump of water that spreads and a round pulse of pressure.
 start: the first run of each physics on a machine, what a scene without basins compiles, memory per cell.
 
-`--quick` for fewer sizes and repeats. One thread, CPU time, the best of several, everything compiled before. PyClaw
-(`clawpack` from PyPI, built with gfortran) is left out where it does not import.
+`--quick` for one small grid of water, without `start`, which planes_start.py has. One thread, CPU time, the best of
+several, everything compiled before. PyClaw (`clawpack` from PyPI, built with gfortran) is left out where it does not
+import.
 """
 
-import argparse
-
-from measure import machine
+from measure import machine, parser
 from planes_error import error_table
 from planes_speed import speed_table
 from planes_start import start_table
@@ -20,13 +19,12 @@ TABLES = {"speed": speed_table, "error": error_table, "start": start_table}
 
 def main() -> None:
     """Print the tables asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", nargs="*", help=f"{', '.join(TABLES)}; all if none is named")
-    parser.add_argument("--quick", action="store_true", help="fewer sizes and repeats")
-    arguments = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("what", nargs="*", help=f"{', '.join(TABLES)}; all if none is named, by --quick two")
+    given = options.parse_args()
     print(machine("numpy", "numba", "clawpack"))
-    for name in arguments.what or TABLES:
-        TABLES[name](arguments.quick)
+    for name in given.what or list(TABLES)[: 2 if given.quick else None]:
+        TABLES[name](given.quick)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
 """First runs of each physics, as whole processes; what a scene without basins compiles; memory per cell.
 
-This file runs itself, `python benchmarks/planes_start.py KIND CELLS FOLDER`. Cold is the first run in an empty cache;
+    python benchmarks/planes_start.py [--quick]
+
+This file runs itself, with `--memory KIND CELLS FOLDER` too. Cold is the first run in an empty cache;
 `after` the first run in a cache where a scene of two tanks has been, which has neither basins nor pipes; warm every run
-from then on. `compile` is cold less warm, `own` after less warm.
+from then on. `compile` is cold less warm, `own` after less warm. With `--quick` all are in the user's own cache.
 """
 
 from __future__ import annotations
@@ -14,8 +16,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from measure import machine, parser
 from planes_scenes import BASINS, of_triangles, scene, square
-from start_up import seconds
+from start_up import cache, seconds
 
 CASES = Path(__file__).resolve().parent.parent / "cases"
 GOAL = 10.0  # [s] that compiling a physics adds
@@ -43,26 +46,31 @@ def start_table(quick: bool) -> None:
     with tempfile.TemporaryDirectory(prefix="fvsolve-planes-") as name:
         folder = Path(name)
         run = [sys.executable, "-m", "fvsolve", "run", "--force", "--out", str(folder / "out")]
-        spent([*run, str(CASES / "two-tanks.toml")], folder / "tanks")
-        for k, kind in enumerate(KINDS):
-            command, colds, afters = [sys.executable, __file__, kind, str(SMALL), name], [], []
+        if not quick:
+            spent([*run, str(CASES / "two-tanks.toml")], folder / "tanks")
+        kinds = ("free surface",) if quick else KINDS
+        for k, kind in enumerate(kinds):
+            command, colds, afters = [sys.executable, __file__, "--memory", kind, str(SMALL), name], [], []
             for i in range(1 if quick else 3):
-                shutil.copytree(folder / "tanks", folder / f"{k}-{i}-after")
-                colds.append(spent(command, folder / f"{k}-{i}"))
-                afters.append(spent(command, folder / f"{k}-{i}-after"))
-            cold, after, warm = min(colds), min(afters), min(spent(command, folder / f"{k}-0") for _ in range(3))
+                colds.append(spent(command, cache(folder / f"{k}-{i}", quick)))
+                if not quick:
+                    shutil.copytree(folder / "tanks", folder / f"{k}-{i}-after")
+                    afters.append(spent(command, folder / f"{k}-{i}-after"))
+            warm = min(spent(command, cache(folder / f"{k}-0", quick)) for _ in range(1 if quick else 3))
+            cold, after = min(colds), min(afters or colds)
             times = " | ".join(f"{wall:.1f} ({cpu:.1f})" for wall, cpu in (cold, after, warm))
             whole, own = (f"{one[0] - warm[0]:.1f} ({one[1] - warm[1]:.1f})" for one in (cold, after))
             verdict = "met" if after[0] - warm[0] < GOAL else "missed"
             print(f"| {kind} | {times} | {whole} | {own}, {verdict} |", flush=True)
-        spent([*run, str(CASES / "valve-closure.toml")], folder / "pipe")
-        files = list((folder / "pipe").rglob("*.nbi"))
-        strays = sorted({path.name.split("-")[0] for path in files if path.parent.name.startswith("plane_")})
-        print(f"\nOf {len(files)} functions that a scene of one pipe compiles, of the plane: {strays or 'none'}")
+        if not quick:
+            spent([*run, str(CASES / "valve-closure.toml")], folder / "pipe")
+            files = list((folder / "pipe").rglob("*.nbi"))
+            strays = sorted({path.name.split("-")[0] for path in files if path.parent.name.startswith("plane_")})
+            print(f"\nOf {len(files)} functions that a scene of one pipe compiles, of the plane: {strays or 'none'}")
         print("Threads: there are none yet.\n\nMemory [bytes per cell]")
-        for kind in KINDS:
-            cells = LARGE // 2 if "triangles" in kind else LARGE
-            command = [sys.executable, __file__, kind, str(cells), name]
+        for kind in kinds:
+            cells = (2 * SMALL if quick else LARGE) // (2 if "triangles" in kind else 1)
+            command = [sys.executable, __file__, "--memory", kind, str(cells), name]
             for _ in range(1 + ("triangles" in kind)):  # making these takes more memory than running on them
                 told = subprocess.run(command, check=True, capture_output=True, text=True)
             print(f"  {kind}: {told.stdout.strip()}", flush=True)
@@ -100,5 +108,18 @@ def memory(kind: str, cells: int, folder: Path) -> str:
     return f"tables {held[0] / n:.0f}, loop {held[1] / n:.0f}, peak of the process {(peak() - before) / n:.0f}"
 
 
+def main() -> None:
+    """Print the table, or what one process of it finds."""
+    options = parser(__doc__)
+    options.add_argument("--memory", nargs=3, metavar=("KIND", "CELLS", "FOLDER"), help="one run of the table")
+    given = options.parse_args()
+    if given.memory:
+        kind, cells, folder = given.memory
+        print(memory(kind, int(cells), Path(folder)))
+    else:
+        print(machine("fvsolve", "numba"))
+        start_table(given.quick)
+
+
 if __name__ == "__main__":
-    print(memory(sys.argv[1], int(sys.argv[2]), Path(sys.argv[3])))
+    main()

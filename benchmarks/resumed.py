@@ -1,6 +1,8 @@
 """A large dam break stopped by one process and resumed by two ranks, with --back the other way round too: hashes.
 
-Run with the number of cells along a side, 4096 if nothing is said: each rank wants some 13 GiB for these while it makes
+    python benchmarks/resumed.py [--quick] [--back] [CELLS]
+
+CELLS along a side are 4096 if nothing is said: each rank wants some 13 GiB for these while it makes
 its model, one after the other, and up to 10 after that.
 """
 
@@ -16,7 +18,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from measure import machine
+from measure import agree, machine, parser, peer_module
 from planes_scenes import SIZE, scene, square
 
 from fvsolve.case import load
@@ -99,21 +101,30 @@ def asked(many: int, *words) -> list[str]:
 
 
 def main() -> None:
-    if "--part" in sys.argv:
-        part(int(sys.argv[2]), *sys.argv[3:])
+    options = parser(__doc__)
+    options.add_argument("cells", nargs="?", type=int, help="number of cells along a side; 4096, by --quick 32")
+    options.add_argument("--back", action="store_true", help="also stopped by two ranks and resumed by one process")
+    options.add_argument("--part", nargs="+", metavar="WORD", help="what one process of these does")
+    given = options.parse_args()
+    if given.part:
+        part(int(given.part[0]), *given.part[1:])
         return
-    cells = int(sys.argv[1]) if len(sys.argv) > 1 else 4096
+    cells = given.cells or (32 if given.quick else 4096)
     print(f"{machine('fvsolve', 'numba', 'mpi4py')}\ndam break on {cells}^2 cells; hashes of states", flush=True)
     with tempfile.TemporaryDirectory(prefix="fvsolve-resumed-") as folder:
         one, two = Path(folder) / "one.npz", Path(folder) / "two.npz"
         half, whole = asked(1, cells, "-", one, STOP, STEPS - STOP)
+        if not peer_module("mpi4py", "mpi4py"):
+            return
         (again,) = asked(2, cells, one, "-", STEPS - STOP)
         print(f"stopped by one and resumed by two ranks: states are {'equal' if whole == again else 'NOT'}", flush=True)
-        if "--back" in sys.argv:
+        agree("states that differ", whole != again, 0)
+        if given.back:
             (other,) = asked(2, cells, "-", two, STOP)
             (back,) = asked(1, cells, two, "-", STEPS - STOP)
             same = half == other and whole == back
             print(f"stopped by two and resumed by one: states are {'equal' if same else 'NOT'}")
+            agree("states that differ", not same, 0)
 
 
 if __name__ == "__main__":

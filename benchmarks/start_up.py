@@ -1,17 +1,17 @@
 """Whole-process time of `fvsolve run` on the main case: to the answer, and to whole pictures; cold, by a store, warm.
 
-    python benchmarks/start_up.py [--times 5] [--beside CHECKOUT] [CASE]
+    python benchmarks/start_up.py [--quick] [--times 5] [--beside CHECKOUT] [CASE]
 
 Cold is a new cache folder: kernels are compiled and CoolProp is asked. With a store is the first run from a copy of
 what `fvsolve warm` leaves, code and fluid properties, without numba's own cache; `without fluids` of its code alone, so
 that CoolProp is asked. Warm is every run after that. `--beside` takes turns with another
 checkout, of an earlier version, and prints ratios. The answer is there when the terminal says how the run ended, the
-pictures when the process has.
+pictures when the process has. With `--quick` two-tanks is run, and the user's own cache stands for the new one, so that
+nothing is compiled if it has been before.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import shutil
@@ -20,6 +20,8 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+
+from measure import agree, parser
 
 HERE = Path(__file__).resolve().parent.parent
 CASE = HERE / "cases" / "valve-closure.toml"
@@ -54,7 +56,16 @@ def busy() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def measure(case: Path, times: int, packages: dict[str, Path]) -> dict[tuple[str, str], list[tuple]]:
+def cache(folder: Path, quick: bool) -> Path:
+    """A new cache folder; if quick the user's own instead, where code has been compiled before."""
+    if not quick:
+        return folder
+    from fvsolve.jit import cache_folder
+
+    return cache_folder()
+
+
+def measure(case: Path, times: int, packages: dict[str, Path], quick: bool) -> dict[tuple[str, str], list[tuple]]:
     """(version, start) -> what was measured of each run, versions in turn."""
     found: dict[tuple[str, str], list[tuple]] = {}
     with tempfile.TemporaryDirectory(prefix="fvsolve-start-up-") as folder:
@@ -66,38 +77,43 @@ def measure(case: Path, times: int, packages: dict[str, Path]) -> dict[tuple[str
 
         for i in range(max(1, times // 3)):
             for version in packages:
-                go(version, "cold", top / f"{version}-{i}")
+                go(version, "cold", cache(top / f"{version}-{i}", quick))
         for i in range(max(1, times // 3)):
-            for start, part in (("store", ""), ("store without fluids", "code")):
+            for start, part in (("store", ""), ("store without fluids", "code"))[: 1 if quick else None]:
                 copied = top / f"{start}-{i}"
-                shutil.copytree(top / "this-0" / part, copied / part, ignore=shutil.ignore_patterns("*.nb?"))
+                shutil.copytree(
+                    cache(top / "this-0", quick) / part, copied / part, ignore=shutil.ignore_patterns("*.nb?")
+                )
                 go("this", start, copied)
         for _ in range(times):
             for version in packages:
-                go(version, "warm", top / f"{version}-0")
+                go(version, "warm", cache(top / f"{version}-0", quick))
         for _ in range(times):
-            floor = measured([sys.executable, "-c", IMPORTS], top / "this-0")
+            floor = measured([sys.executable, "-c", IMPORTS], cache(top / "this-0", quick))
             found.setdefault(("this", "imports of numpy and numba alone"), []).append(floor)
     return found
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("case", nargs="?", type=Path, default=CASE)
-    parser.add_argument("--times", type=int, default=5)
-    parser.add_argument("--beside", type=Path, help="a checkout of another version")
-    arguments = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("case", nargs="?", type=Path, help="case to run; valve-closure, by --quick two-tanks")
+    options.add_argument("--times", type=int, help="number of warm runs; 5, by --quick 1")
+    options.add_argument("--beside", type=Path, help="a checkout of another version")
+    arguments = options.parse_args()
+    arguments.case = arguments.case or (CASE.with_stem("two-tanks") if arguments.quick else CASE)
+    arguments.times = arguments.times or (1 if arguments.quick else 5)
     packages = {"this": HERE} | ({"other": arguments.beside.resolve()} if arguments.beside else {})
     print(f"fvsolve run {arguments.case.name}, whole process, least of the runs [s]\n")
     print("| version | start | answer | whole | CPU | runs | goal | |\n|---|---|---|---|---|---|---|---|")
-    found = measure(arguments.case, arguments.times, packages)
+    found = measure(arguments.case, arguments.times, packages, arguments.quick)
     least = {key: [min(column) for column in zip(*runs, strict=True)] for key, runs in found.items()}
     for (version, start), (answer, whole, cpu) in least.items():
         goal = GOALS.get(start) if version == "this" else None
         verdict = "" if goal is None else "met" if whole <= goal else f"missed by {whole / goal:.2f} times"
         stated = "" if goal is None else f"{goal:g}"
-        runs = len(found[version, start])
-        print(f"| {version} | {start} | {answer:.2f} | {whole:.2f} | {cpu:.2f} | {runs} | {stated} | {verdict} |")
+        runs = found[version, start]
+        agree("runs that give no answer", sum(one[0] != one[0] for one in runs) if "imports" not in start else 0, 0)
+        print(f"| {version} | {start} | {answer:.2f} | {whole:.2f} | {cpu:.2f} | {len(runs)} | {stated} | {verdict} |")
     if arguments.beside:
         parts = [a / b for a, b in zip(least["this", "warm"], least["other", "warm"], strict=True)]
         verdict = "met" if parts[1] <= RATIO else f"missed by {parts[1] / RATIO:.2f} times"

@@ -6,26 +6,25 @@ network:  what a step of Newton's method costs in networks of 1 000 and 10 000 c
 start:    what the first implicit run of a machine, and every later one, takes longer than an explicit run.
 auto:     CPU time of `auto` at equal error beside the best single method, in six cases; no peer is wanted.
 
-`--quick` for fewer tolerances and repeats. One thread. Wall times are the best of several, everything compiled before.
+`--quick` for few tolerances, methods and repeats, without `start`, which stiff_start.py has. One thread. Wall times are
+the best of several, everything compiled before.
 """
 
-import argparse
 from importlib import import_module
 
-from measure import machine
+from measure import machine, parser
 
 TABLES = ("cylinder", "pipe", "network", "start", "auto")  # each of a module, which imports its peers
 
 
 def main() -> None:
     """Print the tables asked for."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", nargs="*", help=f"{', '.join(TABLES)}; all if none is named")
-    parser.add_argument("--quick", action="store_true", help="fewer tolerances and repeats")
-    arguments = parser.parse_args()
+    options = parser(__doc__)
+    options.add_argument("what", nargs="*", help=f"{', '.join(TABLES)}; all if none is named, by --quick all but start")
+    given = options.parse_args()
     print(machine("numpy", "numba", "scipy", "numbalsoda", "scikit-sundae"))
-    for name in arguments.what or TABLES:
-        getattr(import_module(f"stiff_{name}"), f"{name}_table")(arguments.quick)
+    for name in given.what or [name for name in TABLES if name != "start" or not given.quick]:
+        getattr(import_module(f"stiff_{name}"), f"{name}_table")(given.quick)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from measure import best
 from networks import WATER
@@ -13,9 +12,11 @@ from scipy.sparse.linalg import splu
 
 import fvsolve
 from fvsolve.case import load
+from fvsolve.jit import njit
 from fvsolve.model import Slate, build
 from fvsolve.model.dependence import sparsity
 from fvsolve.steppers.differences import differences
+from fvsolve.steppers.signatures import addresses, rhs_at
 from fvsolve.steppers.structure import Structure
 
 SIZES = ((10, 100), (50, 200))  # (pipes, cells of each)
@@ -23,6 +24,7 @@ SCHEMES = ("upwind", "upwind5")
 COURANT, METHOD = 20.0, "alexander-2"  # two stages, solved in turn with one factor
 STUDY = {"factor": 71.0, "solve": 18.0}  # [us] for 10 pipes of 100 cells, 2 000 unknowns, first order (numba.md)
 GOAL = 1.5  # times the study's time at the most
+BUDGET = 0.2  # of a measurement [s]
 
 
 def network(pipes: int, cells: int, scheme: str, **numerics) -> dict:
@@ -66,8 +68,10 @@ def network_table(quick: bool) -> None:
     title = f"{'factor':>9} {'study':>6} {'SuperLU':>8} {'solve':>8} {'study':>6} {'SuperLU':>8} {'f':>7} {'df/dy':>8}"
     print(f"\nNetworks at Courant {COURANT:g} [us]; study: times the figures of numba.md, scaled by the unknowns")
     print(f"  {'pipes':>5} {'unknowns':>8} {'scheme':8} {'kind':7} {title}")
-    for pipes, cells in SIZES[: 1 if quick else None]:
-        for scheme in SCHEMES:
+    global BUDGET
+    sizes, schemes, BUDGET = (SIZES[:1], SCHEMES[:1], 0.0) if quick else (SIZES, SCHEMES, BUDGET)
+    for pipes, cells in sizes:
+        for scheme in schemes:
             model = build(load(network(pipes, cells, scheme)))
             structure, costs, matrix = parts(model)
             peer = superlu(matrix)  # factor, solve
@@ -92,8 +96,8 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
     shift = 1.0 / (step * (1.0 - np.sqrt(0.5)))
     rhs(0.0, y, f, out, handle)
     supply = out[where : where + m].copy()
-    change = numba.njit(error_model="numpy")(differences.py_func)
-    given = (rhs, handle, shape, where, 0.0, y, f, supply, model.scale, y_work, f_work, out, jacobian)
+    at = int(addresses((rhs,))[0])
+    given = (at, handle, shape, where, 0.0, y, f, supply, model.scale, y_work, f_work, out, jacobian)
     change(*given)
     if factor(shape, jacobian, shift, store) != 0:
         raise SystemExit("no pivot")
@@ -102,13 +106,13 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
         x[:] = f
         solve(shape, store, x)
 
-    many(rhs, 1, y, f_work, out, handle)
-    calls = 1000.0 * best(lambda: many(rhs, 1000, y, f_work, out, handle), 0.1)
+    many(at, 1, y, f_work, out, handle)
+    calls = 1000.0 * best(lambda: many(at, 1000, y, f_work, out, handle), 0.5 * BUDGET)
     costs = Costs(
         rhs=calls,
-        jacobian=1e6 * best(lambda: change(*given), 0.1),
-        factor=1e6 * best(lambda: factor(shape, jacobian, shift, store), 0.2),
-        solve=1e6 * best(fresh, 0.2),
+        jacobian=1e6 * best(lambda: change(*given), 0.5 * BUDGET),
+        factor=1e6 * best(lambda: factor(shape, jacobian, shift, store), BUDGET),
+        solve=1e6 * best(fresh, BUDGET),
     )
     square = csc_array((jacobian, structure.pattern.indices, structure.pattern.indptr), shape=(n + m, n))[:n]
     matrix = (shift * eye_array(n) - square).tocsc()
@@ -119,18 +123,24 @@ def parts(model) -> tuple[Structure, Costs, csc_array]:
     return structure, costs, matrix
 
 
-@numba.njit
-def many(rhs, times, y, dydt, out, handle):
-    """rhs, `times` over."""
+@njit
+def many(at, times, y, dydt, out, handle):
+    """The right-hand side at an address, `times` over."""
     for _ in range(times):
-        rhs(0.0, y, dydt, out, handle)
+        rhs_at(at)(0.0, y, dydt, out, handle)
+
+
+@njit
+def change(at, handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian):
+    """A Jacobian by differences of the right-hand side at an address."""
+    differences(rhs_at(at), handle, shape, where, t, y, f, supply, scale, y_work, f_work, out, jacobian)
 
 
 def superlu(matrix: csc_array) -> tuple[float, float]:
     """(factor, solve) by SciPy's SuperLU, ordered for symmetric patterns [us]."""
     options = {"permc_spec": "MMD_AT_PLUS_A", "options": {"SymmetricMode": True}, "diag_pivot_thresh": 0.0}
     made, b = splu(matrix, **options), np.ones(matrix.shape[0])
-    return 1e6 * best(lambda: splu(matrix, **options), 0.2), 1e6 * best(lambda: made.solve(b), 0.1)
+    return 1e6 * best(lambda: splu(matrix, **options), BUDGET), 1e6 * best(lambda: made.solve(b), 0.5 * BUDGET)
 
 
 def whole(pipes: int, cells: int, scheme: str, costs: Costs, scaled: dict) -> None:

@@ -1,8 +1,9 @@
 """What an implicit run takes longer than an explicit one of the same scene, as whole processes.
 
-This file runs itself, `python benchmarks/stiff_start.py KIND METHOD`, with a cache folder of its own. Cold is the
-first run in an empty cache; `after` the first implicit run where the explicit one has been before; warm every run
-from then on.
+    python benchmarks/stiff_start.py [--quick]
+
+This file runs itself, with `--run KIND METHOD` too. Cold is the first run in an empty cache; `after` the first implicit
+run where the explicit one has been before; warm every run from then on. With `--quick` all are in the user's own cache.
 """
 
 from __future__ import annotations
@@ -11,7 +12,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from measure import machine, parser
 from networks import WATER
+from start_up import cache
 
 EXPLICIT, IMPLICIT = "ssp-rk3", ("radau-iia-5", "esdirk-4")
 GOALS = {"cold": 8.0, "warm": 0.8}  # [s] more than the explicit run
@@ -45,19 +48,19 @@ def scene(kind: str, method: str) -> dict:
 
 def start_table(quick: bool) -> None:
     """Wall times of first and later runs, and what a cache holds after an explicit run."""
-
     print("\nStart-up, whole processes [s]; more: beyond the explicit run of the same scene")
     print(f"  {'scene':8} {'method':12} {'cold':>6} {'more':>6} {'after':>6} {'more':>6} {'warm':>6} {'more':>6}")
     worst = {"cold": 0.0, "warm": 0.0}
     with tempfile.TemporaryDirectory(prefix="fvsolve-stiff-") as folder:
         for kind in ["sparse"] if quick else SCENES:
-            base, first = first_and_later(Path(folder) / kind, kind, EXPLICIT, quick)
+            own = cache(Path(folder) / kind, quick)
+            base, first = first_and_later(own, kind, EXPLICIT, quick)
             print(f"  {kind:8} {EXPLICIT:12} {first:6.2f} {'':6} {'':6} {'':6} {base:6.2f}", flush=True)
-            strays = compiled_rooms(Path(folder) / kind)
-            print(f"    compiled of the implicit rooms: {', '.join(strays) or 'nothing'}")
+            if not quick:
+                print(f"    compiled of the implicit rooms: {', '.join(compiled_rooms(own)) or 'nothing'}")
             for method in IMPLICIT[: 1 if quick else None]:
-                cold = seconds(kind, method, Path(folder) / f"{kind}-{method}")
-                warm, after = first_and_later(Path(folder) / kind, kind, method, quick)
+                cold = seconds(kind, method, cache(Path(folder) / f"{kind}-{method}", quick))
+                warm, after = first_and_later(own, kind, method, quick)
                 more = {"cold": cold - first, "after": after - base, "warm": warm - base}
                 cells = (
                     f"{cold:6.2f} {more['cold']:6.2f} {after:6.2f} {more['after']:6.2f} {warm:6.2f} {more['warm']:6.2f}"
@@ -71,16 +74,16 @@ def start_table(quick: bool) -> None:
 
 
 def first_and_later(cache: Path, kind: str, method: str, quick: bool) -> tuple[float, float]:
-    """(best later, first) wall time of one scene in one cache [s]."""
+    """(best later, first) wall time of one scene in one cache [s]; if quick the first for both."""
     first = seconds(kind, method, cache)
-    return min(seconds(kind, method, cache) for _ in range(2 if quick else 5)), first
+    return min((seconds(kind, method, cache) for _ in range(0 if quick else 5)), default=first), first
 
 
 def seconds(kind: str, method: str, cache: Path) -> float:
     """Wall time of one process [s]."""
     import start_up
 
-    return start_up.seconds([sys.executable, __file__, kind, method], cache)
+    return start_up.seconds([sys.executable, __file__, "--run", kind, method], cache)
 
 
 def compiled_rooms(cache: Path) -> list[str]:
@@ -89,8 +92,19 @@ def compiled_rooms(cache: Path) -> list[str]:
     return sorted(name for name in names if name.startswith(ROOMS))
 
 
-if __name__ == "__main__":
-    import fvsolve
+def main() -> None:
+    """Print the table, or make one run of it."""
+    options = parser(__doc__)
+    options.add_argument("--run", nargs=2, metavar=("KIND", "METHOD"), help="one run of the table")
+    given = options.parse_args()
+    if given.run:
+        import fvsolve
 
-    found = fvsolve.run(scene(*sys.argv[1:]))
-    sys.exit(0 if found.ok else found.reason)
+        found = fvsolve.run(scene(*given.run))
+        sys.exit(0 if found.ok else found.reason)
+    print(machine("fvsolve", "numba"))
+    start_table(given.quick)
+
+
+if __name__ == "__main__":
+    main()

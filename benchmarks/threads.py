@@ -2,7 +2,7 @@
 
 Wall times per step, the least of many, both numbers of threads in turn: on shared cores nothing else says anything, and
 where they are never free not even that. So CPU times stand beside them: twice that of one thread over that of two is
-what free cores would allow, but for memory that they share. Run with --quick for the smaller grids alone, --large for
+what free cores would allow, but for memory that they share. Run with --quick for a small grid alone, --large for
 4096^2 too, --flat 64 256 1024 for speeds by these sizes alone.
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
-from measure import against, machine
+from measure import against, agree, machine, parser, peer_module
 from planes_scenes import BASINS, scene, square
 
 from fvsolve.case import load
@@ -32,6 +32,7 @@ from fvsolve.solve.team import yielding
 END = 1e6  # [s] that no run here comes to
 WATER = "free surface with bed"
 SIZES, GOAL_TWO, GOAL_SIXTEEN, GOAL_WEAK = (256, 512, 1024), 1.8, 12.0, 0.85
+WEAK, MODELLED, BY_SIZE = 512, (512, 1024), (64, 128, 256, 512, 1024)  # cells along a side
 FLAT = {"advection": 1.25, "liquid": 1.25, WATER: 1.2}
 CHUNK, ROUNDS = 0.02, 60  # [s] of a call, and how many of each
 
@@ -79,6 +80,17 @@ def by_threads(models, counts, rounds: int) -> list[np.ndarray]:
     return found
 
 
+def apart(model) -> float:
+    """Greatest difference between states after ten steps by one thread and by two."""
+    states = []
+    for many in (1, 2):
+        loop = begun(model, threads=many)
+        loop.run(10.0)
+        states.append(loop.now.copy())
+        loop.close()
+    return np.abs(states[0] - states[1]).max()
+
+
 @njit
 def meet(own, times):
     """Wait for each other so often."""
@@ -112,6 +124,7 @@ def two_threads(sizes, rounds: int) -> None:
         row, ups = f"| {name} |", {}
         for n in sizes:
             model = model_of(name, n, n)
+            agree("states of one thread beside those of two", apart(model), 0.0)
             (one, cpu), (two, both) = by_threads([model, model], (1, 2), rounds)
             ups[n] = one / two
             row += f" {1e6 * one:.0f}, {1e6 * two:.0f}: {ups[n]:.2f} ({2.0 * cpu / both:.2f}) |"
@@ -122,9 +135,10 @@ def two_threads(sizes, rounds: int) -> None:
 
 def weak(rounds: int) -> None:
     """Twice the rows by twice the threads."""
-    models = [model_of(WATER, 512, rows) for rows in (256, 512)]
+    models = [model_of(WATER, WEAK, rows) for rows in (WEAK // 2, WEAK)]
     (one, cpu), (two, both) = by_threads(models, (1, 2), rounds)
-    print(f"\nWeak scaling, 512 x 256 cells a thread: {1e6 * one:.0f} us, {1e6 * two:.0f} us by two: {one / two:.2f}, "
+    print(f"\nWeak scaling, {WEAK} x {WEAK // 2} cells a thread: "
+          f"{1e6 * one:.0f} us, {1e6 * two:.0f} us by two: {one / two:.2f}, "
           f"{against(GOAL_WEAK, one / two)}; by CPU time {2.0 * cpu / both:.2f}", flush=True)  # fmt: skip
 
 
@@ -196,13 +210,11 @@ def rank(sizes, rounds: int) -> None:
 
 def two_ranks(sizes, rounds: int) -> None:
     """Speed-ups of two ranks."""
+    if not peer_module("mpi4py", "mpi4py"):
+        return
     start = Path(sys.executable).with_name("mpiexec")
     command = [start, "-n", "2", sys.executable, __file__, "--rank", *map(str, sizes)]
-    try:
-        found = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ).stdout
-    except (OSError, subprocess.CalledProcessError) as error:
-        print(f"\nno ranks of MPI here: {error}")
-        return
+    found = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True, env=os.environ).stdout
     print(f"\nTwo ranks, {WATER}: wall time of a step [us] by one process and by two ranks, speed-up")
     for line in found.splitlines():
         n, two = int(line.split()[0]), float(line.split()[1])
@@ -212,26 +224,40 @@ def two_ranks(sizes, rounds: int) -> None:
 
 
 def main() -> None:
-    if "--rank" in sys.argv:
-        rank([int(one) for one in sys.argv[2:]], ROUNDS)
+    global BASINS, CHUNK, WEAK, MODELLED, BY_SIZE
+    options = parser(__doc__)
+    options.add_argument("--large", action="store_true", help="speeds of 2048^2 and 4096^2 cells too")
+    options.add_argument("--flat", nargs="+", type=int, metavar="SIZE", help="speeds by these sizes alone")
+    options.add_argument("--rank", nargs="+", type=int, metavar="SIZE", help="what one rank of MPI does")
+    given, sizes, rounds = options.parse_args(), SIZES, ROUNDS
+    if given.quick:
+        sizes, rounds, WEAK, MODELLED, BY_SIZE, BASINS, CHUNK = (
+            (64,),
+            2,
+            64,
+            (64,),
+            (32, 64),
+            {WATER: BASINS[WATER]},
+            2e-3,
+        )
+    if given.rank:
+        rank(given.rank, ROUNDS)
         return
-    if "--flat" in sys.argv:
+    if given.flat:
         print(machine("fvsolve", "numba"))
-        by_size([int(one) for one in sys.argv[2:]])
+        by_size(given.flat)
         return
-    quick = "--quick" in sys.argv
-    sizes, rounds = SIZES[:2] if quick else SIZES, ROUNDS // 4 if quick else ROUNDS
     print(machine("fvsolve", "numba", "mpi4py"))
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f} when this began")
-    wait = waiting()
+    wait = waiting(*((200, 5) if given.quick else ()))
     print(f"two threads find each other in {1e9 * wait:.0f} ns, the least")
     two_threads(sizes, rounds)
     weak(rounds)
     two_ranks(sizes, rounds)
     print()
-    for n in (512, 1024):
+    for n in MODELLED:
         sixteen(n, wait)
-    by_size((64, 128, 256, 512, 1024, *((2048, 4096) if "--large" in sys.argv else ())))
+    by_size((*BY_SIZE, *((2048, 4096) if given.large else ())))
 
 
 if __name__ == "__main__":

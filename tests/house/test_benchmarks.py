@@ -39,9 +39,9 @@ def test_acoustics_have_the_rates_of_their_model():
 def test_mechanisms_call_rates_in_a_loop():
     import mechanisms
 
-    slate, once, many = mechanisms.rates(mechanisms.chain(1))
+    slate, once, many, dydt = mechanisms.rates(mechanisms.chain(1))
     once(), many(3)
-    assert slate is not None
+    assert slate is not None and np.abs(dydt).max() > 0.0
 
 
 def test_bands_of_delay_lines_hold_what_eight_times_the_resolution_gives():
@@ -55,3 +55,32 @@ def test_bands_of_delay_lines_hold_what_eight_times_the_resolution_gives():
         found += line_bands.bands(scene)
     assert controls == {"courant", "step", "rtol"}
     assert len(found) > 60 and all(off <= band for _, band, off in found)
+
+
+def test_every_script_has_quick():
+    """`quick.py` runs them by it; a script is started by name, and reads its options by `measure.parser` alone."""
+    import quick
+
+    scripts = quick.scripts()
+    assert len(scripts) > 20
+    for path in scripts:
+        text = path.read_text(encoding="utf-8")
+        assert "parser(__doc__)" in text and ".quick" in text and "sys.argv" not in text, path.name
+
+
+def test_quick_says_that_its_figures_are_no_measurement(capsys):
+    import measure
+
+    assert measure.parser("A table.").parse_args(["--quick"]).quick
+    assert measure.QUICK in capsys.readouterr().out
+
+
+def test_a_missing_peer_is_a_line_and_a_difference_an_error(capsys):
+    import measure
+
+    assert measure.peer_module("no_such_peer.part", "no-such-peer") is None
+    assert capsys.readouterr().out == f"no-such-peer is not installed: {measure.SKIPPED}\n"
+    measure.agree("heads", 1e-9, 1e-6)
+    for difference in (1e-3, np.nan):
+        with pytest.raises(SystemExit, match="heads: .*, expected at most 1e-06"):
+            measure.agree("heads", difference, 1e-6)
