@@ -276,16 +276,16 @@ def test_limits_and_claims_look_at_its_level():
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        ({"diameter": None, "slope": None}, "level: says nothing of a vessel without a shape; give diameter or area"),
+        ({"diameter": None, "slope": None}, "level: has no effect on a vessel without a shape; give diameter or area"),
         ({"gas_volume": 0.05}, "gas_volume and level are given; keep one"),
         ({"level": None}, "no gas; wanted one of precharge, gas_volume, level"),
         ({"area": 0.1}, "diameter and area are given; keep one"),
         ({"diameter": None, "area": 0.1}, "slope: goes with diameter"),
-        ({"level": None, "precharge": 4e5}, "a bladder has no level"),
-        ({"slope": 45.0}, '2578.31 deg is steeper than upright; wanted 0 to 90 deg, did you mean "45 deg"'),
+        ({"level": None, "precharge": 4e5}, "does not go with precharge (a bladder)"),
+        ({"slope": 45.0}, '2578.31 deg is steeper than upright; expected 0 to 90 deg, did you mean "45 deg"'),
         ({"slope": -0.1}, "out of range"),
-        ({"level": 5.0}, "5 m leaves no room for gas; it is full at 0.827"),
-        ({"compressor": {"start": 0.2, "stop": 0.3, "flow": 1e-3}}, "compressor.stop: 0.3 m is not below its start"),
+        ({"level": 5.0}, "5 m leaves no volume for gas; the vessel is full at 0.827"),
+        ({"compressor": {"start": 0.2, "stop": 0.3, "flow": 1e-3}}, "compressor.stop: 0.3 m is not below start"),
         ({"compressor": {"start": 2.0, "stop": 0.3, "flow": 1e-3}}, "2 m is never reached; the vessel is full at"),
         ({"compressor": {"start": 0.2}}, "stop is missing"),
         (
