@@ -290,7 +290,7 @@ def test_limits_and_claims_look_at_its_level():
         ({"compressor": {"start": 0.2}}, "stop is missing"),
         (
             {"bottom": 70.0},
-            "no steady state: 600000 Pa at its place are less than the weight of the fluid, 70.4 m",
+            "no steady state: the pressure at its place, 600000 Pa, is below that of the fluid column, 70.4 m",
         ),
         ({"inclination": 0.2}, "slope"),
     ],

@@ -120,7 +120,7 @@ def moment_below(floats, at, z):
 
 @njit
 def level_at(floats, at, volume):
-    """Level below which the vessel contains a volume [m], 0 if the volume is not positive; bounded Newton in cylinders."""
+    """Level below which the vessel contains a volume [m], 0 for no volume; bounded Newton for a cylinder."""
     kind = int(floats[at + KIND])
     if volume <= 0.0:
         return 0.0

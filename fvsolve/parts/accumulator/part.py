@@ -106,7 +106,7 @@ class Accumulator(Node, kind="accumulator"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
-        faults += [(keys, f"the amount of gas is not given; {message}") for keys, message in at_least_one(given, START)]
+        faults += [(keys, f"no gas; {message}") for keys, message in at_least_one(given, START)]
         shapes = [key for key in FORMS if key in given]
         if not shapes:
             text = "has no effect on a vessel without a shape; give diameter or area, or remove it"
