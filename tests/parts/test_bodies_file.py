@@ -64,7 +64,8 @@ BAD = {
         "b.joint.at: arm.bob gives the position already",
     ),
     "a rate of what is driven": (
-        arm(joint=hinge(angle={"mean": 0, "amplitude": 1, "period": 1}, rate=1)), "joint.rate: has no effect, because angle is driven",
+        arm(joint=hinge(angle={"mean": 0, "amplitude": 1, "period": 1}, rate=1)),
+        "joint.rate: has no effect, because angle is driven",
     ),
     "points of one number": (arm(points={"tip": [1, 2]}), "nodes.arm.points.tip: [1, 2] has 2 values; wanted 3"),
 }  # fmt: skip

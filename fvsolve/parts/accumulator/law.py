@@ -16,8 +16,8 @@ from fvsolve.kernels.records import LAW_LINEAR
 
 EXPONENT, GAS, ROOM, NECK, EMPTY, SHED = 0, 1, 2, 3, 4, 5  # indices into the numbers of an accumulator
 NUMBERS = 6
-"""Exponent n; gas volume in the profile [m3]; volume of gas, fluid and neck [m3]; stiffness of the neck [Pa/kg], 0 if
-there is none; inflow since the start at which the gas just fills the vessel [kg], negative if fluid must flow out;
+"""Exponent n; gas volume in the profile [m3]; volume of gas, fluid and neck [m3]; stiffness of the neck [Pa/kg], 0
+without a neck; inflow since the start at which the gas just fills the vessel [kg], negative if fluid must flow out;
 pressure in that state minus that of the profile [Pa]."""
 
 

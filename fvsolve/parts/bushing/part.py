@@ -24,7 +24,7 @@ class Bushing(TwoPort, kind="bushing"):
         if not any((self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)):
             yield (
                 ("stiffness",),
-                "is 0, and so are damping, rotational_stiffness and rotational_damping; expected at least one above 0",
+                "is 0, like damping and both rotational coefficients; expected at least one above 0",
             )
 
     stiffness: Annotated[float, Quantity("stiffness", nonnegative, "force per gap [N/m]", changes=VALUE)] = 0.0
