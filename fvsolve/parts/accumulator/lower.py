@@ -81,7 +81,7 @@ class AccumulatorRows(Device, kind="accumulator"):
         return law.accumulator_energy(st, floats, node, int(row["data"]), y)
 
     def above(self, model, part, row) -> float:
-        """Stored energy minus that of the state that can release no more: head 0, or no fluid left [J]."""
+        """Stored energy minus that of the state that can release no more: energy head 0, or no fluid left [J]."""
         from fvsolve.kernels.energy_barotropic import head_at
 
         st, floats = model.tables.settings[0], model.tables.floats

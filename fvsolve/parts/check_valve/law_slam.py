@@ -22,7 +22,7 @@ LEAST = 1e-300
 
 @njit
 def stands(y, tables, device):
-    """REVERSED, SHUT or OPEN; UNKNOWN before the first events."""
+    """REVERSED, SHUT or OPEN by its flags; without a flag, REVERSED if a slam velocity is stored, otherwise UNKNOWN."""
     for mode in range(BEYOND):
         if tables.armed[device["event"] + mode] > 0.0:
             return mode
