@@ -175,7 +175,7 @@ def test_it_is_stepped_implicitly(said):
 def test_it_is_checked_by_its_own_declaration(said):
     assert 'no physics named "belt"; wanted one of free-surface, liquid, transport' in said["unknown"]
     assert "nodes.belt: pace is missing" in said["missing"]
-    assert 'nodes.belt.level: means nothing to physics "belt"; it goes with free-surface' in said["other"]
+    assert 'nodes.belt.level: is not a key of physics "belt"; it belongs to free-surface' in said["other"]
     assert 'nodes.belt.start.u: means nothing to physics "belt"' in said["start"]
     assert 'fluid.law: "log" does not go with basins; wanted "linear"' in said["law"]
     assert said["path"] == "grid" and said["schema"]
@@ -194,11 +194,11 @@ def test_every_physics_is_a_folder_that_lowers_itself():
 @pytest.mark.parametrize("key", ["pressure", "size"])  # of a liquid, of all basins
 def test_a_key_that_is_there_keeps_its_meaning(key):
     keys = {"__annotations__": {key: Annotated[float, Quantity("time")]}, "__module__": __name__}
-    with pytest.raises(FvsolveError, match=f'"clock" declares {key} otherwise than a basin has it already'):
+    with pytest.raises(FvsolveError, match=f'"clock" declares {key} differently from the existing key of a basin'):
         type(Physics)("Clock", (Physics,), keys, name="clock")
     assert "clock" not in Physics.kinds and Basin.keys().count(key) == 1
 
 
 def test_a_name_that_is_there_is_taken():
-    with pytest.raises(FvsolveError, match='a physics "liquid" is there already'):
+    with pytest.raises(FvsolveError, match='physics "liquid" exists already'):
         type(Physics)("Other", (Physics,), {"__module__": __name__}, name="liquid")

@@ -227,7 +227,7 @@ def test_a_demand_follows_the_pressure_between_none_and_all():
         ({"required_pressure": 1e5}, "is not above the pressure of no flow"),
         ({"required_pressure": 3e5, "minimum_pressure": 0.9e5}, "is below ambient"),
         ({"required_pressure": 3e5, "demand": -1.0}, "none of it negative"),
-        ({"minimum_pressure": 2e5}, "says nothing without required_pressure"),
+        ({"minimum_pressure": 2e5}, "has no effect without required_pressure"),
     ],
 )
 def test_what_is_wrong_with_such_a_demand_is_said(wrong, said):
@@ -336,12 +336,12 @@ def test_staged_and_resumed_it_is_the_unbroken_run(tmp_path, end):
 
 @pytest.mark.parametrize(
     "more, said",
-    [({"throttled_outlet": None}, "switch: says nothing without throttled_outlet"),
-     ({"switch": None}, "throttled_outlet: says nothing without switch or switch_velocity"),
+    [({"throttled_outlet": None}, "switch: has no effect without throttled_outlet"),
+     ({"switch": None}, "throttled_outlet: has no effect without switch or switch_velocity"),
      ({"switch_velocity": 0.5}, "switch and switch_velocity are given; keep one"),
      ({"switch": None, "switch_velocity": -1.0}, "out of range"),
-     ({"switch": None, "switch_velocity": 0.5, "throttled_outlet": None}, "switch_velocity: says nothing without"),
-     ({"throttled_outlet": 0.03}, "throttles nothing; wanted less than outlet")],
+     ({"switch": None, "switch_velocity": 0.5, "throttled_outlet": None}, "switch_velocity: has no effect without"),
+     ({"throttled_outlet": 0.03}, "does not throttle; expected less than outlet")],
 )  # fmt: skip
 def test_what_is_wrong_with_its_stages_is_said(more, said):
     case = staged(**more)

@@ -29,7 +29,7 @@ def hinge(**more) -> dict:
 
 BAD = {
     "a mass of zero": (arm(mass=0), "nodes.arm.mass: 0 is out of range; wanted a value above 0"),
-    "inertia of no body": (arm(inertia=[1, 1, 3]), "nodes.arm.inertia: moments of 1, 1, 3 kg m2 belong to no body"),
+    "inertia of no body": (arm(inertia=[1, 1, 3]), "nodes.arm.inertia: moments of 1, 1, 3 kg m2 are not possible"),
     "inertia in other units": (arm(inertia=["1 kg m", 1, 1]), 'nodes.arm.inertia[0]: "1 kg m"'),
     "products that are not symmetric": (arm(inertia=[[1, 0.2, 0], [0, 1, 0], [0, 0, 1]]), "is not symmetric"),
     "a matrix of no body": (arm(inertia=[[1, 2, 0], [2, 1, 0], [0, 0, 1]]), "principal moment of -1 kg m2"),
@@ -46,23 +46,26 @@ BAD = {
     "a length as a mass": (arm(mass="3 m"), 'nodes.arm.mass: "3 m" is a length; wanted a mass'),
     "two joints": (
         arm(joint=[hinge(), {"kind": "ball"}]),
-        "nodes.arm.joint: is a list of 2 tables; wanted one, by which it hangs on another, or on the world",
+        "nodes.arm.joint: is a list of 2 tables; wanted one, joint to another body or the world",
     ),
-    "a travel of a hinge": (arm(joint=hinge(travel=1)), "nodes.arm.joint.travel: goes with no joint of kind"),
+    "a travel of a hinge": (arm(joint=hinge(travel=1)), "nodes.arm.joint.travel: is not a key of joints of kind"),
     "a joint of no kind": (arm(joint={"kind": "hinge"}), 'nodes.arm.joint.kind: no joint named "hinge"; say revolute'),
     "a rate along a line": (arm(joint=hinge(rate="1 m/s")), 'nodes.arm.joint.rate: "1 m/s" is a velocity'),
     "a free body on another": (
-        {**arm(), "b": body(1, [1, 1, 1], {"kind": "free", "on": "arm"})}, "nodes.b.joint.on: goes with no free joint",
+        {**arm(), "b": body(1, [1, 1, 1], {"kind": "free", "on": "arm"})},
+        "nodes.b.joint.on: does not go with a free joint",
     ),
     "a joint on nothing": (arm(joint=hinge(on="am")), 'nodes.arm.joint.on: "am" is no node'),
     "a joint on no point": (
         {**arm(), "b": body(1, [1, 1, 1], hinge(on="arm.bop"))}, 'arm has no point "bop"; its points are bob',
     ),
     "a place that is said twice": (
-        {**arm(), "b": body(1, [1, 1, 1], hinge(on="arm.bob", at=[0, 0, 1]))}, "b.joint.at: arm.bob says where it is",
+        {**arm(), "b": body(1, [1, 1, 1], hinge(on="arm.bob", at=[0, 0, 1]))},
+        "b.joint.at: arm.bob gives the position already",
     ),
     "a rate of what is driven": (
-        arm(joint=hinge(angle={"mean": 0, "amplitude": 1, "period": 1}, rate=1)), "joint.rate: its angle is driven",
+        arm(joint=hinge(angle={"mean": 0, "amplitude": 1, "period": 1}, rate=1)),
+        "joint.rate: has no effect, because angle is driven",
     ),
     "points of one number": (arm(points={"tip": [1, 2]}), "nodes.arm.points.tip: [1, 2] has 2 values; wanted 3"),
 }  # fmt: skip
@@ -241,13 +244,13 @@ TOLD = """all.toml: 11 faults
   line 11: nodes.arm.mass: 0 is out of range; wanted a value above 0
   line 12: nodes.arm.inertia[0]: "1 kg m" is a quantity of [kg·m]; wanted a moment of inertia, for example "12 kg m2"
   line 13: nodes.arm.joint: axis is missing: a revolute joint moves along or about one, for example [0, 1, 0]
-  line 17: nodes.boom.inertia: moments of 1, 1, 9 kg m2 belong to no body: one is above the sum of the other two
+  line 17: nodes.boom.inertia: moments of 1, 1, 9 kg m2 are not possible: the largest exceeds the sum of the other two
   line 23: nodes.a.joint.on: hangs on itself: a on b on a; close a loop by a pin, and leave one on out
   line 33: nodes.c.joint.attitude.matrix: is no rotation: R'R is the identity but for 3; wanted columns of length 1 at right angles
   line 39: nodes.pool.on: "boon" is not there; wanted a body: a, arm, b, boom, c; did you mean "boom"?
   line 40: nodes.pool.elevation: it rides on boon; say where with at, in axes of that body
   line 46: nodes.flume.patches.lid.travel: comes 1.5 m inward, and the zone behind it is 1 m wide; wanted less, or a wider zone
-  line 50: links.lift.stroke: the piston starts at 3 m, ground.far less ground.lug; wanted 0 to 1 m
+  line 50: links.lift.stroke: the piston starts at 3 m (ground.far minus ground.lug); expected 0 to 1 m
   line 58: links.s.to: no place named "boom.eye"; places are a, arm, b, boom, c, flume.lid, ground, ground.far, ground.lug, lift.A, lift.B; did you mean "boom"?"""  # noqa: E501
 
 

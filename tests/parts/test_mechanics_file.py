@@ -150,19 +150,22 @@ BAD = {
     "a volume for a mass": (swap('"50 kg"', '"50 l"'), 'nodes.load.mass: "50 l" is a volume; wanted a mass'),
     "a piston outside": (
         swap('"100 mm"', '"300 mm"'),
-        "links.cyl.stroke: the piston starts at 0.3 m, load less ground; wanted 0 to 0.2 m",
+        "links.cyl.stroke: the piston starts at 0.3 m (load minus ground); expected 0 to 0.2 m",
     ),
-    "no area": (swap('piston_diameter = "40 mm"', ""), "links.cyl: wanted area_A or piston_diameter"),
-    "no area at B": (swap('rod_diameter = "25 mm"', ""), "links.cyl: wanted area_B or rod_diameter"),
+    "no area": (swap('piston_diameter = "40 mm"', ""), "links.cyl: area_A or piston_diameter is missing"),
+    "no area at B": (swap('rod_diameter = "25 mm"', ""), "links.cyl: area_B or rod_diameter is missing"),
     "two areas": (
         swap('piston_diameter = "40 mm"', 'piston_diameter = "40 mm"\narea_A = 1'),
         "area_A and piston_diameter are given; keep one",
     ),
     "an area and a rod": (
         swap('piston_diameter = "40 mm"', "area_A = 1"),
-        "links.cyl.rod_diameter: goes with piston_diameter; give area_B beside area_A",
+        "links.cyl.rod_diameter: needs piston_diameter; with area_A give area_B instead",
     ),
-    "a rod too thick": (swap('"25 mm"', '"40 mm"'), "links.cyl.rod_diameter: leaves no area at B; wanted one below"),
+    "a rod too thick": (
+        swap('"25 mm"', '"40 mm"'),
+        "links.cyl.rod_diameter: leaves no area at B; expected a diameter below",
+    ),
     "no dead volume": (
         swap('dead_volume_A = "50 cm3"', "dead_volume_A = 0"),
         "0 is out of range; wanted a value above",

@@ -93,7 +93,7 @@ def test_resumed_it_is_the_unbroken_run_to_the_bit(tmp_path, end):
 
 @pytest.mark.parametrize(
     "wrong, said",
-    [({"time_constant": 0.1, "overpressure": 1e3}, "says how it shuts"),
+    [({"time_constant": 0.1, "overpressure": 1e3}, "define how it shuts"),
      ({"deceleration": {"rate": [1.0, 2.0], "reverse_velocity": [0.1]}}, "1 values for 2 rates"),
      ({"deceleration": {"rate": [2.0, 1.0], "reverse_velocity": [0.1, 0.2]}}, "rates"),
      ({"deceleration": {"rate": [1.0]}}, "reverse_velocity is missing"),

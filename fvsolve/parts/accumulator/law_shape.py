@@ -1,8 +1,9 @@
-"""What a vessel holds below a level: prisms, cylinders at any slope, tables of areas. Knows one shape; knows no gas.
+"""Volume, free surface and first moment of a vessel below a level: prisms, cylinders at any slope, tables of areas.
 
-Of a cylinder with flat ends, radius R, length L, its axis at `slope` to the horizontal, a level z is the depth
-d = z / (R cos) at its lower end and d - (L / R) tan at the other, in radii. With S(d) the wetted segment of the unit
-circle, T and U its first and second integral over d, V = R^3 cot (T(d) - T(d')), dV/dz = R^2 (S(d) - S(d')) / sin.
+For a cylinder with flat ends, radius R and length L, whose axis has the angle `slope` to the horizontal, a level z is
+the depth d = z / (R cos) at the lower end and d' = d - (L / R) tan at the upper end, both in radii. S(d) is the wetted
+segment of the unit circle, T and U are its first and second integral over d. Then V = R^3 cot (T(d) - T(d')) and
+dV/dz = R^2 (S(d) - S(d')) / sin.
 """
 
 from math import acos, cos, pi, sin, sqrt
@@ -12,11 +13,11 @@ from fvsolve.kernels.energy import level_moment
 from fvsolve.kernels.tanks import level_of_volume
 
 KIND, TOP, FIRST, SECOND, THIRD = 0, 1, 2, 3, 4
-"""numbers of a shape: its kind, the level at which it is full [m]; then an area [m2], or the radius and length [m] and
-the slope [rad] of a cylinder, or how many levels, areas and volumes follow."""
+"""Numbers of a shape: its kind; the level at which it is full [m]; then an area [m2], or the radius [m], length [m] and
+slope [rad] of a cylinder, or the number of levels, areas and volumes that follow."""
 PRISM, LYING, SLOPED, TABLE = 0, 1, 2, 3
 NUMBERS = 5
-NARROW = 1e-6  # of the greatest surface: a lesser one counts as this where a level is sought
+NARROW = 1e-6  # of the mean surface: least slope dV/dz in the search for a level
 
 
 @njit
@@ -54,24 +55,24 @@ def segment_twice(d):
 
 @njit
 def depths(floats, at, z):
-    """(d at the lower end, d at the other, tangent of the slope) of a sloped cylinder."""
+    """(d at the lower end, d at the upper end, tangent of the slope) of an inclined cylinder."""
     radius, length, slope = floats[at + FIRST], floats[at + SECOND], floats[at + THIRD]
-    rise = sin(slope) / cos(slope)
+    tangent = sin(slope) / cos(slope)
     d = z / (radius * cos(slope))
-    return d, d - length / radius * rise, rise
+    return d, d - length / radius * tangent, tangent
 
 
 @njit
 def volume_below(floats, at, z):
-    """Volume below level z [m3]; levels within the vessel."""
+    """Volume below level z [m3]; z must lie within the vessel."""
     kind, first = int(floats[at + KIND]), floats[at + FIRST]
     if kind == PRISM:
         return first * z
     if kind == LYING:
         return first * first * floats[at + SECOND] * segment(z / first)
     if kind == SLOPED:
-        d, other, rise = depths(floats, at, z)
-        return first * first * first / rise * (segment_once(d) - segment_once(other))
+        d, upper, tangent = depths(floats, at, z)
+        return first * first * first / tangent * (segment_once(d) - segment_once(upper))
     rows, o, k = int(first), at + NUMBERS, 0
     while k < rows - 2 and z >= floats[o + k + 1]:
         k += 1
@@ -84,7 +85,7 @@ def volume_below(floats, at, z):
 
 @njit
 def surface_at(floats, at, z):
-    """Free surface at level z [m2]."""
+    """Area of the free surface at level z [m2]."""
     kind, first = int(floats[at + KIND]), floats[at + FIRST]
     if kind == PRISM:
         return first
@@ -92,8 +93,8 @@ def surface_at(floats, at, z):
         d = z / first
         return 2.0 * first * floats[at + SECOND] * sqrt(max(0.0, d * (2.0 - d)))
     if kind == SLOPED:
-        d, other, _ = depths(floats, at, z)
-        return first * first * (segment(d) - segment(other)) / sin(floats[at + THIRD])
+        d, upper, _ = depths(floats, at, z)
+        return first * first * (segment(d) - segment(upper)) / sin(floats[at + THIRD])
     rows, o, k = int(first), at + NUMBERS, 0
     while k < rows - 2 and z >= floats[o + k + 1]:
         k += 1
@@ -111,15 +112,15 @@ def moment_below(floats, at, z):
     if kind == LYING:
         return z * volume_below(floats, at, z) - first * first * first * floats[at + SECOND] * segment_once(z / first)
     if kind == SLOPED:
-        d, other, rise = depths(floats, at, z)
-        beyond = segment_twice(d) - segment_twice(other)
-        return z * volume_below(floats, at, z) - first**4 * cos(floats[at + THIRD]) / rise * beyond
+        d, upper, tangent = depths(floats, at, z)
+        difference = segment_twice(d) - segment_twice(upper)
+        return z * volume_below(floats, at, z) - first**4 * cos(floats[at + THIRD]) / tangent * difference
     return level_moment(floats, at + NUMBERS, int(first), z)
 
 
 @njit
 def level_at(floats, at, volume):
-    """Level below which it holds a volume, 0 where it holds none [m]; of a cylinder by Newton within bounds."""
+    """Level below which the vessel contains a volume [m], 0 for no volume; bounded Newton for a cylinder."""
     kind = int(floats[at + KIND])
     if volume <= 0.0:
         return 0.0
@@ -128,18 +129,18 @@ def level_at(floats, at, volume):
     if kind == TABLE:
         return level_of_volume(floats, at + NUMBERS, int(floats[at + FIRST]), volume)
     low, high = 0.0, floats[at + TOP]
-    whole = pi * floats[at + FIRST] ** 2 * floats[at + SECOND]
-    z, least = high * min(volume / whole, 1.0), NARROW * whole / high
+    total = pi * floats[at + FIRST] ** 2 * floats[at + SECOND]
+    z, least = high * min(volume / total, 1.0), NARROW * total / high
     for _ in range(100):
-        over = volume_below(floats, at, z) - volume
-        if over > 0.0:
+        excess = volume_below(floats, at, z) - volume
+        if excess > 0.0:
             high = z
         else:
             low = z
-        moved = z - over / max(surface_at(floats, at, z), least)
-        if not low <= moved <= high:
-            moved = 0.5 * (low + high)
-        if abs(moved - z) <= 2e-16 * floats[at + TOP]:
-            return moved
-        z = moved
+        next_z = z - excess / max(surface_at(floats, at, z), least)
+        if not low <= next_z <= high:
+            next_z = 0.5 * (low + high)
+        if abs(next_z - z) <= 2e-16 * floats[at + TOP]:
+            return next_z
+        z = next_z
     return z

@@ -1,4 +1,4 @@
-"""Accumulators in the tables of a scene."""
+"""Accumulators in the tables of a model."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from fvsolve.errors import Notice
 from fvsolve.model.device import Device
 from fvsolve.parts.accumulator import law
 
-ROUNDED = 1e-5  # share of the mass that it gave which errors in its neck are measured against, so as to exceed rounding
-NECK = 0.01  # share of its volume that is fluid in the neck of a bladder accumulator
+ROUNDED = 1e-5  # share of the released mass added to the scale of errors in the neck, so that it exceeds rounding
+NECK = 0.01  # volume of the neck of a bladder accumulator over its volume
 
 
 class AccumulatorRows(Device, kind="accumulator"):
@@ -19,7 +19,7 @@ class AccumulatorRows(Device, kind="accumulator"):
     vessel = True
     quantities = ("gas_volume", "gas_pressure")
     events = ("is empty", "holds fluid again")
-    remedy = "give it a connection, whose loss brakes what comes and goes"
+    remedy = "give it a connection, whose loss damps the flow in and out"
 
     def of(self, part) -> Device:
         return self if not part.shaped else ShapedRows() if part.compressor is None else CompressedRows()
@@ -38,50 +38,50 @@ class AccumulatorRows(Device, kind="accumulator"):
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
 
-    def settle(self, slate, row, t, y, scale) -> None:
-        model = slate.model
+    def settle(self, run_data, row, t, y, scale) -> None:
+        model = run_data.model
         floats, at = model.tables.floats[row["data"] :], model.tables.nodes[row["node"]]["y"]
         scale[at] = model.scale[at]
-        if floats[law.NECK] > 0.0 and slate.armed[row["event"]] > 0.0:  # its neck feels far less
+        if floats[law.NECK] > 0.0 and run_data.armed[row["event"]] > 0.0:  # the neck takes up far less mass
             scale[at] = -(1e5 / floats[law.NECK] + ROUNDED * abs(floats[law.EMPTY]))
 
     def begin(self, start, part, row) -> list[str]:
         draft, fluid = start.draft, start.draft.fluid
         node = draft.node_table[row["node"]]
-        p, dense = float(node["pressure"]), draft.case.law.density
+        p, density = float(node["pressure"]), draft.case.law.density
         neck = NECK * part.volume if part.precharge is not None else 0.0
-        first = part.precharge if part.precharge is not None else p
-        gas = part.gas_volume or part.volume * min(1.0, (first / p) ** (1.0 / part.exponent))
-        room = part.volume + neck
-        mass = dense(p) * (room - gas)
-        shed = (first if neck else p * (gas / part.volume) ** part.exponent) - p
-        stiff = fluid.bulk_modulus / (fluid.density * neck) if neck else 0.0
-        empty = dense(p + shed) * neck - mass
+        charge_pressure = part.precharge if part.precharge is not None else p
+        gas = part.gas_volume or part.volume * min(1.0, (charge_pressure / p) ** (1.0 / part.exponent))
+        total = part.volume + neck
+        mass = density(p) * (total - gas)
+        excess = (charge_pressure if neck else p * (gas / part.volume) ** part.exponent) - p
+        stiffness = fluid.bulk_modulus / (fluid.density * neck) if neck else 0.0
+        empty = density(p + excess) * neck - mass
         if draft.case.law.linear:
-            empty = shed / stiff if neck and shed > 0.0 else -fluid.density * (part.volume - gas)
+            empty = excess / stiffness if neck and excess > 0.0 else -fluid.density * (part.volume - gas)
         floats = draft.tables.floats
-        floats[row["data"] : row["data"] + law.NUMBERS] = [part.exponent, gas, room, stiff, empty, shed]
+        floats[row["data"] : row["data"] + law.NUMBERS] = [part.exponent, gas, total, stiffness, empty, excess]
         node["mass"] = mass
-        node["stiffness"] = stiff if shed > 0.0 and neck else part.exponent * p / (fluid.density * gas)
-        if neck and shed >= 0.0:
+        node["stiffness"] = stiffness if excess > 0.0 and neck else part.exponent * p / (fluid.density * gas)
+        if neck and excess >= 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
-            charge, pressure = (draft.case.amount(one, "pressure", 6) for one in (first, p))
-            text = f"{name}: empty at the start, where its precharge, {charge}, is not below the pressure, {pressure}"
-            draft.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(first), float(p)))
+            charge, pressure = (draft.case.amount(value, "pressure", 6) for value in (charge_pressure, p))
+            text = f"{name}: empty at the start: its precharge, {charge}, is not below the pressure, {pressure}"
+            draft.warnings.append(Notice("start", f"nodes.{name}", text, "precharge", float(charge_pressure), float(p)))
         return []
 
     def change(self, model, row, y: float) -> float:
-        """Pressure over that of the profile [Pa] once y [kg] came in."""
+        """Pressure minus that of the profile [Pa] after an inflow y [kg]."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         return law.gas_and_pressure(st, floats, node, int(row["data"]), y)[1]
 
     def energy(self, model, row, y: float) -> float:
-        """What it stores once y [kg] came in, over the profile [J]."""
+        """Stored energy after an inflow y [kg], minus that of the profile [J]."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         return law.accumulator_energy(st, floats, node, int(row["data"]), y)
 
     def above(self, model, part, row) -> float:
-        """Over the state in which it could give no more: P = 0, or no fluid left."""
+        """Stored energy minus that of the state that can release no more: energy head 0, or no fluid left [J]."""
         from fvsolve.kernels.energy_barotropic import head_at
 
         st, floats = model.tables.settings[0], model.tables.floats
@@ -100,7 +100,7 @@ class AccumulatorRows(Device, kind="accumulator"):
 
 
 class ShapedRows(AccumulatorRows, kind=""):
-    """An air vessel with a shape: the weight of its fluid counts."""
+    """An air vessel with a shape, whose fluid has weight."""
 
     quantities = (*AccumulatorRows.quantities, "level")
 
@@ -113,32 +113,35 @@ class ShapedRows(AccumulatorRows, kind=""):
     def numbers(self, draft, name, part) -> list[float]:
         from fvsolve.parts.accumulator.lower_shape import shape_of
 
-        lift = [0.0, 0.0, 0.0]
+        compressor = [0.0, 0.0, 0.0]
         if part.compressor is not None:
-            lift = [0.0, part.compressor.start, part.compressor.stop]
-        return [0.0] * law.NUMBERS + [0.0, 0.0, part.bottom or 0.0, *lift] + shape_of(part)
+            compressor = [0.0, part.compressor.start, part.compressor.stop]
+        return [0.0] * law.NUMBERS + [0.0, 0.0, part.bottom or 0.0, *compressor] + shape_of(part)
 
     def begin(self, start, part, row) -> list[str]:
         from fvsolve.parts.accumulator.lower_shape import VesselStart
 
         draft, n = start.draft, part.exponent
         node, at = draft.node_table[row["node"]], row["data"]
-        stands = VesselStart(start, part)
-        p, mass = stands.gas_pressure(float(node["pressure"]))
+        at_start = VesselStart(start, part)
+        p, mass = at_start.gas_pressure(float(node["pressure"]))
         if not p > 0.0:
             name = list(draft.case.places)[row["node"]].removesuffix(".inside")
-            high = stands.level + stands.bottom
-            has, deep = draft.case.amount(node["pressure"], "pressure", 6), draft.case.amount(high, "head", span=True)
-            text = (f"no steady state: {has} at its place are less than the weight of the fluid, "
-                    f"{deep} high, and leave its gas none; set bottom or level lower")  # fmt: skip
+            height = at_start.level + at_start.bottom
+            pressure, head = (
+                draft.case.amount(node["pressure"], "pressure", 6),
+                draft.case.amount(height, "head", span=True),
+            )
+            text = (f"no steady state: the pressure at its place, {pressure}, is below that of the fluid column, "
+                    f"{head} high, so the gas would have none; set bottom or level lower")  # fmt: skip
             draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
             return []
         floats = draft.tables.floats
-        empty = -draft.fluid.density * stands.held if start.law.linear else -mass
-        floats[at : at + law.NUMBERS] = [n, stands.gas, part.volume, 0.0, empty, 0.0]
-        floats[at + self.law.FIRST], floats[at + self.law.LEVEL] = p, stands.level
+        empty = -draft.fluid.density * at_start.held if start.law.linear else -mass
+        floats[at : at + law.NUMBERS] = [n, at_start.gas, part.volume, 0.0, empty, 0.0]
+        floats[at + self.law.FIRST], floats[at + self.law.LEVEL] = p, at_start.level
         if part.compressor is not None:
-            floats[at + self.law.BRINGS] = part.compressor.flow * start.case.ambient_pressure / (p * stands.gas)
+            floats[at + self.law.BRINGS] = part.compressor.flow * start.case.ambient_pressure / (p * at_start.gas)
         node["mass"] = mass
         st = draft.tables.settings[0]
         node["stiffness"] = self.law.pressure_and_stiffness(st, floats, node, int(at), 0.0, 0.0)[1]
@@ -154,7 +157,7 @@ class ShapedRows(AccumulatorRows, kind=""):
 
 
 class CompressedRows(ShapedRows, kind=""):
-    """One whose compressor keeps the level down."""
+    """An air vessel whose compressor limits the level."""
 
     states = ("gas",)
     events = (*ShapedRows.events, "compressor starts", "compressor stops")
@@ -163,12 +166,12 @@ class CompressedRows(ShapedRows, kind=""):
         return [0.1]
 
     def squares(self, model, part, row, y, out):
-        """n p V / 2 (da / (1 + a) + dy / (rho V))^2, and g / (2 rho surface) dy^2: what gas and weight take up."""
+        """n p V / 2 (da / (1 + a) + dy / (rho V))^2 of the gas, g / (2 rho surface) dy^2 of the weight of the fluid."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
         u, change, _, _ = self.law.standing(st, floats, node, at, float(y[mass]), a)
         gas, p = floats[at + law.GAS] * math.exp(u), floats[at + self.law.FIRST] + change
         root = math.sqrt(0.5 * part.exponent * p * gas)
-        whole = super().squares(model, part, row, y, out)[0][mass]
-        rest = math.sqrt(max(0.0, whole**2 - (root / (rho * gas)) ** 2))
+        total = super().squares(model, part, row, y, out)[0][mass]
+        rest = math.sqrt(max(0.0, total**2 - (root / (rho * gas)) ** 2))
         return [{int(row["y"]): root / (1.0 + a), mass: root / (rho * gas)}, {mass: rest}]

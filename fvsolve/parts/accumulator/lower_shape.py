@@ -1,4 +1,4 @@
-"""How high the fluid of a vessel stands at the start, and what its gas has left. Knows its shape; fills no table."""
+"""Level, gas volume and pressures of a vessel with a shape at the start."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import numpy as np
 from fvsolve.parts.accumulator import law_shape
 from fvsolve.parts.accumulator.shape import UPRIGHT, height_of, length_of
 
-FLAT = 1e-6  # rise of a cylinder's axis over its length, in radii, below which it lies; likewise, upright
+FLAT = 1e-6  # axis rise over radius below which a cylinder counts as horizontal; likewise for upright
 
 
 class VesselStart:
     """Gas and fluid of a vessel with a shape at the start.
 
-    gas : its volume [m3]; level : of the fluid [m]; centroid : of the fluid, above the bottom [m]
+    gas : gas volume [m3]; held : fluid volume [m3]; level : level of the fluid above the bottom [m]
+    centroid : height of the centroid of the fluid above the bottom [m]
     """
 
     def __init__(self, start, part) -> None:
@@ -30,17 +31,17 @@ class VesselStart:
         self.centroid = below / self.held if self.held > 0.0 else 0.0
 
     def gas_pressure(self, p: float) -> tuple[float, float]:
-        """(pressure of the gas [Pa], mass of the fluid [kg]) where the place has p."""
+        """(pressure of the gas [Pa], mass of the fluid [kg]) for pressure p of the node."""
         if self.law.linear:
             rho = self.law.rho
             return p - rho * self.gravity * (self.bottom + self.level), rho * self.held
-        above = self.gravity * (self.bottom + self.centroid)
-        q = float(self.law.pressure_of_enthalpy(self.law.enthalpy(p) - above))
+        potential = self.gravity * (self.bottom + self.centroid)
+        q = float(self.law.pressure_of_enthalpy(self.law.enthalpy(p) - potential))
         rho = float(self.law.density(q))
         return q - rho * self.gravity * (self.level - self.centroid), rho * self.held
 
     def under(self, gas: float) -> float:
-        """Pressure of the place [Pa] where the gas has a pressure."""
+        """Pressure of the node [Pa] for a pressure of the gas."""
         if self.law.linear:
             return gas + self.law.rho * self.gravity * (self.bottom + self.level)
         q = gas
@@ -50,7 +51,7 @@ class VesselStart:
 
 
 def shape_of(part) -> list[float]:
-    """Numbers of the shape of a vessel, as `law_shape` reads them."""
+    """Numbers of the shape of a vessel, in the order of `law_shape`."""
     top = height_of(part)
     if part.diameter is None:
         if not hasattr(part.area, "level") or len(part.area.level) == 1:

@@ -1,4 +1,4 @@
-"""A vessel with gas over its fluid. Knows sizes, shapes and pressures; computes nothing."""
+"""Accumulators and air vessels: keys, ranges and faults."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ from fvsolve.parts.value import Number, Quantity, Range, Usual, nonnegative, pos
 VOLUMES = Usual(1e-7, 1e5, "pilot accumulators to air cushions in rock")
 GAS = Usual(1e4, 2e8, "vacuum to test rigs")
 EXPONENTS = Usual(1.0, 2.0, "isothermal to adiabatic real gases")
-FORMS = ("diameter", "area")  # keys that give it a shape
-OF_SHAPE = ("level", "slope", "bottom", "compressor")  # keys that say nothing without one
-START = ("precharge", "gas_volume", "level")  # keys that say how much gas there is
+FORMS = ("diameter", "area")  # keys that define a shape
+OF_SHAPE = ("level", "slope", "bottom", "compressor")  # keys that have no effect without a shape
+START = ("precharge", "gas_volume", "level")  # keys that determine the amount of gas
 
 
 class Accumulator(Node, kind="accumulator"):
     """A bladder accumulator (`precharge`) or an air vessel (`gas_volume`, `level`): p V^n constant in its gas.
 
-    Ports: any number, at one pressure, that of the gas; with a shape, `diameter` or `area`, that and the weight of the
-    fluid that stands above. Stored energy, p from ambient: the gas's, p0 V0 ((V0 / V)^(n-1) - 1) / (n - 1) less the
-    work of ambient, and the fluid's height [J]. Dissipated energy: that of its connection.
+    Ports: any number, at one pressure: that of the gas, plus the weight of the fluid column above the node if a shape
+    (`diameter` or `area`) is given. Stored energy, p from ambient: of the gas, p0 V0 ((V0 / V)^(n-1) - 1) / (n - 1)
+    minus the work of ambient, and of the height of the fluid [J]. Dissipated energy: that of its connection.
 
-    A bladder fills `volume` at `precharge`; below it nothing but the hundredth part of `volume`, of fluid in the neck,
-    feels the pressure. An air vessel that runs empty lets its air into the place it is joined to.
+    A bladder fills `volume` at `precharge`. Below that pressure only the fluid in the neck, 1 % of `volume`, is
+    compressed. An air vessel that runs empty lets its air into the node.
     """
 
     no_scalars: ClassVar[str] = "its contents carry no scalars yet"
@@ -38,16 +38,16 @@ class Accumulator(Node, kind="accumulator"):
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
     fixes_pressure: ClassVar[bool] = True
     meant: ClassVar[dict[str, str]] = {
-        "height": "volume, of which it follows", "length": "volume, of which it follows", "inclination": "slope",
+        "height": "volume, from which it follows", "length": "volume, from which it follows", "inclination": "slope",
         "base": "bottom", "initial_level": "level", "liquid_level": "level", "gas_exponent": "exponent",
     }  # fmt: skip
 
-    volume: Annotated[float, Quantity("volume", positive, "that gas and fluid share [m3]", VOLUMES)]
+    volume: Annotated[float, Quantity("volume", positive, "total volume of gas and fluid [m3]", VOLUMES)]
     precharge: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="of the gas when it fills volume [Pa]: a bladder; gas_volume or level is needed if left out",
+            about="gas pressure at which the bladder fills volume [Pa]; gas_volume or level is needed if left out",
             usual=GAS,
         ),
     ] = None
@@ -56,7 +56,7 @@ class Accumulator(Node, kind="accumulator"):
         Quantity(
             "volume",
             positive,
-            "of the gas at the start [m3]: an air vessel; precharge or level is needed if left out",
+            "gas volume of an air vessel at the start [m3]; precharge or level is needed if left out",
             VOLUMES,
         ),
     ] = None
@@ -65,32 +65,32 @@ class Accumulator(Node, kind="accumulator"):
         Quantity(
             "level",
             nonnegative,
-            "of the fluid at the start, above the bottom [m]; precharge or gas_volume is needed if left out",
+            "level of the fluid above the bottom at the start [m]; precharge or gas_volume is needed if left out",
             LEVELS,
         ),
     ] = None
     diameter: Annotated[
         float | None,
-        Quantity("length", positive, "of a cylinder with flat ends, as long as volume says [m]",
+        Quantity("length", positive, "diameter of a cylinder with flat ends, whose length follows from volume [m]",
                  Usual(0.01, 10.0, "pilot vessels to field-built ones")),
     ] = None  # fmt: skip
     slope: Annotated[
         float | None,
-        Quantity("angle", nonnegative, "of its axis, 0 where it lies [rad]; upright if left out",
-                 Usual(0.0, UPRIGHT, "lying to upright")),
+        Quantity("angle", nonnegative, "angle of the axis above the horizontal [rad]; upright if left out",
+                 Usual(0.0, UPRIGHT, "horizontal to upright")),
     ] = None  # fmt: skip
     area: Annotated[Any, Surface()] = None
     bottom: Annotated[
         float | None,
-        Quantity("length", about="its lowest point, above its place [m]; 0 if left out",
+        Quantity("length", about="height of the lowest point above the elevation of the node [m]; 0 if left out",
                  usual=Usual(-50.0, 50.0, "below or above the line")),
     ] = None  # fmt: skip
     compressor: Annotated[
-        Compressor | None, Inside(Compressor, "that brings gas where the level is high; none if left out")
+        Compressor | None, Inside(Compressor, "compressor that adds gas at a high level; none if left out")
     ] = None
-    exponent: Annotated[float, Number(Range(1.0), "n of p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)] = 1.2
+    exponent: Annotated[float, Number(Range(1.0), "n in p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)] = 1.2
     initial_pressure: Annotated[
-        float | None, Quantity("pressure", about="of the gas at the start [Pa]; in equilibrium if left out")
+        float | None, Quantity("pressure", about="gas pressure at the start [Pa]; in equilibrium if left out")
     ] = None
     connection: Annotated[Connection | None, Joined()] = None
 
@@ -100,22 +100,24 @@ class Accumulator(Node, kind="accumulator"):
 
     @property
     def shaped(self) -> bool:
-        """Whether the height of its fluid is known."""
+        """True if a diameter or a table of areas is given, so that the level of the fluid is known."""
         return self.diameter is not None or self.area is not None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
         faults += [(keys, f"no gas; {message}") for keys, message in at_least_one(given, START)]
-        formed = [key for key in FORMS if key in given]
-        if not formed:
-            text = "says nothing of a vessel without a shape; give diameter or area, or leave it out"
+        shapes = [key for key in FORMS if key in given]
+        if not shapes:
+            text = "has no effect on a vessel without a shape; give diameter or area, or remove it"
             faults += [((key,), text) for key in OF_SHAPE if key in given]
         elif "precharge" in given:
-            text = "a bladder has no level; give gas_volume or level in place of precharge, or leave it out"
-            faults += [((key,), text) for key in formed]
-        if "slope" in given and formed == ["area"]:
-            faults.append((("slope",), "goes with diameter; area says all levels by itself"))
+            text = (
+                "does not go with precharge (a bladder); give gas_volume or level in place of precharge, or remove it"
+            )
+            faults += [((key,), text) for key in shapes]
+        if "slope" in given and shapes == ["area"]:
+            faults.append((("slope",), "goes with diameter only; area gives the surface at all levels"))
         return faults
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -123,27 +125,27 @@ class Accumulator(Node, kind="accumulator"):
 
     def faults(self, name: str, around: Around) -> Faults:
         if (self.gas_volume or 0.0) > self.volume:
-            yield ("gas_volume",), f"{self.gas_volume:g} m3 is more than its volume of {self.volume:g} m3"
+            yield ("gas_volume",), f"{self.gas_volume:g} m3 is greater than volume, {self.volume:g} m3"
         if self.initial_pressure is not None:
             yield from around.vacuum("nodes", name, "initial_pressure", [self.initial_pressure])
         if not self.shaped:
             return
         if self.slope is not None and self.slope > UPRIGHT:
-            text = f"{math.degrees(self.slope):g} deg is steeper than upright; wanted 0 to 90 deg"
+            text = f"{math.degrees(self.slope):g} deg is steeper than upright; expected 0 to 90 deg"
             yield ("slope",), text + f', did you mean "{self.slope:g} deg"' * (self.slope <= 90.0)
             return
         top = height_of(self)
         if self.level is not None and self.level >= top:
-            yield ("level",), f"{self.level:g} m leaves no room for gas; it is full at {top:.6g} m"
+            yield ("level",), f"{self.level:g} m leaves no volume for gas; the vessel is full at {top:.6g} m"
         if self.compressor is not None:
             start, stop = self.compressor.start, self.compressor.stop
             if stop >= start:
-                yield ("compressor", "stop"), f"{stop:g} m is not below its start at {start:g} m; set it lower"
+                yield ("compressor", "stop"), f"{stop:g} m is not below start, {start:g} m; set it lower"
             if start >= top:
                 yield ("compressor", "start"), f"{start:g} m is never reached; the vessel is full at {top:.6g} m"
 
 
 class Vessel(Accumulator):
-    """One with a shape, whose level can be read."""
+    """A vessel with a shape; its level can be probed."""
 
     quantities: ClassVar[dict[str, str]] = {**Accumulator.quantities, "level": "level"}

@@ -1,4 +1,4 @@
-"""What shape a vessel has, and what keeps its level. Knows sizes; knows no fluid and no gas."""
+"""Shape of a vessel and its compressor: keys, height and length."""
 
 from __future__ import annotations
 
@@ -13,21 +13,23 @@ UPRIGHT = 0.5 * math.pi
 
 
 class Compressor(Table):
-    """It runs from where the level has risen to `start` until it has fallen to `stop`, and brings `flow`."""
+    """Compressor that adds gas: starts when the level rises to `start`, stops when the level falls to `stop`."""
 
-    start: Annotated[float, Quantity("level", nonnegative, "of the fluid at which it starts [m]", LEVELS)]
-    stop: Annotated[float, Quantity("level", nonnegative, "of the fluid, lower, at which it stops [m]", LEVELS)]
+    start: Annotated[float, Quantity("level", nonnegative, "level of the fluid at which it starts [m]", LEVELS)]
+    stop: Annotated[
+        float, Quantity("level", nonnegative, "level of the fluid at which it stops, below start [m]", LEVELS)
+    ]
     flow: Annotated[
         float,
         Quantity(
-            "flow", positive, "of free air: at ambient pressure and the temperature of the gas at the start [m3/s]",
+            "flow", positive, "flow of free air, at ambient pressure and the initial temperature of the gas [m3/s]",
             Usual(1e-5, 10.0, "workshops to stations"),
         ),
     ]  # fmt: skip
 
 
 def length_of(vessel: Any) -> float:
-    """Length of a cylinder [m]."""
+    """Length of a cylindrical vessel [m]."""
     return vessel.volume / (math.pi * (0.5 * vessel.diameter) ** 2)
 
 
@@ -41,8 +43,8 @@ def height_of(vessel: Any) -> float:
         return vessel.volume / vessel.area
     level, area, left = vessel.area.level, vessel.area.area, vessel.volume
     for z, end, low, high in zip(level, level[1:], area, area[1:], strict=False):
-        growth, held = (high - low) / (end - z), 0.5 * (low + high) * (end - z)
-        if left <= held:
+        growth, layer = (high - low) / (end - z), 0.5 * (low + high) * (end - z)
+        if left <= layer:
             return float(z + 2.0 * left / (low + math.sqrt(max(low * low + 2.0 * growth * left, 0.0))))
-        left -= held
+        left -= layer
     return float(level[-1] + left / area[-1])

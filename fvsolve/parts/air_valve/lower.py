@@ -1,4 +1,4 @@
-"""Air valves in the tables of a scene."""
+"""Air valves in the tables of a model."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ GAS_CONSTANT = 287.05  # of air [J/kg/K]
 
 
 class AirValveRows(Device, kind="air-valve"):
-    """The chamber of one; it is shut at the start."""
+    """The chamber of an air valve, which is shut at the start."""
 
     law = law
     vessel = sudden = True
@@ -36,13 +36,13 @@ class AirValveRows(Device, kind="air-valve"):
         return name.removesuffix(".inside") + ".connection"
 
     def numbers(self, draft, name, part) -> list[float]:
-        heat = GAS_CONSTANT * part.temperature
-        held = draft.case.ambient_pressure * part.volume / heat
+        rt = GAS_CONSTANT * part.temperature
+        air_mass = draft.case.ambient_pressure * part.volume / rt
         into, wide, small, always = (
             part.discharge_coefficient * math.pi / 4.0 * (d or 0.0) ** 2
             for d in (part.inlet, part.outlet, part.throttled_outlet, part.automatic)
         )
-        return [part.volume, held, heat, into, wide + always, part.switch or 0.0, small + always, 0.0]
+        return [part.volume, air_mass, rt, into, wide + always, part.switch or 0.0, small + always, 0.0]
 
     def scales(self, draft, name, part) -> list[float]:
         return [self.numbers(draft, name, part)[law.AIR]]
@@ -58,17 +58,17 @@ class AirValveRows(Device, kind="air-valve"):
         node, place = nodes[row["node"]], nodes[start.valves[row["valve"]]["from_node"]]
         node["pressure"], node["mass"] = start.case.ambient_pressure, 0.0
         node["stiffness"] = start.case.ambient_pressure / (part.volume * node["density"])
-        short = start.case.ambient_pressure - float(place["pressure"])
+        deficit = start.case.ambient_pressure - float(place["pressure"])
         name = list(start.case.places)[row["node"]].removesuffix(".inside")
-        if short <= law.RELUCTANCE:
+        if deficit <= law.RELUCTANCE:
             return []
-        below = start.case.amount(short, "pressure", span=True)
+        below = start.case.amount(deficit, "pressure", span=True)
         text = f"{name}: the air valve is open at the start, {below} below ambient"
-        start.draft.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(short), 0.0))
+        start.draft.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(deficit), 0.0))
         return [f"air valve {name}: {below} below ambient, so it opens"]
 
     def squares(self, model, part, row, y, out):
-        """R T / (2 m) (dm + m / (V rho) dy)^2 : what changes its pressure, in air or in fluid."""
+        """R T / (2 m) (dm + m / (V rho) dy)^2 : pressure energy of air and fluid in the chamber."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes
         node, at = node[row["node"]], int(row["data"])
         _, volume, mass = law.air_state(st, floats, node, at, float(y[node["y"]]), float(y[row["y"]]))
@@ -77,7 +77,7 @@ class AirValveRows(Device, kind="air-valve"):
 
 
 class Throttling(AirValveRows, kind=""):
-    """One that lets air out through a small bore from `switch` or `switch_velocity` on."""
+    """An air valve that releases air through a small bore from `switch` or `switch_velocity` on."""
 
     events = (*AirValveRows.events, "throttles", "is wide again")
 

@@ -1,4 +1,4 @@
-"""A valve that lets air in and out. Knows its bores; evaluates no flow."""
+"""Air valves: keys, ranges and faults."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
 from fvsolve.parts.value import Number, Quantity, Usual, between, positive
 
-BORE = between(0, 1, open=True)  # m: a bare 50 is meant in mm
-BODY = 3.0  # width and length of the float's chamber where its volume is not given, in diameters of the inlet
+BORE = between(0, 1, open=True)  # m; a plain 50 would be in mm
+BODY = 3.0  # diameter and length of the float chamber if its volume is not given, in inlet diameters
 LINES = ("pipe", "rigid-column")
-SWITCHES = ("switch", "switch_velocity")  # from what on it throttles
-WIDE = 30.0  # throat between fluid and air, in diameters of the inlet, of loss 1
+SWITCHES = ("switch", "switch_velocity")  # thresholds of throttling
+WIDE = 30.0  # diameter of the throat between fluid and air, in inlet diameters; its loss coefficient is 1
 
 
 class AirValve(Node, kind="air-valve"):
-    """A junction until its pressure falls below ambient; then air comes in, and goes out where it exceeds ambient.
+    """A junction that admits air when its pressure falls below ambient, and releases it above ambient.
 
-    Air flows isentropically through bores of their own each way, choked beyond their critical pressures, and stays at
-    `temperature`: p V = m R T. The float's chamber, `volume`, holds air from the start; once the fluid has filled all
-    else the valve shuts, with the blow that this makes. Ports: any number. Stored energy: m R T (ln(p / p_ambient) - 1)
-    + p_ambient V [J]. Dissipated power: R T ln(p_ambient / p) times the flow of air [W]. With `switch` or
-    `switch_velocity` it throttles what goes out, until the air inside is at ambient again.
+    Air flows isentropically through a bore for each direction, choked beyond the critical pressure ratio, and keeps
+    `temperature`: p V = m R T. The chamber of the float, `volume`, is full of air at the start. When the fluid has
+    filled the rest, the valve shuts, with a pressure surge. Ports: any number. Stored energy:
+    m R T (ln(p / p_ambient) - 1) + p_ambient V [J]. Dissipated power: R T ln(p_ambient / p) times the flow of air [W].
+    With `switch` or `switch_velocity` it throttles the outflow until the air inside is at ambient pressure again.
     """
 
     no_scalars: ClassVar[str] = "its contents carry no scalars yet"
@@ -42,7 +42,7 @@ class AirValve(Node, kind="air-valve"):
         Quantity(
             "pressure_drop",
             positive,
-            "of the air over ambient, from which on it goes out through throttled_outlet in place of outlet",
+            "air pressure above ambient from which air leaves by throttled_outlet instead of outlet",
             Usual(100.0, 1e5, "anti-slam discs"),
         ),
     ] = None
@@ -51,25 +51,29 @@ class AirValve(Node, kind="air-valve"):
         Quantity(
             "velocity",
             positive,
-            "of the fluid that fills the line towards it, from which on likewise, in place of switch [m/s]",
+            "velocity of the fluid towards the valve from which it throttles, instead of switch [m/s]",
             Usual(0.01, 20.0, "anti-slam discs"),
         ),
     ] = None
     throttled_outlet: Annotated[
-        float | None, Quantity("length", BORE, "diameter of the small bore for air out beyond the switch [m]")
+        float | None, Quantity("length", BORE, "diameter of the bore for air out while throttled [m]")
     ] = None
     automatic: Annotated[
-        float | None, Quantity("length", BORE, "diameter of the automatic bore, by which air goes out at all times [m]")
+        float | None, Quantity("length", BORE, "diameter of the automatic bore, always open for air out [m]")
     ] = None
-    discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "Cd of all bores")] = 0.6
+    discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "coefficient Cd of all bores")] = 0.6
     volume: Annotated[
         float | None,
-        Quantity("volume", positive, "of the float's chamber [m3]; a cylinder three inlets long and wide if left out"),
+        Quantity(
+            "volume",
+            positive,
+            "volume of the float chamber [m3]; a cylinder three inlet diameters long and wide if left out",
+        ),
     ] = None
     temperature: Annotated[
         float,
         Quantity(
-            "temperature", positive, "of the air, which keeps it [K]", Usual(220.0, 370.0, "outdoors to hot rooms")
+            "temperature", positive, "constant temperature of the air [K]", Usual(220.0, 370.0, "outdoors to hot rooms")
         ),
     ] = 293.15
 
@@ -80,21 +84,26 @@ class AirValve(Node, kind="air-valve"):
         faults = super().key_faults(given)
         switches = [key for key in SWITCHES if key in given]
         if switches and "throttled_outlet" not in given:
-            faults.append(((switches[0],), "says nothing without throttled_outlet; give both, or leave it out"))
+            faults.append(((switches[0],), "has no effect without throttled_outlet; give both, or remove it"))
         elif "throttled_outlet" in given and not switches:
-            text = "says nothing without switch or switch_velocity; give one, or leave it out"
+            text = "has no effect without switch or switch_velocity; give one, or remove it"
             faults.append((("throttled_outlet",), text))
         return faults
 
     def faults(self, name: str, around: Around) -> Faults:
         if self.throttled_outlet is not None and not self.throttled_outlet < self.outlet:
-            text = f"{self.throttled_outlet:g} m throttles nothing; wanted less than outlet, {self.outlet:g} m"
+            text = f"{self.throttled_outlet:g} m does not throttle; expected less than outlet, {self.outlet:g} m"
             yield ("throttled_outlet",), text
         lines = [
-            one for one in around.links.values() if one.kind in ("pipe", "rigid-column") and name in one.ports.values()
+            link
+            for link in around.links.values()
+            if link.kind in ("pipe", "rigid-column") and name in link.ports.values()
         ]
         if self.switch_velocity is not None and not lines:
-            yield ("switch_velocity",), "no pipe or rigid column ends here for the fluid to fill; give switch"
+            yield (
+                ("switch_velocity",),
+                "no pipe or rigid column joins this node, so it has no velocity; give switch",
+            )
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         size = Connection.model_construct(area=None, diameter=WIDE * self.inlet, loss_in=1.0, loss_out=1.0)

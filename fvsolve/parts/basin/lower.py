@@ -1,4 +1,4 @@
-"""Patches as places of the fluid in the tables of a model."""
+"""Patches of basins as nodes in the tables of a model."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class PatchRows(Lowering, kind="patch"):
-    """A place whose pressure the cells behind it set."""
+    """A node whose pressure is that of the cells behind the patch."""
 
     books = "dry patch"
 
@@ -19,8 +19,8 @@ class PatchRows(Lowering, kind="patch"):
             return node.pressure
         return start.law.pressure_under(node.depth) if node.depth else start.case.ambient_pressure
 
-    def moves(self, name, node, row, inflow, flow, told) -> str:
-        return f"basin {name}: {told(flow, 'flow')} flow in"
+    def moves(self, name, node, row, inflow, flow, amount) -> str:
+        return f"basin {name}: {amount(flow, 'flow')} flow in"
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity in ("force", "power", "travel"):
@@ -32,7 +32,7 @@ class PatchRows(Lowering, kind="patch"):
             self.probe_flow(draft, name, row)
 
     def probe_flow(self, draft, name, row) -> None:
-        """Fill the PROBE row of what flows in."""
+        """Fill the PROBE row of the flow into the basin."""
         row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
         if not draft.case.nodes[draft.case.places[name].basin].own.joined:
             row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW

@@ -1,4 +1,4 @@
-"""Bodies in the tables of a model, as probes read them."""
+"""Probes of rigid bodies in the tables of a model."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from fvsolve.model.lowering import Lowering
 
 
 class BodyRows(Lowering, kind="body"):
-    """What moves in space."""
+    """Rigid bodies in space."""
 
     def probe(self, draft, name, probe, row) -> None:
-        from fvsolve.kernels.mechanism.observe import BODY_QUANTITIES  # scenes without bodies load none of it
+        from fvsolve.kernels.mechanism.observe import BODY_QUANTITIES  # not loaded by models without bodies
 
-        which = "angle" if probe.quantity == "travel" else probe.quantity
-        row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(which)
+        quantity = "angle" if probe.quantity == "travel" else probe.quantity
+        row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(quantity)
         row["index"] = draft.body_names.index(name)

@@ -1,4 +1,4 @@
-"""A rigid body in space and the joint it hangs by. Knows its inertia and its points; knows no force."""
+"""Rigid bodies in space and their joints: keys, units and faults."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import show
 
-JOINTS = {  # kind -> keys that go with it, beside `on`, `at` and `attitude`
+JOINTS = {  # kind -> keys it allows besides `on`, `at` and `attitude`
     "revolute": ("axis", "angle", "rate", "damping", "stiffness"),
     "prismatic": ("axis", "travel", "rate", "damping", "stiffness"),
     "ball": ("rate", "damping"),
@@ -45,12 +45,12 @@ ROTATION = {"x": "position", "y": "position", "z": "position", "roll": "angle", 
 
 
 def along(name: str, dimension: str) -> dict[str, str]:
-    """A quantity along x, y and z."""
+    """Quantities of the x, y and z components of a vector."""
     return {f"{name}{axis}": dimension for axis in "xyz"}
 
 
 class OfJoint(Value):
-    """A number whose unit hangs on the kind of joint, or three of them along the body's axes."""
+    """A number whose unit depends on the kind of joint, or three such numbers along the axes of the body."""
 
     changes = PROFILE
 
@@ -67,40 +67,48 @@ class OfJoint(Value):
         return WIDE[self.dimension]
 
     def json(self) -> dict[str, Any]:
-        one = Quantity(self.dimension).json()
-        return {"anyOf": [one, {"type": "array", "items": one, "minItems": 3}]}
+        number = Quantity(self.dimension).json()
+        return {"anyOf": [number, {"type": "array", "items": number, "minItems": 3}]}
 
 
 class Joint(Table):
-    """By what a body hangs on another, or on the world: which way it may move, where, and how it starts.
+    """Joint between a body and another body or the world: kind, position, initial state.
 
-    The body's own origin lies at its joint. At angle or travel 0 its axes are those of the joint.
+    The origin of the body lies at its joint. At angle or travel 0 the axes of the body are those of the joint.
     """
 
-    kind: Annotated[str, Choice("joint", tuple(JOINTS), "which way it may move", OFTEN)] = "free"
-    on: Annotated[str | None, Text("BODY, BODY.POINT or FRAME.POINT; the world if left out")] = None
+    kind: Annotated[str, Choice("joint", tuple(JOINTS), "kind of joint, its degrees of freedom", OFTEN)] = "free"
+    on: Annotated[str | None, Text("carrier: BODY, BODY.POINT or FRAME.POINT; the world if left out")] = None
     at: Annotated[
-        tuple[float, ...] | None, Rows("position", length=3, about="its place in the axes of `on` [m]; 0 if left out")
+        tuple[float, ...] | None,
+        Rows("position", length=3, about="position of the joint in the axes of `on` [m]; 0 if left out"),
     ] = None
-    attitude: Annotated[Attitude, Inside(Attitude, "of its axes in those of `on`")] = Attitude()
-    axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="in its own axes")] = None
+    attitude: Annotated[Attitude, Inside(Attitude, "attitude of the joint axes in those of `on`")] = Attitude()
+    axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of motion in the joint axes")] = None
     angle: Annotated[
-        Schedule | None, Scheduled("angle", about="at the start [rad]; a schedule drives it; 0 if left out")
+        Schedule | None, Scheduled("angle", about="angle at the start [rad]; a schedule drives it; 0 if left out")
     ] = None
     travel: Annotated[
-        Schedule | None, Scheduled("position", about="at the start [m]; a schedule drives it; 0 if left out")
+        Schedule | None, Scheduled("position", about="travel at the start [m]; a schedule drives it; 0 if left out")
     ] = None
     rate: Annotated[
         Any,
-        OfJoint("angular_velocity", "at the start, of a ball or a free body [x, y, z] in its own axes; 0 if left out"),
+        OfJoint(
+            "angular_velocity",
+            "rate at the start; of a ball joint or free body [x, y, z] in the axes of the body; 0 if left out",
+        ),
     ] = None
     velocity: Annotated[
         tuple[float, ...] | None,
-        Rows("velocity", length=3, about="of a free body's centre of mass at the start [m/s]; 0 if left out"),
+        Rows(
+            "velocity",
+            length=3,
+            about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
+        ),
     ] = None
-    damping: Annotated[Any, OfJoint("damping", "torque or force against its rate; 0 if left out")] = None
+    damping: Annotated[Any, OfJoint("damping", "damping torque or force per rate; 0 if left out")] = None
     stiffness: Annotated[
-        Any, OfJoint("stiffness", "of a spring that pulls its angle or travel back to 0; none if left out")
+        Any, OfJoint("stiffness", "stiffness of a spring towards angle or travel 0; none if left out")
     ] = None
 
     @classmethod
@@ -110,31 +118,35 @@ class Joint(Table):
         if own is None:
             return faults
         others = {key for keys in JOINTS.values() for key in keys} - {*own}
-        wanted = f"its keys are {', '.join(('on', 'at', 'attitude', *own))}"
-        faults += [((key,), f"goes with no joint of kind {show(kind)}; {wanted}") for key in given if key in others]
+        allowed = f"its keys are {', '.join(('on', 'at', 'attitude', *own))}"
+        faults += [
+            ((key,), f"is not a key of joints of kind {show(kind)}; {allowed}") for key in given if key in others
+        ]
         if "axis" in own and "axis" not in given:
             faults.append(((), f"axis is missing: a {kind} joint moves along or about one, for example [0, 1, 0]"))
         if kind == "free" and "on" in given:
-            faults.append((("on",), "goes with no free joint, which joins a body to nothing; leave it out"))
+            faults.append((("on",), "does not go with a free joint, which has no carrier; remove it"))
         if isinstance(given.get("axis"), (list, tuple)) and len(given["axis"]) == 3:
             if all(isinstance(x, (int, float)) for x in given["axis"]) and no_direction(given["axis"]):
-                faults.append((("axis",), "is all zeros; wanted a direction, for example [0, 1, 0]"))
+                faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))
         if "at" in given and isinstance(given.get("on"), str) and "." in given["on"]:
-            faults.append((("at",), f"{given['on']} says where it is; leave at out, or name the body alone"))
+            faults.append(
+                (("at",), f"{given['on']} gives the position already; remove at, or name only the body in on")
+            )
         return faults
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
-        """The same; rate, damping and stiffness read in the units of its kind."""
-        kind, found, faults = given.get("kind", "free"), dict(given), []
+        """The table with rate, damping and stiffness read in the units of its kind of joint."""
+        kind, result, faults = given.get("kind", "free"), dict(given), []
         rate, damping, stiffness = SLIDING if kind == "prismatic" else TURNING
-        three = kind in ("ball", "free")
-        values = {"rate": Rows(rate, length=3) if three else Quantity(rate), "damping": Quantity(damping, nonnegative),
+        triple = kind in ("ball", "free")
+        values = {"rate": Rows(rate, length=3) if triple else Quantity(rate), "damping": Quantity(damping, nonnegative),
                   "stiffness": Quantity(stiffness, nonnegative)}  # fmt: skip
         for key, value in values.items():
             try:
                 if key in given:
-                    found[key] = value.read(given[key], setting)
+                    result[key] = value.read(given[key], setting)
             except Misfit as error:
                 faults += [((key, *below), text) for below, text in error.faults]
             except ValueError as error:
@@ -142,48 +154,48 @@ class Joint(Table):
         driven = [key for key in ("angle", "travel") if isinstance(given.get(key), dict)]
         for key in ("rate", "damping", "stiffness") if driven else ():
             if key in given:
-                faults.append(((key,), f"its {driven[0]} is driven, so its {key} decides nothing; leave it out"))
+                faults.append(((key,), f"has no effect, because {driven[0]} is driven by a schedule; remove it"))
         if faults:
             raise Misfit(faults)
-        return found
+        return result
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from uneven("axis", self.axis)
 
     @property
     def driven(self) -> Schedule | None:
-        """What drives it, if anything does."""
+        """Schedule that drives the joint, None without one."""
         given = self.coordinate
         return given if given is not None and not given.constant else None
 
     @property
     def coordinate(self) -> Schedule | None:
-        """Its angle or travel."""
+        """Angle or travel of the joint."""
         return self.travel if self.kind == "prismatic" else self.angle
 
     @property
     def unit_axis(self) -> np.ndarray:
-        """Its axis, of length 1 : float64[3]."""
+        """Unit vector along the axis : float64[3]."""
         axis = np.array(self.axis or (0.0, 0.0, 0.0))
         return axis / (np.linalg.norm(axis) or 1.0)
 
     @property
     def turning(self) -> np.ndarray:
-        """Angular velocity of a ball or a free body at the start, in its own axes : float64[3]."""
+        """Angular velocity of a ball joint or a free body at the start, in the axes of the body : float64[3]."""
         return np.array(self.rate or (0.0, 0.0, 0.0))
 
     @property
     def speed(self) -> np.ndarray:
-        """Velocity of a free body's centre of mass at the start : float64[3]."""
+        """Velocity of the centre of mass of a free body at the start : float64[3]."""
         return np.array(self.velocity or (0.0, 0.0, 0.0))
 
 
 class Body(Node, kind="body"):
-    """A rigid body, F = m a_c and T = J alpha + w x J w about its centre of mass (68), moved by its joint's freedoms.
+    """A rigid body, F = m a_c and T = J alpha + w x J w about its centre of mass (68), moved by its joint.
 
     Ports: its origin, and its points, `NAME.POINT`; velocity and force. Stored energy: m v_c^2 / 2 + w J w / 2 +
-    m g z_c + k s^2 / 2 of its joint [J]. Dissipated power: damping times rate^2 of its joint [W]; a driven joint brings
-    its torque times rate.
+    m g z_c + k s^2 / 2 of its joint [J]. Dissipated power: damping times rate^2 of its joint [W]. A driven joint
+    supplies its torque times rate.
     """
 
     domain: ClassVar[str] = "spatial"
@@ -194,23 +206,23 @@ class Body(Node, kind="body"):
         **along("momentum_", "momentum"), **along("angular_momentum_", "angular_momentum"),
     }  # fmt: skip
 
-    mass: Annotated[float, Quantity("mass", positive, "of all that moves with it [kg]",
+    mass: Annotated[float, Quantity("mass", positive, "mass of all that moves with it [kg]",
                                     Usual(1e-6, 1e9, "poppets to ships"))]  # fmt: skip
     inertia: Annotated[Any, Inertia()]
-    centre_of_mass: Annotated[tuple[float, ...], Rows("position", length=3, about="in its own axes [m]")] = (
-        0.0, 0.0, 0.0
-    )  # fmt: skip
+    centre_of_mass: Annotated[
+        tuple[float, ...], Rows("position", length=3, about="centre of mass in the axes of the body [m]")
+    ] = (0.0, 0.0, 0.0)
     points: Annotated[dict[str, tuple[float, ...]], PlacesByName()] = {}
-    joint: Annotated[Joint, Inside(Joint, "by which it hangs on another, or on the world")] = Joint()
+    joint: Annotated[Joint, Inside(Joint, "joint to another body or the world")] = Joint()
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
-        where = "decides nothing: a body is where joint.at, angle or travel put it; leave it out"
+        where = "has no effect: joint.at, angle or travel set the position of a body; remove it"
         return faults + [((key,), where) for key in ("elevation", "position") if key in given]
 
     def moment(self) -> np.ndarray:
-        """Its inertia about the centre of mass in its own axes [kg m2] : float64[3, 3]."""
+        """Inertia matrix about the centre of mass in the axes of the body [kg m2] : float64[3, 3]."""
         given = np.array(self.inertia, dtype=float)
         return np.diag(given) if given.ndim == 1 else given
 
@@ -219,7 +231,7 @@ SHARES = ("relative", "coriolis", "transversal", "centripetal")
 
 
 class BodyPoint(Node, kind=""):
-    """A point of a body, or of the world: where a link may push. No part of its own."""
+    """A point of a body or of the world, to which a link may apply a force. Not a part of its own."""
 
     kind: ClassVar[str] = "point"
     domain: ClassVar[str] = "spatial"

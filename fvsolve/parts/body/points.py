@@ -1,4 +1,4 @@
-"""PlacesByName of a body and its inertia, as a case says them. Knows forms and ranges; knows no joint."""
+"""Points of a body and its inertia, as values of a case file."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ import numpy as np
 from fvsolve.parts.value import Matrix, Misfit, Rows, Setting, Value, nonnegative
 from fvsolve.units import show
 
-SLACK = 1e-6  # of the largest moment, by which numbers typed with six digits may break the triangle inequality
+SLACK = 1e-6  # share of the largest moment: tolerance of the triangle inequality for numbers of six digits
 
 
 class PlacesByName(Value):
-    """A table of places by name."""
+    """A table of points by name."""
 
     takes = "`{ NAME = [x, y, z] }`"
 
-    def __init__(self, about: str = "places that links push at, in its own axes [m]") -> None:
+    def __init__(self, about: str = "points for links, in the axes of the body [m]") -> None:
         self.about = about
 
     def read(self, given: Any, setting: Setting) -> dict[str, tuple[float, ...]]:
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table; wanted {{ NAME = [x, y, z] }}")
-        found, faults = {}, []
+            raise ValueError(f"{show(given)} is not a table; expected {{ NAME = [x, y, z] }}")
+        points, faults = {}, []
         for name, place in given.items():
             if not re.fullmatch(r"[\w-]+", name):
-                faults.append(((name,), f"{show(name)} is no name; a name has letters, digits, _ and -"))
+                faults.append(((name,), f"{show(name)} is not a valid name; a name has letters, digits, _ and -"))
             try:
-                found[name] = Rows("position", length=3).read(place, setting)
+                points[name] = Rows("position", length=3).read(place, setting)
             except Misfit as error:
                 faults += [((name, *below), text) for below, text in error.faults]
             except ValueError as error:
                 faults.append(((name,), str(error)))
         if faults:
             raise Misfit(faults)
-        return found
+        return points
 
     def below(self, key: str) -> Value:
         return Rows("position", length=3)
@@ -46,25 +46,27 @@ class PlacesByName(Value):
 
 
 class Inertia(Value):
-    """Three moments about the axes through the centre of mass, or the whole matrix, symmetric."""
+    """Three moments about the axes through the centre of mass, or the whole symmetric matrix."""
 
-    about = "about the centre of mass in its own axes: moments about x, y, z, or 3 x 3 [kg m2]"
+    about = "inertia about the centre of mass in the axes of the body: moments about x, y, z, or 3 x 3 [kg m2]"
     takes = "[kg m2, kg m2, kg m2], or three such rows"
     changes = "profile"
 
     def read(self, given: Any, setting: Setting) -> tuple:
         if not isinstance(given, (list, tuple)) or len(given) != 3:
-            raise ValueError(f"{show(given)} is no inertia; wanted moments about x, y and z, or three rows of three")
+            raise ValueError(
+                f"{show(given)} is not an inertia; expected moments about x, y and z, or three rows of three"
+            )
         if any(isinstance(row, (list, tuple)) for row in given):
-            found = Matrix("inertia").read(given, setting)
-            moments = principal(found)
+            inertia = Matrix("inertia").read(given, setting)
+            moments = principal(inertia)
         else:
-            found = Rows("inertia", nonnegative, length=3).read(given, setting)
-            moments = np.sort(found)
+            inertia = Rows("inertia", nonnegative, length=3).read(given, setting)
+            moments = np.sort(inertia)
         if moments[2] > moments[0] + moments[1] + SLACK * moments[2]:
-            text = ", ".join(f"{one:.4g}" for one in moments)
-            raise ValueError(f"moments of {text} kg m2 belong to no body: one is above the sum of the other two")
-        return found
+            text = ", ".join(f"{moment:.4g}" for moment in moments)
+            raise ValueError(f"moments of {text} kg m2 are not possible: the largest exceeds the sum of the other two")
+        return inertia
 
     def below(self, key: str) -> Value:
         return Rows("inertia", length=3)
@@ -74,11 +76,11 @@ class Inertia(Value):
 
 
 def principal(rows: tuple) -> np.ndarray:
-    """Moments about the principal axes, rising; ValueError of a matrix that is not symmetric, or of negative ones."""
+    """Principal moments, ascending; ValueError if the matrix is not symmetric or a moment is negative."""
     matrix = np.array(rows)
     if np.abs(matrix - matrix.T).max() > SLACK * np.abs(matrix).max():
-        raise ValueError(f"{show(rows)} is not symmetric; wanted the moments, and minus the products of inertia")
+        raise ValueError(f"{show(rows)} is not symmetric; expected the moments, and minus the products of inertia")
     moments = np.linalg.eigvalsh(matrix)
     if moments[0] < -SLACK * moments[2]:
-        raise ValueError(f"has a principal moment of {moments[0]:.4g} kg m2; wanted none below 0")
+        raise ValueError(f"has a principal moment of {moments[0]:.4g} kg m2; expected all at least 0")
     return moments

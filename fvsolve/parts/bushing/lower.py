@@ -8,7 +8,7 @@ from fvsolve.model.mechanism import point_row, pose_of
 
 
 class BushingRows(Lowering, kind="bushing"):
-    """Six forces between two bodies."""
+    """Three forces and three torques between two bodies."""
 
     table = "bushing"
 

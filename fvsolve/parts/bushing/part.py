@@ -1,4 +1,4 @@
-"""A block of rubber between two bodies. Knows how stiff it is; computes no force."""
+"""Elastic bushings between two bodies: keys and faults."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative
 
 
 class Bushing(TwoPort, kind="bushing"):
-    """Pulls point `to` to point `from`, and turns its body back to how it stood at the start, by the deviation (56).
+    """Pulls point `to` to point `from` and turns its body back to the initial relative attitude, by the deviation (56).
 
     force = -stiffness gap - damping d(gap)/dt, torque = -2 rotational_stiffness eta eps - rotational_damping w~ (57),
     in the axes of `from`, on both bodies at point `to`. Ports: from, to; velocity and force. Stored energy: stiffness
@@ -22,13 +22,18 @@ class Bushing(TwoPort, kind="bushing"):
 
     def faults(self, name: str, around: Around) -> Faults:
         if not any((self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)):
-            yield ("stiffness",), "is 0, as are damping and both of turning: it holds nothing; expected one above 0"
+            yield (
+                ("stiffness",),
+                "is 0, like damping and both rotational coefficients; expected at least one above 0",
+            )
 
     stiffness: Annotated[float, Quantity("stiffness", nonnegative, "force per gap [N/m]", changes=VALUE)] = 0.0
-    damping: Annotated[float, Quantity("damping", nonnegative, "force per rate of that [N s/m]", changes=VALUE)] = 0.0
+    damping: Annotated[float, Quantity("damping", nonnegative, "force per rate of the gap [N s/m]", changes=VALUE)] = (
+        0.0
+    )
     rotational_stiffness: Annotated[
-        float, Quantity("torque", nonnegative, "torque per angle, of small ones [N m]", changes=VALUE)
+        float, Quantity("torque", nonnegative, "torque per angle, for small angles [N m]", changes=VALUE)
     ] = 0.0
     rotational_damping: Annotated[
-        float, Quantity("rotational_damping", nonnegative, "torque per rate of turning [N m s]", changes=VALUE)
+        float, Quantity("rotational_damping", nonnegative, "torque per angular velocity [N m s]", changes=VALUE)
     ] = 0.0

@@ -1,4 +1,4 @@
-"""Closed volumes in the tables of a model: chambers, and those that the piston of a cylinder moves."""
+"""Closed volumes in the tables of a model: chambers, and the chambers of cylinders."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from fvsolve.model.lowering import Lowering
 
 
 def on_axis(case, cylinder) -> bool:
-    """Whether a cylinder joins masses on one axis, and no points of bodies."""
+    """True if a cylinder joins masses on one axis, not points of bodies."""
     ends = [cylinder.ports[port] for port in ("case", "rod")]
     return all(getattr(case.nodes.get(end), "domain", "") == "translational" for end in ends)
 
 
 class ChamberRows(Lowering, kind="chamber"):
-    """A place whose pressure is that of the fluid it holds."""
+    """A node whose pressure follows from the mass of the fluid in it."""
 
     def place(self, draft, name, node, row) -> None:
         moving, air = name in draft.owned, draft.fluid.air
@@ -21,7 +21,7 @@ class ChamberRows(Lowering, kind="chamber"):
         row["stiffness"] = draft.fluid.bulk_modulus / (draft.fluid.density * node.volume)
         swept = moving and on_axis(draft.case, draft.case.links[name.rpartition(".")[0]])
         row["y"] = draft.states([f"{name}.{'excess' if swept else 'mass'}"], 1e5 / row["stiffness"])
-        if moving or (air is not None and air.fraction > 0.0):  # which softens it
+        if moving or (air is not None and air.fraction > 0.0):  # air makes the stiffness depend on pressure
             row["row"] = draft.stiff()
 
     def pressure_at_start(self, start, i, node, row) -> float | None:
@@ -29,5 +29,5 @@ class ChamberRows(Lowering, kind="chamber"):
             return node.initial_pressure
         return start.case.ambient_pressure if row["kind"] == rec.MOVING and not start.touched(i) else None
 
-    def moves(self, name, node, row, inflow, flow, told) -> str:
-        return f"chamber {name}: pressure changes by {told(row['stiffness'] * inflow, 'pressure', span=True)}/s"
+    def moves(self, name, node, row, inflow, flow, amount) -> str:
+        return f"chamber {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"

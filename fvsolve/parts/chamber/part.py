@@ -1,4 +1,4 @@
-"""A closed volume of fluid. Knows its size; knows no link."""
+"""Closed volumes of fluid: keys and faults."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ class Chamber(Rider, kind="chamber"):
     fixes_pressure: ClassVar[bool] = True
 
     volume: Annotated[
-        float, Quantity("volume", positive, "fluid held [m3]", Usual(1e-10, 1e5, "cylinders to caverns"), VALUE)
+        float, Quantity("volume", positive, "volume of fluid [m3]", Usual(1e-10, 1e5, "cylinders to caverns"), VALUE)
     ]
     initial_pressure: Annotated[
-        float | None, Quantity("pressure", about="at the start [Pa]; in equilibrium if left out")
+        float | None, Quantity("pressure", about="pressure at the start [Pa]; in equilibrium if left out")
     ] = None
 
     def faults(self, name: str, around: Around) -> Faults:

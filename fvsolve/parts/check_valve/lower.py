@@ -1,4 +1,4 @@
-"""Check valves in the tables of a scene."""
+"""Check valves in the tables of a model."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fvsolve.parts.check_valve import law, law_slam
 from fvsolve.parts.disc.law import CHECK
 from fvsolve.parts.disc.lower import Lifting
 
-SHORT = 1e-6  # time over which the deceleration of a flow is taken [s]
-SMALL_FLOW = 1e-9  # share of the flows of a scene below which a reversed one is rounding
+SHORT = 1e-6  # interval of the difference quotient for the deceleration of the flow [s]
+SMALL_FLOW = 1e-9  # share of the flow scale below which a reversed flow is rounding
 
 
 class CheckDisc(Lifting, kind=""):
-    """A check valve whose disc takes its time."""
+    """A check valve whose disc moves with a delay."""
 
     mode = CHECK
 
@@ -27,23 +27,23 @@ class CheckDisc(Lifting, kind=""):
         part, ratio = self.part(start, k), start.ratio.get(k, 1.0)
 
         def newton(flow, drop, potential):
-            asked, slope, rise = self.flow_at(
+            target, slope, rise = self.flow_at(
                 start, k, drop, (drop * ratio - part.cracking_pressure) / part.overpressure
             )
             slope += rise * ratio / part.overpressure
             size = max(slope, 1e-12 * start.flow_scale)
-            return 1.0 / size, slope / size, (asked - flow) / size, 0.0
+            return 1.0 / size, slope / size, (target - flow) / size, 0.0
 
         return newton
 
     def tell(self, start, name, x):
-        """A disc beside other valves does not lead the column that they hold together."""
+        """Warn that a disc that shares a rigid column with other valves does not control the column."""
         valve, nodes = start.valves[start.draft.valve_names.index(name)], start.nodes
         if any(
             nodes["gates"][valve[end]] >= 0 and nodes["gate_count"][valve[end]] > 1 for end in ("from_node", "to_node")
         ):
-            text = (f"{name}: its disc and other valves hold a rigid column: its lift and flow are not to be trusted "
-                    "from where it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
+            text = (f"{name}: its disc and other valves join the same rigid column: its lift and flow are not reliable "
+                    "once it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
             start.draft.warnings.append(Notice("range", f"links.{name}", text))
 
     def next(self, x, back, now):
@@ -51,19 +51,19 @@ class CheckDisc(Lifting, kind=""):
 
 
 class CheckSwing(CheckDisc, kind=""):
-    """The same with inertia."""
+    """A check valve whose disc has inertia."""
 
     states = ("opening", "speed")
 
 
 class CheckLag(CheckDisc, kind=""):
-    """The same without."""
+    """A check valve whose disc has no inertia."""
 
     states = ("opening",)
 
 
 class CheckValveRows(Device, kind="check-valve"):
-    """Open or shut; its steady state is that in which no open one flows back and no shut one is pushed open."""
+    """An open or shut valve. In the steady state no open valve has reverse flow, and no shut valve is pushed open."""
 
     law, sudden = law, True
     quantities = ("opening",)
@@ -90,7 +90,7 @@ class CheckValveRows(Device, kind="check-valve"):
 
 
 class Slamming(CheckValveRows, kind=""):
-    """One that shuts at the reverse velocity that its maker's curve says."""
+    """A check valve that shuts at the reverse velocity of its manufacturer's curve."""
 
     law = law_slam
     states = ("slam_velocity", "deceleration")
@@ -103,22 +103,22 @@ class Slamming(CheckValveRows, kind=""):
     def scales(self, draft, name, part) -> list[float]:
         return [1.0, 1.0]
 
-    def settle(self, slate, row, t, y, scale) -> None:
-        o, at, curve = row["y"], row["event"], slate.model.case.conduits[self.name(slate, row)].deceleration
-        if slate.armed[at + law_slam.TURNED] == 0.0:
+    def settle(self, run_data, row, t, y, scale) -> None:
+        o, at, curve = row["y"], row["event"], run_data.model.case.conduits[self.name(run_data, row)].deceleration
+        if run_data.armed[at + law_slam.TURNED] == 0.0:
             y[o] = y[o + 1] = 0.0
         elif y[o] == 0.0:
-            y[o + 1] = self.deceleration(slate, row, t, y)
+            y[o + 1] = self.deceleration(run_data, row, t, y)
             y[o] = max(float(np.interp(y[o + 1], curve.rate, curve.reverse_velocity)), law_slam.LEAST)
 
-    def name(self, slate, row) -> str:
-        return slate.model.valve_names[row["valve"]]
+    def name(self, run_data, row) -> str:
+        return run_data.model.valve_names[row["valve"]]
 
-    def deceleration(self, slate, row, t: float, y) -> float:
-        """By how much its velocity falls a second, on the way on which the state has come [m/s2]."""
-        model, k = slate.model, int(slate.model.layout["valve"] + row["valve"])
+    def deceleration(self, run_data, row, t: float, y) -> float:
+        """Deceleration of the flow at the state, by a backward difference along the solution [m/s2]."""
+        model, k = run_data.model, int(run_data.model.layout["valve"] + row["valve"])
         dydt, now, before = np.zeros(y.size), model.new_out(), model.new_out()
-        model.functions.rhs(t, y, dydt, now, slate.handle)
-        model.functions.rhs(t - SHORT, y - SHORT * dydt, np.zeros(y.size), before, slate.handle)
+        model.functions.rhs(t, y, dydt, now, run_data.handle)
+        model.functions.rhs(t - SHORT, y - SHORT * dydt, np.zeros(y.size), before, run_data.handle)
         full = model.tables.floats[row["data"] + law_slam.FULL]
         return max(float(before[k] - now[k]) / (SHORT * full), 0.0)

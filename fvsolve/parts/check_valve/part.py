@@ -1,4 +1,4 @@
-"""A valve that lets flow pass one way. Knows its size; evaluates no flow."""
+"""Check valves: keys, faults and the curve of slam velocities."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from fvsolve.parts.valve.part import Sized
 
 @dataclass(frozen=True)
 class SlamCurve:
-    """Reverse velocity at which a valve slams over the deceleration of its column, linear between entries.
+    """Reverse velocity at which a valve shuts over the deceleration of the flow, linear between entries.
 
-    rate : rising [m/s2]; reverse_velocity : [m/s], of its bore
+    rate : deceleration, ascending [m/s2]; reverse_velocity : velocity in the bore [m/s]
     """
 
     rate: tuple[float, ...]
     reverse_velocity: tuple[float, ...]
 
     def table(self) -> dict[str, list[float]]:
-        """What the file would say."""
+        """The table as in a case file."""
         return {"rate": [*self.rate], "reverse_velocity": [*self.reverse_velocity]}
 
 
 class Slams(Value):
-    """A maker's curve of slams."""
+    """A manufacturer's curve of slam velocities in a case file."""
 
-    about = "reverse velocity at which it shuts over the deceleration with which the flow turned, by its maker"
+    about = "reverse velocity at which it shuts over the deceleration of the flow, from the manufacturer"
     takes = "`{ rate = [...], reverse_velocity = [...] }`, m/s2 and m/s"
     keys = {
         "rate": (Rows("acceleration", nonnegative), NEEDED),
@@ -42,11 +42,13 @@ class Slams(Value):
         if isinstance(given, SlamCurve):
             return given
         if not isinstance(given, dict):
-            raise ValueError(f"is no table; wanted {self.takes}")
-        found, faults = read_keys(given, self.keys, setting), []
-        rate, velocity = found["rate"], found["reverse_velocity"]
+            raise ValueError(f"is not a table; expected {self.takes}")
+        values, faults = read_keys(given, self.keys, setting), []
+        rate, velocity = values["rate"], values["reverse_velocity"]
         if len(rate) != len(velocity):
-            faults.append((("reverse_velocity",), f"{len(velocity)} values for {len(rate)} rates"))
+            faults.append(
+                (("reverse_velocity",), f"{len(velocity)} values for {len(rate)} rates; expected equal numbers")
+            )
         try:
             check_rising(rate, given["rate"], "rates")
         except ValueError as error:
@@ -60,12 +62,12 @@ class Slams(Value):
 
 
 class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
-    """Open, a turbulent restriction q = Cd A sqrt(2 dp / rho) (79); it shuts where the flow reverses, and then q = 0.
+    """Open, a turbulent restriction q = Cd A sqrt(2 dp / rho) (79); it shuts when the flow reverses, and then q = 0.
 
-    It opens again once the drop from `from` to `to` exceeds `cracking_pressure`. With a time_constant or a
-    natural_frequency it takes its time, q = x Cd A sqrt(2 |dp| / rho) sign(dp), its disc drawn to
-    x = (dp - cracking_pressure) / overpressure: then flow turns back before it shuts. With `deceleration` it shuts at
-    the reverse velocity that this says. Ports: from, to. Stored energy: none, its disc's is not counted. Dissipated
+    It opens again when the drop from `from` to `to` exceeds `cracking_pressure`. With a time_constant or a
+    natural_frequency its disc moves with a delay: q = x Cd A sqrt(2 |dp| / rho) sign(dp), and the disc tends to
+    x = (dp - cracking_pressure) / overpressure, so the flow reverses before it shuts. With `deceleration` it shuts at
+    the reverse velocity of that curve. Ports: from, to. Stored energy: none, that of the disc is neglected. Dissipated
     power: dp q [W].
     """
 
@@ -79,7 +81,7 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
         Quantity(
             "pressure_drop",
             positive,
-            "drop above cracking_pressure that opens it fully [Pa], with a disc that takes its time",
+            "drop above cracking_pressure that opens it fully, with a time_constant or natural_frequency [Pa]",
             DROPS,
         ),
     ] = None
@@ -87,7 +89,7 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
 
     @property
     def bore(self) -> float:
-        """Area that the velocities of `deceleration` are of [m2]."""
+        """Area to which the velocities of `deceleration` refer [m2]."""
         return self.area if self.area is not None else math.pi / 4.0 * self.diameter**2
 
     @classmethod
@@ -97,11 +99,11 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
         if moves and "overpressure" not in given:
             faults.append(((), "overpressure is missing: the drop above cracking_pressure that holds it fully open"))
         if "overpressure" in given and not moves:
-            faults.append((("overpressure",), "wants a time_constant or a natural_frequency beside it"))
+            faults.append((("overpressure",), "needs a time_constant or a natural_frequency"))
         if "deceleration" in given and moves:
-            text = "says how it shuts, as its time_constant or natural_frequency does; leave one out"
+            text = "does not go with time_constant or natural_frequency, which also define how it shuts; remove one"
             faults.append((("deceleration",), text))
         if "deceleration" in given and not {"area", "diameter"} & set(given):
-            text = "its velocities are of a bore; wanted diameter or area, with loss_coefficient in place of Kv or Cv"
+            text = "its velocities need a bore; expected diameter or area, with loss_coefficient instead of Kv or Cv"
             faults.append((("deceleration",), text))
         return faults

@@ -8,7 +8,7 @@ from fvsolve.parts.schedule import constant
 
 
 class ConnectionRows(Restriction, kind="connection"):
-    """A throat with a loss each way."""
+    """A throat with a loss coefficient for each direction."""
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"], row["back"] = draft.schedules.add(constant(1.0)), link.back

@@ -1,4 +1,4 @@
-"""What a vessel is joined by, and with what loss each way. Knows its size; knows no vessel."""
+"""Throat between a vessel and its node: keys, and the link made from them."""
 
 from __future__ import annotations
 
@@ -12,35 +12,39 @@ from fvsolve.units import show
 
 
 class Connection(Table):
-    """The throat between a vessel and its place: dp = loss rho v |v| / 2, v in its area, one loss each way."""
+    """The throat between a vessel and its node: dp = loss rho v |v| / 2, v in its area, a loss for each direction."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
 
     area: Annotated[
-        float | None, Quantity("area", positive, "of the throat [m2]", Usual(1e-9, 200.0, "capillaries to shafts"))
+        float | None, Quantity("area", positive, "area of the throat [m2]", Usual(1e-9, 200.0, "capillaries to shafts"))
     ] = None
     diameter: Annotated[
-        float | None, Quantity("length", positive, "of the throat [m]", Usual(5e-5, 14.0, "capillaries to shafts"))
+        float | None,
+        Quantity("length", positive, "diameter of the throat [m]", Usual(5e-5, 14.0, "capillaries to shafts")),
     ] = None
-    # losses alike have other roots, where a pipe joins
+    # shape: with equal losses a pipe end has other roots
     loss_in: Annotated[
-        float, Number(positive, "K of K rho v^2 / 2 with v in the throat, into the vessel", changes=SHAPE)
+        float,
+        Number(
+            positive, "loss coefficient K in K rho v^2 / 2, v in the throat, for flow into the vessel", changes=SHAPE
+        ),
     ]
-    loss_out: Annotated[float, Number(positive, "K likewise, out of the vessel", changes=SHAPE)]
+    loss_out: Annotated[float, Number(positive, "loss coefficient K for flow out of the vessel", changes=SHAPE)]
 
 
 class Joined(Value):
-    """The table of a connection."""
+    """The table of a connection in a case file."""
 
-    about = "a throat with a loss each way; joined without loss if left out"
+    about = "throat with a loss for each direction; joined without loss if left out"
     takes = "[connection](#connection)"
 
     def read(self, given: Any, setting: Setting) -> Connection:
         if isinstance(given, Connection):
             return given
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no connection; wanted {{ diameter, loss_in, loss_out }}")
+            raise ValueError(f"{show(given)} is not a connection; expected {{ diameter, loss_in, loss_out }}")
         return Connection.model_validate(given, context=setting)
 
     def below(self, key: str) -> Value | None:
@@ -51,7 +55,7 @@ class Joined(Value):
 
 
 class Throat(TwoPort):
-    """A connection as a link: from the place where the vessel is joined to what is inside."""
+    """A connection as a link from the node of the vessel to the vessel inside."""
 
     kind: ClassVar[str] = "connection"
 
@@ -61,29 +65,29 @@ class Throat(TwoPort):
     laminar_reynolds: float | None = None
 
     def flow_area(self) -> float:
-        """Area over the root of the loss into the vessel [m2]."""
+        """Area over the square root of the loss into the vessel [m2]."""
         return self.throat / math.sqrt(self.size.loss_in)
 
     @property
     def throat(self) -> float:
-        """Its area [m2]."""
+        """Area of the throat [m2]."""
         return self.size.area if self.size.area is not None else math.pi / 4.0 * self.size.diameter**2
 
     @property
     def back(self) -> float:
-        """Conductance out of the vessel over that into it [-]."""
+        """Conductance out of the vessel over the conductance into it [-]."""
         return self.size.loss_in / self.size.loss_out
 
 
 def joined(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any], dict[str, Throat]]:
-    """(places, links) of a vessel: itself, or `place` at `name`, the throat and the vessel inside."""
+    """(places, links) of a vessel: the vessel alone, or `place` at `name`, the throat and the vessel inside."""
     if vessel.connection is None:
         return {name: vessel}, {}
     return behind(name, vessel.model_copy(update={"connection": None}), place, vessel.connection)
 
 
 def behind(name: str, inside: Any, place: Any, size: Connection) -> tuple[dict[str, Any], dict[str, Throat]]:
-    """(places, links) of what lies inside, behind a throat from `place` at `name`."""
+    """(places, links) of a vessel `inside` a throat from `place` at `name`."""
     ends = {"from": name, "to": f"{name}.inside"}
     throat = Throat.model_construct(**ends, size=size, diameter=size.diameter, area=size.area)
     return {name: place, f"{name}.inside": inside}, {f"{name}.connection": throat}

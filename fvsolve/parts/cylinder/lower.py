@@ -1,4 +1,4 @@
-"""Cylinders in the tables of a model; their chambers are places of their own."""
+"""Cylinders in the tables of a model; their chambers are nodes of their own."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class CylinderRows(Push, kind="cylinder"):
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        apart, row["speed"] = join(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
-        row["position"] = apart - link.closed_length
+        distance, row["speed"] = join(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
+        row["position"] = distance - link.closed_length
         row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
         row["area_a"], row["area_b"] = link.areas()
         row["stroke"], row["leakage"], row["damping"] = link.stroke, link.leakage, link.viscous_friction

@@ -1,4 +1,4 @@
-"""A piston between two chambers. Knows sizes and ports; computes no pressure and no force."""
+"""Hydraulic cylinders: keys, faults and chambers."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ AREAS = Usual(1e-7, 30.0, "micro-hydraulics to presses")
 
 
 class Cylinder(Link, kind="cylinder"):
-    """Chambers A and B, V_A = dead_volume_A + area_A x, V_B = dead_volume_B + area_B (stroke - x), x = x_rod - x_case -
-    closed_length, between points of bodies their distance less closed_length.
+    """Chambers A and B, V_A = dead_volume_A + area_A x, V_B = dead_volume_B + area_B (stroke - x).
 
+    x = x_rod - x_case - closed_length; between points of bodies, their distance minus closed_length.
     The piston pushes the rod forward by area_A p_A - area_B p_B - viscous_friction (v_rod - v_case), p from ambient,
-    and the case back by as much. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored energy: that
-    of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
+    and the case backward by the same force. Ports: rod, case (velocity, force); places A, B (pressure, flow). Stored
+    energy: that of its chambers. Dissipated power: leakage (p_A - p_B)^2 + viscous_friction (v_rod - v_case)^2 [W].
     """
 
     no_scalars: ClassVar[str] = "its chambers carry no scalars yet"
@@ -30,72 +30,77 @@ class Cylinder(Link, kind="cylinder"):
     quantities: ClassVar[dict[str, str]] = {"force": "force", "position": "position", "velocity": "velocity"}
 
     ports: Annotated[dict[str, str], Ports(("rod", "case"))]
-    stroke: Annotated[float, Quantity("length", positive, "from x = 0, rod in, to x = stroke [m]", SIZES, VALUE)]
+    stroke: Annotated[
+        float, Quantity("length", positive, "stroke, from x = 0 (rod in) to x = stroke [m]", SIZES, VALUE)
+    ]
     closed_length: Annotated[
-        float, Quantity("length", nonnegative, "from case to rod with the rod in, x = 0 [m]", changes=PROFILE)
+        float, Quantity("length", nonnegative, "distance from case to rod with the rod in, x = 0 [m]", changes=PROFILE)
     ] = 0.0
     area_A: Annotated[
         float | None,
-        Quantity("area", positive, "of the piston at A [m2]; piston_diameter is needed if left out", AREAS),
+        Quantity("area", positive, "area of the piston at A [m2]; piston_diameter is needed if left out", AREAS),
     ] = None
     area_B: Annotated[
         float | None,
-        Quantity("area", positive, "the ring at B, without the rod [m2]; rod_diameter is needed if left out", AREAS),
+        Quantity("area", positive, "ring area at B, without the rod [m2]; rod_diameter is needed if left out", AREAS),
     ] = None
-    piston_diameter: Annotated[float | None, Quantity("length", positive, "in place of area_A [m]", SIZES)] = None
+    piston_diameter: Annotated[
+        float | None, Quantity("length", positive, "diameter of the piston, instead of area_A [m]", SIZES)
+    ] = None
     rod_diameter: Annotated[
-        float | None, Quantity("length", nonnegative, "in place of area_B, beside piston_diameter [m]", SIZES)
+        float | None,
+        Quantity("length", nonnegative, "diameter of the rod, instead of area_B, with piston_diameter [m]", SIZES),
     ] = None
     dead_volume_A: Annotated[
-        float, Quantity("volume", positive, "of A with the rod in, lines included [m3]", changes=VALUE)
+        float, Quantity("volume", positive, "volume of A with the rod in, lines included [m3]", changes=VALUE)
     ]
     dead_volume_B: Annotated[
-        float, Quantity("volume", positive, "of B with the rod out, lines included [m3]", changes=VALUE)
+        float, Quantity("volume", positive, "volume of B with the rod out, lines included [m3]", changes=VALUE)
     ]
     initial_pressure_A: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="at the start [Pa]; what holds its load if shut, else as its links leave it if left out",
+            about="pressure at the start [Pa]; load pressure if shut, else that of its links if left out",
         ),
     ] = None
     initial_pressure_B: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="at the start [Pa]; what holds its load if shut, else as its links leave it if left out",
+            about="pressure at the start [Pa]; load pressure if shut, else that of its links if left out",
         ),
     ] = None
     leakage: Annotated[float, Quantity("leakage", nonnegative, "flow from A to B per pressure [m3/s/Pa]")] = 0.0
-    viscous_friction: Annotated[float, Quantity("damping", nonnegative, "of piston and rod [N s/m]", changes=VALUE)] = (
-        0.0
-    )
-    elevation: Annotated[float | None, Quantity("length", about="of both chambers, as of nodes [m]")] = None
+    viscous_friction: Annotated[
+        float, Quantity("damping", nonnegative, "viscous friction of piston and rod [N s/m]", changes=VALUE)
+    ] = 0.0
+    elevation: Annotated[float | None, Quantity("length", about="elevation of both chambers [m]")] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
         if "area_A" not in given and "piston_diameter" not in given:
-            faults.append(((), "wanted area_A or piston_diameter"))
+            faults.append(((), "area_A or piston_diameter is missing"))
         if "area_B" not in given and "rod_diameter" not in given:
-            faults.append(((), "wanted area_B or rod_diameter"))
+            faults.append(((), "area_B or rod_diameter is missing"))
         if "rod_diameter" in given and "area_A" in given and "piston_diameter" not in given:
-            faults.append((("rod_diameter",), "goes with piston_diameter; give area_B beside area_A"))
+            faults.append((("rod_diameter",), "needs piston_diameter; with area_A give area_B instead"))
         return faults
 
     def faults(self, name: str, around: Around) -> Faults:
         for place, pressure in (("A", self.initial_pressure_A), ("B", self.initial_pressure_B)):
             if pressure is not None:
                 yield from around.vacuum("links", name, f"initial_pressure_{place}", [pressure])
-        if (apart := around.ahead(self, "case", "rod")) is None:
+        if (distance := around.ahead(self, "case", "rod")) is None:
             return
-        x, (rod, case) = apart - self.closed_length, (self.ports["rod"], self.ports["case"])
+        x, (rod, case) = distance - self.closed_length, (self.ports["rod"], self.ports["case"])
         if not 0.0 <= x <= self.stroke:
-            closed = ", less closed_length" if self.closed_length else ""
-            text = f"the piston starts at {x:g} m, {rod} less {case}{closed}; wanted 0 to {self.stroke:g} m"
+            closed = " minus closed_length" if self.closed_length else ""
+            text = f"the piston starts at {x:g} m ({rod} minus {case}{closed}); expected 0 to {self.stroke:g} m"
             yield ("stroke",), text
         if min(self.areas()) <= 0.0:
-            yield ("rod_diameter",), "leaves no area at B; wanted one below piston_diameter"
+            yield ("rod_diameter",), "leaves no area at B; expected a diameter below piston_diameter"
 
     def areas(self) -> tuple[float, float]:
         """Areas of the piston at A and at B [m2]."""
@@ -105,7 +110,7 @@ class Cylinder(Link, kind="cylinder"):
         return bore, math.pi / 4.0 * (self.piston_diameter**2 - self.rod_diameter**2)
 
     def chambers(self, x: float) -> dict[str, Chamber]:
-        """Its two chambers with the piston at x [m]."""
+        """Both chambers with the piston at x [m]."""
         a, b = self.areas()
         volumes = {"A": self.dead_volume_A + a * x, "B": self.dead_volume_B + b * (self.stroke - x)}
         given = {"A": self.initial_pressure_A, "B": self.initial_pressure_B}

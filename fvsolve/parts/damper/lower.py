@@ -6,7 +6,7 @@ from fvsolve.model.masses import Push, join
 
 
 class DamperRows(Push, kind="damper"):
-    """A force by the speed between two bodies."""
+    """A force proportional to the relative velocity of two bodies."""
 
     books = "dissipated"
     table, rank = "brace", 1

@@ -1,4 +1,4 @@
-"""A viscous damper between two bodies. Knows its damping; computes no force."""
+"""Viscous dampers between two bodies."""
 
 from __future__ import annotations
 

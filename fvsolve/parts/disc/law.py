@@ -1,10 +1,10 @@
-"""A disc on a spring that opens a restriction, M |M| = G x^2 dP. Knows one disc; knows no network.
+"""A disc on a spring that opens a restriction, M |M| = G x^2 dP.
 
-T dx/dt = target - x, or x'' = w^2 (target - x) - 2 zeta w x', between its seat at 0 and its stop at 1, where it comes
-to rest: armed[event] says that it is against its stop, armed[event + 2] that it is on its seat. target =
-(what is felt - what begins to open it) / span, of the pressure before a relief valve, of the drop across a check valve.
+T dx/dt = target - x, or x'' = w^2 (target - x) - 2 zeta w x', between the seat at 0 and the stop at 1, where the disc
+comes to rest: armed[event] marks it at its stop, armed[event + 2] on its seat. target = (lifting pressure - opening
+pressure) / span; the lifting pressure is the upstream pressure of a relief valve, or the drop across a check valve.
 
-Where it alone holds a rigid column, it leads that from its seat (armed[event + 4]): `devices.lead`.
+A disc that alone joins a rigid column controls its flow near the seat (armed[event + 4]): `kernels.valve_seating`.
 """
 
 from math import sqrt
@@ -17,11 +17,12 @@ from fvsolve.kernels.records import CLOSING, RATE
 from fvsolve.kernels.restrictions import head_drop
 
 RELIEF, CHECK = 0, 1  # modes
-LIFT, TARGET, FELT, SPAN, TIME, SWING, DAMPING = 0, 1, 2, 3, 4, 5, 6  # numbers: three of the start, then its keys
-AT_REST = 1e-10  # share of its span that does not lift it off a stop: rounding must not
-SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
-EARLY = 1e-6  # share of 1 / w by which it is asked which way it moves
-SLAM = 1e-9  # share of T or 1 / w in which a disc that is about to reach its seat has done so
+# indices into its numbers: lift, target and lifting pressure at the start, then the keys
+LIFT, TARGET, FELT, SPAN, TIME, SWING, DAMPING = 0, 1, 2, 3, 4, 5, 6
+AT_REST = 1e-10  # drive away from a stop, over the span, at which the disc leaves it; above rounding
+SETTLED = 0.5 * AT_REST  # share of the span by which it comes to rest earlier than it leaves
+EARLY = 1e-6  # time over 1 / w that its speed is extrapolated for the direction of motion
+SLAM = 1e-9  # time over T or 1 / w before the seat at which a closing disc counts as seated
 
 
 @njit
@@ -32,14 +33,14 @@ def disc_lift(y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Its conductance G x^2."""
+    """Write its conductance G x^2."""
     k, x = device["valve"], min(max(disc_lift(y, tables, device), 0.0), 1.0)
     out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
 
 
 @njit
 def disc_drive(y, out, tables, device):
-    """target - x."""
+    """target - x at the present state."""
     k = device["valve"]
     before = out[tables.layout[0]["pressure"] + tables.valves[k]["from_node"]]
     return disc_push(y, tables, device, before, head_drop(tables, out, k)[1])
@@ -47,60 +48,60 @@ def disc_drive(y, out, tables, device):
 
 @njit
 def disc_push(y, tables, device, before, drop):
-    """target - x, at p' before it and a drop across it."""
+    """target - x at an upstream pressure deviation p' and a drop across the disc."""
     floats, data = tables.floats, device["data"]
-    felt = before if device["mode"] == RELIEF else drop - floats[data + FELT]
-    return (floats[data + TARGET] - floats[data + LIFT]) + felt / floats[data + SPAN] - y[device["y"]]
+    lifting = before if device["mode"] == RELIEF else drop - floats[data + FELT]
+    return (floats[data + TARGET] - floats[data + LIFT]) + lifting / floats[data + SPAN] - y[device["y"]]
 
 
 @njit
 def lead(t, y, tables, device, before, behind, drop, ahead):
-    """dx/dt at p' before it and a drop across it, and what of it rises with the drop [1/Pa/s]."""
+    """dx/dt at pressures p' of its ends and a drop across it, and the derivative of dx/dt by the drop [1/Pa/s]."""
     floats, armed, at, data = tables.floats, tables.armed, device["event"], device["data"]
     if armed[at] > 0.0 or armed[at + 2] > 0.0:
         return 0.0, 0.0
     if device["states"] == 2:
         return y[device["y"] + 1], 0.0
-    felt = device["mode"] == CHECK or ahead
-    slope = disc_slope(tables, device) if felt else 0.0
+    by_drop = device["mode"] == CHECK or ahead
+    slope = disc_slope(tables, device) if by_drop else 0.0
     return disc_push(y, tables, device, before, drop) / floats[data + TIME], slope
 
 
 @njit
 def disc_slope(tables, device):
-    """d(dx/dt) / d(what it feels) [1/Pa/s]; none of a disc with inertia."""
+    """d(dx/dt) / d(lifting pressure) [1/Pa/s]; 0 for a disc with inertia."""
     floats, data = tables.floats, device["data"]
     return 1.0 / (floats[data + TIME] * floats[data + SPAN]) if device["states"] == 1 else 0.0
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Rates of its lift and of its speed, none against a stop; its greatest rate.
+    """Rates of its lift and speed, 0 at a stop, and its rate limit.
 
-    And -x'/x where it closes on a column into out[CLOSING]: one that flows back slams it, x ~ (time left)^(1/3), which
-    no step leads across.
+    While the disc closes on a column, -x'/x goes into out[CLOSING]: a column that flows back slams the disc,
+    x ~ (time left)^(1/3), and a step must not pass that instant.
     """
     floats, armed, at, o = tables.floats, tables.armed, device["event"], device["y"]
-    drive, held = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
+    drive, stopped = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
     time, swing = floats[device["data"] + TIME], floats[device["data"] + SWING]
     own = 1.0 / time if device["states"] == 1 else swing * max(1.0, 2.0 * floats[device["data"] + DAMPING])
-    out[RATE] = max(out[RATE], own if held else disc_loop(y, out, tables, device, own))
+    out[RATE] = max(out[RATE], own if stopped else disc_loop(y, out, tables, device, own))
     if dydt.size == 0:
         return
     if device["states"] == 1:
-        dydt[o] = 0.0 if held else drive / time
+        dydt[o] = 0.0 if stopped else drive / time
     else:
-        dydt[o] = 0.0 if held else y[o + 1]
-        dydt[o + 1] = 0.0 if held else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
+        dydt[o] = 0.0 if stopped else y[o + 1]
+        dydt[o + 1] = 0.0 if stopped else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
     valve, nodes = tables.valves[device["valve"]], tables.nodes
-    brakes = nodes[valve["from_node"]]["gates"] >= 0 or nodes[valve["to_node"]]["gates"] >= 0
-    if brakes and dydt[o] < 0.0 and not leads(tables, device["valve"]):
+    on_column = nodes[valve["from_node"]]["gates"] >= 0 or nodes[valve["to_node"]]["gates"] >= 0
+    if on_column and dydt[o] < 0.0 and not leads(tables, device["valve"]):
         out[CLOSING] = max(out[CLOSING], -dydt[o] / max(disc_lift(y, tables, device), 1e-300))
 
 
 @njit
 def disc_loop(y, out, tables, device, own):
-    """Its rate with that of the places at its ends in the loop; where a column sets its flow, d dP / dx = -2 dP / x."""
+    """Rate limit including the nodes at its ends; where a column sets the flow, d dP / dx = -2 dP / x."""
     k, speed, nodes = device["valve"], own / tables.floats[device["data"] + SPAN], tables.nodes
     before, behind = tables.valves[k]["from_node"], tables.valves[k]["to_node"]
     if leads(tables, k):
@@ -115,12 +116,12 @@ def disc_loop(y, out, tables, device, own):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: way to its stop, to its seat, to where it leads no column any more; each both ways."""
+    """g: distance to the stop, to the seat, and to the lift at which it stops controlling a column; each both ways."""
     armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
     stop, seat = -drive - AT_REST, drive - AT_REST
     if device["states"] == 1:
-        down = AT_REST if armed[at + 4] > 0.0 else -SETTLED  # its column holds it back, as it did not on its seat
+        down = AT_REST if armed[at + 4] > 0.0 else -SETTLED  # the column delays it, unlike on the seat
         onward, speed = (drive + down, drive + SETTLED), drive
     else:
         speed = y[o + 1] / tables.floats[device["data"] + SWING] + EARLY * drive
@@ -135,6 +136,6 @@ def events(t, y, out, tables, device, g):
 
 
 @njit
-def value(t, y, out, tables, device, which):
-    """Its lift, 0 to 1."""
+def value(t, y, out, tables, device, quantity):
+    """Lift, 0 to 1."""
     return min(max(disc_lift(y, tables, device), 0.0), 1.0)

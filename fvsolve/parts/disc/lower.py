@@ -1,4 +1,4 @@
-"""Valves whose disc is lifted by a pressure in the tables of a scene, and how they stand in its steady state."""
+"""Valves with a disc lifted by pressure, in the tables of a model and in its steady state."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from fvsolve.model.device import Device, opening_of
 from fvsolve.parts.disc import law
 from fvsolve.steady import Edge
 
-LIFTING, OPEN = "lifting", "open"  # in `start.shut`, shut
-SEATED = 1e-12  # lift below its seat of a disc that has slammed, so that rounding does not open it
-SMALL_LIFT = 1e-9  # of a lift, what is rounding
-STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "", "")  # leads its column: not told
+LIFTING, OPEN = "lifting", "open"  # modes of a valve; shut valves are in `start.shut`
+SEATED = 1e-12  # lift below the seat of a disc that has slammed, so that rounding does not open it
+SMALL_LIFT = 1e-9  # lift that counts as rounding
+# control of a column (the last two) is not reported
+STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "", "")
 
 
 class Lifting(Device, kind=""):
-    """Shut, fully open, or lifted between; with a disc that takes its time its lift is a state."""
+    """A valve that is shut, fully open, or lifted between; a disc with a delay has its lift as a state."""
 
     law, leads = law, 4
     quantities = ("opening",)
@@ -24,7 +25,7 @@ class Lifting(Device, kind=""):
     remedy = "give it a greater overpressure"
 
     def numbers(self, draft, name, part) -> list[float]:
-        """At the start: lift, where the pressures draw it, what it feels; then its span, and how its disc moves."""
+        """Lift, target and lifting pressure at the start; then the span and the dynamics of the disc."""
         frequency = part.natural_frequency or 0.0
         return [0.0, 0.0, 0.0, part.overpressure, part.time_constant or 0.0, 2.0 * math.pi * frequency,
                 part.damping_ratio or 0.0]  # fmt: skip
@@ -32,10 +33,10 @@ class Lifting(Device, kind=""):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
-    def settle(self, slate, row, t, y, scale) -> None:
-        tables = slate.model.tables
-        stop, seat = (slate.armed[row["event"] + k] > 0.0 for k in (0, 2))
-        if self.states and seat and law.disc_lift(y, tables, row) > 0.0:  # it has slammed
+    def settle(self, run_data, row, t, y, scale) -> None:
+        tables = run_data.model.tables
+        stop, seat = (run_data.armed[row["event"] + k] > 0.0 for k in (0, 2))
+        if self.states and seat and law.disc_lift(y, tables, row) > 0.0:  # the disc has slammed
             y[row["y"]] = -tables.floats[row["data"] + law.LIFT] - SEATED
         if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
@@ -44,7 +45,7 @@ class Lifting(Device, kind=""):
         return start.draft.devices[start.valves[k]["device"]][1]
 
     def felt(self, start, k: int) -> float:
-        """What lifts it beyond its first opening, in the solution just found [Pa]."""
+        """Lifting pressure beyond the opening pressure in the present steady solution [Pa]."""
         raise NotImplementedError
 
     def edge(self, start, k):
@@ -56,10 +57,10 @@ class Lifting(Device, kind=""):
         return Edge(i, j, self.row(start, k), 0.0, senses=i)
 
     def follow(self, start, k) -> None:
-        """Nothing: `begin` sees to it."""
+        """Nothing: `begin` sets the drop."""
 
     def flow_at(self, start, k: int, drop: float, lift: float) -> tuple[float, float, float]:
-        """(flow, its slope over the drop at this lift, its slope over the lift)."""
+        """(flow, its derivative by the drop at this lift, its derivative by the lift)."""
         g = float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0)
         transition = transition_of(start.valves[k], g)
         full, x = flow_at_drop(g, transition, drop), max(lift, 0.0)
@@ -78,7 +79,7 @@ class Lifting(Device, kind=""):
         return after != before
 
     def next(self, x: float, back: bool, now: str) -> str:
-        """As what it should stand in the next solution."""
+        """Mode in the next steady solution."""
         if now == "shut":
             return LIFTING if x > SMALL_LIFT else now
         if x < -SMALL_LIFT:
@@ -100,8 +101,8 @@ class Lifting(Device, kind=""):
         return [f"{name}: shut, though the pressure lifts it"] if start.rest and target > SMALL_LIFT else []
 
     def put_lift(self, start, row, x: float, target: float) -> None:
-        """Its lift at the start, and where the pressures draw it."""
+        """Store the lift and the target at the start."""
         start.draft.tables.floats[row["data"] : row["data"] + 2] = x, target
 
     def tell(self, start, name: str, x: float) -> None:
-        """What its user may not expect."""
+        """Add notices about the start."""

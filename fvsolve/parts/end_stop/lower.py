@@ -4,22 +4,24 @@ from __future__ import annotations
 
 from fvsolve.model.masses import Push, join
 
-FAR = 1e300  # room before a stop that is not there
+FAR = 1e300  # distance to a stop that does not exist
 
 
 class EndStopRows(Push, kind="end-stop"):
-    """A spring and a damper that push where two bodies meet."""
+    """A spring and a damper that act while two bodies are in contact."""
 
     table = "stop"
 
     def fill(self, draft, name, link, rows) -> None:
-        from fvsolve.kernels.masses import contact  # models without bodies load none of it
+        from fvsolve.kernels.masses import contact  # not loaded by models without bodies
 
         (row,) = rows
         x, speed = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
         row["below"] = FAR if link.least is None else x - link.least
         row["above"] = FAR if link.greatest is None else link.greatest - x
-        for room, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
-            if room <= 0.0:
-                row["force"] += sign * contact(float(link.stiffness), float(link.damping), -room, float(-sign * speed))
+        for distance, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
+            if distance <= 0.0:
+                row["force"] += sign * contact(
+                    float(link.stiffness), float(link.damping), -distance, float(-sign * speed)
+                )

@@ -1,4 +1,4 @@
-"""What keeps two bodies within reach of one another. Knows where it touches; computes no force."""
+"""End stops between two bodies: keys and faults."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative, positive
 
 
 class EndStop(Coupling, kind="end-stop"):
-    """Contact where x_to - x_from leaves [least, greatest], by a depth d: max(0, stiffness d + damping dd/dt) back.
+    """Contact outside least <= x_to - x_from <= greatest, at depth d with force max(0, stiffness d + damping dd/dt).
 
     Ports: from, to; the force pushes `to` forward, so it is negative at `greatest`; it never pulls. Stored energy:
     stiffness d^2 / 2 [J]. Dissipated power: (force - stiffness d) dd/dt [W].
@@ -18,13 +18,13 @@ class EndStop(Coupling, kind="end-stop"):
 
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("least", "greatest"),)
 
-    stiffness: Annotated[float, Quantity("stiffness", positive, "of the contact [N/m]", changes=VALUE)]
-    damping: Annotated[float, Quantity("damping", nonnegative, "of the contact [N s/m]", changes=VALUE)] = 0.0
+    stiffness: Annotated[float, Quantity("stiffness", positive, "stiffness of the contact [N/m]", changes=VALUE)]
+    damping: Annotated[float, Quantity("damping", nonnegative, "damping of the contact [N s/m]", changes=VALUE)] = 0.0
     least: Annotated[
-        float | None, Quantity("position", about="x_to - x_from below which it pushes [m]", changes=VALUE)
+        float | None, Quantity("position", about="x_to - x_from below which the stop acts [m]", changes=VALUE)
     ] = None
     greatest: Annotated[
-        float | None, Quantity("position", about="x_to - x_from above which it holds [m]", changes=VALUE)
+        float | None, Quantity("position", about="x_to - x_from above which the stop acts [m]", changes=VALUE)
     ] = None
 
     def faults(self, name: str, around: Around) -> Faults:

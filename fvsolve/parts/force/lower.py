@@ -1,4 +1,4 @@
-"""Forces from outside in the tables of a model."""
+"""External forces in the tables of a model."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from fvsolve.model.masses import Push, join
 
 
 class ForceRows(Push, kind="force"):
-    """A force by a schedule."""
+    """A force given by a schedule."""
 
     books = "supplied"
     table, rank = "brace", 2
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        how = () if link.direction is None else (rec.TOWARD, link.direction / np.linalg.norm(link.direction))
-        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *how)
+        direction = () if link.direction is None else (rec.TOWARD, link.direction / np.linalg.norm(link.direction))
+        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *direction)
         row["schedule"] = draft.schedules.add(link.force)
 
     def inputs(self, model, name, part):
@@ -27,5 +27,5 @@ class ForceRows(Push, kind="force"):
 
 
 def brace_of(model, name: str):
-    """The BRACE row of a link."""
-    return model.tables.braces[[one for one, _, _ in rows_in(model.case, "brace")].index(name)]
+    """BRACE row of a link."""
+    return model.tables.braces[[link for link, _, _ in rows_in(model.case, "brace")].index(name)]

@@ -1,4 +1,4 @@
-"""A force from outside on a mass or a body. Knows its course; knows no body."""
+"""External forces on a mass or a body: keys and faults."""
 
 from __future__ import annotations
 
@@ -15,19 +15,21 @@ from fvsolve.parts.value import Rows, Text
 
 
 class Force(Coupling, kind="force"):
-    """force(t) on `to`, forward; as much back on `from`, where there is one.
+    """force(t) on `to`, forward; the opposite force acts on `from`, if given.
 
-    Ports: from, to. Stored and dissipated energy: none; it brings force times (v_to - v_from) [W], in space along its
+    Ports: from, to. Stored and dissipated energy: none; it supplies force times (v_to - v_from) [W], in space along its
     direction.
     """
 
     may_lack: ClassVar[tuple[str, ...]] = ("from",)
 
-    from_: Annotated[str | None, Text("what it pushes itself off from, if anything"), Field(alias="from")] = None
-    force: Annotated[Schedule, Scheduled("force", about="on `to`, positive forward [N]")]
+    from_: Annotated[
+        str | None, Text("mass or point that takes the reaction; none if left out"), Field(alias="from")
+    ] = None
+    force: Annotated[Schedule, Scheduled("force", about="force on `to`, positive forward [N]")]
     direction: Annotated[
         tuple[float, ...] | None,
-        Rows("number", length=3, about="forward in the world, of a point; the line from `from` to `to` if left out"),
+        Rows("number", length=3, about="direction in world axes, for points; the line from `from` to `to` if left out"),
     ] = None
 
     @property
@@ -37,14 +39,14 @@ class Force(Coupling, kind="force"):
 
     def faults(self, name: str, around: Around) -> Faults:
         if no_direction(self.direction):
-            yield ("direction",), "is all zeros; wanted for example [0, 0, -1]"
+            yield ("direction",), "is all zeros; expected for example [0, 0, -1]"
         if around.spatial(self.to) and self.from_ is None and self.direction is None:
             yield (
                 (),
-                "direction is missing: without `from` a force on a point needs one, [0, 0, -1] is down",
+                "direction is missing: a force on a point without `from` needs it; [0, 0, -1] is down",
             )
         if not around.spatial(self.to) and self.direction is not None:
-            yield ("direction",), f"{self.to} moves along one axis, which is its direction; leave it out"
+            yield ("direction",), f"{self.to} moves along one axis, which is the direction of the force; remove it"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from uneven("direction", self.direction)

@@ -4,4 +4,4 @@ from fvsolve.model.masses import OnAxis
 
 
 class FrameRows(OnAxis, kind="frame"):
-    """A body that stands still."""
+    """A fixed body on the axis."""

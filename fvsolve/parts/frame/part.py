@@ -1,4 +1,4 @@
-"""A body that stands still. Knows where; knows no force."""
+"""Frames: fixed positions on the axis and points in the world."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.value import Quantity
 
 
 class Frame(Node, kind="frame"):
-    """A fixed place on the axis, velocity zero whatever force it takes.
+    """A fixed position on the axis; its velocity is zero under any force.
 
     Ports: those of the links that name it, velocity and force. Stored and dissipated energy: none.
     """
@@ -18,5 +18,5 @@ class Frame(Node, kind="frame"):
     domain: ClassVar[str] = "translational"
     quantities: ClassVar[dict[str, str]] = {"position": "position"}
 
-    initial_position: Annotated[float, Quantity("position", about="where it stands on the common axis [m]")] = 0.0
-    points: Annotated[dict[str, tuple[float, ...]], PlacesByName("places in the world that links push at [m]")] = {}
+    initial_position: Annotated[float, Quantity("position", about="position on the common axis [m]")] = 0.0
+    points: Annotated[dict[str, tuple[float, ...]], PlacesByName("points in the world for links [m]")] = {}

@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class InflowRows(Lowering, kind="inflow"):
-    """A junction whose demand is negative."""
+    """A junction with negative demand."""
 
     books = "inflow"
 

@@ -1,4 +1,4 @@
-"""A place that feeds a given flow. Knows its flow; knows no link."""
+"""Nodes with a given inflow: keys."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from fvsolve.parts.schedule import Schedule, Scheduled
 
 
 class Inflow(Rider, kind="inflow"):
-    """A place without volume that feeds `flow(t)` into its links.
+    """A node without volume that supplies `flow(t)` to its links.
 
-    Ports: any number. Stored energy: none. Dissipated energy: none; it brings p times flow [W].
+    Ports: any number. Stored energy: none. Dissipated energy: none; it supplies p times flow [W].
     """
 
     driven: ClassVar[tuple[str, float]] = "flow", 1.0
     own_scalars: ClassVar[str] = "inflow"
 
-    flow: Annotated[Schedule, Scheduled("flow", about="positive into the network, of the reference density [m3/s]")]
+    flow: Annotated[Schedule, Scheduled("flow", about="flow at reference density, positive into the network [m3/s]")]

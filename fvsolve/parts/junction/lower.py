@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class JunctionRows(Lowering, kind="junction"):
-    """A place whose flows sum to what is drawn there."""
+    """A node at which the flows add up to the demand."""
 
     books = "demand"
 

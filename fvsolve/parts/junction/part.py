@@ -1,4 +1,4 @@
-"""A place where links meet. Knows its demand; knows no link."""
+"""Junctions and their demands: keys and faults."""
 
 from __future__ import annotations
 
@@ -14,27 +14,28 @@ from fvsolve.parts.value import Number, Quantity, between
 
 
 class Junction(Rider, kind="junction"):
-    """A place without volume: the flows into its links and its demand sum to zero.
+    """A node without volume: the flows into its links and its demand sum to zero.
 
-    Ports: any number. Stored energy: none. Dissipated energy: none; the demand leaves with p demand [W].
+    Ports: any number. Stored energy: none. Dissipated energy: none; the demand removes p demand [W].
 
-    With a `required_pressure` it gets what its pressure allows, demand ((p - minimum) / (required - minimum))^exponent
-    from none at `minimum_pressure` to all at `required_pressure` and above (Wagner, Shamir and Marks 1988); what it
-    gets runs out to ambient, and (p - ambient) q is dissipated [W].
+    With a `required_pressure` the demand depends on pressure: demand ((p - minimum) / (required - minimum))^exponent,
+    0 at `minimum_pressure`, all of it at `required_pressure` and above (Wagner, Shamir and Marks 1988). It flows out
+    to ambient, and (p - ambient) q is dissipated [W].
     """
 
     driven: ClassVar[tuple[str, float]] = "demand", -1.0
 
-    demand: Annotated[Schedule, Scheduled("flow", about="positive outward, of the reference density [m3/s]")] = Field(
-        default_factory=lambda: constant(0.0)
+    demand: Annotated[Schedule, Scheduled("flow", about="demand at reference density, positive outward [m3/s]")] = (
+        Field(default_factory=lambda: constant(0.0))
     )
     required_pressure: Annotated[
-        float | None, Quantity("pressure", about="from which it gets all of its demand [Pa]; always if left out")
+        float | None,
+        Quantity("pressure", about="pressure from which the full demand is supplied [Pa]; always supplied if left out"),
     ] = None
     minimum_pressure: Annotated[
-        float | None, Quantity("pressure", about="up to which it gets none [Pa]; ambient if left out")
+        float | None, Quantity("pressure", about="pressure up to which no demand is supplied [Pa]; ambient if left out")
     ] = None
-    demand_exponent: Annotated[float, Number(between(0, 3, open=True), "of the pressure between the two")] = 0.5
+    demand_exponent: Annotated[float, Number(between(0, 3, open=True), "exponent of the pressure between both")] = 0.5
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         if self.required_pressure is None:
@@ -49,12 +50,12 @@ class Junction(Rider, kind="junction"):
         least = around.ambient if self.minimum_pressure is None else self.minimum_pressure
         if self.required_pressure is None:
             if self.minimum_pressure is not None:
-                yield ("minimum_pressure",), "says nothing without required_pressure"
+                yield ("minimum_pressure",), "has no effect without required_pressure"
             return
         if self.required_pressure <= least:
             text = f"{self.required_pressure:g} Pa is not above the pressure of no flow, {least:g} Pa"
             yield ("required_pressure",), text
         if least < around.ambient:
-            yield ("minimum_pressure",), f"{least:g} Pa is below ambient, where nothing runs out"
+            yield ("minimum_pressure",), f"{least:g} Pa is below ambient pressure, where nothing flows out"
         if not (self.demand.value.min() >= 0.0 and self.demand.value.max() > 0.0):
-            yield ("demand",), "wanted a demand, none of it negative, beside required_pressure"
+            yield ("demand",), "with required_pressure, expected a demand that is never negative and not always 0"

@@ -1,4 +1,4 @@
-"""A hole through which fluid is lost. Knows its coefficient; evaluates no flow."""
+"""Leaks and emitters: keys and faults."""
 
 from __future__ import annotations
 
@@ -16,20 +16,22 @@ from fvsolve.parts.value import Number, Text, Usual, between, positive
 class Leak(Link, kind="leak"):
     """A leak or emitter, q = opening coefficient (p - ambient)^exponent, none where p is below ambient.
 
-    Port: from; it runs out at the elevation of its place. Below 10 Pa, a millimetre of head, a cubic leads from there
-    to no flow. Stored energy: none. Dissipated power: (p - ambient) q [W].
+    Port: from; the outflow is at the elevation of its node. Below 10 Pa, a millimetre of head, a cubic joins the power
+    law to zero flow. Stored energy: none. Dissipated power: (p - ambient) q [W].
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic"}
 
-    from_: Annotated[str, Text("the place it drains"), Field(alias="from")]
+    from_: Annotated[str, Text("place at which it leaks"), Field(alias="from")]
     coefficient: Annotated[
-        float, Number(positive, "q in m3/s at a drop of 1 Pa", Usual(1e-15, 0.1, "seeping to a main torn off"))
+        float, Number(positive, "flow in m3/s at a drop of 1 Pa", Usual(1e-15, 0.1, "seeping to a main torn off"))
     ]
-    exponent: Annotated[float, Number(between(0, 3, open=True), "of the drop, 0.5 for a hole of fixed size")] = 0.5
-    opening: Annotated[Schedule, Scheduled("number", between(0, 1), "share of the coefficient that is open")] = Field(
-        default_factory=lambda: constant(1.0)
-    )
+    exponent: Annotated[
+        float, Number(between(0, 3, open=True), "exponent of the drop, 0.5 for a hole of fixed size")
+    ] = 0.5
+    opening: Annotated[
+        Schedule, Scheduled("number", between(0, 1), "relative opening, a factor of the coefficient")
+    ] = Field(default_factory=lambda: constant(1.0))
 
     @property
     def ports(self) -> dict[str, str]:
@@ -42,5 +44,5 @@ class Leak(Link, kind="leak"):
 
     def faults(self, name: str, around: Around) -> Faults:
         if getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
-            text = "is a reservoir, whose pressure no leak changes; wanted a junction, a tank or another place"
+            text = "is a reservoir, whose pressure a leak cannot change; expected a junction, a tank or another place"
             yield ("from",), f"{self.from_} {text}"

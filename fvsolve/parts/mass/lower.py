@@ -4,4 +4,4 @@ from fvsolve.model.masses import OnAxis
 
 
 class MassRows(OnAxis, kind="mass"):
-    """A body that forces move."""
+    """A body on an axis, moved by forces."""

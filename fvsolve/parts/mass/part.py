@@ -1,4 +1,4 @@
-"""A body that moves along one axis. Knows its inertia; knows no force."""
+"""Masses that move along one axis: keys."""
 
 from __future__ import annotations
 
@@ -18,7 +18,10 @@ class Mass(Node, kind="mass"):
     quantities: ClassVar[dict[str, str]] = {"position": "position", "velocity": "velocity"}
 
     mass: Annotated[
-        float, Quantity("mass", positive, "of all that moves with it [kg]", Usual(1e-6, 1e9, "poppets to ships"), VALUE)
+        float,
+        Quantity("mass", positive, "mass of all that moves with it [kg]", Usual(1e-6, 1e9, "poppets to ships"), VALUE),
     ]
-    initial_position: Annotated[float, Quantity("position", about="at the start, along the common axis [m]")] = 0.0
-    initial_velocity: Annotated[float, Quantity("velocity", about="at the start [m/s]")] = 0.0
+    initial_position: Annotated[
+        float, Quantity("position", about="position at the start, along the common axis [m]")
+    ] = 0.0
+    initial_velocity: Annotated[float, Quantity("velocity", about="velocity at the start [m/s]")] = 0.0

@@ -4,4 +4,4 @@ from fvsolve.parts.valve.lower import ValveRows
 
 
 class OrificeRows(ValveRows, kind="orifice"):
-    """As a valve."""
+    """Rows of orifices, equal to those of valves."""

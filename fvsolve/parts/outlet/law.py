@@ -1,9 +1,10 @@
-"""Outflow as a power of the drop, none backwards: leaks, and demands that follow the pressure. Knows one outlet.
+"""Outflow to ambient as a power of the drop, without backflow: leaks, and demands that depend on pressure.
 
-M = sqrt(G span) min(most, x^n), x = (drop - least) / span. Below LEAST_DROP a cubic leads from no flow with no slope
-to the power, so that the slope is bounded and has no jump; n, least, span and most are four numbers in `floats`, the
-fifth says where its flags stand. These change on accepted states alone, so that no step meets a bend: shut, it lets
-nothing out; short of all that is asked it goes on beyond it; with all of it, it falls short at half of x alone.
+M = sqrt(G span) min(most, x^n), x = (drop - least) / span. Below LEAST_DROP a cubic joins the power law to zero flow
+with zero slope, so that the slope is bounded and continuous. `floats` has n, least, span and most; `event` of the
+VALVE row is the index of the flags. The flags change on accepted states only, so that no step crosses a kink. Shut,
+the outlet passes nothing. With a part of its demand (PART) the power law holds also above `most`. With all of it
+(FULL) the flow stays at the limit until x is half of its value at full demand.
 """
 
 from math import sqrt
@@ -11,17 +12,17 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.either import either
 
-LEAST_DROP = 10.0  # drop above `least` below which the cubic holds [Pa]
-EVENTS = 4  # of an outlet: it shuts, it opens; it gives all that is asked, or less
-FREE, SHUT, PART, FULL = 0, 1, 2, 3  # rules; FREE as the drop says
-SLIGHT = 1e-3  # drop by which it must pass `least` before it opens or shuts: rounding must not [Pa]
-NEAR = 1e-9  # the same of what gives all, of span
-NO_END = 1e300  # as the most that is asked
+LEAST_DROP = 10.0  # drop above `least` below which the cubic applies [Pa]
+EVENTS = 4  # of an outlet: it shuts, opens, supplies all of its demand, or less
+FREE, SHUT, PART, FULL = 0, 1, 2, 3  # rules; FREE: by the drop alone
+SLIGHT = 1e-3  # drop beyond `least` at which it opens or shuts, so that rounding does not [Pa]
+NEAR = 1e-9  # such a margin at full demand, over span
+NO_END = 1e300  # value of `most` without a limit
 
 
 @njit(forceinline=True)
 def rule_of(tables, k):
-    """The rule that restriction k follows until its next event."""
+    """Rule of restriction k until its next event."""
     armed, at = tables.armed, tables.valves[k]["event"]
     if armed[at] > 0.0:
         return SHUT
@@ -30,7 +31,7 @@ def rule_of(tables, k):
 
 @njit(forceinline=True)
 def bent(floats, at, drop, rule):
-    """(drop above `least` as the power sees it, most) under a rule."""
+    """(drop above `least` for the power law, most) under a rule."""
     above, most = drop - floats[at + 1], floats[at + 3]
     if rule == PART:
         return above, NO_END
@@ -70,32 +71,32 @@ def emitter_slope(floats, at, g, drop, rule):
 
 @njit
 def cubic_root(n, share):
-    """s in [0, 1] with s^2 ((3 - n) + (n - 2) s) = share, by Newton between bounds."""
+    """s in [0, 1] with s^2 ((3 - n) + (n - 2) s) = share, by bounded Newton."""
     low, high, s = 0.0, 1.0, sqrt(share)
     for _ in range(60):
-        miss = s * s * ((3.0 - n) + (n - 2.0) * s) - share
-        if miss > 0.0:
+        residual = s * s * ((3.0 - n) + (n - 2.0) * s) - share
+        if residual > 0.0:
             high = s
         else:
             low = s
         slope = s * (2.0 * (3.0 - n) + 3.0 * (n - 2.0) * s)
-        new = s - miss / slope if slope > 0.0 else low
-        new = new if low < new < high else 0.5 * (low + high)
-        if abs(new - s) <= 1e-12 * s:
+        next_s = s - residual / slope if slope > 0.0 else low
+        next_s = next_s if low < next_s < high else 0.5 * (low + high)
+        if abs(next_s - s) <= 1e-12 * s:
             break
-        s = new
+        s = next_s
     return s
 
 
 @njit
 def emitter_drop(floats, at, g, flow, rule):
-    """Drop [Pa] at which it carries a flow [kg/s]; that from which on it is none for none."""
+    """Drop [Pa] at which it carries a flow [kg/s]; for no flow, the drop at which flow begins."""
     n, span = floats[at], floats[at + 2]
     if flow <= 0.0 or g <= 0.0:
         return floats[at + 1]
     most, least = NO_END if rule == PART else floats[at + 3], (LEAST_DROP / span) ** n
-    share = min(most, flow / sqrt(g * span))
-    above = LEAST_DROP * cubic_root(n, share / least) if share < least else span * share ** (1.0 / n)
+    ratio = min(most, flow / sqrt(g * span))
+    above = LEAST_DROP * cubic_root(n, ratio / least) if ratio < least else span * ratio ** (1.0 / n)
     return floats[at + 1] + (0.5 * above if rule == FULL else above)
 
 
@@ -103,21 +104,21 @@ def emitter_drop(floats, at, g, flow, rule):
 def emitter_step(floats, at, g, m, drop, rule):
     """a, s with dM = a + s d(drop) for the next Newton step of an emitter that carries m [kg/s] at a drop [Pa].
 
-    s is the chord between what it carries and what the drop asks for: for n = 1/2 Newton's own slope in M^2. As the
-    flow grows with the drop, and what is left of it for the outlet falls, the root lies between the two: every chord is
-    within that of the iterate before, and Newton cannot go round in circles at a bend.
+    s is the chord between the present flow and the flow at the drop; for n = 1/2 it is Newton's slope in M^2. The flow
+    rises with the drop, and the flow that the network leaves for the outlet falls, so the root lies between both. Every
+    chord lies within the previous one, so Newton cannot cycle at a kink.
     """
-    target, asked = emitter_flow(floats, at, g, drop, rule), emitter_drop(floats, at, g, m, rule)
+    target, own_drop = emitter_flow(floats, at, g, drop, rule), emitter_drop(floats, at, g, m, rule)
     if rule == SHUT:
         return -m, 0.0
-    if abs(drop - asked) <= 1e-6 * abs(drop - floats[at + 1]):
+    if abs(drop - own_drop) <= 1e-6 * abs(drop - floats[at + 1]):
         return target - m, emitter_slope(floats, at, g, drop, rule)
-    return target - m, max(0.0, (target - max(m, 0.0)) / (drop - asked))
+    return target - m, max(0.0, (target - max(m, 0.0)) / (drop - own_drop))
 
 
 @njit
 def bends(tables, k, drop, g):
-    """g: until it shuts, or opens; until it gives all that is asked, or less [Pa]."""
+    """g: margins until it shuts or opens, and until it supplies all of its demand or less [Pa]."""
     valve, floats, armed = tables.valves[k], tables.floats, tables.armed
     at, event = valve["data"], valve["event"]
     above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
@@ -129,7 +130,7 @@ def bends(tables, k, drop, g):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s under the rule that holds; it is its volume that follows the drop."""
+    """a, s under the present rule; the volume flow follows the drop."""
     return emitter_step(tables.floats, tables.valves[k]["data"], g * denser * denser, m, drop, rule_of(tables, k))
 
 

@@ -1,6 +1,6 @@
-"""Of what opens to ambient by the root M = sqrt(G (p - ambient)): an outlet's law of exponent 1/2. Knows one of these.
+"""Flow to ambient by the square-root law M = sqrt(G (p - ambient)): an outlet of exponent 1/2, for valves.
 
-Nothing comes back, and below 10 Pa a cubic leads to no flow.
+No backflow; below 10 Pa a cubic joins the law to zero flow.
 """
 
 from fvsolve.jit import njit
@@ -11,7 +11,7 @@ __all__ = ["bends", "slope", "step"]
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s of its flow under the rule that holds."""
+    """a, s of its flow under the present rule."""
     return emitter_step(tables.floats, tables.valves[k]["data"], g * denser, m, drop, rule_of(tables, k))
 
 

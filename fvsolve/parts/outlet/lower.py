@@ -1,4 +1,4 @@
-"""Ways out to ambient in the tables of a scene."""
+"""Outlets to ambient in the tables of a model."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from fvsolve.model.lowering import Lowering, Restriction
 from fvsolve.parts.outlet import law
 from fvsolve.parts.schedule import constant
 
-SPAN = 1e5  # drop at which an outlet has its flow, if nothing else is said [Pa]
+SPAN = 1e5  # default drop at which an outlet has its nominal flow [Pa]
 
 
 class OutsideRows(Lowering, kind="outside"):
-    """Ambient pressure."""
+    """A node at ambient pressure."""
 
     books = "outside"
 
@@ -23,12 +23,12 @@ class OutsideRows(Lowering, kind="outside"):
     def pressure_at_start(self, start, i, node, row) -> float:
         return start.given(row["schedule"])
 
-    def moves(self, name, node, row, inflow, flow, told) -> str:
+    def moves(self, name, node, row, inflow, flow, amount) -> str:
         return ""
 
 
 class OutletRows(Restriction, kind="outlet"):
-    """Its flow a power of the drop."""
+    """A link whose flow is a power of the drop."""
 
     law = law
     events = ("",) * law.EVENTS
@@ -41,11 +41,11 @@ class OutletRows(Restriction, kind="outlet"):
         return [link.exponent, self.least(draft, link), self.span(draft, link), link.most]
 
     def least(self, draft, link) -> float:
-        """Drop from which on it lets something out [Pa]."""
+        """Drop from which flow begins [Pa]."""
         return 0.0 if link.least is None else link.least - draft.case.ambient_pressure
 
     def span(self, draft, link) -> float:
-        """From there to the drop at which it lets out its flow [Pa]."""
+        """Drop from there to the drop of the nominal flow [Pa]."""
         return SPAN if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
 
     def inputs(self, model, name, part):
@@ -53,15 +53,15 @@ class OutletRows(Restriction, kind="outlet"):
 
 
 class RelievingRows(Device, kind=""):
-    """What is shut at the start and opens to a place, by a root, or to ambient, by an outlet's law of exponent 1/2.
+    """A valve shut at the start that opens to a node (square-root law) or to ambient (outlet of exponent 1/2).
 
-    mode : by how many numbers and flags of an outlet its own are preceded
+    mode : count of numbers and flags of an outlet that precede its own
     """
 
     quantities = ("opening",)
 
     def own_numbers(self, draft, name, part) -> list[float]:
-        """Those of its own."""
+        """Numbers of the valve itself."""
         raise NotImplementedError
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -74,4 +74,4 @@ class RelievingRows(Device, kind=""):
         return new
 
     def follow(self, start, k) -> None:
-        """Nothing: it carries none."""
+        """Nothing: a shut valve carries no flow."""

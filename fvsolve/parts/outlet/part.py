@@ -1,4 +1,4 @@
-"""Ways out of the fluid into ambient. Knows how they open; evaluates no flow."""
+"""Outlets to ambient, and valves that may open to ambient: keys and faults."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.parts.valve.part import Sized
 
 
 class Outside(Node):
-    """Ambient pressure on the level of another place."""
+    """Ambient pressure at the elevation of another node."""
 
     kind: ClassVar[str] = "outside"
     fixes_pressure: ClassVar[bool] = True
@@ -23,9 +23,10 @@ class Outside(Node):
 
 
 class Outlet(TwoPort):
-    """From a place to its outside, q = opening / full flow min(most, ((p - least) / (upper - least))^exponent).
+    """From a place to ambient, q = opening / full flow min(most, ((p - least) / (upper - least))^exponent).
 
-    None back. flow : [m3/s] at p = upper and opening = full; least : [Pa], ambient if None; upper : [Pa], 1 bar above
+    No backflow. flow : [m3/s] at p = upper and opening = full; least : [Pa], ambient if None; upper : [Pa], 1 bar above
+    least if None
     """
 
     kind: ClassVar[str] = "outlet"
@@ -46,14 +47,14 @@ def out_of(name: str, place: str, **law: Any) -> tuple[dict[str, Node], dict[str
 
 
 class Relieving(Sized, Link):
-    """What is shut at the start and opens to another place, or, without `to`, to ambient."""
+    """A valve shut at the start that opens to another place, or, without `to`, to ambient."""
 
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "hydraulic"}
     may_lack: ClassVar[tuple[str, ...]] = ("to",)
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    from_: Annotated[str, Text("the place that it guards"), Field(alias="from")]
-    to: Annotated[str | None, Text("the place it opens to; ambient if left out")] = None
+    from_: Annotated[str, Text("place that it protects"), Field(alias="from")]
+    to: Annotated[str | None, Text("place to which it opens; ambient if left out")] = None
 
     @property
     def ports(self) -> dict[str, str]:
@@ -62,7 +63,7 @@ class Relieving(Sized, Link):
 
     @property
     def outward(self) -> bool:
-        """Whether it opens to ambient."""
+        """True if it opens to ambient."""
         return self.to is None or self.to.endswith(".outside")
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
@@ -73,5 +74,5 @@ class Relieving(Sized, Link):
 
     def faults(self, name: str, around: Around) -> Faults:
         if self.to is None and getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
-            text = f"is a reservoir, whose pressure no {self.kind} relieves; wanted a junction, a tank or another place"
+            text = f"is a reservoir; a {self.kind} cannot relieve it. Expected a junction, a tank or another place"
             yield ("from",), f"{self.from_} {text}"
