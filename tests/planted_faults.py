@@ -107,8 +107,8 @@ FAULTS = [
     Fault("parts/sizes.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
     Fault(
         "parts/accumulator/law.py",
-        "rho * (n * p * soft * (room - volume) + volume)",
-        "rho * (n * p * soft * (room - volume) - volume)",
+        "rho * (n * p * compressibility * (total - volume) + volume)",
+        "rho * (n * p * compressibility * (total - volume) - volume)",
     ),
     Fault("parts/tank/lower.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
     Fault("parts/pump/law_curve.py", "rest = drop + weight * head", "rest = drop + 1.01 * weight * head"),

@@ -10,6 +10,7 @@ stays that alone runs a part, scheme, method, density law, command or shipped ca
 from __future__ import annotations
 
 import argparse
+import functools
 import json
 import os
 import subprocess
@@ -34,12 +35,41 @@ class Cost:
     names: frozenset[str]
 
 
+CALLED: set[str] = set()  # functions that the present test calls
+
+
+def recording(cache):
+    """The same decorator as `cache`, but a cached result counts as calls of the functions that computing it called."""
+
+    def decorator(function):
+        calls: dict = {}
+
+        def watched(*arguments):
+            outer = set(CALLED)
+            CALLED.clear()
+            result = function(*arguments)
+            calls[arguments] = set(CALLED)
+            CALLED.update(outer)
+            return result
+
+        cached = cache(functools.wraps(function)(watched))
+
+        @functools.wraps(function)
+        def called(*arguments):
+            result = cached(*arguments)
+            CALLED.update(calls.get(arguments, ()))
+            return result
+
+        return called if function.__module__.startswith("fvsolve.") else cache(function)
+
+    return decorator
+
+
 class Recorder:
     """Plugin of pytest that writes a line for each test of a worker process."""
 
     def __init__(self, path: Path) -> None:
         self.file = path.open("a", buffering=1, encoding="utf-8")
-        self.called: set[str] = set()
         self.seconds: dict[str, float] = {}
         self.nested: list[float] = []
         self._watch()
@@ -50,11 +80,11 @@ class Recorder:
         code, call, compiled = jit.Function.code, jit.Function.__call__, jit.Function._compiled
 
         def watched_code(function, letters, *more, **options):
-            self.called.add(f"{function.__module__}.{function.__qualname__}({letters})")
+            CALLED.add(f"{function.__module__}.{function.__qualname__}({letters})")
             return code(function, letters, *more, **options)
 
         def watched_call(function, *values):
-            self.called.add(f"{function.__module__}.{function.__qualname__}")
+            CALLED.add(f"{function.__module__}.{function.__qualname__}")
             return call(function, *values)
 
         def watched_compiled(function, key, *more):
@@ -76,7 +106,7 @@ class Recorder:
 
         tally = item.config.stash[TALLY]
         before, tally.names = tally.names, defaultdict(set)
-        self.called.clear()
+        CALLED.clear()
         self.seconds.clear()
         start = processor_seconds()
         try:
@@ -84,7 +114,7 @@ class Recorder:
         finally:
             names = [f"{kind} {name}" for kind, some in tally.names.items() for name in some]
             row = {"test": item.nodeid, "seconds": processor_seconds() - start, "compiled": self.seconds,
-                   "called": sorted(self.called), "names": sorted(names)}  # fmt: skip
+                   "called": sorted(CALLED), "names": sorted(names)}  # fmt: skip
             self.file.write(json.dumps(row) + "\n")
             tally.names = before
 
@@ -93,6 +123,13 @@ def processor_seconds() -> float:
     """Processor time of this process and of its finished children [s]."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
+
+
+if FOLDER in os.environ:  # before fvsolve is imported
+    import fvsolve.jit
+
+    fvsolve.jit.once = recording(fvsolve.jit.once)
+    functools.cache = recording(functools.cache)
 
 
 def pytest_configure(config) -> None:
@@ -114,10 +151,14 @@ def costs(rows: list[dict]) -> tuple[dict[str, Cost], dict[str, float]]:
     for row in rows:
         for name, seconds in row["compiled"].items():
             compiled[name] = max(compiled[name], seconds)
+    by_name = defaultdict(list)
+    for name in compiled:
+        by_name[name.split("(")[0]].append(name)
     return {
         row["test"]: Cost(
             max(0.0, row["seconds"] - sum(row["compiled"].values())),
-            frozenset(name for name in row["called"] if name in compiled) | frozenset(row["compiled"]),
+            frozenset(name for called in row["called"] for name in by_name[called.split("(")[0]] if called in name)
+            | frozenset(row["compiled"]),
             frozenset(row["names"]),
         )
         for row in rows

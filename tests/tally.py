@@ -41,8 +41,8 @@ class Tally:
         self.names[kind].update(names)
 
     def _run(self, run) -> None:
-        case, names = run.model.case, {part: name for name, part in parts().items()}
-        self._add("part", *(names[type(part)] for part in (*case.nodes.values(), *case.links.values())))
+        case = run.model.case
+        self._add("part", *(part.kind for part in (*case.nodes.values(), *case.links.values())))
         self._add("scheme", case.numerics.scheme)
         self._add("law", case.fluid.law)
         if case.path is not None and case.path.resolve().parent == folders.CASES.resolve():

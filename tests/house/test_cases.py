@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 
+import numpy as np
 import pytest
 from truth import folders
 
@@ -26,3 +27,15 @@ def test_a_shipped_case_keeps_its_claims(path):
     assert result.expectations
     assert [e for e in result.expectations if not e.ok] == []
     assert abs(result.ledger["mass"]["relative"]) < 1e-12
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda p: p.stem)
+def test_a_shipped_case_begins(path):
+    """The first hundredth of each case, for the quick tests: mass is kept, and all is finite."""
+    case = fvsolve.load(path)
+    numerics = case.numerics
+    end = numerics.start + 0.01 * (numerics.end - numerics.start)
+    result = fvsolve.run(path, {"numerics.end": end, "expect": {}, "compare": {}})
+    assert result.reason == "finished"
+    assert abs(result.ledger["mass"]["relative"]) < 1e-12
+    assert all(np.isfinite(result[str(probe)]).all() for probe in result.probes)

@@ -13,7 +13,7 @@ from truth.folders import DOCS
 
 TOP = DOCS.parent
 PAGES = {name: (TOP / name).read_text(encoding="utf-8") for name in ("CONTRIBUTING.md", "docs/developing.md")}
-HEAVY = ("python3 -m venv", ".ci/run")  # installs, or runs all
+HEAVY = ("python3 -m venv", ".ci/run", "python tests/")  # installs, or runs many tests
 
 
 def commands() -> list[str]:

@@ -297,7 +297,7 @@ def test_one_pair_is_explained(said):
         (("--method", "rk44"), 'did you mean "rk4"'),
         (("--scheme", "muscl", "--method", "gauss-4"), "gauss-4 is implicit"),
         (("--cells", "2"), "wanted 6 or more"),
-        (("--courant", "-1"), "wanted a positive number"),
+        (("--courant", "-1"), "expected a positive number"),
         (("--steps", "1"), "wanted 10 or more"),
     ],
 )

@@ -57,8 +57,11 @@ def settings(table: dict, keys: tuple, to) -> dict:
     return {spoken(keys[:at]): found}
 
 
-def compare(name: str, table: dict, done: set, every: bool) -> list[str]:
-    """Keys of a case that say another thing by `vary` than read anew; of each kind one, of all cases or of each."""
+def compare(name: str, table: dict, done: set, every: bool, turn: int = 0) -> list[str]:
+    """Keys of a case with other results by `vary` than by a fresh reading; of each kind one, of all cases or of each.
+
+    turn : with `every`, which third of the kinds of keys this case moves
+    """
     model, wrong = fvsolve.build(fvsolve.load(table)), []
     for keys, _ in leaves(table):
         value = declared(table, tuple(key for key in keys if isinstance(key, str)))
@@ -66,6 +69,8 @@ def compare(name: str, table: dict, done: set, every: bool) -> list[str]:
         if kind in done:
             continue
         done.add(kind)
+        if every and (len(done) + turn) % 3:
+            continue
         for to in others(table, keys, value, far=True)[: 3 if every else 1]:
             given = settings(table, keys, to)
             anew = told(lambda given=given: fvsolve.build(fvsolve.load(table, given)))
@@ -82,9 +87,13 @@ def test_each_kind_of_key_of_the_shipped_cases_gives_the_model_of_a_fresh_readin
     assert len(done) > 150
 
 
-@pytest.mark.parametrize("name", [path.stem for path in sorted(CASES.glob("*.toml")) if path.stem not in LARGE])
-def test_every_key_of_every_shipped_case_gives_the_model_of_a_fresh_reading(name):
-    assert compare(name, raw_case(name), set(), every=True) == []
+NAMES = [path.stem for path in sorted(CASES.glob("*.toml")) if path.stem not in LARGE]
+
+
+@pytest.mark.parametrize("turn, name", enumerate(NAMES), ids=NAMES)
+def test_every_key_of_every_shipped_case_gives_the_model_of_a_fresh_reading(turn, name):
+    """Every third kind of key of each case, in turn."""
+    assert compare(name, raw_case(name), set(), every=True, turn=turn) == []
 
 
 SMALL = {"links.main.cells": 12, "numerics.end": 2.0, "output.fields": 0, "expect": {}}

@@ -56,7 +56,7 @@ def surging(numerics: dict) -> dict:
         "down": pipe("fork", "gate", 350.0, 0.4, 1100.0, 20),
         "valve": valve("gate", "out", 0.02, ramp(0.5, 0.2, 1.0, 0.0)),
     }
-    return scene(nodes, links, 4.0, numerics, ["gate.pressure", "main.pressure@0.37", "valve.flow", "down.flow@0.5"])
+    return scene(nodes, links, 2.0, numerics, ["gate.pressure", "main.pressure@0.37", "valve.flow", "down.flow@0.5"])
 
 
 SCENES = {"slam": slam, "surging": surging}
