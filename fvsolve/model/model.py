@@ -305,7 +305,7 @@ class Model(Shown):
     def refuse_lines(self, function: str) -> None:
         """Raise FvsolveError if the model has delay lines: their history is not part of y."""
         if len(self.tables.delays):
-            raise FvsolveError(f"{function}(t, y) is not defined for a model with delay lines: the waves sent into them "
+            raise FvsolveError(f"{function}(t, y) is not defined for a model with delay lines: waves sent into them "
                                'are needed too. Expected rhs(State), or line = "cells" in the case')  # fmt: skip
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:

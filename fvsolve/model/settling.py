@@ -59,7 +59,7 @@ class Found:
 def settled(case, draft) -> tuple[Any, list[Notice]]:
     """Case with bodies and masses in static equilibrium, and notices about it : (case, notices).
 
-    builder : tables of the case with its steady start. Bodies with stated velocities stay where they are.
+    draft : tables of the case with its steady start. Bodies with stated velocities stay where they are.
     Raises CaseError if no equilibrium is found.
     """
     at = Displaced(draft)

@@ -34,7 +34,7 @@ BAD = {
     "products that are not symmetric": (arm(inertia=[[1, 0.2, 0], [0, 1, 0], [0, 0, 1]]), "is not symmetric"),
     "a matrix of no body": (arm(inertia=[[1, 2, 0], [2, 1, 0], [0, 0, 1]]), "principal moment of -1 kg m2"),
     "inertia of nothing": (
-        {**arm(), "b": body(1, [1, 0, 1], hinge(on="arm.bob"))}, "nodes.b.inertia: nothing resists the motion",
+        {**arm(), "b": body(1, [1, 0, 1], hinge(on="arm.bob"))}, "nodes.b.inertia: its inertia is 0",
     ),
     "a joint without axis": (arm(joint={"kind": "revolute"}), "nodes.arm.joint: axis is missing"),
     "an axis of zeros": (arm(joint=hinge(axis=[0, 0, 0])), "nodes.arm.joint.axis: is all zeros"),
