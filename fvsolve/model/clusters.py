@@ -136,7 +136,7 @@ def gates(draft) -> None:
 
 
 def refuse_loose_groups(draft, members) -> None:
-    """Faults of groups of nodes that valves join only to each other, apart from air valves and rigid columns."""
+    """Faults of groups of nodes that only valves join, apart from air valves and rigid columns."""
     nodes, valves, names = draft.node_table, draft.valve_table, list(draft.case.places)
     for group in members.values():
         links = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
@@ -166,22 +166,20 @@ def asks_nothing(draft, i: int) -> bool:
 
 
 def carries_its_column(draft, members, ks) -> bool:
-    """True if a single valve takes the flow of a rigid column: its drop then follows the flow, smooth at zero."""
+    """True if a single valve takes the flow of a rigid column: its drop follows the flow, smooth at zero."""
     ends = np.concatenate((draft.column_table["from_node"], draft.column_table["to_node"]))
     plain = is_root(draft.valve_table)[ks[0]]
     return len(ks) == 1 and len(members) == 1 and members[0] in ends and bool(plain)
 
 
-UNSEEN = (
-    10.0  # in tolerances of a vessel: its tolerance grows with its deviation, up to nine times its scale is allowed for
-)
+UNSEEN = 10.0  # tolerances of a vessel: its tolerance grows with its deviation, here up to nine times its scale
 
 
 def soften(draft, ks) -> None:
     """Bound the slope at zero drop where no pipe end does: laminar flow below Reynolds number 10.
 
-    At a bladder accumulator the bound is at least a drop of 1 Pa, as its neck stores hardly any mass. It is also at least
-    the drop below error control (`tolerated_drop`).
+    At a bladder accumulator the bound is at least a drop of 1 Pa, as its neck stores hardly any mass. It is also at
+    least the drop below error control (`tolerated_drop`).
     """
     places, unseen = list(draft.case.places.values()), unseen_drop(draft, ks)
     for k in ks:

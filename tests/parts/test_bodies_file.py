@@ -119,7 +119,7 @@ def test_a_loop_that_is_not_closed_is_told_by_how_much_and_one_held_twice_by_whi
     assert "links.loop: in some direction nothing can open it" in told(nodes, links)
     nodes, links = parallelogram()
     nodes["two"]["joint"]["rate"] = 0.5
-    assert "links.loop: the rates of the start open it at" in told(nodes, links)
+    assert "links.loop: velocities at the start open it at" in told(nodes, links)
 
 
 def test_a_probe_that_a_joint_has_not_is_refused():
@@ -161,7 +161,7 @@ def test_what_moves_at_the_start_is_said():
     model = fvsolve.build(fvsolve.load(case))
     assert model.steady["moving"] == ["body arm turns at 2 rad/s", "body arm accelerates at 11.79 rad/s2"]
     case["numerics"]["initial"] = "equilibrium"
-    with pytest.raises(CaseError, match="wants nothing to move, but body arm turns at 2 rad/s"):
+    with pytest.raises(CaseError, match="expects that nothing moves, but body arm turns at 2 rad/s"):
         fvsolve.build(fvsolve.load(case))
 
 
