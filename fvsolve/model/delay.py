@@ -63,7 +63,7 @@ def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
     rate = pipes[slowest].cells / travel[slowest]
     cells = max((pipes[name].cells / travel[name] for name in methods), default=0.0)
     numerics = case.numerics
-    longest = 1.0 / rate  # under error control, see `solve.loop.longest_step`
+    longest = 1.0 / rate  # under error control, see `solve.run_loop.longest_step`
     if numerics.step is not None or numerics.courant is not None:
         longest = numerics.step or numerics.courant / max(rate, cells)
     steppers = (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)

@@ -41,7 +41,7 @@ class Device(Restriction):
         return node.initial_pressure
 
     def moves(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
-        """Text of the change at the start, as `Lowering.motion_text`."""
+        """Text of the pressure change at the start."""
         return f"{node.kind} {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"
 
     def gate(self, name: str) -> str | None:

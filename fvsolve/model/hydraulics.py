@@ -27,7 +27,7 @@ class Hydraulics:
         return schedules.add(head, weight, self.ambient - weight * elevation)
 
     def friction(self, name: str, link, row, fault) -> None:
-        """Friction of a pipe or column: dM/dt = -(loss |M| M + ...), see `kernels.friction`.
+        """Friction of a pipe or column: dM/dt = -(loss |M| M + ...), see `kernels.steady_friction`.
 
         For `steady` friction by roughness the factor is set later, from the starting flow.
         """

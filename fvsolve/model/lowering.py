@@ -30,7 +30,7 @@ class Lowering:
     law : module of its compiled law, whose functions are named as in `kernels.calls.HOOKS`; if it has a `step`, that
     gives the flow through its restriction, in place of the root
     events : meaning of a zero of each event function, "" if it is not reported
-    acts : True if it is also a device, see `model.device`
+    acts : True if it is also a device, see `model.device_lowering`
     books : its name in the energy ledger: for a place, of the energy it supplies ("" for none); for a link, of its row
     """
 

@@ -53,7 +53,7 @@ class Slate:
             basins = model.tables.basins.copy()
             self.tables = model.tables._replace(plane=lined(model.tables.plane.size), basins=basins)
             self.tables.plane[:] = model.tables.plane
-        if len(model.tables.rides):  # `heavy` is set where joint forces are read
+        if len(model.tables.rides):  # `loads_body` is set where joint forces are read
             self.tables = self.tables._replace(rides=model.tables.rides.copy())
         self.clock, self.full_at = self.written.clock[0], -np.inf  # number of history entries at which rings are full
         self.armed, self.marks = self.written.armed, self.written.marks

@@ -268,7 +268,7 @@ class Start:
         return Edge(i, j, lambda flow, present: (1.0 / g, 1.0, present - flow / g))
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
-        """Mass flow from A to B past a piston, as `kernels.masses.leak_flow` [kg/s]."""
+        """Mass flow from A to B past a piston, as `kernels.mass_dynamics.leak_flow` [kg/s]."""
         return self.law.density(max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
 
     def report_faults(self, held) -> None:

@@ -45,7 +45,7 @@ def plain(shapes: rec.Written) -> rec.Written:
 
 
 def factored(model, y: np.ndarray) -> np.ndarray:
-    """Data that `accelerate` leaves in `scratch` at a state: from 8 freedoms on, L of the mass matrix L'L."""
+    """Data that `solve_accelerations` leaves in `scratch` at a state: from 8 freedoms on, L of the mass matrix L'L."""
     written, t = plain(model.shapes), model.case.numerics.start
     written.clock["limit"] = np.inf
     call_pieces((*model.tables, *written), (MOTION, ACCELERATE), t, y.copy(), model.new_out())
@@ -92,7 +92,7 @@ class Statics:
         return self.written.scratch[6 * n : 7 * n].copy()
 
     def accelerations(self) -> np.ndarray:
-        """Accelerations of all freedoms after a call of `accelerate` [rad/s2] or [m/s2]."""
+        """Accelerations of all freedoms after a call of `solve_accelerations` [rad/s2] or [m/s2]."""
         n = len(self.draft.freedom_table)
         return self.written.scratch[6 * n : 7 * n].copy()
 

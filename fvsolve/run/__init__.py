@@ -70,7 +70,7 @@ def open_run(directory: str | Path) -> Result:
 def model_of(case, set: Mapping | None = None, like=None):
     """Model of the `case` argument of `run`. Faults of its start refer to lines of the file.
 
-    like : a model, as for `model.build.built`
+    like : a model, as for `model.build.build_like`
     """
     from fvsolve.case import Case, load, located
     from fvsolve.model import Model
