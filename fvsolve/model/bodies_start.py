@@ -7,9 +7,7 @@ import numpy as np
 from fvsolve.kernels import records as rec
 from fvsolve.model.statics import ACCELERATE, GAPS, HOLD, MOTION, PINNED, Statics
 
-ALIKE = (
-    1e-8  # a row of pins whose part independent of the other rows is below this share of the largest row is redundant
-)
+ALIKE = 1e-8  # a row of pins is redundant if its independent part is below this share of the largest row
 LOOSE = 1e-6  # greatest rate at which a pin may open at the start [m/s]
 SNAP = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
 CLOSE = 1e-9  # likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
@@ -121,9 +119,8 @@ def moves(draft, accelerations: np.ndarray) -> list[str]:
     texts, amount = [], draft.case.amount
     for name, row in zip(draft.body_names, draft.body_table, strict=True):
         pose, own = draft.case.poses[name], accelerations[row["freedom"] : row["freedom"] + row["freedoms"]]
-        stated = (
-            name in draft.case.nodes
-        )  # water in sloshing modes is not among the nodes: only its accelerations are listed
+        # water in sloshing modes is not among the nodes: only its accelerations are listed
+        stated = name in draft.case.nodes
         if stated and (size := np.linalg.norm(pose.spin)) > 0.0:
             texts.append(f"body {name} turns at {amount(size, 'angular_velocity')}")
         if stated and (size := np.linalg.norm(pose.velocity)) > 0.0:

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from fvsolve.errors import Notice
 
-DURATION, RATE = (
-    1.03,
-    0.7,
-)  # relative error of the duration of a first cavity: DURATION cells^-RATE (docs/cavitation.md)
+# relative error of the duration of a first cavity: DURATION cells^-RATE (docs/cavitation.md)
+DURATION, RATE = 1.03, 0.7
 ENOUGH = 200  # number of cells from which on there is no notice
 
 

@@ -67,9 +67,8 @@ def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
     if numerics.step is not None or numerics.courant is not None:
         longest = numerics.step or numerics.courant / max(rate, cells)
     steppers = (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)
-    longest *= max(
-        1.0, *(time for method in steppers for time in method_named(method).times)
-    )  # no value is read that is not yet known
+    # no value is read that is not yet known
+    longest *= max(1.0, *(time for method in steppers for time in method_named(method).times))
     for name in lines:
         reason = "waves travel along it unchanged except for friction"
         if travel[name] < longest:

@@ -82,9 +82,8 @@ class Draft:
     meshes: list[PipeMesh] = field(default_factory=list)
     basins: list[Any] = field(default_factory=list)
     links: dict[str, list[tuple]] = field(default_factory=dict)  # table -> links with rows in it, see `model.lowering`
-    followed: dict[str, Any] = field(
-        default_factory=dict
-    )  # pipe -> by cells or as a delay line, see `model.delay_line_selection`
+    # pipe -> by cells or as a delay line, see `model.delay_line_selection`
+    followed: dict[str, Any] = field(default_factory=dict)
 
     # rows
     node_table: np.ndarray = rows(rec.NODE)
@@ -111,9 +110,8 @@ class Draft:
     probe_table: np.ndarray = rows(rec.PROBE)
 
     # results of the start
-    locked: dict[int, list[str]] = field(
-        default_factory=dict
-    )  # piston -> sides whose closed chambers may support a load
+    # piston -> sides whose closed chambers may support a load
+    locked: dict[int, list[str]] = field(default_factory=dict)
     shut: dict[int, list[str]] = field(default_factory=dict)  # piston -> sides that no open link joins to another node
     tables: Any = None  # all tables, as kernels read them
     shapes: Any = None  # shapes of the arrays that runs write

@@ -31,19 +31,19 @@ class Accounts:
     Accounts of stored energy in `stored_accounts` and of its rates (category "rate") are in the same order.
     """
 
-    def __init__(self, slate: Slate) -> None:
-        self.slate, self.model = slate, slate.model
-        model, case = slate.model, slate.model.case
+    def __init__(self, run_data: Slate) -> None:
+        self.slate, self.model = run_data, run_data.model
+        model, case = run_data.model, run_data.model.case
         refuse_unfelt(case)
         if len(model.tables.rides):
-            slate.tables.rides["heavy"] = rec.ASKED
+            run_data.tables.rides["heavy"] = rec.ASKED
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of a basin on a body with an open side is not supported")
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is computed for law = "linear" only')
         self.power, self.stored = model.functions.energies
         if model.basins and len(model.tables.bodies):  # include loads of the fluid in basins on bodies, for its work
-            slate.tables.basins["heavy"] = 1
+            run_data.tables.basins["heavy"] = 1
         self.accounts: list[Account] = []
         self.held: list[Account] = []  # accounts of stored energy, by rows of `stored`
         self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop

@@ -34,9 +34,8 @@ def holding_pressures(draft, start) -> dict[int, float]:
     size = draft.case.ambient_pressure * float(max(draft.piston_table["area_a"]))
     unit_pushes, base = size * np.eye(pushes.size)[first:], balance.under(0.0 * pushes)
     influence = np.array([balance.under(unit_pushes[k]) - base for k in pistons]).T / size
-    influence = np.hstack(
-        [influence, balance.pins().T]
-    )  # forces of pins are unknowns too, so pistons take none of their share
+    # forces of pins are unknowns too, so pistons take none of their share
+    influence = np.hstack([influence, balance.pins().T])
     forces = np.zeros(len(pistons))
     for _ in range(ROUNDS):  # the second is exact to rounding
         pushes[[first + k for k in pistons]] = forces

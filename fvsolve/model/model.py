@@ -229,7 +229,7 @@ class Model(Shown):
 
     @cached_property
     def functions(self):
-        """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and the parts of this model."""
+        """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and parts of this model."""
         from fvsolve.basins.lower_pieces import of_basins, of_scalars
         from fvsolve.kernels.functions import functions
         from fvsolve.kernels.phases import Cast

@@ -10,11 +10,8 @@ from fvsolve.errors import Notice
 from fvsolve.kernels.delay import history as at
 
 JUMPS, LEAST_JUMPS, MOST_JUMPS = 2**16, 32, 1024  # stored jumps: in all lines together, least and most of each wave
-ENTRIES, LEAST_SPARE, MOST_SPARE = (
-    2**14,
-    32,
-    256,
-)  # spare entries beyond a delay: in all lines together, least and most of each
+# spare entries beyond a delay: in all lines together, least and most of each
+ENTRIES, LEAST_SPARE, MOST_SPARE = 2**14, 32, 256
 OLDER = 1.1  # a history spans this many delays
 BESIDE = 8  # and so many entries before that
 LEAST_ROOM = 16  # steps
@@ -98,13 +95,13 @@ def times_of_jumps(past: np.ndarray, delays: np.ndarray, begin: float, end: floa
 
 def room_left(past: np.ndarray, delays: np.ndarray) -> int:
     """Steps that can be taken before an entry is lost that is still needed."""
-    count, rooms = int(past[at.COUNT]), int(past[at.WIDER]) * delays["room"]
+    count, sizes = int(past[at.COUNT]), int(past[at.WIDER]) * delays["room"]
     if count == 0:
-        return int(rooms.min()) - BESIDE - LEAST_ROOM
+        return int(sizes.min()) - BESIDE - LEAST_ROOM
     stored = kept_entries(past)
     times = past[at.HEAD + (stored & (int(past[at.CAPACITY]) - 1))]
     oldest = stored[0] + np.maximum(0, np.searchsorted(times, times[-1] - OLDER * delays["hold"]) - BESIDE)
-    return int((rooms - (count - oldest)).min())
+    return int((sizes - (count - oldest)).min())
 
 
 def doubled(past: np.ndarray, delays: np.ndarray) -> np.ndarray:

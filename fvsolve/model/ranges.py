@@ -10,10 +10,8 @@ from fvsolve.errors import Notice, listing
 
 QUICKEST = 60.0  # of pipe flow [m/s]: penstocks are below 10, jets of 180 m of head reach it
 LAMINAR, AT_REST = 2000.0, 1.0  # Reynolds numbers below which a flow is laminar, or negligible
-WIDE, WATERY = (
-    0.05,
-    (950.0, 1050.0),
-)  # pipes [m] and liquids [kg/m3] with normally turbulent flow: water mains, not oil hydraulics
+# pipes [m] and liquids [kg/m3] with normally turbulent flow: water mains, not oil hydraulics
+WIDE, WATERY = 0.05, (950.0, 1050.0)
 
 
 def flow_notices(draft: Any) -> list[Notice]:

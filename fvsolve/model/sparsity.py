@@ -263,8 +263,8 @@ class Couplings:
         for basin in self.basins:
             if basin.row["body"] >= 0:
                 trees.setdefault(self.tied(self.bodies[basin.row["body"]]["root"]), []).append(pattern.all_of(basin))
-        for ride, cells in self.carried() if len(self.rides) else ():
-            trees.setdefault(self.tied(self.bodies[self.rides[ride]["body"]]["root"]), []).append(cells)
+        for index, cells in self.carried() if len(self.rides) else ():
+            trees.setdefault(self.tied(self.bodies[self.rides[index]["body"]]["root"]), []).append(cells)
         for root, cells in trees.items():
             own = [self.of_tree(root, order) for order in (0, 1)]
             if own[0].size == 0:

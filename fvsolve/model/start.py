@@ -26,10 +26,8 @@ from fvsolve.steady import Edge, solve_steady, union
 HELD = (rec.FIXED, rec.TANK, rec.PATCH)  # nodes whose pressure does not depend on flows
 STORED = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
 REVISIONS = 200  # greatest number of revisions of devices
-AT_ONCE, ROUND = (
-    10,
-    20,
-)  # revisions in which all devices change together; interval at which regulating devices restart at random
+# revisions in which all devices change together; interval at which regulating devices restart at random
+AT_ONCE, ROUND = 10, 20
 PRESSURE_SCALE = 1e5
 SNAP = 1e-12  # flows below this share of the flow scale are zero
 
@@ -209,9 +207,8 @@ class Start:
         if link.initial_flow is not None:
             return Edge(i, j, None, link.initial_flow * self.draft.fluid.density, drop=drop)
         free = row["friction"] == rec.FRICTION_NONE
-        first = (
-            0.0 if free else self.draft.fluid.density * row["area"]
-        )  # so that loops without friction get the solution of least norm
+        # so that loops without friction get the solution of least norm
+        first = 0.0 if free else self.draft.fluid.density * row["area"]
         return Edge(i, j, newton, first, drop=drop)
 
     def valve_edge(self, k: int) -> Edge:

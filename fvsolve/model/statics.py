@@ -15,10 +15,8 @@ MOTION, LINES = f"{ROOM}.joints: kinematics", f"{ROOM}.lines: push_bodies"
 WEIGH, ACCELERATE = f"{ROOM}.matrix: weigh", f"{ROOM}.matrix: accelerate"
 RUBBER = f"{ROOM}.bushings: push_bushings"
 PINNED, GAPS, HOLD = (f"{ROOM}.pins: {one}" for one in ("accelerate_pinned", "gaps", "hold"))
-WATER = (
-    "basins.frames: set_frames",
-    "basins.frames_flow: turn_fluid",
-)  # loads on bodies of fluid at rest, in addition to pushes
+# loads on bodies of fluid at rest, in addition to pushes
+WATER = ("basins.frames: set_frames", "basins.frames_flow: turn_fluid")
 WALLS = ("basins.walls: press_at_rest",)
 DRIVES = f"{ROOM}.rides: set_rides"
 LOADS = f"{ROOM}.freight: load_networks"
@@ -63,13 +61,13 @@ class Statics:
         self.written.clock["limit"] = t
         self.layout = draft.tables.layout[0]
         self.out = np.zeros(int(self.layout["size"]))
-        self.y, self.tables, rides = np.zeros(draft.size), draft.tables, (draft.basin_table["frame"] >= 0).any()
+        self.y, self.tables, moving_basins = np.zeros(draft.size), draft.tables, (draft.basin_table["frame"] >= 0).any()
         rubber = (RUBBER,) if len(draft.bushing_table) else ()
-        self.pushes = (MOTION, LINES, *rubber, *(WATER if rides else ()))
+        self.pushes = (MOTION, LINES, *rubber, *(WATER if moving_basins else ()))
         self.pushes += WALLS if (draft.wall_table["body"] >= 0).any() else ()
         if len(draft.ride_table):
             self.pushes += NETWORKS
-        if rides:
+        if moving_basins:
             self.y, self.tables = (
                 at_start(draft.basins, draft.size),
                 draft.tables._replace(plane=draft.tables.plane.copy()),

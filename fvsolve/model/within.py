@@ -10,7 +10,7 @@ NOBODY = -1
 
 
 def within(model) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds (at, by) as arguments of `steppers.row_blocks.limit_to_bounds`; depths before the amounts they bound."""
+    """Bounds (at, by) as arguments of `steppers.output_rows.limit_to_bounds`; depths before the amounts they bound."""
     rows = [*depths(model)]
     for q in range(len(model.tables.scalars)):
         rows += [*in_pipes(model, q), *in_nodes(model, q), *in_basins(model, q)]

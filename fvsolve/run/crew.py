@@ -20,10 +20,10 @@ NOT_STARTED = 'a worker process could not be started; a script that uses jobs ne
 
 
 class Crew:
-    """Pool of up to `room` processes, started when needed; if a process is killed, only its chunk is lost."""
+    """Pool of up to `size` processes, started when needed; if a process is killed, only its chunk is lost."""
 
-    def __init__(self, work: Any, room: int) -> None:
-        self.work, self.room = work, room
+    def __init__(self, work: Any, size: int) -> None:
+        self.work, self.room = work, size
         self.context = get_context("spawn")
         self.idle: list[Worker] = []
         self.busy: list[Worker] = []
@@ -98,9 +98,8 @@ class Worker:
 
 def serve(pipe: Connection, work: Any) -> None:
     """Compute chunks received by a pipe, until its other end is closed."""
-    signal.signal(
-        signal.SIGINT, signal.SIG_IGN
-    )  # Ctrl-C reaches all processes of a terminal; the parent process ends this process
+    # Ctrl-C reaches all processes of a terminal; the parent process ends this process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=follow, daemon=True).start()
     try:
         pipe.send(READY)

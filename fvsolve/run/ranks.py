@@ -15,11 +15,8 @@ from fvsolve.solve.bands import cut, threads_of
 from fvsolve.solve.loop import Loop
 from fvsolve.solve.soundness import Soundness
 
-SIZES = (
-    "PMI_SIZE",
-    "OMPI_COMM_WORLD_SIZE",
-    "PALS_SIZE",
-)  # environment variables by which MPI launchers state the number of processes
+# environment variables by which MPI launchers state the number of processes
+SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PALS_SIZE")
 EXTRA = 'pip install "fvsolve[mpi]"'
 
 

@@ -15,9 +15,7 @@ from fvsolve.output.column import UnitColumn, column
 from fvsolve.run.met import Met, in_quantity, met, pressure_of
 from fvsolve.run.result import FAILS, HOLDS, OPEN
 
-ROUNDING = (
-    1e-9  # relative to a limit and to the typical size of its quantity; a smaller excess counts as within the limit
-)
+ROUNDING = 1e-9  # relative to a limit and the typical size of its quantity; a smaller excess is within the limit
 SIZES = {"pressure": 1e5, "gauge_pressure": 1e5, "head": 10.0, "pressure_head": 10.0}
 MAGNITUDES = ("velocity", "force")  # quantities of which a limit bounds the magnitude
 NEAR = 1e-3  # relative to a vapour pressure, within which a limit counts as equal to it: a cavity keeps about that much
@@ -68,11 +66,11 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
         extent = limit.extent
         shown = column(extent.quantity, "head" if extent.quantity == "pressure_head" else extent.dimension, model.case)
         shared = {"name": limit.name, "quantity": extent.quantity, "until": float(summary.t)}
-        found_rows = [
+        nearest_rows = [
             row for part in met(model, summary, extent) for row in nearest(model, summary, limit, part, complete)
         ]
         tables.append([row_of(row, shown, chainage, extent) | shared | {BESIDE: beside(model, extent, shown, row)}
-                     for row in found_rows])  # fmt: skip
+                     for row in nearest_rows])  # fmt: skip
     return tables
 
 
