@@ -287,7 +287,9 @@ def test_a_tank_on_two_sides_and_its_duct_do_not_move_where_their_levels_agree()
     result = fvsolve.run(balanced(nodes, {"duct": duct}, ["hull.angle", "duct.flow"]))
     assert result["hull.angle"] == approx(0.0, abs=1e-12) and result["duct.flow"] == approx(0.0, abs=1e-9)
     nodes["hull"]["centre_of_mass"] = [0, 0.05, -1.1]
-    with pytest.raises(CaseError, match="expects that nothing moves, but rigid column duct: 4777 Pa drive it unbalanced"):
+    with pytest.raises(
+        CaseError, match="expects that nothing moves, but rigid column duct: 4777 Pa drive it unbalanced"
+    ):
         built(balanced(nodes, {"duct": duct}))
 
 
