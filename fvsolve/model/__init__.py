@@ -1,4 +1,4 @@
-"""A case made ready: names are indices, laws are codes, data are flat arrays."""
+"""Model of a case in compiled form: names become indices, laws become codes, data become flat arrays."""
 
 from fvsolve.model.build import build
 from fvsolve.model.model import Model, PipeMesh, State

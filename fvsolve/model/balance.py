@@ -1,4 +1,4 @@
-"""What is said of a balance: bodies and masses as a case has them there, notices, faults. Knows words; seeks none."""
+"""Results of the search for static equilibrium: bodies and masses in their new places, notices, faults."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from fvsolve.model.places import Displaced
 from fvsolve.parts.attitude import Attitude
 from fvsolve.parts.schedule import constant
 
-STIR = 1e-15  # of a length or an angle: less is where it stood
+STIR = 1e-15  # smaller changes of a length or an angle count as none, relative
 
 
 def nodes_at(at: Displaced, y: np.ndarray) -> dict[str, Any]:
-    """Bodies and masses that stand elsewhere now, as a case would say them."""
-    draft, found = at.draft, {}
+    """Bodies and masses of a case that moved, with their new positions."""
+    draft, nodes = at.draft, {}
     for name, row in zip(draft.body_names, at.bodies, strict=True):
         body, first = draft.case.nodes.get(name), int(row["y"])
-        many = {rec.BALL: 4, rec.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
-        if body is not None and np.any(np.abs(y[first : first + many]) > STIR * (1.0 + np.abs(row["start"][:many]))):
-            change = joint_at(body.joint, row, row["start"][:many] + y[first : first + many])
-            found[name] = body.model_copy(update={"joint": body.joint.model_copy(update=change)})
-    far = np.abs(y[at.masses["y"][at.free]])
-    for i in at.free[far > STIR * (1.0 + np.abs(at.masses["position"][at.free]))]:
+        count = {rec.BALL: 4, rec.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
+        if body is not None and np.any(np.abs(y[first : first + count]) > STIR * (1.0 + np.abs(row["start"][:count]))):
+            change = joint_at(body.joint, row, row["start"][:count] + y[first : first + count])
+            nodes[name] = body.model_copy(update={"joint": body.joint.model_copy(update=change)})
+    distance = np.abs(y[at.masses["y"][at.free]])
+    for i in at.free[distance > STIR * (1.0 + np.abs(at.masses["position"][at.free]))]:
         name, place = draft.mass_names[i], at.masses["position"][i] + y[at.masses["y"][i]]
-        found[name] = draft.case.nodes[name].model_copy(update={"initial_position": float(place)})
-    return found
+        nodes[name] = draft.case.nodes[name].model_copy(update={"initial_position": float(place)})
+    return nodes
 
 
 def joint_at(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
-    """What a joint says where its coordinates are q."""
+    """Joint keys for coordinates q."""
     if row["joint"] in (rec.REVOLUTE, rec.PRISMATIC):
         return {"angle" if row["joint"] == rec.REVOLUTE else "travel": constant(float(q[0]))}
     turn = attitude.of_euler_parameters(q[-4:])
@@ -47,26 +47,28 @@ def joint_at(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
     return {"attitude": said(joint.attitude.rotation @ turn)}
 
 
-def said(turn: np.ndarray) -> Attitude:
-    """An attitude by Euler parameters."""
-    return Attitude().model_copy(update={"euler_parameters": tuple(attitude.euler_parameters(turn).tolist())})
+def said(rotation: np.ndarray) -> Attitude:
+    """Attitude by Euler parameters, from a rotation matrix."""
+    return Attitude().model_copy(update={"euler_parameters": tuple(attitude.euler_parameters(rotation).tolist())})
 
 
 def told(case) -> Iterator[Notice]:
-    """Where what is stated elsewhere stands now."""
+    """Notices of positions that differ from the stated positions."""
     for name, node in case.found.items():
         before = case.nodes[name]
         if node.kind == "mass":
             yield moved(case, name, "initial_position", before.initial_position, node.initial_position, "position")
         elif node.joint.kind in ("revolute", "prismatic"):
-            key, what = ("angle", "angle") if node.joint.kind == "revolute" else ("travel", "position")
-            yield moved(case, name, f"joint.{key}", *(coordinate(one.joint, 0.0) for one in (before, node)), what)
+            key, dimension = ("angle", "angle") if node.joint.kind == "revolute" else ("travel", "position")
+            yield moved(
+                case, name, f"joint.{key}", *(coordinate(part.joint, 0.0) for part in (before, node)), dimension
+            )
         else:
             yield from stands(case, name, node.joint.kind == "free", case.poses[name], case.stated.poses[name])
 
 
 def stands(case, name: str, free: bool, pose, before) -> Iterator[Notice]:
-    """Where a ball joint's body, or a free one, stands, and how far from where it is stated to."""
+    """Notices of the attitude of a body on a ball joint or a free body, and of its distance from the stated one."""
     turn = attitude.axis_angle(attitude.deviation(pose.attitude, before.attitude))[1]
     roll, pitch, yaw = np.degrees(attitude.roll_pitch_yaw(pose.attitude))
     text = f"roll {roll:.6g}, pitch {pitch:.6g}, yaw {yaw:.6g} deg, turned by {math.degrees(turn):.4g} deg"
@@ -79,14 +81,14 @@ def stands(case, name: str, free: bool, pose, before) -> Iterator[Notice]:
 
 
 def moved(case, name: str, key: str, before: float, now: float, dimension: str) -> Notice:
-    """That one number is another than stated."""
-    found, stated = (case.amount(one, dimension, 6) for one in (now, before))
-    text = f"{name}: forces balance at {key.removeprefix('joint.')} {found}, stated {stated}"
+    """Notice of a coordinate that differs from its stated value."""
+    result, stated = (case.amount(value, dimension, 6) for value in (now, before))
+    text = f"{name}: forces balance at {key.removeprefix('joint.')} {result}, stated {stated}"
     return Notice("start", f"nodes.{name}", text, key, now, before)
 
 
 def owner(at: Displaced, unknown: int) -> str:
-    """The body or mass that an unknown is of; of a mode the basin, whose name it begins with."""
+    """Name of the body or mass of an unknown; for a sloshing mode, of the basin, with which its name begins."""
     if unknown >= at.freedoms:
         return at.draft.mass_names[at.free[unknown - at.freedoms]]
     ends = at.bodies["freedom"] + at.bodies["freedoms"]
@@ -94,24 +96,27 @@ def owner(at: Displaced, unknown: int) -> str:
 
 
 def report(at: Displaced, force: np.ndarray, scale: np.ndarray) -> None:
-    """A fault for every body and mass that is left with a force where the search ended."""
-    turns, far = at.turns(), np.abs(force) > CLOSE * scale
-    for name in dict.fromkeys(owner(at, int(i)) for i in np.flatnonzero(far)):
+    """Faults of every body and mass with an unbalanced force at the end of the search."""
+    angular, unbalanced = at.turns(), np.abs(force) > CLOSE * scale
+    for name in dict.fromkeys(owner(at, int(i)) for i in np.flatnonzero(unbalanced)):
         own = np.array([owner(at, i) == name for i in range(at.size)])
-        left = [f"{np.linalg.norm(force[own & part]):.4g} {unit}"
-                for part, unit in ((~turns, "N"), (turns, "N m")) if np.any(far & own & part)]  # fmt: skip
-        text = f'"equilibrium" finds no place where its forces balance: {" and ".join(left)} are left'
-        remedy = 'hold it by a spring, a cylinder or a driven joint, state a place nearer to balance, or use "steady"'
+        residuals = [f"{np.linalg.norm(force[own & part]):.4g} {unit}"
+                for part, unit in ((~angular, "N"), (angular, "N m")) if np.any(unbalanced & own & part)]  # fmt: skip
+        text = f'"equilibrium" finds no position where its forces balance: {" and ".join(residuals)} remain'
+        remedy = (
+            "support it by a spring, a cylinder or a driven joint, state a position nearer to equilibrium, "
+            'or use "steady"'
+        )
         at.draft.fault(f"nodes.{name}", f"{text}; {remedy}")
 
 
 def upset(at: Displaced, y: np.ndarray) -> None:
-    """A fault of what rides on bodies where nothing presses on what is in it."""
+    """Fault of a tank or basin on a body that is overturned in equilibrium."""
     at.out[rec.STATUS] = rec.OK
     at.force(y)
     if at.out[rec.STATUS] != rec.NO_WEIGHT:
         return
     where = int(at.out[rec.WHERE]) - len(at.draft.basins)
     name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
-    text = "where forces balance it is turned over, and what is in it would run out"
-    at.draft.fault(f"nodes.{name}", f'{text}; hold its body upright, state another place, or use "steady"')
+    text = "where forces balance it is turned over, and its contents would run out"
+    at.draft.fault(f"nodes.{name}", f'{text}; hold its body upright, state another position, or use "steady"')

@@ -1,4 +1,4 @@
-"""The starting profile under laws that are not linear. Knows what the linear start lacks."""
+"""Starting profile under density laws that are not linear."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.model.start import PRESSURE_SCALE, Start
 
 
 class BarotropicStart(Start):
-    """Potentials are rho_ref (h(p) + g z); what densities change in drops is lagged until nothing moves."""
+    """Steady flow with potentials rho_ref (h(p) + g z); density effects on drops are lagged until convergence."""
 
     def __init__(self, draft) -> None:
         super().__init__(draft)
@@ -29,27 +29,27 @@ class BarotropicStart(Start):
             self.end_flow = end_flow_cavitating
 
     def solve(self) -> None:
-        before = None
+        previous = None
         for _ in range(80):
             super().solve()
-            now = np.concatenate((self.answer.potential / PRESSURE_SCALE, self.answer.flow / self.flow_scale))
-            scale = 1 + np.max(np.abs(now), initial=0.0)  # masses alone have no unknowns here
-            moves = np.full(now.size, np.inf) if before is None else np.abs(now - before) / scale
-            if np.max(moves, initial=0.0) <= 1e-14:
+            present = np.concatenate((self.answer.potential / PRESSURE_SCALE, self.answer.flow / self.flow_scale))
+            scale = 1 + np.max(np.abs(present), initial=0.0)  # with masses alone there are no unknowns
+            changes = np.full(present.size, np.inf) if previous is None else np.abs(present - previous) / scale
+            if np.max(changes, initial=0.0) <= 1e-14:
                 return
-            before = now
+            previous = present
             self.correct()
-        if np.max(moves) > 1e-9:
-            draft, worst = self.draft, int(np.argmax(moves))
+        if np.max(changes) > 1e-9:
+            draft, worst = self.draft, int(np.argmax(changes))
             names = [*self.case.places, *draft.pipe_names, *draft.column_names, *draft.valve_names, *self.case.links]
-            draft.fault("numerics.initial", f"no steady state was found: {names[worst]} moves with the densities; "
-                        'look at the heads around it, or use initial = "rest"')  # fmt: skip
+            draft.fault("numerics.initial", f"no steady state was found: {names[worst]} does not converge with the "
+                        'densities; check the heads around it, or use initial = "rest"')  # fmt: skip
             self.draft.check()
 
     def jet(self, row, m_from: float, m_to: float) -> tuple[float, float]:
-        """What a pipe's flow M loses over M^2 [Pa s2/kg2] where it leaves at its `from` end and at its `to` end.
+        """Loss of flow M that leaves a pipe at its `from` and `to` end, over M^2 [Pa s2/kg2].
 
-        rho / (2 m^2), m [kg/m] the mass per length there; none where nothing is at rest.
+        rho / (2 m^2), m [kg/m] the mass per length there; none at junctions.
         """
         ends = ((int(row["from_node"]), m_from), (int(row["to_node"]), m_to))
         back, ahead = (0.5 * self.rho / m**2 if self.still(i) else 0.0 for i, m in ends)
@@ -59,7 +59,7 @@ class BarotropicStart(Start):
         return self.nodes["kind"][i] != rec.JUNCTION
 
     def correct(self) -> None:
-        """What drops differ from those of a constant density, at the present answer."""
+        """Set corrections of drops relative to constant density, at the present solution."""
         potential = self.answer.potential
         names = self.draft.pipe_names
         for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
@@ -68,27 +68,35 @@ class BarotropicStart(Start):
             row["drag"] = self.pipe_drop(row)
             b_to = self.march(row, mesh, flow)[2]
             if not math.isfinite(b_to):
-                self.draft.fault(f"links.{names[k]}", "no steady state: its pressure falls below what the density law "
-                                 'can hold; look at the heads at its ends, or use initial = "rest"')  # fmt: skip
+                self.draft.fault(f"links.{names[k]}", "no steady state: its pressure falls below the range of the "
+                                 'density law; check the heads at its ends, or use initial = "rest"')  # fmt: skip
                 self.draft.check()
-            lost = 0.5 * (flow / self.ends[1]) ** 2 if flow > 0.0 and self.still(j) else 0.0
+            exit_loss = 0.5 * (flow / self.ends[1]) ** 2 if flow > 0.0 and self.still(j) else 0.0
             self.jets[names[k]] = self.jet(row, *self.ends)
-            plain = row["drag"] / row["area"] * mesh.length + self.jets[names[k]][flow > 0.0] * abs(flow) * flow
-            self.extra[names[k]] = (potential[i] - self.rho * (b_to - lost)) - plain if flow != 0.0 else 0.0
+            constant_density = (
+                row["drag"] / row["area"] * mesh.length + self.jets[names[k]][flow > 0.0] * abs(flow) * flow
+            )
+            self.extra[names[k]] = (
+                (potential[i] - self.rho * (b_to - exit_loss)) - constant_density if flow != 0.0 else 0.0
+            )
         for k, row in enumerate(self.valves):
             i, j = int(row["from_node"]), int(row["to_node"])
-            denser, wider = self.denser(i, j)
-            self.dense_of[k], self.factor[k], self.ratio[k] = (denser, wider), denser * wider, wider
+            density_ratio, drive_ratio = self.denser(i, j)
+            self.dense_of[k], self.factor[k], self.ratio[k] = (
+                (density_ratio, drive_ratio),
+                density_ratio * drive_ratio,
+                drive_ratio,
+            )
         for k, row in enumerate(self.pistons):
             self.factor[len(self.valves) + k] = self.dense(int(row["a"]), int(row["b"]))
 
     def dense(self, i: int, j: int) -> float:
         """(upstream density / rho)(driving pressure / change of potential)."""
-        denser, wider = self.denser(i, j)
-        return denser * wider
+        density_ratio, drive_ratio = self.denser(i, j)
+        return density_ratio * drive_ratio
 
     def denser(self, i: int, j: int) -> tuple[float, float]:
-        """Upstream density / rho, driving pressure / change of potential."""
+        """Upstream density / rho, and driving pressure / change of potential."""
         z, p = self.nodes["elevation"], [self.pressure(i), self.pressure(j)]
         drop, rho = drive(self.st, self.floats, p[0], z[i], p[1], z[j])
         change = self.answer.potential[i] - self.answer.potential[j]
@@ -96,7 +104,7 @@ class BarotropicStart(Start):
         return rho / self.rho, ratio
 
     def march(self, row, mesh, flow: float):
-        """(mass per length at faces, at centres, Bernoulli constant at the `to` end) of a pipe's profile."""
+        """Profile of a pipe : (mass per length at faces, at centres, Bernoulli constant at the `to` end)."""
         i = int(row["from_node"])
         z = float(self.nodes["elevation"][i])
         start = self.answer.potential[i] / self.rho
@@ -111,18 +119,20 @@ class BarotropicStart(Start):
         return faces, centers, b_to
 
     def match(self, row, mesh, flow: float):
-        """The profile that ends at the pressure of its `to` node; what friction does not hold of it drives the flow."""
+        """Profile that ends at the pressure of its `to` node; unbalanced pressure drives the flow."""
         j = int(row["to_node"])
         for sweep in range(20):
             faces, centers, b_to = self.march(row, mesh, flow)
-            leaves = 0.5 * (flow / faces[-1]) ** 2 if flow > 0.0 and self.still(j) else 0.0
-            short = self.answer.potential[j] - self.rho * (b_to - leaves)
-            if sweep == 0 and not self.drive_pipe(mesh, row, self.pipe_drop(row) / row["area"] * mesh.length - short):
+            exit_loss = 0.5 * (flow / faces[-1]) ** 2 if flow > 0.0 and self.still(j) else 0.0
+            shortfall = self.answer.potential[j] - self.rho * (b_to - exit_loss)
+            if sweep == 0 and not self.drive_pipe(
+                mesh, row, self.pipe_drop(row) / row["area"] * mesh.length - shortfall
+            ):
                 break
-            if abs(short) <= 1e-9 * PRESSURE_SCALE:
+            if abs(shortfall) <= 1e-9 * PRESSURE_SCALE:
                 break
             if sweep > 0:
-                row["drag"] -= short * row["area"] / mesh.length
+                row["drag"] -= shortfall * row["area"] / mesh.length
         return faces, centers
 
     def fill_pipes(self) -> None:
@@ -136,13 +146,13 @@ class BarotropicStart(Start):
             profile[row["center"] : row["center"] + n] = centers
             for m0, name, sign in ((faces[0], "from", -1.0), (faces[-1], "to", 1.0)):
                 i = int(row[f"{name}_node"])
-                into, _, mass = self.end_flow(self.st, self.floats, row, m0, sign * flow,
+                inflow, _, mass = self.end_flow(self.st, self.floats, row, m0, sign * flow,
                                          float(self.nodes["pressure"][i]), bool(self.still(i)))  # fmt: skip
-                near = abs(into - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
-                row[f"{name}_base"] = into if near else sign * flow
-                row[f"{name}_mass"] = mass if near else m0
-            boiling, _ = kernels.mass_of_pressure(self.st, self.floats, row, self.law.cavity_pressure)
-            profile[row["cell"] : row["cell"] + n] = row["speed"] * (boiling - centers)
+                consistent = abs(inflow - sign * flow) <= 1e-7 * (self.flow_scale * 1e-3 + abs(flow))
+                row[f"{name}_base"] = inflow if consistent else sign * flow
+                row[f"{name}_mass"] = mass if consistent else m0
+            vapour_mass, _ = kernels.mass_of_pressure(self.st, self.floats, row, self.law.cavity_pressure)
+            profile[row["cell"] : row["cell"] + n] = row["speed"] * (vapour_mass - centers)
             self.draft.profiles[k] = np.array([self.pressure_of_mass(row, m) for m in centers])
             self.flux(row, faces, profile)
 
@@ -163,21 +173,21 @@ class BarotropicStart(Start):
         """Mass per length of the profile at a fraction of pipe k, linear between faces and centres."""
         row, mesh = self.pipes[k], self.draft.meshes[k]
         profile, n = self.draft.tables.profile, mesh.cells
-        both = np.empty(2 * n + 1)
-        both[0::2], both[1::2] = (
+        masses = np.empty(2 * n + 1)
+        masses[0::2], masses[1::2] = (
             profile[row["face"] : row["face"] + n + 1],
             profile[row["center"] : row["center"] + n],
         )
-        m = float(np.interp(fraction, np.linspace(0.0, 1.0, 2 * n + 1), both))
+        m = float(np.interp(fraction, np.linspace(0.0, 1.0, 2 * n + 1), masses))
         return m if row["rise"] < 0 else self.leant(row, mesh, fraction, m)
 
     def leant(self, row, mesh, fraction: float, m: float) -> float:
-        """Mass per length of a place between faces and centres, which may lie above or below their straight line."""
+        """Mass per length at a place between faces and centres, corrected for its height above their line."""
         rises = self.draft.tables.profile[row["rise"] : row["rise"] + 2 * mesh.cells + 1]
         straight = np.interp(fraction, np.linspace(0.0, 1.0, rises.size), rises)
-        higher = mesh.profile.at(fraction * mesh.length) - mesh.profile.elevation[0] - straight
+        excess = mesh.profile.at(fraction * mesh.length) - mesh.profile.elevation[0] - straight
         p = self.pressure_of_mass(row, m)
-        p -= self.law.density(p) * self.case.gravity * higher
+        p -= self.law.density(p) * self.case.gravity * excess
         return float(kernels.mass_of_pressure(self.st, self.floats, row, float(p))[0])
 
     def fill_columns(self) -> None:
@@ -187,9 +197,9 @@ class BarotropicStart(Start):
             row["drag"] = self.pipe_drop(row)
             z, p = self.nodes["elevation"], self.nodes["pressure"]
             row["base"] = drive(self.st, self.floats, p[i], z[i], p[j], z[j])[0]
-            pull = row["drag"] * row["length"] / row["area"]
+            friction = row["drag"] * row["length"] / row["area"]
             change = self.answer.potential[i] - self.answer.potential[j]
-            offset = row["base"] - pull
+            offset = row["base"] - friction
             small = 1e-10 * (PRESSURE_SCALE + abs(change)) + abs(row["base"] - change)
             row["offset"] = offset if abs(offset) > small else 0.0
 
@@ -207,6 +217,6 @@ class BarotropicStart(Start):
                 self.lowered(k).follow(self, k)
             elif row["open"] > 0.0:
                 target = valve_target(self.draft.tables, self.out, k, float(row["open"]))[0]
-                asked = target if row["transition"] > 0.0 else np.sign(target) * np.sqrt(abs(target))
-                if abs(asked - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
+                law_flow = target if row["transition"] > 0.0 else np.sign(target) * np.sqrt(abs(target))
+                if abs(law_flow - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
                     row["open"] = 0.0

@@ -1,4 +1,4 @@
-"""From a case to a model: the one place where names meet numbers."""
+"""Build of a model from a case."""
 
 from __future__ import annotations
 
@@ -38,35 +38,35 @@ from fvsolve.steppers.tableau import method_named
 
 
 def build(case) -> Model:
-    """The model of a case, with the profile it starts from.
+    """Build the model of a case, with its starting profile.
 
-    Raises CaseError where no start can be found: a frictionless pipe between unequal heads, a demand that nothing
-    can bring, a node joined only by rigid columns.
+    Raises CaseError if no start exists: a frictionless pipe between unequal heads, a demand that no link can supply, a
+    node joined only by rigid columns.
     """
     if not isinstance(case, Case):
-        raise FvsolveError(f"build takes a Case, not {type(case).__name__}; wanted what load() gives")
+        raise FvsolveError(f"build takes a Case, not {type(case).__name__}; expected the result of load()")
     return built(case)
 
 
 def built(case: Case, like: Model | None = None) -> Model:
-    """The same; like : a model of a case that differs in few numbers, of which what they leave is taken."""
-    told = []
+    """Build a model; like : model of a case that differs in few numbers, of which unchanged tables are reused."""
+    notices = []
     if case.settles:
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
-        case, told = settled(case, drafted(steady))
+        case, notices = settled(case, drafted(steady))
     if like is not None and not like.packed:
         like.packed.append(packed(like.case))
-    taken = None if like is None else resized(like.packed[0], case)
-    draft = drafted(case, taken)
-    draft.warnings += told
-    found = model_of(draft)
-    if draft is taken and found.unsteady == like.unsteady:
-        found.__dict__["functions"] = like.functions
-    return found
+    reused = None if like is None else resized(like.packed[0], case)
+    draft = drafted(case, reused)
+    draft.warnings += notices
+    model = model_of(draft)
+    if draft is reused and model.unsteady == like.unsteady:
+        model.__dict__["functions"] = like.functions
+    return model
 
 
 def drafted(case: Case, draft: Draft | None = None, unfit: Collection[str] = ()) -> Draft:
-    """The tables of a case, packed before if given, and its profile; unfit : no delay lines, see `model.delay`."""
+    """Tables of a case with its profile; draft : tables before the start; unfit : pipes that cannot be delay lines."""
     draft = draft or packed(case, unfit)
     draft.check()
     draft.steady = start_profile(draft)
@@ -77,7 +77,7 @@ def drafted(case: Case, draft: Draft | None = None, unfit: Collection[str] = ())
 
 
 def packed(case: Case, unfit: Collection[str] = ()) -> Draft:
-    """The tables of a case as they are before its start is known."""
+    """Tables of a case before its start is known."""
     draft = Draft(case)
     draft.followed = followed(case, unfit)
     fill_places(draft)
@@ -92,7 +92,7 @@ def packed(case: Case, unfit: Collection[str] = ()) -> Draft:
 
 
 def fill_places(draft: Draft) -> None:
-    """A row for every place of the fluid."""
+    """Fill a row for every node of the fluid."""
     table = draft.node_table = np.zeros(len(draft.case.places), rec.NODE)
     table["y"] = table["shape"] = table["schedule"] = table["row"] = table["ride"] = -1
     table["full"] = np.inf
@@ -102,7 +102,7 @@ def fill_places(draft: Draft) -> None:
 
 
 def fill_links(draft: Draft) -> None:
-    """Rows of links, of devices and of masses."""
+    """Fill rows of links, devices, bodies and masses."""
     draft.pipe_names, draft.pipe_table = draft.fill("pipe", rec.PIPE)
     lower_delays(draft)
     draft.column_names, draft.column_table = draft.fill("column", rec.COLUMN)
@@ -118,8 +118,11 @@ def fill_links(draft: Draft) -> None:
 
 
 def profile_size(draft: Draft) -> int:
-    """Place of every pipe's profile: a threshold a cell; under other laws than `linear` masses, fluxes and the rise of
-    what is not straight behind it."""
+    """Size of all profiles; sets the offsets of each pipe.
+
+    A profile has a threshold for each cell. Under laws other than `linear`, masses, fluxes and, for pipes that are not
+    straight, rises follow it.
+    """
     at = draft.cells
     if draft.case.law.linear:
         return 2 * at if draft.case.scalars else at
@@ -134,7 +137,7 @@ def profile_size(draft: Draft) -> int:
 
 
 def fill_rises(draft: Draft) -> None:
-    """How far pipes with a profile rise from their `from` end, at faces and centres [m]."""
+    """Set the rise of pipes with a profile from their `from` end, at faces and centres [m]."""
     for row, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
         if row["rise"] >= 0:
             heights = mesh.profile.at(np.linspace(0.0, mesh.length, 2 * mesh.cells + 1))
@@ -144,11 +147,11 @@ def fill_rises(draft: Draft) -> None:
 
 
 def pack(draft: Draft, profile: np.ndarray) -> None:
-    """Make the tuple of tables, and shape what runs write; records stay the same arrays: later changes are seen."""
+    """Make the tuple of tables and the shapes of run arrays. Records stay the same arrays: later changes reach them."""
     settings = settings_of(draft)
     draft.probe_table = lower_probes(draft)
     schedules, pieces = draft.schedules.tables()
-    schedules.flags.writeable = pieces.flags.writeable = False  # from here on, as in the model
+    schedules.flags.writeable = pieces.flags.writeable = False  # from here on constant, as in the model
     layout = layout_of(draft)
     draft.tables = rec.Tables(
         settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
@@ -170,9 +173,9 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
 
 
 def settings_of(draft: Draft) -> np.ndarray:
-    """SETTINGS[1] of a model."""
-    case, pipes, found = draft.case, draft.pipe_table, np.zeros(1, rec.SETTINGS)
-    s = found[0]
+    """Settings of a model : SETTINGS[1]."""
+    case, pipes, table = draft.case, draft.pipe_table, np.zeros(1, rec.SETTINGS)
+    s = table[0]
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
     s["viscosity"] = draft.fluid.viscosity or 0.0
     s["ambient"], s["gravity"] = case.ambient_pressure, case.gravity
@@ -185,11 +188,11 @@ def settings_of(draft: Draft) -> np.ndarray:
         s["weights"], s["stages"] = len(draft.floats), method.stages
         draft.floats += [*map(float, method.b), *method.times]
     s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *column_rates(draft)])
-    return found
+    return table
 
 
 def column_rates(draft: Draft):
-    """Rates at which rigid columns swing between places that store [1/s]."""
+    """Angular frequencies of rigid columns between nodes that store [1/s]."""
     stiff = draft.node_table["stiffness"]
     for row in draft.column_table:
         k = stiff[row["from_node"]] + stiff[row["to_node"]]
@@ -197,73 +200,73 @@ def column_rates(draft: Draft):
 
 
 def layout_of(draft: Draft) -> np.ndarray:
-    """LAYOUT[1]: offsets of what the rhs writes beside dydt."""
+    """Offsets in `out`, which the right-hand side writes in addition to dydt : LAYOUT[1]."""
     nodes, pipes, valves, columns = map(
         len, (draft.node_table, draft.pipe_table, draft.valve_table, draft.column_table)
     )
-    many, found, at = len(draft.scalar_table), np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
+    scalars, layout, at = len(draft.scalar_table), np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
     for name, size in (
-        ("pressure", nodes), ("supply", nodes), ("gain", many * nodes), ("loss", sum(draft.scalar_table["losses"])),
+        ("pressure", nodes), ("supply", nodes), ("gain", scalars * nodes), ("loss", sum(draft.scalar_table["losses"])),
         ("net", nodes), ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("led", columns),
         ("stiffness", draft.moving), ("had", draft.moving), ("swept", draft.moving),
         ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
-        ("conductance", valves), ("drive", valves), ("value", many * nodes), ("edge", 2 * pipes * many),
-        ("carried", 2 * pipes * many), ("brought", many * nodes), ("wall", len(draft.wall_table)),
+        ("conductance", valves), ("drive", valves), ("value", scalars * nodes), ("edge", 2 * pipes * scalars),
+        ("carried", 2 * pipes * scalars), ("brought", scalars * nodes), ("wall", len(draft.wall_table)),
         ("ride", len(draft.ride_table)),
         ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
         ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),
     ):  # fmt: skip
-        found[name], at = at, at + size
-    found["size"] = at
-    found["forces"] = draft.to_work(most_states(draft)) if (draft.probe_table["kind"] == rec.PIPE_FORCE).any() else -1
-    found["rates"] = draft.to_work(most_states(draft)) if draft.ride_table["heavy"].any() else -1
-    return found
+        layout[name], at = at, at + size
+    layout["size"] = at
+    layout["forces"] = draft.to_work(most_states(draft)) if (draft.probe_table["kind"] == rec.PIPE_FORCE).any() else -1
+    layout["rates"] = draft.to_work(most_states(draft)) if draft.ride_table["heavy"].any() else -1
+    return layout
 
 
 def most_states(draft: Draft) -> int:
-    """How many states there may be once the start has chosen the terms of unsteady friction."""
+    """Upper bound of the number of states after the start has chosen terms of unsteady friction."""
     unsteady = [mesh.cells for mesh in draft.meshes if draft.case.links[mesh.name].friction.model == "unsteady"]
     return draft.size + MOST_TERMS * sum(unsteady)
 
 
 def marks_of(draft: Draft) -> int:
-    """How many marks a run may set, of cavities three a pipe: first place, greatest volume and its time."""
+    """Number of marks of a run; for cavities three for each pipe: first place, greatest volume and its time."""
     parts = len(draft.pipe_table) + 3 * len(draft.node_table) + len(draft.column_table)
     own = 2 * len(draft.device_table) + len(draft.piston_table)
     return parts + own + (3 * len(draft.pipe_table) if draft.case.law.cavitates else 0)
 
 
 def spare_of(draft: Draft) -> int:
-    """Numbers beside `out`: closed nodes for events; with delay lines those of two states, and values, see `record`."""
-    size, beside = int(draft.tables.layout["size"][0]), len(draft.probe_table) + len(draft.node_table)
-    return size if not len(draft.delay_table) else 2 * size + 3 * beside
+    """Size of the spare array: nodes without storage at events; with delay lines `out` of two states and values."""
+    size, values = int(draft.tables.layout["size"][0]), len(draft.probe_table) + len(draft.node_table)
+    return size if not len(draft.delay_table) else 2 * size + 3 * values
 
 
 def scratch_of(draft: Draft) -> int:
-    """Numbers that the rhs needs to work with, at most."""
-    many, nodes = len(draft.scalar_table), len(draft.node_table)
+    """Largest size of scratch data of the right-hand side."""
+    scalars, nodes = len(draft.scalar_table), len(draft.node_table)
     most = max([0, *draft.pipe_table["cells"], *draft.delay_table["places"]])
     system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in draft.cluster_table), default=0)
     rigid = int(np.sum(draft.node_table["columns"] > 1))
     system = max(system, rigid * (rigid + 3))
     system += 6 * nodes + 2 * len(draft.valve_table) + 5 * len(draft.cluster_table)
-    held = int(sum(draft.pin_table["rows"]))
+    constraints = int(sum(draft.pin_table["rows"]))
     spatial = 8 * len(draft.freedom_table) + draft.factor_size + 16 * len(draft.body_table)
-    spatial += held * (2 * len(draft.freedom_table) + held + 1)
+    spatial += constraints * (2 * len(draft.freedom_table) + constraints + 1)
     spatial = max(spatial, 18 if len(draft.body_table) else 0)
-    return int(max(spatial, (5 if many else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * many * nodes))
+    return int(max(spatial, (5 if scalars else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * scalars * nodes))
 
 
 def model_of(draft: Draft) -> Model:
-    """The model, whose state at the start deviates from the profile in basins alone, and by amounts of scalars."""
+    """Model of a draft. Its start deviates from the profile in basins only, and by amounts of scalars."""
     case, start = draft.case, at_start(draft.basins, draft.size)
     start_amounts(draft, start)
     inside = sorted(
         (t, jump) for t, jump in draft.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
     )
-    of_basins = [one for basin in draft.basins for one in basin.notices(basin.of(start))]
-    draft.warnings += [*of_basins, *coarse_for_cavities(draft), *flow_notices(draft), *too_few_cells(draft)]
+    basin_notices = [notice for basin in draft.basins for notice in basin.notices(basin.of(start))]
+    draft.warnings += [*basin_notices, *coarse_for_cavities(draft), *flow_notices(draft), *too_few_cells(draft)]
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,
         draft.meshes, list(case.places), list(case.links), draft.valve_names, draft.column_names, draft.piston_names,

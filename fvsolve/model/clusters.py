@@ -1,4 +1,4 @@
-"""How each node without storage is solved: alone, by a closed root, or by Newton with others. Knows indices."""
+"""Solution method of each node without storage: direct, by a closed root, or by Newton's method with other nodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.steady import union
 
 
 def sort_nodes(draft) -> None:
-    """Sort nodes and valves into those with closed roots and those that Newton solves together."""
+    """Sort nodes and valves into those with closed roots and clusters solved by Newton's method."""
     nodes, valves = draft.node_table, draft.valve_table
     inner = nodes["kind"] == rec.JUNCTION
     short = np.flatnonzero(draft.delay_table["now"] > 0.0)
@@ -34,15 +34,15 @@ def sort_nodes(draft) -> None:
                 if k not in touched[group[i]]:
                     touched[group[i]].append(k)
     mark_acting(draft, group)
-    known = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
+    fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
     integers = draft.integers
     clusters = []
     members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
-    nodes["solve"], even = rec.ALONE, is_root(valves)
+    nodes["solve"], symmetric = rec.ALONE, is_root(valves)
     for root, ks in touched.items():
-        soft = np.all(nodes["admittance"][members[root]] > 0.0)
-        plain = np.all(even[ks])
-        single = len(ks) == 1 and soft and plain and draft.case.law.linear and root not in couples
+        regular = np.all(nodes["admittance"][members[root]] > 0.0)
+        plain = np.all(symmetric[ks])
+        single = len(ks) == 1 and regular and plain and draft.case.law.linear and root not in couples
         nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
         valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
         if not np.any(nodes["admittance"][members[root]] > 0.0) and not carries_its_column(draft, members[root], ks):
@@ -55,7 +55,7 @@ def sort_nodes(draft) -> None:
         inverse = inverted(draft, members[root], own) if not ks else -1
         clusters.append((at, n, at + n, len(ks), at + n + len(ks), len(own), inverse))
         integers += members[root] + ks + own
-    for k in np.flatnonzero(known & ~even):  # a cluster without nodes
+    for k in np.flatnonzero(fixed & ~symmetric):  # clusters without nodes
         valves["solve"][k] = rec.CLUSTER
         clusters.append((len(integers), 0, len(integers), 1, 0, 0, -1))
         integers.append(int(k))
@@ -66,7 +66,7 @@ def sort_nodes(draft) -> None:
             integers.append(int(i))
     gates(draft)
     refuse_loose_groups(draft, members)
-    for k in np.flatnonzero(known):
+    for k in np.flatnonzero(fixed):
         soften(draft, [k])
     draft.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
     for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
@@ -77,7 +77,7 @@ def sort_nodes(draft) -> None:
 
 
 def mark_acting(draft, group) -> None:
-    """Note the ends of delay lines at junctions that share what they take with a device that acts at an event."""
+    """Mark ends of delay lines at junctions whose group contains a device with events."""
     inner, valves, acting = draft.node_table["kind"] == rec.JUNCTION, draft.valve_table, set()
     for v in valves:
         if v["hooks"] >= 0 or (v["device"] >= 0 and draft.devices[v["device"]][2].events):
@@ -92,7 +92,10 @@ def mark_acting(draft, group) -> None:
 
 
 def inverted(draft, members, couples) -> int:
-    """Where the inverse of the admittances of nodes that short delay lines join lies in `floats`, row by row."""
+    """Append the inverse of the admittance matrix of nodes joined by short delay lines to `floats`.
+
+    Returns its offset. The matrix lies row by row.
+    """
     rows, place = {i: k for k, i in enumerate(members)}, len(draft.floats)
     matrix = np.diag(draft.node_table["admittance"][members])
     for k in couples:
@@ -109,46 +112,50 @@ def inverted(draft, members, couples) -> int:
 
 
 def is_root(valves) -> np.ndarray:
-    """Which of them are solved by a root that is the same both ways : bool[valves]."""
+    """True for valves solved by a closed root that is the same in both directions : bool[valves]."""
     return (valves["hooks"] < 0) & (valves["back"] == 1.0)
 
 
 def gates(draft) -> None:
-    """Note the valves of every node that they and rigid columns join, and nothing else, and how many columns."""
+    """For nodes that only valves and rigid columns join, store these valves and the number of columns."""
     nodes, valves, columns = draft.node_table, draft.valve_table, draft.column_table
     nodes["gates"] = -1
     bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
     for i in np.flatnonzero(bare):
-        held = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
-        if any(senses(draft, int(valves["device"][k])) for k in held):
+        joined = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
+        if any(senses(draft, int(valves["device"][k])) for k in joined):
             continue
-        met = sum(i in (c["from_node"], c["to_node"]) for c in columns)
-        if met > 0 and held and asks_nothing(draft, i):
-            nodes["gates"][i], nodes["gate_count"][i], nodes["columns"][i] = len(draft.integers), len(held), met
-            draft.integers += held
+        column_count = sum(i in (c["from_node"], c["to_node"]) for c in columns)
+        if column_count > 0 and joined and asks_nothing(draft, i):
+            nodes["gates"][i], nodes["gate_count"][i], nodes["columns"][i] = (
+                len(draft.integers),
+                len(joined),
+                column_count,
+            )
+            draft.integers += joined
 
 
 def refuse_loose_groups(draft, members) -> None:
-    """Places that valves join to one another and to nothing else, but for air valves: rigid columns alone lead on."""
+    """Faults of groups of nodes that only valves join, apart from air valves and rigid columns."""
     nodes, valves, names = draft.node_table, draft.valve_table, list(draft.case.places)
     for group in members.values():
-        ways = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
-        air = [v for v in ways if v["device"] >= 0 and draft.devices[v["device"]][2].vessel]
-        known = [v for v in ways if not {int(v["from_node"]), int(v["to_node"])} <= set(group)]
-        if len(group) < 2 or len(known) > len(air) or np.any(nodes["admittance"][group] > 0.0):
+        links = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
+        air = [v for v in links if v["device"] >= 0 and draft.devices[v["device"]][2].vessel]
+        to_fixed = [v for v in links if not {int(v["from_node"]), int(v["to_node"])} <= set(group)]
+        if len(group) < 2 or len(to_fixed) > len(air) or np.any(nodes["admittance"][group] > 0.0):
             continue
         first = int(air[0]["from_node"]) if air else group[0]
         place, other = (names[i] for i in sorted(group, key=lambda i: i != first)[:2])
-        what, span = "a valve joins this air valve", " while it is shut"
+        reason, span = "a valve joins this air valve", " while it is shut"
         if not air:
             joins = [name for name, v in zip(draft.valve_names, valves, strict=True) if int(v["from_node"]) in group]
-            what, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} it", ""
-        draft.fault(f"nodes.{place}", f"{what} to {other}, and only rigid columns lead on, so nothing sets their "
+            reason, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} it", ""
+        draft.fault(f"nodes.{place}", f"{reason} to {other}, and only rigid columns lead on, so nothing sets their "
                     f"pressure{span}; give {other} a chamber volume, or make one of the columns a pipe")  # fmt: skip
 
 
 def senses(draft, device: int) -> bool:
-    """Whether a device goes by the pressure of a place, and is no vessel."""
+    """True if a device that is not a vessel reads the pressure of a node."""
     return device >= 0 and draft.device_table["node"][device] >= 0 and not draft.devices[device][2].vessel
 
 
@@ -159,20 +166,20 @@ def asks_nothing(draft, i: int) -> bool:
 
 
 def carries_its_column(draft, members, ks) -> bool:
-    """Whether one valve alone takes what a rigid column brings: its drop then follows the flow, smooth at zero."""
+    """True if a single valve takes the flow of a rigid column: its drop follows the flow, smooth at zero."""
     ends = np.concatenate((draft.column_table["from_node"], draft.column_table["to_node"]))
     plain = is_root(draft.valve_table)[ks[0]]
     return len(ks) == 1 and len(members) == 1 and members[0] in ends and bool(plain)
 
 
-UNSEEN = 10.0  # tolerances of a vessel: that grows with what it has deviated, nine times its scale are foreseen
+UNSEEN = 10.0  # tolerances of a vessel: its tolerance grows with its deviation, here up to nine times its scale
 
 
 def soften(draft, ks) -> None:
-    """Bound the slope at zero drop where no pipe end does: laminar below Reynolds 10.
+    """Bound the slope at zero drop where no pipe end does: laminar flow below Reynolds number 10.
 
-    At a bladder accumulator, whose neck holds the least of pressures in hardly any mass, below a drop of 1 Pa; and
-    below one that error control does not see (`unseen_drop`).
+    At a bladder accumulator the bound is at least a drop of 1 Pa, as its neck stores hardly any mass. It is also at
+    least the drop below error control (`tolerated_drop`).
     """
     places, unseen = list(draft.case.places.values()), unseen_drop(draft, ks)
     for k in ks:
@@ -185,15 +192,15 @@ def soften(draft, ks) -> None:
 
 
 def soften_root(draft, name: str, link, row) -> None:
-    """Let a restriction be laminar below Reynolds 10."""
+    """Make a restriction laminar below Reynolds number 10."""
     row["transition"] = draft.hydraulics.transition_flow(name, link, 10.0, draft.fault)
 
 
 def unseen_drop(draft, ks) -> float:
-    """The drop [Pa] whose end moves no vessel by more than a few tolerances of a step; 0 without error control.
+    """Drop [Pa] whose decay changes each vessel by a few tolerances of a step at most.
 
-    Below it a root has no bound of slopes, and linearly implicit steps jump to and fro, none wrong by more than the
-    tolerance and none nearer to rest: a chamber of 10 l took 1e6 of them in 10 s.
+    It is 0 without error control. Below it the slope of a root is unbounded. Linearly implicit steps then alternate in
+    sign: each error is below the tolerance, but none comes nearer to rest. A chamber of 10 l took 1e6 steps in 10 s.
     """
     rtol, nodes = draft.case.numerics.rtol, draft.node_table
     ends = {int(draft.valve_table[k][end]) for k in ks for end in ("from_node", "to_node")}

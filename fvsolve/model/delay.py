@@ -1,8 +1,8 @@
-"""Which pipes are followed as delay lines, into how many stretches they are cut, and how far off that may be.
+"""Selection of pipes that become delay lines, their division into stretches, and bounds of the error.
 
-Bounds, in units of the greatest jump that a schedule makes: friction in the middle of stretches, a quarter of what it
-takes of a wave there; interpolation of what schedules smooth over a time T, by derivatives of half a cosine; a line
-shorter than the longest step h, the curvature of that over its delay, tau (h - tau) / 2.
+Bounds are relative to the greatest jump of a schedule. Friction concentrated in the middle of stretches: a quarter of
+the attenuation of a wave in a stretch. Interpolation of changes that schedules smooth over a time T: derivatives of
+half a cosine. A line shorter than the longest step h: curvature of the wave over its delay, tau (h - tau) / 2.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from fvsolve.steppers import automatic
 from fvsolve.steppers.methods import AUTO
 from fvsolve.steppers.tableau import method_named
 
-FELT = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start where friction is looked at
-DRIVEN = 1e-9  # of a bar's wave: what friction leaves of a drop
-BEND = 0.1  # of what a step brings: overshoot of six entries behind a kink
-ROUGH = 0.5  # of a wave: friction of a line shorter than a step may take no more
+FELT = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start to evaluate friction
+DRIVEN = 1e-9  # relative to the wave of 1 bar: pressure drop that friction does not balance
+BEND = 0.1  # relative to the change in a step: overshoot of six entries after a kink
+ROUGH = 0.5  # greatest attenuation of a wave by friction in a line shorter than a step
 
 
 @dataclass(frozen=True)
 class Followed:
-    """How a pipe is followed: "cells" or "delay", why, and what steps go by.
+    """Method for a pipe, "cells" or "delay", the reason, and the steps it implies.
 
-    rate : of lines that ask for steps [1/s]; longest : step that lines are cut for [s]
+    rate : of lines that limit steps [1/s]; longest : step for which lines are divided [s]
     """
 
     line: str
@@ -44,38 +44,37 @@ class Followed:
 
 
 def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
-    """Pipe -> how it is followed; unfit : those that `auto` has found to be off by more than `numerics.accuracy`."""
+    """Pipe -> method; unfit : pipes whose error `auto` has estimated to exceed `numerics.accuracy`."""
     pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
-    found, lines = {}, []
+    methods, lines = {}, []
     for name, link in pipes.items():
         line = link.line or case.numerics.line
-        lacks = "" if line == "cells" else what_needs_cells(case, name, link)
-        if line == "cells" or lacks:
-            found[name] = Followed("cells", lacks or f'line = "{line}"')
+        need = "" if line == "cells" else what_needs_cells(case, name, link)
+        if line == "cells" or need:
+            methods[name] = Followed("cells", need or f'line = "{line}"')
         elif name in unfit:
-            found[name] = Followed("cells", "its bound as a delay line is above numerics.accuracy")
+            methods[name] = Followed("cells", "its bound as a delay line is above numerics.accuracy")
         else:
             lines.append(name)
     if not lines:
-        return {name: found[name] for name in pipes}
+        return {name: methods[name] for name in pipes}
     travel = {name: link.length / case.wave_speed(name) for name, link in pipes.items()}
     slowest = max(lines, key=travel.get)
     rate = pipes[slowest].cells / travel[slowest]
-    cells = max((pipes[name].cells / travel[name] for name in found), default=0.0)
+    cells = max((pipes[name].cells / travel[name] for name in methods), default=0.0)
     numerics = case.numerics
-    longest = 1.0 / rate  # under error control, see `solve.loop.longest_step`
+    longest = 1.0 / rate  # under error control, see `solve.run_loop.longest_step`
     if numerics.step is not None or numerics.courant is not None:
         longest = numerics.step or numerics.courant / max(rate, cells)
-    kinds = (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)
-    longest *= max(
-        1.0, *(time for kind in kinds for time in method_named(kind).times)
-    )  # nothing is read that is not yet known
+    steppers = (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)
+    # no value is read that is not yet known
+    longest *= max(1.0, *(time for method in steppers for time in method_named(method).times))
     for name in lines:
-        why = "waves travel along it unchanged but for friction"
+        reason = "waves travel along it unchanged except for friction"
         if travel[name] < longest:
-            why += f", and faster than a step of {case.step_amount(longest, 4)}"
-        found[name] = Followed("delay", why, rate, longest)
-    return {name: found[name] for name in pipes}
+            reason += f", and faster than a step of {case.step_amount(longest, 4)}"
+        methods[name] = Followed("delay", reason, rate, longest)
+    return {name: methods[name] for name in pipes}
 
 
 def what_needs_cells(case, name: str, link) -> str:
@@ -85,27 +84,28 @@ def what_needs_cells(case, name: str, link) -> str:
     if case.scalars:
         return "scalars are carried in cells"
     if link.friction.model == "unsteady":
-        return "unsteady friction remembers the flow of every cell"
+        return "unsteady friction depends on the flow history of every cell"
     if link.yielding:
         return "its wall creeps in every cell"
     if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
-        return "a body that it rides on drives its cells"
+        return "the acceleration of its body acts on its cells"
     if any(
-        one.quantity == "force" and (one.part, one.name) == ("links", name) for one in (*case.probes, *case.watched)
+        probe.quantity == "force" and (probe.part, probe.name) == ("links", name)
+        for probe in (*case.probes, *case.watched)
     ):
-        return "its force is asked for, which is found from cells"
+        return "its force is requested, which is computed from cells"
     return ""
 
 
 def lower_delays(draft) -> None:
-    """Rows of delay lines, and the faults of those that cannot be one."""
+    """Fill rows of delay lines; faults of pipes that cannot be delay lines."""
     case, rows = draft.case, []
     for k, name in enumerate(draft.pipe_names):
         link, chosen = case.links[name], draft.followed[name]
-        asked = link.line or case.numerics.line
-        if asked == "delay" and chosen.line == "cells":
+        stated = link.line or case.numerics.line
+        if stated == "delay" and chosen.line == "cells":
             key = f"links.{name}.line" if link.line else "numerics.line"
-            draft.fault(key, f'"delay" does not fit links.{name}: {chosen.why}; wanted "cells", or "auto"')
+            draft.fault(key, f'"delay" is not possible for links.{name}: {chosen.why}; expected "cells" or "auto"')
         if chosen.line == "cells":
             continue
         row = np.zeros((), rec.DELAY)
@@ -123,19 +123,22 @@ def lower_delays(draft) -> None:
     for d, row in enumerate(rows):
         for side, end in enumerate(("from_node", "to_node")):
             ends[draft.pipe_table[row["pipe"]][end]].append(2 * d + side)
-    for i, there in enumerate(ends):
-        draft.node_table["lines"][i], draft.node_table["line_count"][i] = len(draft.integers), len(there)
-        draft.integers += there
+    for i, lines in enumerate(ends):
+        draft.node_table["lines"][i], draft.node_table["line_count"][i] = len(draft.integers), len(lines)
+        draft.integers += lines
 
 
 def tables_for_jumps(draft) -> dict[str, np.ndarray]:
-    """Tables that differ where lines shorter than a step are as all others: what a jump meets. Empty without these."""
+    """Tables that replace the model's while a jump is solved: lines shorter than a step as ordinary lines.
+
+    Empty without such lines.
+    """
     short = draft.delay_table["now"] > 0.0
     if not short.any():
         return {}
     own, tables = copy.copy(draft), draft.tables
     own.node_table, own.valve_table, own.delay_table = (
-        one.copy() for one in (draft.node_table, draft.valve_table, draft.delay_table)
+        table.copy() for table in (draft.node_table, draft.valve_table, draft.delay_table)
     )
     own.integers, own.floats, own.faults = tables.integers.tolist(), tables.floats.tolist(), []
     for pipe in draft.pipe_table[draft.delay_table["pipe"][short]]:
@@ -150,74 +153,80 @@ def tables_for_jumps(draft) -> dict[str, np.ndarray]:
 
 
 def at_ends(draft, pipe) -> float:
-    """Admittance of a pipe's ends over that of its waves: less of a line whose ends know each other."""
+    """Admittance of a pipe's ends relative to that of its waves; less for a line shorter than a step.
+
+    The ends of such a line are coupled within the step.
+    """
     beta = draft.delay_table["now"][pipe["delay"]] if pipe["delay"] >= 0 else 0.0
     return float((1.0 - beta) / (1.0 + beta))
 
 
 def cut_lines(draft) -> list[str]:
-    """Stretches of all lines, by friction at the start; names of those whose bound is above the accuracy under auto."""
+    """Divide all lines into stretches by friction at the start.
+
+    Returns names of lines whose bound exceeds the accuracy under `auto`.
+    """
     case, at, unfit = draft.case, 0, []
-    found = draft.steady["lines"] = {}
+    facts = draft.steady["lines"] = {}
     for name, chosen in draft.followed.items():
-        found[name] = {"line": chosen.line, "line_bound": None, "line_why": chosen.why}
+        facts[name] = {"line": chosen.line, "line_bound": None, "line_why": chosen.why}
     scale, ramp = time_scales(draft) if len(draft.delay_table) else (0.0, 0.0)
     for row in draft.delay_table:
         name = draft.pipe_names[row["pipe"]]
         pipe, chosen = draft.pipe_table[row["pipe"]], draft.followed[name]
         travel = float(row["tau"] * row["stretches"])
         flow = abs(float(pipe["flow"])) + float(pipe["admittance"]) * FELT
-        takes = travel * float(drag_and_slope(pipe, flow)[1])
-        most = max(1, math.floor(travel / chosen.longest * (1.0 + 1e-9)))
-        many = min(most, max(1, math.ceil(0.5 * takes / case.numerics.accuracy)))
+        attenuation = travel * float(drag_and_slope(pipe, flow)[1])
+        limit = max(1, math.floor(travel / chosen.longest * (1.0 + 1e-9)))
+        count = min(limit, max(1, math.ceil(0.5 * attenuation / case.numerics.accuracy)))
         if row["now"] > 0.0:
-            many = 1
-        row["stretches"], row["stretch"], row["tau"] = many, at, travel / many
+            count = 1
+        row["stretches"], row["stretch"], row["tau"] = count, at, travel / count
         row["passes"] = 1.0 / (1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1])
         row["hold"] = row["hold"] if row["now"] > 0.0 else row["tau"]
-        at += many
+        at += count
         smoothed = by_interpolation(float(row["tau"]), chosen.longest, scale, ramp)
-        off = 0.25 * takes / many + smoothed
-        found[name]["line_bound"] = off
+        bound = 0.25 * attenuation / count + smoothed
+        facts[name]["line_bound"] = bound
         force = float(drag_and_slope(pipe, float(pipe["flow"]))[0])
         if abs(float(pipe["drag"]) - force) > DRIVEN * float(pipe["admittance"]) * 1e5 / travel:
-            off = math.inf
+            bound = math.inf
             unfit.append(name)
             if (case.links[name].line or case.numerics.line) == "delay":
-                draft.fault(f"links.{name}.line", '"delay" does not fit: at the start friction does not hold the drop '
-                            'of pressure along it, which drives every part of it; wanted "cells"')  # fmt: skip
+                draft.fault(f"links.{name}.line", '"delay" is not possible: at the start friction does not balance the '
+                            'drop of pressure along it; expected "cells"')  # fmt: skip
             continue
-        if row["now"] > 0.0 and takes > ROUGH:
-            off = math.inf
-            found[name]["line_why"] += ", where friction takes too much of a wave"
-        asked = case.links[name].line or case.numerics.line
-        if asked == "auto" and off > case.numerics.accuracy:
+        if row["now"] > 0.0 and attenuation > ROUGH:
+            bound = math.inf
+            facts[name]["line_why"] += ", where friction attenuates a wave too much"
+        stated = case.links[name].line or case.numerics.line
+        if stated == "auto" and bound > case.numerics.accuracy:
             unfit.append(name)
-        elif smoothed > case.numerics.accuracy and off < math.inf:
+        elif smoothed > case.numerics.accuracy and bound < math.inf:
             draft.warnings.append(too_quick(case, name, chosen.longest, min(scale, ramp or scale), smoothed))
-        elif off == math.inf:
+        elif bound == math.inf:
             longest = draft.case.step_amount(chosen.longest, 4)
-            draft.fault(f"links.{name}.line", f'"delay" does not fit: friction takes {takes:.3g} of a wave in a line '
-                        f'shorter than a step of {longest}; wanted shorter steps, or "cells"')  # fmt: skip
+            draft.fault(f"links.{name}.line", f'"delay" is not possible: friction takes {attenuation:.3g} of a wave in '
+                        f'a line shorter than a step of {longest}; expected shorter steps, or "cells"')  # fmt: skip
     shape_past(draft)
     return unfit
 
 
-def too_quick(case, name: str, step: float, scale: float, off: float) -> Notice:
-    """Notice that a schedule changes too quickly for the steps of a delay line."""
+def too_quick(case, name: str, step: float, scale: float, bound: float) -> Notice:
+    """Notice of a schedule that changes too fast for the steps of a delay line."""
     text = (
         f"{name}: a schedule changes something within {case.step_amount(scale, 3)}, and steps of "
-        f"{case.step_amount(step, 3)} may put its waves off by {off:.2g} of the change; "
-        f'wanted shorter steps, or line = "cells"'
+        f"{case.step_amount(step, 3)} may cause an error of its waves of {bound:.2g} of the change; "
+        f'expected shorter steps, or line = "cells"'
     )
-    return Notice("lines", f"links.{name}", text, "line", off, case.numerics.accuracy)
+    return Notice("lines", f"links.{name}", text, "line", bound, case.numerics.accuracy)
 
 
 def by_interpolation(tau: float, step: float, scale: float, ramp: float) -> float:
-    """Bound of what reading between steps is off by, as a share of what a schedule changes.
+    """Bound of the error of interpolation between steps, relative to the change of a schedule.
 
-    scale : duration of half a cosine [s], 0 for none; ramp : of a straight ramp, whose kinks the polynomial through
-    six entries overshoots by up to a tenth of what a step brings
+    scale : duration of half a cosine [s], 0 for none; ramp : duration of a straight ramp [s], at whose kinks a
+    polynomial through six entries overshoots by up to a tenth of the change in a step
     """
     kinks = BEND * step / ramp if ramp > 0.0 else 0.0
     bend = math.pi * step / scale if scale > 0.0 else 0.0
@@ -232,29 +241,29 @@ def by_interpolation(tau: float, step: float, scale: float, ramp: float) -> floa
 
 
 def time_scales(draft) -> tuple[float, float]:
-    """The shortest time in which a schedule changes its value, and of these that of a straight ramp [s].
+    """Shortest times of a change by a schedule : (of any shape, of a straight ramp) [s].
 
-    0 where none does but by jumps, which are kept.
+    0 if there is none except jumps, which are followed exactly.
     """
-    found, ramp, schedules = math.inf, math.inf, draft.schedules
+    shortest, ramp, schedules = math.inf, math.inf, draft.schedules
     for first, count in schedules.records:
         rows = schedules.rows[first : first + count]
         for k, row in enumerate(rows):
             if row[1] == WAVE:
-                found = min(found, math.pi / row[5]) if row[4] != 0.0 else found
+                shortest = min(shortest, math.pi / row[5]) if row[4] != 0.0 else shortest
             elif 0 < k < count - 1 and (row[1] != 0 or any(row[4:7])):
-                found = min(found, rows[k + 1][0] - row[0])
+                shortest = min(shortest, rows[k + 1][0] - row[0])
                 if row[1] == POWER or not any(row[5:7]):
                     ramp = min(ramp, rows[k + 1][0] - row[0])
-    return tuple(one if math.isfinite(one) else 0.0 for one in (found, ramp))
+    return tuple(duration if math.isfinite(duration) else 0.0 for duration in (shortest, ramp))
 
 
 def shape_past(draft) -> None:
-    """Rings of all lines, and the size of what a run keeps of them."""
+    """Set rings of all lines, and the size of their history in a run."""
     rings_of(draft.delay_table, longest_of(draft))
     draft.shapes = draft.shapes._replace(past=past_size(draft.delay_table))
 
 
 def longest_of(draft) -> float:
-    """Step that lines are cut for [s]."""
-    return min((one.longest for one in draft.followed.values() if one.line == "delay"), default=math.inf)
+    """Step for which lines are divided [s]."""
+    return min((method.longest for method in draft.followed.values() if method.line == "delay"), default=math.inf)

@@ -1,4 +1,4 @@
-"""How parts that act by a law of their own become rows of tables. Knows drafts; knows no rhs."""
+"""Device table: parts with a compiled law of their own."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from fvsolve.model.lowering import Lowering, Restriction, lowering_of
 
 
 class Device(Restriction):
-    """Parts of one kind with a row among the devices: what they hold, how they stand in a steady state.
+    """Lowering of a kind of device: its states, and its state in the steady start.
 
-    mode : what their law knows the row as; quantities : probes, in the order in which its `value` numbers them
-    sudden : whether events alone open it; leads : which of its events lets it lead a rigid column, -1 for none
-    states : names of what each holds; remedy : what to try where its events go to and fro
+    mode : code of the kind in its law; quantities : probes, in the order of codes in its `value`
+    sudden : True if only events open it; leads : index of its event that lets it control a rigid column, -1 for none
+    states : names of its states; remedy : advice for events that alternate
     """
 
     acts, rank = True, 2
@@ -30,30 +30,30 @@ class Device(Restriction):
     states: ClassVar[tuple[str, ...]] = ()
     quantities: ClassVar[tuple[str, ...]] = ()
     remedy: ClassVar[str] = "give it a time_constant"
-    vessel: ClassVar[bool] = False  # a place whose pressure it computes
+    vessel: ClassVar[bool] = False  # True for a node whose pressure it computes
 
     def place(self, draft, name: str, node: Any, row) -> None:
         """Fill the NODE row of a vessel."""
         row["kind"], row["row"] = rec.VESSEL, draft.stiff()
 
     def pressure_at_start(self, start, i: int, node: Any, row) -> float | None:
-        """As of `Lowering`: what a vessel is said to have at the start."""
+        """Pressure [Pa] of a vessel at the start."""
         return node.initial_pressure
 
-    def moves(self, name: str, node: Any, row, inflow: float, flow: float, told: Callable[..., str]) -> str:
-        """As of `Lowering`."""
-        return f"{node.kind} {name}: pressure changes by {told(row['stiffness'] * inflow, 'pressure', span=True)}/s"
+    def moves(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
+        """Text of the pressure change at the start."""
+        return f"{node.kind} {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"
 
     def gate(self, name: str) -> str | None:
-        """The link that a vessel opens and shuts beside."""
+        """Link that a vessel opens and closes in addition."""
         return None
 
     def row_of(self, model, name: str):
-        """The DEVICE row of one."""
-        return model.tables.devices[[one for one, _, _ in model.devices].index(name)]
+        """DEVICE row of a part."""
+        return model.tables.devices[[device_name for device_name, _, _ in model.devices].index(name)]
 
     def probe(self, draft, name: str, probe: Any, row) -> None:
-        """As of `Lowering`."""
+        """Fill the PROBE row of a quantity of the part."""
         if probe.quantity in self.quantities:
             row["index"] = draft.device_names.index(draft.inside(name))
             row["kind"], row["side"] = rec.DEVICE_VALUE, self.quantities.index(probe.quantity)
@@ -63,36 +63,36 @@ class Device(Restriction):
             super().probe(draft, name, probe, row)
 
     def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
-        """Names of what one holds."""
+        """Names of the states of a part."""
         return self.states
 
     def scales(self, draft, name: str, part: Any) -> list[float]:
-        """What counts as a small deviation of each of its states."""
+        """Size of a small deviation of each of its states."""
         return []
 
     def revise(self, start, part: Any, row) -> bool:
-        """Whether a steady solution asks for another state of it, which is then set."""
+        """Set the state that a steady solution implies; True if it changed."""
         return False
 
     def begin(self, start, part: Any, row) -> list[str]:
-        """Fill in what depends on the profile; returns what moves, in words."""
+        """Fill in data that depend on the profile; return texts of motions at the start."""
         return []
 
     def passing(self, model, name: str, part: Any, time: float) -> Notice:
-        """What is to be known where its law's `outside` said PASSING, at first at that time."""
+        """Notice for the result PASSING of its law's `outside`, first at that time."""
         raise NotImplementedError
 
-    def settle(self, slate, row, t: float, y: np.ndarray, scale: np.ndarray) -> None:
-        """Put into y what an event of its own does at once, and into `scale` what is a small deviation from now on."""
+    def settle(self, run_data, row, t: float, y: np.ndarray, scale: np.ndarray) -> None:
+        """Apply sudden changes of an event of the device to y, and new sizes of small deviations to `scale`."""
 
     def resists(self, part: Any) -> bool:
-        """Whether its restriction dissipates drop times flow; else that is energy supplied."""
+        """True if its restriction dissipates drop times flow; else that is energy supplied."""
         return True
 
     def squares(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
-        """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it, state -> factor.
+        """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it : state -> factor.
 
-        Of a vessel, m^2 dp/dm / (2 rho) of its mass; nothing of others.
+        For a vessel, m^2 dp/dm / (2 rho) of its mass; none for other devices.
         """
         if not self.vessel:
             return []
@@ -101,7 +101,7 @@ class Device(Restriction):
         return [{int(node["y"]): float(np.sqrt(stiffness / (2.0 * model.case.properties.density)))}]
 
     def above(self, model, part: Any, row) -> float:
-        """Energy that it holds at the start above the least it can hold [J]."""
+        """Energy of the device at the start above its least energy [J]."""
         return 0.0
 
 
@@ -133,23 +133,23 @@ def lower_devices(draft) -> None:
 
 
 def sets_up(valve, device: Device, k: int, row) -> None:
-    """Let a VALVE row know its device: which opens it if its law has a `set`, and where its flags and numbers stand."""
+    """Write the device into its VALVE row: it opens the valve if its law has a `set`; offsets of flags and numbers."""
     valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1
     valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
 
 
 def opening_of(start, k: int) -> float:
-    """Opening x between 0 and 1 at which valve k passes its flow of the profile, M |M| = G x^2 dP."""
+    """Opening x between 0 and 1 at which valve k has its flow of the profile, M |M| = G x^2 dP."""
     valve = start.valves[k]
-    dense, drop = start.law_of(k)
+    conductance, drop = start.law_of(k)
     flow = abs(float(valve["flow"]))
-    if flow == 0.0 or not dense * drop > 0.0:
+    if flow == 0.0 or not conductance * drop > 0.0:
         return 0.0
     if flow >= valve["transition"] and drop >= valve["unseen"]:
-        return min(flow / math.sqrt(dense * drop), 1.0)
+        return min(flow / math.sqrt(conductance * drop), 1.0)
     low, high, x = 0.0, 1.0, 0.5
     for _ in range(60):
-        g = dense * x * x
+        g = conductance * x * x
         low, high = (x, high) if flow_at_drop(g, transition_of(valve, g), drop) < flow else (low, x)
         x = 0.5 * (low + high)
     return x

@@ -1,4 +1,4 @@
-"""The accounts of energy of a model: which row of power or storage is whose. Knows names; steps nothing."""
+"""Energy accounts of a model: the part and category of each row of power and of stored energy."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fvsolve.model.slate import Slate
 
 @dataclass(frozen=True)
 class Account:
-    """Rows that make one line of the ledger: `what` of `place`, and their signs."""
+    """Rows of power that form a line of the ledger, with signs: `category` at `place`."""
 
     what: str  # "supplied" | "stored" | "dissipated" | "scheme" | "law"
     place: str
@@ -26,26 +26,26 @@ class Account:
 
 
 class Accounts:
-    """Power rows and stored rows of a model by account, read by the slate of the run that they are of.
+    """Rows of power and of stored energy by account, for the run data of a run.
 
-    stored rows and the power rows of their rates stand in the same order in `stored` and `rates`.
+    Accounts of stored energy in `stored_accounts` and of its rates (category "rate") are in the same order.
     """
 
-    def __init__(self, slate: Slate) -> None:
-        self.slate, self.model = slate, slate.model
-        model, case = slate.model, slate.model.case
+    def __init__(self, run_data: Slate) -> None:
+        self.slate, self.model = run_data, run_data.model
+        model, case = run_data.model, run_data.model.case
         refuse_unfelt(case)
         if len(model.tables.rides):
-            slate.tables.rides["heavy"] = rec.ASKED
+            run_data.tables.rides["heavy"] = rec.ASKED
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
-            raise FvsolveError("the energy of basins that ride on bodies is not booked where a side is open yet")
+            raise FvsolveError("the energy of a basin on a body with an open side is not supported")
         if model.basins and not case.law.linear:
-            raise FvsolveError('the energy of basins is booked under law = "linear" alone')
+            raise FvsolveError('the energy of basins is computed for law = "linear" only')
         self.power, self.stored = model.functions.energies
-        if model.basins and len(model.tables.bodies):  # feel what rides on them, for its work
-            slate.tables.basins["heavy"] = 1
+        if model.basins and len(model.tables.bodies):  # include loads of the fluid in basins on bodies, for its work
+            run_data.tables.basins["heavy"] = 1
         self.accounts: list[Account] = []
-        self.held: list[Account] = []  # of stored energy: rows of `stored`
+        self.held: list[Account] = []  # accounts of stored energy, by rows of `stored`
         self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
         self.powers = self.stores = 0
         nodes = model.tables.nodes
@@ -75,16 +75,16 @@ class Accounts:
         self.holding = matrix_of(self.held, self.stores)
 
     def take(self, count: int) -> int:
-        """The next rows of power."""
+        """First of `count` new rows of power."""
         self.powers += count
         return self.powers - count
 
-    def add(self, what: str, place: str, kind: str, row: int, sign: float = 1.0) -> None:
-        """One more line, of one row of power."""
-        self.accounts.append(Account(what, place, kind, (row,), (sign,)))
+    def add(self, category: str, place: str, kind: str, row: int, sign: float = 1.0) -> None:
+        """Add an account with a single row of power."""
+        self.accounts.append(Account(category, place, kind, (row,), (sign,)))
 
     def hold(self, place: str, kind: str, rate: int | None, rows: int = 1) -> None:
-        """One more part that stores: its next rows of `stored`, and the row of power that is their rate."""
+        """Add a part that stores: its next rows of `stored`, and the row of power that is their rate."""
         at = self.stores
         self.stores += rows
         if rate is not None:
@@ -95,11 +95,11 @@ class Accounts:
         at = self.take(2)
         if books := lowering_of(type(place)).books:
             self.add("supplied", name, books, at)
-        stores = code in (rec.TANK, rec.CHAMBER, rec.MOVING)  # a vessel's is its device's
+        stores = code in (rec.TANK, rec.CHAMBER, rec.MOVING)  # the energy of a vessel is booked by its device
         self.hold(name, place.kind, at + 1 if stores else None)
 
     def valves(self) -> None:
-        self.taken: dict[str, tuple[int, bool]] = {}  # row of a device's restriction, and whether it dissipates
+        self.taken: dict[str, tuple[int, bool]] = {}  # row of a device's restriction, and True if it dissipates
         resists = {name: device.resists(part) for name, part, device in self.model.devices}
         for link, _, lowering in rows_in(self.model.case, "valve"):
             for name in lowering.row_names(link):
@@ -151,11 +151,11 @@ class Accounts:
             rows = {"supplied": [at], "dissipated": [at + 2]}
             if own is not None:
                 rows["dissipated" if resists else "supplied"].append(own)
-            for what, (sign, of) in {
+            for category, (sign, indices) in {
                 "supplied": (-1.0, rows["supplied"]),
                 "dissipated": (1.0, rows["dissipated"]),
             }.items():
-                self.accounts.append(Account(what, name, kind, tuple(of), (1.0, sign)[: len(of)]))
+                self.accounts.append(Account(category, name, kind, tuple(indices), (1.0, sign)[: len(indices)]))
             self.hold(name, kind, at + 1)
 
     def walls(self) -> None:
@@ -177,23 +177,23 @@ class Accounts:
             rows = (at, at + 1, at + 2, at + 3, at + 4)
             self.accounts.append(Account("scheme", basin.name, "basin", rows, (1, -1, -1, -1, -1)))
 
-    def of(self, what: str) -> list[int]:
-        """Numbers of the lines of one kind."""
-        return [k for k, one in enumerate(self.accounts) if one.what == what]
+    def of(self, category: str) -> list[int]:
+        """Numbers of the lines of a category."""
+        return [k for k, account in enumerate(self.accounts) if account.what == category]
 
     def power_at(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """Power of every line [W] : float64[lines], from a state; its rates and `out` are written here."""
+        """Power of every line [W] : float64[lines], at a state; writes its rates and `out`."""
         self.model.functions.rhs(t, y, dydt, out, self.slate.handle)
         return self.power_by(t, y, dydt, out)
 
     def power_by(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """The same, from a state with rates and `out` as given."""
+        """Power of every line [W] at a state whose rates and `out` are given."""
         rows = np.zeros(self.powers)
         self.power(t, y, dydt, out, self.slate.handle, rows)
         return self.matrix @ rows
 
     def stored_at(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Change of what every part stores since the profile [J] : float64[held]."""
+        """Change of the energy of every storing part since the profile [J] : float64[stored]."""
         rows, out = np.zeros(self.stores), self.model.new_out()
         self.model.functions.rhs(t, y, np.zeros(0), out, self.slate.handle)
         self.stored(t, y, np.zeros(0), out, self.slate.handle, rows)
@@ -201,15 +201,15 @@ class Accounts:
 
 
 def refuse_unfelt(case) -> None:
-    """FvsolveError where something rides whose energy is not booked."""
-    found = [f"{'.'.join(place)}: {text}" for place, text in unfelt(case.nodes, case.links)]
-    if found:
-        raise FvsolveError(f"the energy of this network that rides on a body is not booked; {'; '.join(found)}")
+    """Raise FvsolveError if the energy of a network on a body is not booked."""
+    faults = [f"{'.'.join(place)}: {text}" for place, text in unfelt(case.nodes, case.links)]
+    if faults:
+        raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
 
 
 def matrix_of(accounts: list[Account], rows: int) -> np.ndarray:
-    """float64[accounts, rows] that sums rows with their signs."""
-    found = np.zeros((len(accounts), rows))
-    for k, one in enumerate(accounts):
-        found[k, list(one.rows)] += one.signs
-    return found
+    """Matrix that sums rows with their signs : float64[accounts, rows]."""
+    matrix = np.zeros((len(accounts), rows))
+    for k, account in enumerate(accounts):
+        matrix[k, list(account.rows)] += account.signs
+    return matrix

@@ -1,4 +1,4 @@
-"""What energy a model starts with, above that of the same parts at rest with ambient. Knows tables; steps nothing."""
+"""Energy of a model at the start, above that of the same parts at rest and at ambient pressure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.model.unsteady import memory_shares
 
 
 def datum_of(model: Model, port: str | None = None) -> float:
-    """Elevation from which heights count [m]: the port's, else the lowest; a reservoir given by head has none."""
+    """Datum of elevations [m]: that of a port if given, else the lowest node; reservoirs given by head do not count."""
     if port is not None:
         return float(model.elevation[port])
     placed = [model.elevation[name] for name, node in model.case.places.items() if getattr(node, "head", None) is None]
@@ -20,39 +20,39 @@ def datum_of(model: Model, port: str | None = None) -> float:
 
 
 def available(model: Model) -> dict[str, float]:
-    """Energy of the starting profile above that of the same parts all at P = 0 [J]: what could be had at most.
+    """Energy of the starting profile above that of the same parts at P = 0 [J], an upper bound of released energy.
 
-    P = p - p_ambient + rho g z, z from the datum in the settings: there, or as near to it as it can, the surface of a
-    tank would stand.
+    P = p - p_ambient + rho g z, z from the datum in the settings. For a tank P = 0 puts its surface at the datum, or as
+    near to it as its bottom and rim allow.
     """
-    tables, nodes, found = model.tables, model.tables.nodes, {}
+    tables, nodes, energies = model.tables, model.tables.nodes, {}
     datum = float(tables.settings[0]["datum"])
     vessels = vessels_above(model)
     for name, row in zip(model.node_names, nodes, strict=True):
         if row["y"] >= 0 and row["kind"] != rec.VESSEL:
-            found[name] = tank_above(model, row) if row["kind"] == rec.TANK else vessels(row)
+            energies[name] = tank_above(model, row) if row["kind"] == rec.TANK else vessels(row)
     for (name, part, device), row in zip(model.devices, tables.devices, strict=True):
         if above := device.above(model, part, row):
-            found[name] = above
+            energies[name] = above
     for k, pipe in enumerate(model.pipes):
-        found[pipe.name] = pipe_above(model, k) + memory_above(model, k) + creep_above(model, k)
+        energies[pipe.name] = pipe_above(model, k) + memory_above(model, k) + creep_above(model, k)
     for name, row in zip(model.column_names, tables.columns, strict=True):
-        found[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
+        energies[name] = 0.5 * row["flow"] ** 2 * row["length"] / (model.case.properties.density * row["area"])
     for name, row in zip(model.mass_names, tables.masses, strict=False):
         if row["y"] >= 0:
-            found[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
+            energies[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
     for basin in model.basins:
-        found[basin.name] = basin.above(basin.of(model.start), datum)
+        energies[basin.name] = basin.above(basin.of(model.start), datum)
     for (name, *_), row in zip(rows_in(model.case, "brace"), tables.braces, strict=True):
         if row["stiffness"] > 0.0:
-            found[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
+            energies[name] = 0.5 * row["force"] ** 2 / row["stiffness"]
     for (name, *_), row in zip(rows_in(model.case, "stop"), tables.stops, strict=True):
-        found[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
-    return {name: float(value) for name, value in found.items()}
+        energies[name] = 0.5 * row["stiffness"] * min(0.0, row["below"], row["above"]) ** 2
+    return {name: float(value) for name, value in energies.items()}
 
 
 def vessels_above(model: Model):
-    """energy(node row) of a chamber at the start above that at P = 0 [J]."""
+    """Function energy(node row) of a chamber at the start, above that at P = 0 [J]."""
     st, floats = model.tables.settings[0], model.tables.floats
     if model.case.law.linear:
         return lambda row: 0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
@@ -95,37 +95,37 @@ def pipe_above(model: Model, k: int) -> float:
         low = mass_of_pressure(st, floats, row, rest)[0]
         p = pressure_of_mass(st, floats, row, m)
         head, least = enthalpy(st, floats, p) - base + height, enthalpy(st, floats, rest) - base + height
-        squeezed = m * head - low * least - (thrust(st, floats, row, p) - thrust(st, floats, row, rest))
-        total += float(row["dx"]) * (squeezed + 0.5 * row["flow"] ** 2 / m)
+        strain_energy = m * head - low * least - (thrust(st, floats, row, p) - thrust(st, floats, row, rest))
+        total += float(row["dx"]) * (strain_energy + 0.5 * row["flow"] ** 2 / m)
     return float(total)
 
 
 def memory_above(model: Model, k: int) -> float:
-    """What unsteady friction of pipe k remembers of the flow of the start [J]."""
+    """Energy in memory states of unsteady friction of pipe k, for the flow of the start [J]."""
     row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
     share, full, square = float(memory_shares(model.tables.floats, row).sum()), st["rho"] * row["area"], 1.0
-    if not model.case.law.linear:  # the velocity is remembered
+    if not model.case.law.linear:  # memory states hold velocities
         square = np.mean((full / model.tables.profile[row["center"] + np.arange(pipe.cells)]) ** 2)
     return float(0.5 * share * square * row["flow"] ** 2 * pipe.length / full)
 
 
 def creep_above(model: Model, k: int) -> float:
-    """What the wall of pipe k holds by creep at the start above that at P = 0 [J]."""
+    """Energy in creep of the wall of pipe k at the start above that at P = 0 [J]."""
     row = model.tables.pipes[k]
     if row["elements"] == 0:
         return 0.0
     pairs, rest = elements(model.tables.floats, row), pipe_above(model, k)
     area, rho, length = float(row["area"]), model.case.properties.density, model.pipes[k].length
     if model.case.law.linear:
-        pressed = rest - float(0.5 * row["flow"] ** 2 * length / (rho * area))
+        elastic = rest - float(0.5 * row["flow"] ** 2 * length / (rho * area))
     else:
         from fvsolve.kernels.density import pressure_of_mass
 
         st, floats, profile = model.tables.settings[0], model.tables.floats, model.tables.profile
         p = [pressure_of_mass(st, floats, row, float(m)) for m in profile[row["center"] + np.arange(row["cells"])]]
         excess = np.array(p) - st["ambient"] + rho * st["gravity"] * (model.pipes[k].elevation - st["datum"])
-        pressed = float(0.5 * row["dx"] * area / rho * np.sum((excess / row["speed"]) ** 2))
-    return float(np.sum(pairs[:, 0] / pairs[:, 1])) * pressed
+        elastic = float(0.5 * row["dx"] * area / rho * np.sum((excess / row["speed"]) ** 2))
+    return float(np.sum(pairs[:, 0] / pairs[:, 1])) * elastic
 
 
 def tank_above(model: Model, row) -> float:
@@ -138,10 +138,10 @@ def tank_above(model: Model, row) -> float:
     low = -float(row["mass"])
     if target <= 0.0:
         return float(-tank_energy(st, floats, row, rho, low))
-    room = rho * float(row["area"]) * target + float(row["mass"])
-    while tank_level(row, floats, rho, low + room) < target and row["mass"] + low + room < row["full"]:
-        room *= 2.0
-    high = min(float(row["full"] - row["mass"]), low + room)
+    added = rho * float(row["area"]) * target + float(row["mass"])
+    while tank_level(row, floats, rho, low + added) < target and row["mass"] + low + added < row["full"]:
+        added *= 2.0
+    high = min(float(row["full"] - row["mass"]), low + added)
     for _ in range(200):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if tank_level(row, floats, rho, middle) < target else (low, middle)

@@ -1,4 +1,4 @@
-"""Friction, transitions and hydrostatics of a case in numbers. Knows the fluid; knows no network."""
+"""Coefficients of friction, laminar transitions and hydrostatics of a case."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ MANNING = 4.0 ** (10.0 / 3.0) / math.pi**2  # h / L = 10.294 n^2 q^2 / D^(16/3),
 
 
 class Hydraulics:
-    """What the fluid and gravity of a case make of sizes."""
+    """Coefficients from sizes of parts, the fluid and gravity."""
 
     def __init__(self, case) -> None:
         self.case, self.fluid = case, case.properties
         self.rho, self.gravity, self.ambient = self.fluid.density, case.gravity, case.ambient_pressure
 
     def add_head(self, schedules, head, row) -> int:
-        """A schedule of head [m] as one of pressure [Pa] at an elevation [m]; as it is under laws that bend it."""
+        """Add a schedule of head [m] as pressure [Pa] at the row's elevation; unchanged under nonlinear laws."""
         if not self.case.law.linear:
             row["head_given"] = 1
             return schedules.add(head)
@@ -27,7 +27,10 @@ class Hydraulics:
         return schedules.add(head, weight, self.ambient - weight * elevation)
 
     def friction(self, name: str, link, row, fault) -> None:
-        """Friction of a pipe or column: dM/dt = -(loss |M| M + ...), kernels.friction; `steady` by roughness waits."""
+        """Friction of a pipe or column: dM/dt = -(loss |M| M + ...), see `kernels.steady_friction`.
+
+        For `steady` friction by roughness the factor is set later, from the starting flow.
+        """
         area = math.pi / 4.0 * link.diameter**2
         law, row["loss"] = link.friction, link.minor_loss / (2.0 * self.rho * area**2 * link.length) * area
         per_factor = 1.0 / (2.0 * link.diameter * self.rho * area)
@@ -62,13 +65,15 @@ class Hydraulics:
             row["reynolds"] = link.diameter / (area * self.fluid.viscosity)
 
     def compliance(self, name: str, speed: float, fault) -> float:
-        """Growth of a pipe's area with pressure [1/Pa], as its law has it; none may be negative."""
-        found = self.case.law.compliance(speed)
-        if found < -1e-9 / self.fluid.bulk_modulus:
-            told, sound = (self.case.amount(one, "velocity", 6) for one in (speed, self.fluid.sound_speed))
-            fault(f"links.{name}.wave_speed", f"{told} is faster than sound in the fluid, {sound}; wanted at most "
+        """Growth of a pipe's area with pressure [1/Pa], by the density law; a negative value is a fault."""
+        growth = self.case.law.compliance(speed)
+        if growth < -1e-9 / self.fluid.bulk_modulus:
+            given, sound = (
+                self.case.amount(speed_value, "velocity", 6) for speed_value in (speed, self.fluid.sound_speed)
+            )
+            fault(f"links.{name}.wave_speed", f"{given} is faster than sound in the fluid, {sound}; expected at most "
                   'that, or law = "linear"')  # fmt: skip
-        return found if found > 1e-9 / self.fluid.bulk_modulus else 0.0
+        return growth if growth > 1e-9 / self.fluid.bulk_modulus else 0.0
 
     def transition_flow(self, name: str, link, reynolds: float, fault) -> float:
         """Mass flow [kg/s] at a Reynolds number of the full opening, Re = 4 M / (pi d mu)."""
@@ -82,5 +87,5 @@ class Hydraulics:
         if not viscosity:
             if link.laminar_reynolds is not None:
                 fault(f"links.{name}.laminar_reynolds", "needs the fluid's viscosity; give fluid.viscosity")
-            viscosity = 1e-6 * self.rho  # bounds the slope at zero drop only: no more viscous than water
+            viscosity = 1e-6 * self.rho  # water's: it only bounds the slope at zero drop
         return reynolds * math.pi / 4.0 * diameter * viscosity

@@ -1,4 +1,4 @@
-"""What of a model can be held at a value: schedules, by the names of their keys. Knows tables; holds nothing."""
+"""Inputs of a model: schedules that can be held at a value, by `part.key`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class Sort(NamedTuple):
-    """What a value is: its unit, what is wanted of it, its range, and what counts as a small change [SI]."""
+    """Kind of an input: unit, expected value (text), range, and size of a small change [SI]."""
 
     unit: str
     wanted: str
@@ -39,39 +39,39 @@ VALUE = Sort("-", "a finite number")
 
 
 class Input(NamedTuple):
-    """A schedule that can be held: what kernels read is scale * value + offset."""
+    """Schedule that can be held; kernels read scale * value + offset."""
 
     sort: Sort
     schedule: int
     scale: float = 1.0
     offset: float = 0.0
-    node: int = -1  # whose pressure or head it is
-    other: int = -1  # of a value with a sign, the schedule of what lies below zero
-    scalar: int = -1  # whose value flows in
+    node: int = -1  # node, for a pressure or head
+    other: int = -1  # for a value with a sign, the schedule of its negative part
+    scalar: int = -1  # scalar whose value flows in
 
 
 def inputs_of(model: Model) -> dict[str, Input]:
-    """Input name, PART.KEY -> what it holds: what every part has to drive it by, see `Lowering.inputs`."""
+    """Inputs of all parts : name `PART.KEY` -> input, see `Lowering.inputs`."""
     case = model.case
     parts = {**case.places, **{name: case.conduits[name] for name in model.valve_names}}
     parts |= {name: link for name, link in case.links.items() if name not in parts}
-    found: dict[str, Input] = {}
+    inputs: dict[str, Input] = {}
     for name, part in parts.items():
         own = lowering_of(type(part)).of(part).inputs(model, name, part)
-        found |= {f"{name}.{key}": one for key, one in own.items()}
-    return found
+        inputs |= {f"{name}.{key}": value for key, value in own.items()}
+    return inputs
 
 
 def opening(model: Model, name: str) -> dict[str, Input]:
-    """That of a restriction, by its schedule."""
+    """Opening of a restriction, by its schedule."""
     return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
 
 
 def values_in(model: Model, name: str) -> dict[str, Input]:
-    """Values of scalars that flow in from a place, by their names."""
-    i, found = model.node_names.index(name), {}
-    for q, (scalar, one) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
-        place = int(model.tables.integers[one["places"] + i])
+    """Values of scalars that flow in from a node, by their names."""
+    i, inputs = model.node_names.index(name), {}
+    for q, (scalar, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
+        place = int(model.tables.integers[row["places"] + i])
         if place >= 0:
-            found[scalar] = Input(VALUE, place, scalar=q)
-    return found
+            inputs[scalar] = Input(VALUE, place, scalar=q)
+    return inputs

@@ -1,4 +1,4 @@
-"""How parts become rows of tables: what each kind answers while a model is made. Knows drafts; knows no rhs."""
+"""Lowering of parts: methods of each kind of part that fill its rows of tables."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from fvsolve.steady import Edge
 if TYPE_CHECKING:
     from fvsolve.model.inputs import Input
 
-SCALE = 1e5  # a typical drop [Pa]
+SCALE = 1e5  # a typical pressure drop [Pa]
 
 
 class Lowering:
-    """Parts of one kind: their rows, their numbers, how they start, what of them can be held.
+    """Conversion of parts of one kind to rows: their numbers, start, inputs and probes.
 
-    table : of links, where their rows are: "pipe", "column", "valve", "brace", "stop" or "piston"; of places none
-    rows : how many each has there; rank : kinds of a greater one stand behind those of a lesser
-    law : module of its compiled law, whose functions are named as `kernels.calls.HOOKS`; with a `step` it says what its
-    restriction lets through, in place of the root
-    events : what it means that each event function falls to zero, "" where that is nothing to a reader
-    acts : whether it is a device as well, see `model.device`
-    books : name of its line in the ledger of energy: of a place, what it supplies, "" for none; else what a row is
+    table : for links, the table of their rows: "pipe", "column", "valve", "brace", "stop" or "piston"; "" for places
+    rows : number of rows of each part; rank : rows of kinds with greater rank come after those with lesser rank
+    law : module of its compiled law, whose functions are named as in `kernels.calls.HOOKS`; if it has a `step`, that
+    gives the flow through its restriction, in place of the root
+    events : meaning of a zero of each event function, "" if it is not reported
+    acts : True if it is also a device, see `model.device_lowering`
+    books : its name in the energy ledger: for a place, of the energy it supplies ("" for none); for a link, of its row
     """
 
     kinds: ClassVar[dict[str, Lowering]] = {}
@@ -48,40 +48,40 @@ class Lowering:
             Lowering.kinds[kind] = cls()
 
     def of(self, part: Any) -> Lowering:
-        """What lowers this part: itself, but where its keys ask for other states."""
+        """Lowering of this part; another one if the part's keys need other states."""
         return self
 
     def numbers(self, draft, name: str, part: Any) -> list[float]:
-        """Its numbers, in the order in which its law reads them from the place that its row names as `data`."""
+        """Numbers of a part, in the order in which its law reads them from the offset `data` of its row."""
         return []
 
     def resize(self, draft, name: str, before: Any, part: Any, row) -> bool:
-        """Make its row, once packed, that of a part in place of that before; whether it can."""
+        """Update its row to a part that replaces `before`; False if that is not possible."""
         return False
 
     def inputs(self, model, name: str, part: Any) -> dict[str, Input]:
-        """Key -> what of it can be held at a value."""
+        """Key -> schedule that can be held at a value."""
         return {}
 
     def probe(self, draft, name: str, probe: Any, row) -> None:
-        """Fill the PROBE row of one of its quantities."""
+        """Fill the PROBE row of a quantity of the part."""
         row["kind"], row["index"] = rec.PRESSURE, draft.node_index[name]
 
     # places ---------------------------------------------------------------------------------------------------
 
     def place(self, draft, name: str, node: Any, row) -> None:
-        """Fill the NODE row of a place of the fluid."""
+        """Fill the NODE row of a fluid node."""
 
     def pressure_at_start(self, start, i: int, node: Any, row) -> float | None:
-        """Pressure [Pa] that a place holds in the steady problem, None where flows decide."""
+        """Pressure [Pa] that a node holds in the steady problem, None if flows determine it."""
         return None
 
-    def moves(self, name: str, node: Any, row, inflow: float, flow: float, told: Callable[..., str]) -> str:
-        """What a net flow [kg/s], [m3/s] into a place does at the start, in words; "" for nothing.
+    def moves(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
+        """Text of the change that a net inflow [kg/s], [m3/s] causes at the start; "" for none.
 
-        told : as `Case.amount`, numbers in the units of `[output]`
+        amount : as `Case.amount`, numbers in the units of `[output]`
         """
-        return f"junction {name}: {told(flow, 'flow')} more flow in than out"
+        return f"junction {name}: {amount(flow, 'flow')} more flow in than out"
 
     # links ----------------------------------------------------------------------------------------------------
 
@@ -89,12 +89,12 @@ class Lowering:
         """Fill the rows of a link."""
 
     def row_names(self, name: str) -> list[str]:
-        """What the ledger of energy calls each of them."""
+        """Names of its rows in the energy ledger."""
         return [name]
 
 
 class Restriction(Lowering):
-    """Links of one row among the valves, by the root M |M| = G dp or a law of their own."""
+    """Links with one row in the valve table, by the root M |M| = G dp or a law of their own."""
 
     table = "valve"
 
@@ -118,43 +118,43 @@ class Restriction(Lowering):
 
     @property
     def steps(self) -> bool:
-        """Whether a law of its own says what it lets through."""
+        """True if the part has a flow law of its own."""
         return self.law is not None and calls.hook_of(self.law, "step") is not None
 
     def restriction(self, draft, name: str, link: Any, row) -> None:
-        """Fill its VALVE row with what its law does not say."""
+        """Fill the fields of its VALVE row that its law does not set."""
         draft.restriction(name, link, row)
 
     def edge(self, start, k: int) -> Edge | None:
-        """Its edge in the steady problem, k its VALVE row; None for that of a root, open as `start.shut` has it."""
+        """Edge in the steady problem of VALVE row k; None for the root law, open as in `start.shut_valves`."""
         if not self.steps:
             return None
-        row, (denser, wider) = start.valves[k], start.dense_of.get(k, (1.0, 1.0))
+        row, (density_ratio, drive_ratio) = start.valves[k], start.dense_of.get(k, (1.0, 1.0))
         row["open"] = g = start.conductance(k)
         i, j = int(row["from_node"]), int(row["to_node"])
         if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
         if start.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        per, step = math.sqrt(SCALE / (g * denser)), self.stepper(start, k, g, denser)
+        per, step = math.sqrt(SCALE / (g * density_ratio)), self.stepper(start, k, g, density_ratio)
 
         def newton(flow, present):
-            a, s = step(flow, present * wider)
-            return per, per * s * wider, per * a
+            a, s = step(flow, present * drive_ratio)
+            return per, per * s * drive_ratio, per * a
 
-        return Edge(i, j, newton, math.sqrt(g * denser * SCALE))
+        return Edge(i, j, newton, math.sqrt(g * density_ratio * SCALE))
 
-    def stepper(self, start, k: int, g: float, denser: float):
-        """(flow [kg/s], drop [Pa]) -> a, s of its law's `step`, before anything has happened."""
+    def stepper(self, start, k: int, g: float, density_ratio: float):
+        """Function (flow [kg/s], drop [Pa]) -> a, s of its law's `step`, before any event."""
         hook = calls.addressed(self.law.step, calls.HOOKS["step"][0])
-        return lambda flow, drop: step_at(hook, start.out, start.handle, k, g, float(flow), float(drop), denser)
+        return lambda flow, drop: step_at(hook, start.out, start.handle, k, g, float(flow), float(drop), density_ratio)
 
     def follow(self, start, k: int) -> None:
-        """Let the profile's drop be that at which it carries its flow; where that is another one, it is not open."""
-        row, (drop, denser) = start.valves[k], start.drive_of(k)
+        """Set the profile's drop to that of its flow; if they do not agree, the restriction counts as not open."""
+        row, (drop, density_ratio) = start.valves[k], start.drive_of(k)
         if row["open"] <= 0.0:
             return
-        flow, step = float(row["flow"]), self.stepper(start, k, float(row["open"]), denser)
+        flow, step = float(row["flow"]), self.stepper(start, k, float(row["open"]), density_ratio)
         a, s = step(flow, drop)
         if abs(a) > 1e-6 * (start.flow_scale * 1e-6 + abs(flow)):
             row["open"] = 0.0
@@ -167,30 +167,30 @@ class Restriction(Lowering):
             row["drop"] = drop
 
 
-ROUNDS = 5  # of Newton from a drop that is right to 1e-6
+ROUNDS = 5  # Newton steps from a drop that is accurate to 1e-6
 
 
 @functools.cache
 def lowering_of(part: type) -> Lowering:
-    """What lowers parts of a kind: of the module `lower` beside their declaration."""
-    home = part.__module__.rpartition(".")[0]
-    if find_spec(f"{home}.lower") is not None:
-        import_module(f"{home}.lower")
+    """Lowering of a kind of part, from the module `lower` in the package of its declaration."""
+    package = part.__module__.rpartition(".")[0]
+    if find_spec(f"{package}.lower") is not None:
+        import_module(f"{package}.lower")
     return Lowering.kinds.get(part.kind, PLAIN)
 
 
-PLAIN = Lowering()  # of what lies in no table
+PLAIN = Lowering()  # for parts without rows
 
 
 def lowered(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
-    """Table -> (name, link, what it is lowered by) of the links that have rows in it, in the order of these."""
-    found: dict[str, list[tuple[str, Any, Lowering]]] = {}
+    """Table -> (name, link, lowering) of the links with rows in it, in the order of rows."""
+    tables: dict[str, list[tuple[str, Any, Lowering]]] = {}
     for name, link in case.conduits.items():
         lowering = lowering_of(type(link)).of(link)
-        found.setdefault(lowering.table, []).append((name, link, lowering))
-    return {table: sorted(rows, key=lambda one: one[2].rank) for table, rows in found.items()}
+        tables.setdefault(lowering.table, []).append((name, link, lowering))
+    return {table: sorted(rows, key=lambda entry: entry[2].rank) for table, rows in tables.items()}
 
 
 def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
-    """Those of one table."""
+    """Links of one table : (name, link, lowering)."""
     return lowered(case).get(table, [])

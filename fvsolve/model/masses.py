@@ -1,4 +1,4 @@
-"""Masses and what pushes them, lowered to tables, and the forces they start from. Knows names; knows no rhs."""
+"""Tables of masses on axes and of the forces on them, and their forces at the start."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from fvsolve.model.bodies_start import rounding
 from fvsolve.model.lowering import Lowering
 from fvsolve.model.mechanism import add_line, apart
 
-BAR = 1e5  # what counts as a small pressure, and so the travel that makes it
-SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of masses that no chamber holds, of masses that nothing holds
+BAR = 1e5  # a small pressure, which sets the size of a small travel
+SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of masses without chambers; of masses without stiffness
 
 
 class Push(Lowering):
-    """Links between masses, whose force is their quantity."""
+    """Links between masses, whose quantity is their force."""
 
     def probe(self, draft, name, probe, row) -> None:
         row["kind"], row["index"] = rec.FORCE, draft.push_names.index(name)
 
 
 class OnAxis(Lowering):
-    """What moves along an axis, or stands still there."""
+    """Parts that move along an axis, or are fixed on it."""
 
     def probe(self, draft, name, probe, row) -> None:
         row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
@@ -42,7 +42,7 @@ def lower_masses(draft) -> None:
     for name, row in zip(draft.mass_names, draft.mass_table, strict=False):
         node = case.loaded[name]
         row["position"] = node.initial_position
-        if (mass := getattr(node, "mass", None)) is not None:  # a frame stands still
+        if (mass := getattr(node, "mass", None)) is not None:  # a frame is fixed
             row["velocity"], row["lightness"] = node.initial_velocity, 1.0 / mass
     braces, draft.brace_table = draft.fill("brace", rec.BRACE)
     stops, draft.stop_table = draft.fill("stop", rec.STOP)
@@ -52,25 +52,25 @@ def lower_masses(draft) -> None:
 
 
 def ends(link) -> tuple[str | None, str]:
-    """The places that a push joins; the first may be none."""
+    """Places that a push joins; the first may be None."""
     return (
         (link.ports["case"], link.ports["rod"]) if "rod" in link.ports else (link.ports.get("from"), link.ports["to"])
     )
 
 
 def spatial(draft, *places: str | None) -> bool:
-    """Whether places are points of bodies, or of the world."""
+    """True if any place is a point of a body or of the world."""
     return any(place is not None and place not in draft.mass_index for place in places)
 
 
-def join(draft, row, ports: tuple[str, str], places: tuple[str | None, str], *how) -> tuple[float, float]:
-    """Write what two ports join; how far the second lies ahead at the start [m], and its speed ahead [m/s].
+def join(draft, row, ports: tuple[str, str], places: tuple[str | None, str], *line_options) -> tuple[float, float]:
+    """Write what two ports join : (offset of the second at the start [m], its relative velocity [m/s]).
 
-    how : of places that are points, as `mechanism.add_line` takes it
+    how : for points, further arguments of `body_tables.add_line`
     """
     row["line"] = -1
     if spatial(draft, *places):
-        row["line"] = add_line(draft, places, *how)
+        row["line"] = add_line(draft, places, *line_options)
         row[ports[0]] = row[ports[1]] = draft.mass_index[None]
         return apart(draft, places, draft.lines[-1])
     for port, place in zip(ports, places, strict=True):
@@ -80,7 +80,10 @@ def join(draft, row, ports: tuple[str, str], places: tuple[str | None, str], *ho
 
 
 def add_states(draft) -> None:
-    """Position and velocity of every mass; small is the travel that makes a bar, and its speed as it swings."""
+    """Add position and velocity of every mass, with their scales.
+
+    A small travel changes a pressure by 1 bar; a small velocity belongs to an oscillation by it.
+    """
     nodes, masses = draft.node_table, draft.mass_table
     travel, stiffness = np.full(len(masses), SMALL_TRAVEL), np.zeros(len(masses))
     for row in draft.brace_table:
@@ -100,14 +103,14 @@ def add_states(draft) -> None:
 
 
 def pushed_masses(draft) -> np.ndarray:
-    """Of all pushes the two masses that they join : int64[pushes, 2]."""
+    """Masses that each push joins : int64[pushes, 2]."""
     ends = ((draft.brace_table, "from_mass", "to_mass"), (draft.stop_table, "from_mass", "to_mass"),
             (draft.piston_table, "case", "rod"))  # fmt: skip
     return np.concatenate([np.column_stack([table[a], table[b]]) for table, a, b in ends])
 
 
 def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
-    """Sum of pushes, and of what water at rest does to walls, on each mass : float64[masses] [N]."""
+    """Sum of pushes, and of the force of still water on walls, on each mass : float64[masses] [N]."""
     total = np.zeros(len(draft.mass_table))
     for push, (first, second) in zip(pushes, pushed_masses(draft), strict=True):
         total[first] -= push
@@ -119,7 +122,7 @@ def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
 
 
 def start_masses(draft, start) -> list[str]:
-    """The forces of the start and what is left of them on each mass; returns what moves, in words."""
+    """Set forces at the start and the unbalanced force on each mass; return texts of motions."""
     nodes, masses, ambient = draft.node_table, draft.mass_table, draft.case.ambient_pressure
     size = np.zeros(len(masses))
     for row in draft.brace_table:
@@ -146,6 +149,6 @@ def start_masses(draft, start) -> list[str]:
         if row["velocity"] != 0.0:
             moving.append(f"mass {name} moves at {draft.case.amount(row['velocity'], 'velocity')}")
         if row["force"] != 0.0 and row["lightness"] > 0.0:
-            pull = draft.case.amount(row["force"] * row["lightness"], "acceleration")
-            moving.append(f"mass {name} accelerates at {pull}")
+            acceleration = draft.case.amount(row["force"] * row["lightness"], "acceleration")
+            moving.append(f"mass {name} accelerates at {acceleration}")
     return moving

@@ -1,4 +1,4 @@
-"""Bodies, their joints, points and lines lowered to tables. Knows names; knows no force and no rhs."""
+"""Tables of bodies, joints, points and lines."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
 BETWEEN = (-1, -1, -1, rec.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
 KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL, "free": rec.FREE, "fixed": rec.WELD}
 ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
-STATES = {  # of each kind: coordinates, then velocities; with how small each is
+STATES = {  # for each kind: coordinates, then velocities, each with its size of a small deviation
     "revolute": ({"angle": SMALL_ANGLE}, {"rate": SMALL_SPIN}),
     "prismatic": ({"travel": SMALL_TRAVEL}, {"travel_rate": SMALL_SPEED}),
     "ball": (dict.fromkeys(ANGLES, SMALL_ANGLE), dict.fromkeys(SPINS, SMALL_SPIN)),
@@ -25,24 +25,24 @@ STATES = {  # of each kind: coordinates, then velocities; with how small each is
 
 
 def lower_bodies(draft) -> None:
-    """Fill the tables of bodies and of their freedoms, each body behind the one that it hangs on."""
+    """Fill the tables of bodies and of their freedoms, each body after its parent."""
     nodes = draft.case.loaded
     draft.body_names = list(draft.case.poses)
     table = draft.body_table = np.zeros(len(draft.body_names), rec.BODY)
     paths: list[list[int]] = []
-    hung: list[list[int]] = []  # of each body, the freedoms from its root to it
+    chains: list[list[int]] = []  # for each body, the freedoms from its root to it
     for i, (name, row) in enumerate(zip(draft.body_names, table, strict=True)):
         body = nodes[name]
-        up = bodies.hangs_on(body)[0]
-        row["parent"] = draft.body_names.index(up) if isinstance(nodes.get(up), Body) else -1
+        parent_name = bodies.hangs_on(body)[0]
+        row["parent"] = draft.body_names.index(parent_name) if isinstance(nodes.get(parent_name), Body) else -1
         row["root"] = table[row["parent"]]["root"] if row["parent"] >= 0 else i
         fill_body(draft, name, body, row)
         row["freedom"] = len(paths)
-        path = list(hung[row["parent"]]) if row["parent"] >= 0 else []
+        path = list(chains[row["parent"]]) if row["parent"] >= 0 else []
         for _ in range(row["freedoms"]):
             path = [*path, len(paths)]
             paths.append(path)
-        hung.append(path)
+        chains.append(path)
     freedoms = draft.freedom_table = np.zeros(len(paths), rec.FREEDOM)
     at = 0
     for row, path in zip(freedoms, paths, strict=True):
@@ -53,7 +53,7 @@ def lower_bodies(draft) -> None:
 
 
 def fill_body(draft, name: str, body: Body, row) -> None:
-    """What one body's row says of itself, and its states."""
+    """Fill the row of a body, and add its states."""
     joint, t = body.joint, draft.case.numerics.start
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
     row["inertia"], row["axis"] = body.moment().ravel(), joint.unit_axis
@@ -83,22 +83,24 @@ def fill_body(draft, name: str, body: Body, row) -> None:
 
 
 def drive(draft, name: str, schedule, row) -> None:
-    """Let a schedule drive a joint: one whose rate jumps would want a force without end, and is a fault."""
+    """Drive a joint by a schedule. Faults of schedules whose rate jumps: they would need infinite forces."""
     row["schedule"] = draft.schedules.add(schedule)
     key = "travel" if row["joint"] == rec.PRISMATIC else "angle"
-    start, end = draft.case.numerics.start, draft.case.numerics.end  # what it did before does not matter
+    start, end = draft.case.numerics.start, draft.case.numerics.end  # kinks before the start have no effect
     kinks = [time for time, _ in sorted(rate_jumps(schedule)) if start < time <= end]
     if kinks:
-        what = "it jumps" if schedule.kind == "step" else "its rate jumps"
-        when = draft.case.amount(kinks[0], "time", 6)
-        text = f"drives the joint, and at t = {when} {what}, which asks for a force without end"
-        draft.fault(f"nodes.{name}.joint.{key}", f'{text}; wanted kind = "smooth", level at both ends, or a wave')
-    for time in schedule.time if np.all(np.isfinite(schedule.time)) else ():  # its acceleration jumps
+        kind = "it jumps" if schedule.kind == "step" else "its rate jumps"
+        time_text = draft.case.amount(kinks[0], "time", 6)
+        text = f"drives the joint, and at t = {time_text} {kind}, which needs an infinite force"
+        draft.fault(
+            f"nodes.{name}.joint.{key}", f'{text}; expected kind = "smooth" with zero slope at both ends, or a harmonic'
+        )
+    for time in schedule.time if np.all(np.isfinite(schedule.time)) else ():  # jumps of acceleration
         draft.schedules.breaks.setdefault(float(time), False)
 
 
 def rate_jumps(schedule) -> list[tuple[float, bool]]:
-    """Times at which the rate of a schedule jumps, or it itself does: a ramp may begin or end level."""
+    """Times at which the rate or the value of a schedule jumps : (time, True for a value); a ramp may end level."""
     if schedule.kind != "ramp":
         return break_times(schedule)
     (first, last), n = break_times(schedule), schedule.exponent
@@ -106,16 +108,16 @@ def rate_jumps(schedule) -> list[tuple[float, bool]]:
 
 
 def point_row(draft, place: str) -> int:
-    """Row of the point that a link, or a probe, names."""
+    """Row of the point that a link or a probe names; added on first use."""
     if place not in draft.point_index:
-        name, where = bodies.point_of(draft.case.nodes, place)
+        name, position = bodies.point_of(draft.case.nodes, place)
         draft.point_index[place] = len(draft.points)
-        draft.points.append((draft.body_names.index(name) if name != bodies.WORLD else -1, tuple(where)))
+        draft.points.append((draft.body_names.index(name) if name != bodies.WORLD else -1, tuple(position)))
     return draft.point_index[place]
 
 
 def pose_of(draft, place: str) -> bodies.Pose:
-    """How the body of a point stands by what is stated; the world's of a frame."""
+    """Stated pose of the body of a point; the world's pose for a frame."""
     return draft.case.stated.poses.get(bodies.point_of(draft.case.nodes, place)[0], bodies.AT_REST)
 
 
@@ -127,7 +129,7 @@ def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direc
 
 
 def lower_lines(draft) -> None:
-    """Number pushes as `lines` name them; pins."""
+    """Fill tables of pins and bushings; number the push of each line."""
     draft.pin_names, draft.pin_table = draft.fill("pin", rec.PIN)
     draft.bushing_names, draft.bushing_table = draft.fill("bushing", rec.BUSHING)
     for name, row in zip(draft.bushing_names, draft.bushing_table, strict=True):
@@ -143,7 +145,7 @@ def lower_lines(draft) -> None:
 
 
 def turned_since(draft, places: tuple[str, str]) -> float:
-    """eps.eps of the deviation (56) of two bodies at the start from how they are stated to stand."""
+    """eps.eps of the deviation (56) of two bodies at the start from their stated relative attitude."""
     relative = []
     for case in (draft.case, draft.case.stated):
         here, there = (case.poses.get(bodies.point_of(case.nodes, place)[0], bodies.AT_REST) for place in places)
@@ -152,12 +154,12 @@ def turned_since(draft, places: tuple[str, str]) -> float:
 
 
 def apart(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
-    """How far the second of two points lies from the first at the start [m], and how fast that grows [m/s]."""
+    """Distance between two points at the start [m], and its rate [m/s]."""
     ends = []
     for place in places:
-        name, where = (bodies.WORLD, np.zeros(3)) if place is None else bodies.point_of(draft.case.nodes, place)
+        name, position = (bodies.WORLD, np.zeros(3)) if place is None else bodies.point_of(draft.case.nodes, place)
         pose = draft.case.poses.get(name, bodies.AT_REST)
-        ends.append((pose.at(where), pose.moves(where), pose.spin))
+        ends.append((pose.at(position), pose.moves(position), pose.spin))
     (x, u, a), (z, v, b) = ends
     _, _, _, acts, direction, _ = line
     if acts == rec.ABOUT:

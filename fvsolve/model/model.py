@@ -1,4 +1,4 @@
-"""A model and a state: what `solve` and every study hold in their hands. Knows indices and names."""
+"""Model of a case, and the state that a run advances."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PipeMesh:
-    """Cells of one pipe, from its `from` end: x centres, edges [m], elevation of centres [m]; its profile, if any."""
+    """Cells of a pipe from its `from` end: centres x, edges [m], elevation of centres [m], and its profile, if any."""
 
     name: str
     from_: str
@@ -43,10 +43,10 @@ class PipeMesh:
     edges: np.ndarray
     elevation: np.ndarray
     profile: Profile | None
-    ends: tuple[float, float]  # elevations of its ends [m]
+    ends: tuple[float, float]  # elevations of the pipe's ends [m]
 
     def height(self, distance: Any) -> Any:
-        """Elevation at distances from its `from` end [m]."""
+        """Elevation at distances from the `from` end [m]."""
         if self.profile is None:
             return self.ends[0] + (self.ends[1] - self.ends[0]) * (distance / self.length)
         return self.profile.at(distance)
@@ -54,7 +54,7 @@ class PipeMesh:
 
 @dataclass(repr=False)
 class State(Shown):
-    """Time [s], the flat vector y, and the integrator's memory in one flat array (empty: a fresh start)."""
+    """Time [s], flat state vector y, and memory of the integrator in one flat array (empty at a fresh start)."""
 
     t: float
     y: np.ndarray
@@ -67,7 +67,7 @@ class State(Shown):
         self.y, self.memory = given_numbers("y", self.y), given_numbers("memory", self.memory)
         for name, array in (("y", self.y), ("memory", self.memory)):
             if array.ndim != 1:
-                raise FvsolveError(f"{name} has shape {array.shape}; wanted one row of numbers")
+                raise FvsolveError(f"{name} has shape {array.shape}; expected a one-dimensional array of numbers")
 
     def said(self) -> str:
         return f"at t = {self.t:g} s: {self.y.size} numbers"
@@ -77,51 +77,56 @@ class State(Shown):
 
 
 def flags_of(state: State, model: Model) -> np.ndarray | float:
-    """Flags of devices that a state remembers, if `advance` gave it; 0 of others."""
+    """Event flags of devices in a state that `advance` returned; 0 for any other state."""
     memory = state.memory
     if len(model.tables.delays) and memory.size:
         memory = without_past(memory)[0]
     return memory[2:] if memory.size == 2 + model.shapes.armed else 0.0
 
 
-def given_numbers(name: str, given: Any) -> np.ndarray:
-    """What is given as float64[...] that can be written, itself where it is that; FvsolveError if not real numbers."""
-    if type(given) is float:
-        return np.float64(given)
-    if type(given) is np.ndarray and given.dtype == np.float64 and given.flags.carray and given.ndim:
-        return given
+def given_numbers(name: str, values: Any) -> np.ndarray:
+    """Convert to a writable float64[...] array, without a copy where possible.
+
+    Raises FvsolveError if the values are not real numbers.
+    """
+    if type(values) is float:
+        return np.float64(values)
+    if type(values) is np.ndarray and values.dtype == np.float64 and values.flags.carray and values.ndim:
+        return values
     try:
-        found = np.asarray(given)
-        if found.dtype.kind not in "fiu":
+        array = np.asarray(values)
+        if array.dtype.kind not in "fiu":
             raise TypeError
-        return np.require(found, np.float64, ("C", "W")) if found.ndim else found.astype(np.float64)
+        return np.require(array, np.float64, ("C", "W")) if array.ndim else array.astype(np.float64)
     except (TypeError, ValueError):
-        raise FvsolveError(f"{name} = {show(given)} is not made of real numbers") from None
+        raise FvsolveError(
+            f"{name} = {show(values)} does not consist of real numbers; expected a number or an array of numbers"
+        ) from None
 
 
 def given_limit(limit: Any) -> float:
-    """Where a segment ends [s], or infinity; FvsolveError where it is no time."""
-    found = given_numbers("limit", limit)
-    if found.ndim or np.isnan(found):
-        raise FvsolveError(f"limit = {show(found)} is no time; wanted a number of seconds, or infinity")
-    return float(found)
+    """End of a segment [s], or infinity. Raises FvsolveError if it is not a time."""
+    value = given_numbers("limit", limit)
+    if value.ndim or np.isnan(value):
+        raise FvsolveError(f"limit = {show(value)} is not a time; expected a number of seconds, or infinity")
+    return float(value)
 
 
 def given_time(t: Any) -> float:
-    """A time [s]; FvsolveError where it is no finite number."""
-    found = given_numbers("t", t)
-    if found.ndim or not np.isfinite(found):
-        raise FvsolveError(f"t = {show(t)} is no time; wanted a finite number of seconds")
-    return float(found)
+    """A time [s]. Raises FvsolveError if it is not a finite number."""
+    value = given_numbers("t", t)
+    if value.ndim or not np.isfinite(value):
+        raise FvsolveError(f"t = {show(t)} is not a time; expected a finite number of seconds")
+    return float(value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Shown):
-    """A case made ready; frozen, so that runs may share it: what a run writes is on a `Slate` of its own.
+    """Compiled case. It is frozen, so that several runs can share it: each run writes to its own `RunData`.
 
-    tables : the arrays that kernels read, by name; shapes : of those that a run writes, see `Slate`
-    scale : float64[n]  what counts as a small deviation of each state is measured against
-    breaks : (time [s], whether a value jumps), rising, inside the run
+    tables : arrays that kernels read, by name; shapes : shapes of the arrays that a run writes, see `RunData`
+    scale : float64[n]  size of a small deviation of each state, for relative measures
+    breaks : (time [s], True if a value jumps there), increasing, within the run
     """
 
     case: Case
@@ -143,18 +148,18 @@ class Model(Shown):
     elevation: dict[str, float]
     probes: list[Any]
     warnings: list[Notice]
-    steady: dict[str, Any]  # what the start looks like, for `check`
+    steady: dict[str, Any]  # facts about the start, for `fvsolve check`
     profiles: dict[int, np.ndarray]  # pipe -> pressure of the profile at cell centres [Pa]
-    devices: list[tuple]  # (name, part, what it is lowered by), as their table has them
-    laws: list[str]  # modules of compiled laws of parts, as rows of `hooks` lie
-    start: np.ndarray  # the state at the start: nothing moves but what a basin's dam holds back
-    events: list[tuple[str, str]]  # of devices: whose, and what it means that its function falls to zero
-    basins: list[BasinRows]  # as their table has them
-    watched: list[Probe]  # beside the probes, for their extremes alone
-    watched_start: np.ndarray  # what those of pressure along pipes are in the profile [Pa], nan of others
-    sharp: dict[str, np.ndarray]  # tables that a jump meets in place of these, see `model.delay`
-    slates: deque[Slate] = field(default_factory=deque, init=False)  # that wait for what looks at single states
-    packed: list = field(default_factory=list, init=False)  # its draft before the start, where others are made of it
+    devices: list[tuple]  # (name, part, lowering), in the order of their table
+    laws: list[str]  # modules of compiled laws of parts, in the order of the rows of `hooks`
+    start: np.ndarray  # state at the start: deviations are zero, except behind the dam of a basin
+    events: list[tuple[str, str]]  # of devices: (name, meaning of a zero of its event function)
+    basins: list[BasinRows]  # in the order of their table
+    watched: list[Probe]  # read in addition to the probes, for their extremes only
+    watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan of other quantities
+    sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_line_selection`
+    slates: deque[Slate] = field(default_factory=deque, init=False)  # idle run data for evaluating single states
+    packed: list = field(default_factory=list, init=False)  # tables before the start is solved, reused by `vary`
 
     picture = "fvsolve.draw.objects:model_figure"
 
@@ -176,7 +181,7 @@ class Model(Shown):
 
     @property
     def ledgers(self) -> int:
-        """Rows of the stepper's ledger: supply of every node, and of scalars what enters there and what decays."""
+        """Rows of the stepper's ledger: supply of nodes, inflow of each scalar at nodes, decay of each scalar."""
         return int(self.layout["net"] - self.layout["supply"])
 
     @property
@@ -191,133 +196,140 @@ class Model(Shown):
 
     @cached_property
     def wave_rates(self) -> np.ndarray:
-        """Cells that a wave crosses in a second, for every pipe [1/s]."""
+        """Cells that a wave crosses per second, for every pipe [1/s]."""
         pipes = self.tables.pipes
-        found = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["quicker"], 1.0)
-        found.flags.writeable = False
-        return found
+        rates = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["quicker"], 1.0)
+        rates.flags.writeable = False
+        return rates
 
     @property
     def wave_rate(self) -> float:
-        """Cells that the quickest wave crosses in a second, in basins as they count them at the start [1/s]."""
-        found = float(self.wave_rates.max(initial=0.0))
+        """Cells that the fastest wave crosses per second [1/s]; for basins, the rate at the start."""
+        rate = float(self.wave_rates.max(initial=0.0))
         if not self.basins:
-            return found
-        return max(found, float(self.evaluate(self.case.numerics.start, self.start)[1][rec.RATE]))
+            return rate
+        return max(rate, float(self.evaluate(self.case.numerics.start, self.start)[1][rec.RATE]))
 
     @property
     def unsteady(self) -> bool:
-        """Whether the friction of a pipe remembers the past of its flow."""
+        """True if any pipe has unsteady friction."""
         return bool(self.tables.pipes["terms"].any())
 
     @property
     def creeps(self) -> bool:
-        """Whether the wall of a pipe gives way in time."""
+        """True if the wall of any pipe creeps."""
         return bool(self.tables.pipes["elements"].any())
 
     @cached_property
     def places(self) -> tuple:
-        """Where its tables lie, as handles say it."""
+        """Memory addresses of the tables, for handles."""
         from fvsolve.kernels.handle import places_of
 
         return places_of(self.tables)
 
     @cached_property
     def functions(self):
-        """Its compiled functions (`kernels.functions.Functions`): of the case's law, with what the scene has."""
+        """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and parts of this model."""
         from fvsolve.basins.lower_pieces import of_basins, of_scalars
         from fvsolve.kernels.functions import functions
         from fvsolve.kernels.phases import Cast
 
-        many = rec.Tables(*(len(table) > 0 for table in self.tables))
-        there = [many.clusters, many.columns, many.masses, many.bodies, many.lines, many.pins, many.bushings]
-        there.append(many.rides)
-        basins, carried, valves = of_basins(self.basins, many.valves), of_scalars(self.basins), many.valves
-        alone = bool(self.basins) and not (self.pipes or valves or many.devices or any(there))
+        has = rec.Tables(*(len(table) > 0 for table in self.tables))
+        mechanics = [has.clusters, has.columns, has.masses, has.bodies, has.lines, has.pins, has.bushings]
+        mechanics.append(has.rides)
+        basins, carried, valves = of_basins(self.basins, has.valves), of_scalars(self.basins), has.valves
+        alone = bool(self.basins) and not (self.pipes or valves or has.devices or any(mechanics))
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
-        cast = Cast(self.case.law.family, cells, *there, self.unsteady, self.creeps, many.devices, tuple(self.laws),
-                    basins, carried, many.scalars, valves, many.delays, alone,
+        cast = Cast(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
+                    tuple(self.laws), basins, carried, has.scalars, valves, has.delays, alone,
                     forces=bool(self.layout["forces"] >= 0))  # fmt: skip
         return functions(cast)
 
     @property
     def damped(self) -> bool:
-        """True if stages of explicit steps are divided by friction, see `steppers.semi_implicit`."""
+        """True if the stages of explicit steps are divided by friction, see `steppers.semi_implicit`."""
         return bool(self.tables.basins["damped"].any())
 
     @property
     def layout(self):
-        """Offsets of what the rhs writes beside dydt."""
+        """Offsets in `out`, the array that the right-hand side writes in addition to dydt."""
         return self.tables.layout[0]
 
     @cached_property
     def structure(self):
-        """Pattern of the Jacobian and the linear algebra that fits it, or that `numerics.linear_algebra` names."""
+        """Pattern of the Jacobian, and the linear algebra that suits it or that `numerics.linear_algebra` names."""
         from fvsolve.model.dependence import lumped, sparsity
         from fvsolve.steppers.structure import Structure
 
         return Structure(sparsity(self), self.case.numerics.linear_algebra, lumped(self))
 
     def new_out(self) -> np.ndarray:
-        """An array for what the rhs writes beside dydt."""
-        found = np.zeros(int(self.layout["size"]))
-        found[rec.ARRIVES] = rec.NEVER
-        return found
+        """New array for the values that the right-hand side writes in addition to dydt."""
+        out = np.zeros(int(self.layout["size"]))
+        out[rec.ARRIVES] = rec.NEVER
+        return out
 
     def given(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
-        """A time and a state as kernels take them; FvsolveError where they are none of this model, or not finite."""
-        found = self.sized(y)
-        if not np.isfinite(found).all():
-            k = int(np.argmax(~np.isfinite(found)))
-            raise FvsolveError(f"y[{k}] = {found[k]}, {self.state_names[k]}; wanted a finite number for every state")
-        return given_time(t), found
+        """A time and a state as kernels read them.
+
+        Raises FvsolveError if the state does not fit this model or is not finite.
+        """
+        state = self.sized(y)
+        if not np.isfinite(state).all():
+            k = int(np.argmax(~np.isfinite(state)))
+            raise FvsolveError(f"y[{k}] = {state[k]}, {self.state_names[k]}; expected a finite number for every state")
+        return given_time(t), state
 
     def sized(self, y: Any) -> np.ndarray:
-        """A state as float64[n]; FvsolveError where it is none of this model."""
-        found = given_numbers("y", y)
-        if found.shape != (self.y_size,):
-            raise FvsolveError(f"y has shape {found.shape}; wanted a number for each of the {self.y_size} states that "
-                               "Model.state_names lists")  # fmt: skip
-        return found
+        """A state as float64[n]. Raises FvsolveError if it does not fit this model."""
+        state = given_numbers("y", y)
+        if state.shape != (self.y_size,):
+            raise FvsolveError(f"y has shape {state.shape}; expected a number for each of the {self.y_size} states "
+                               "that Model.state_names lists")  # fmt: skip
+        return state
 
     def rhs(self, t: float | State, y: np.ndarray | None = None) -> np.ndarray:
-        """dy/dt = f(t, y) : float64[n]; right-hand values of schedules, devices as at a start from there.
+        """Right-hand side dy/dt = f(t, y) : float64[n].
 
-        With delay lines it wants a `State`, whose memory holds their past; FvsolveError where it gets a y alone.
+        Schedules take their right limit at t; devices are in the position in which a run would start at (t, y).
+        With delay lines the argument must be a `State`, whose memory holds their history; otherwise FvsolveError.
         """
         if isinstance(t, State) and y is None:
-            with self.slate() as slate:
-                slate.recall(t)
-                return slate.evaluate(t.t, t.y, np.inf)[0]
+            with self.slate() as run_data:
+                run_data.recall(t)
+                return run_data.evaluate(t.t, t.y, np.inf)[0]
         self.refuse_lines("rhs")
         return self.evaluate(t, y)[0]
 
-    def refuse_lines(self, what: str) -> None:
-        """FvsolveError where delay lines have a past that no y tells."""
+    def refuse_lines(self, function: str) -> None:
+        """Raise FvsolveError if the model has delay lines: their history is not part of y."""
         if len(self.tables.delays):
-            raise FvsolveError(f"{what}(t, y) of a model with delay lines is not all there is to say: what was sent "
-                               'into them counts too; wanted rhs(State), or line = "cells"')  # fmt: skip
+            raise FvsolveError(f"{function}(t, y) is not defined for a model with delay lines: waves sent into them "
+                               'are needed too. Expected rhs(State), or line = "cells" in the case')  # fmt: skip
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
-        """(dydt, out) at t, as `rhs`; from `limit` [s] on schedules take their left limit there."""
+        """Right-hand side and `out` at t : (dydt, out), as `rhs`.
+
+        From `limit` [s] on, schedules take their left limit there.
+        """
         limit = given_limit(limit)
-        with self.slate() as slate:
-            return slate.evaluate(t, y, limit)
+        with self.slate() as run_data:
+            return run_data.evaluate(t, y, limit)
 
     @contextmanager
     def slate(self, armed: np.ndarray | float = 0.0) -> Iterator[Slate]:
-        """A slate for a look at single states, with flags as given, 0 for those of a start; the next look takes it.
+        """Run data for evaluating single states, reused by the next call. `armed` : event flags, 0 as at a start.
 
-        Its marks and extremes say nothing.
+        Its first occurrences and extremes have no meaning.
         """
         try:
-            slate = self.slates.pop()  # which no other thread then has
+            run_data = self.slates.pop()  # atomic: no other thread gets the same object
         except IndexError:
-            slate = Slate(self)
-        slate.blank(armed)
-        yield slate
-        self.slates.append(slate)
+            run_data = Slate(self)
+        run_data.blank(armed)
+        yield run_data
+        self.slates.append(run_data)
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
         """df/dy : float64[n, n] by central differences of the scaled states."""
@@ -325,31 +337,31 @@ class Model(Shown):
         return self.held_jacobian(t, y)
 
     def held_jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The same where what arrives from delay lines stands still."""
+        """Jacobian by central differences, with the waves that arrive from delay lines held constant."""
         (t, y), n = self.given(t, y), self.y_size
-        found = np.empty((n, n))
+        jacobian = np.empty((n, n))
         for j in range(n):
             step = 1e-6 * (self.scale[j] + abs(y[j]))
             high, low = y.copy(), y.copy()
             high[j] += step
             low[j] -= step
-            found[:, j] = (self.evaluate(t, high)[0] - self.evaluate(t, low)[0]) / (high[j] - low[j])
-        return found
+            jacobian[:, j] = (self.evaluate(t, high)[0] - self.evaluate(t, low)[0]) / (high[j] - low[j])
+        return jacobian
 
     def observe(self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf) -> np.ndarray:
         """Values of all probes, in the order of `.probes`, at a `State` or at (t, y) : float64[probes] [SI].
 
-        Devices stand as at a start from there, or as a state that `advance` gave remembers.
+        Devices are in the position of a start at (t, y), or as stored in a state that `advance` returned.
         """
         armed, limit, past = 0.0, given_limit(limit), None
         if isinstance(t, State) and y is None:
             t, y, armed, past = t.t, t.y, flags_of(t, self), t
         t, y = self.given(t, y)
-        with self.slate(armed) as slate:
-            slate.recall(past)
-            return slate.observe(t, y, slate.evaluate(t, y, limit)[1])
+        with self.slate(armed) as run_data:
+            run_data.recall(past)
+            return run_data.observe(t, y, run_data.evaluate(t, y, limit)[1])
 
-    # what the numbers mean ----------------------------------------------------------------------------------
+    # physical meaning of states --------------------------------------------------------------------------------
 
     def cell_pressure(self, k: int, waves: np.ndarray) -> np.ndarray:
         """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s]."""
@@ -359,29 +371,29 @@ class Model(Shown):
             or not 0 <= k < len(self.pipes)
             or waves.shape != (self.pipes[k].cells,)
         ):
-            raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; wanted a number for each cell of one of "
+            raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; expected a number for each cell of one of "
                                f"{len(self.pipes)} pipes, counted from 0")  # fmt: skip
         return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
 
     def head(self, pressure: np.ndarray, elevation) -> np.ndarray:
-        """Head [m] of the case's fluid above datum, measured from ambient."""
+        """Head [m] of the case's fluid above datum: 0 at ambient pressure and datum level."""
         pressure, elevation = given_numbers("pressure", pressure), given_numbers("elevation", elevation)
         return self.case.law.head(pressure, elevation)
 
     @property
     def cavitates(self) -> bool:
-        """Whether the density law knows cavities: it has a floor."""
+        """True if the density law includes cavities."""
         return self.case.law.cavitates
 
     def fields(self, y: np.ndarray, out: np.ndarray, lines: dict[int, tuple] | None = None) -> dict[str, Any]:
-        """Fields of all pipes and pressures of all nodes at a state, SI; `out` as `evaluate` gives it.
+        """Fields of all pipes and pressures of all nodes at a state, SI; `out` as returned by `evaluate`.
 
-        lines : pipe -> both waves of those that are delay lines, as `Slate.along` gives them
+        lines : pipe -> both waves of delay lines, as returned by `RunData.along`
         """
         y = self.sized(y)
         if np.shape(out) != (int(self.layout["size"]),):
-            raise FvsolveError(f"out has shape {np.shape(out)}; wanted what Model.evaluate gives beside the rates")
-        found, law = {}, self.case.law
+            raise FvsolveError(f"out has shape {np.shape(out)}; expected the second array that Model.evaluate returns")
+        fields, law = {}, self.case.law
         for k, pipe in enumerate(self.pipes):
             row = self.tables.pipes[k]
             n, o = pipe.cells, row["y"]
@@ -390,7 +402,7 @@ class Model(Shown):
                 r, l = (lines or {}).get(k, (np.zeros(n), np.zeros(n)))  # noqa: E741
             pressure, mass_flow = self.cell_pressure(k, r + l), row["flow"] + (r - l)
             flow = mass_flow / law.density(pressure)
-            found[pipe.name] = {
+            fields[pipe.name] = {
                 "pressure": pressure, "head": self.head(pressure, pipe.elevation),
                 "velocity": flow / law.area(row, pressure), "flow": flow,
                 "least_pressure": pressure, "greatest_pressure": pressure, **pipe_values(self, k, y),
@@ -398,20 +410,20 @@ class Model(Shown):
         nodes = self.tables.nodes
         at = int(self.layout["pressure"])
         for basin in self.basins:
-            found[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
-        found["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
+            fields[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
+        fields["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
                            if basin.moves or basin.part.on is not None}  # fmt: skip
-        found["nodes"] = {}
+        fields["nodes"] = {}
         for i, name in enumerate(self.node_names):
             pressure = float(nodes[i]["pressure"] + out[at + i])
-            found["nodes"][name] = {
+            fields["nodes"][name] = {
                 "pressure": pressure,
                 "head": float(self.head(pressure, self.elevation[name])), **node_values(self, i, out),
             }  # fmt: skip
-        return found
+        return fields
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:
-        """Mass stored in the profile and by how much the state deviates from it [kg]."""
+        """Mass stored in the starting profile, and change of mass in state y [kg]."""
         y = self.sized(y)
         initial, change = 0.0, 0.0
         for k, row in enumerate(self.tables.pipes):
@@ -429,7 +441,7 @@ class Model(Shown):
             for own, start in zip(basin.own(y)[:1], basin.own(self.start)[:1], strict=True):
                 initial += rest + float(np.sum(per * start))
                 change += float(np.sum(per * (own - start)))
-        for row in self.tables.pistons:  # what chambers on the axis hold is their excess and what was swept
+        for row in self.tables.pistons:  # mass of chambers on an axis: state plus swept mass
             if row["line"] >= 0:
                 continue
             places = self.tables.masses[[row["case"], row["rod"]]]["y"]
@@ -439,7 +451,7 @@ class Model(Shown):
 
     @property
     def checks(self) -> dict[str, Any]:
-        """What was understood, for `fvsolve check`."""
+        """Facts about the compiled case, for `fvsolve check`."""
         from fvsolve.model.checks import checks
 
         return checks(self)

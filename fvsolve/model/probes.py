@@ -1,4 +1,4 @@
-"""Probes lowered to records: what to read and how to weigh it. Knows units of nothing but SI."""
+"""Probe table: what each probe reads, with scale and offset, in SI units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.model.reading import along
 
 
 def lower_probes(draft) -> np.ndarray:
-    """The probe table of a scene; pressures of the profile are filled in later by `probe_offsets`."""
+    """Probe table of a case. Pressures of the profile are filled in later, by `probe_offsets`."""
     case, table = draft.case, np.zeros(len(observed(draft.case)), rec.PROBE)
     parts = {"nodes": {**case.places, **case.nodes}, "links": {**case.links, **case.conduits}}
     for row, probe in zip(table, observed(case), strict=True):
@@ -21,7 +21,7 @@ def lower_probes(draft) -> np.ndarray:
             lower_point(draft, row, probe)
         elif probe.quantity in draft.case.scalars:
             scalar_probe(draft, row, probe)
-        elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # of a body, or of the world
+        elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
             lower_point_of_body(draft, row, probe)
         else:
             part = parts[probe.part][probe.name]
@@ -30,12 +30,12 @@ def lower_probes(draft) -> np.ndarray:
 
 
 def observed(case) -> list:
-    """All that is read after every step: probes, then what is watched for extremes alone."""
+    """All that is read after every step: probes, then quantities watched for their extremes only."""
     return [*case.probes, *case.watched]
 
 
 def scalar_probe(draft, row, probe) -> None:
-    """Of a scalar at a node or along a pipe, there straight between the centres of cells."""
+    """Probe of a scalar at a node or along a pipe, there by linear interpolation between cell centres."""
     row["scalar"] = list(draft.case.scalars).index(probe.quantity)
     if probe.part == "nodes":
         row["kind"], row["index"] = rec.NODE_SCALAR, draft.node_index[draft.inside(probe.name)]
@@ -45,7 +45,7 @@ def scalar_probe(draft, row, probe) -> None:
 
 
 def lower_point_of_body(draft, row, probe) -> None:
-    """A quantity of a point by name."""
+    """Probe of a quantity at a named point."""
     from fvsolve.kernels.mechanism.observe import POINT_QUANTITIES
 
     row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
@@ -53,7 +53,7 @@ def lower_point_of_body(draft, row, probe) -> None:
 
 
 def lower_point(draft, row, probe) -> None:
-    """The cells of a basin that a probe reads, and their weights."""
+    """Cells of a basin that a probe reads, and their weights."""
     if probe.name in draft.case.lumped:
         return lower_surface(draft, row, probe)
     k = list(draft.case.meshes).index(probe.name)
@@ -71,25 +71,25 @@ def lower_point(draft, row, probe) -> None:
 
 
 def lower_surface(draft, row, probe) -> None:
-    """Depth at a point of water that swings in modes."""
+    """Probe of depth at a point of a basin with sloshing modes."""
     case, basin = draft.case, draft.case.nodes[probe.name]
-    about = basin, case.lumped[probe.name]
-    every, shares = sloshing.reading(*about, *probe.point, case.properties.density, case.gravity)
-    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*about)
-    row["cell"], row["count"], row["weights"] = len(draft.integers), len(every), len(draft.floats)
-    draft.integers += [draft.body_names.index(sloshing.slider(probe.name, one)) for one in every]
+    arguments = basin, case.lumped[probe.name]
+    modes, shares = sloshing.reading(*arguments, *probe.point, case.properties.density, case.gravity)
+    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
+    row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
+    draft.integers += [draft.body_names.index(sloshing.slider(probe.name, mode)) for mode in modes]
     draft.floats += shares
 
 
 def probe_offsets(draft, start) -> None:
-    """Scale and offset of every probe, and pressures of what is watched along pipes, once the profile is known."""
-    few = len(draft.case.probes)
-    draft.watched_start = np.full(len(draft.probe_table) - few, np.nan)
-    for k, (row, probe) in enumerate(zip(draft.probe_table[few:], draft.case.watched, strict=True)):
+    """Set scale and offset of every probe, and start pressures of watched quantities along pipes, from the profile."""
+    count = len(draft.case.probes)
+    draft.watched_start = np.full(len(draft.probe_table) - count, np.nan)
+    for k, (row, probe) in enumerate(zip(draft.probe_table[count:], draft.case.watched, strict=True)):
         if probe.straight and row["kind"] == rec.PIPE_PRESSURE:
             draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
     for row, probe in zip(draft.probe_table, observed(draft.case), strict=True):
-        if row["kind"] >= rec.CELL_FIELD:  # their profile is known to basins
+        if row["kind"] >= rec.CELL_FIELD:  # basins hold the profile of these
             continue
         if draft.case.law.linear:
             linear_offsets(draft, start, row, probe)
@@ -98,7 +98,7 @@ def probe_offsets(draft, start) -> None:
 
 
 def linear_offsets(draft, start, row, probe) -> None:
-    """scale * (deviation of pressure or flow) + offset."""
+    """Offsets for the law `linear`: value = scale * (deviation of pressure or flow) + offset."""
     weight = draft.fluid.density * draft.case.gravity
     row["scale"], row["offset"] = 1.0, 0.0
     if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW, rec.SPOOL_FLOW):
@@ -113,13 +113,13 @@ def linear_offsets(draft, start, row, probe) -> None:
             row["scale"] = 1.0 / draft.pipe_table[row["index"]]["admittance"]
         row["offset"] = base - (0.0 if probe.quantity == "pressure" else draft.case.ambient_pressure)
         if probe.quantity == "head":
-            heavy = weight if weight > 0.0 else np.nan  # where nothing weighs there is none
-            row["scale"] /= heavy
-            row["offset"] = row["offset"] / heavy + z
+            divisor = weight if weight > 0.0 else np.nan  # without gravity there is no head
+            row["scale"] /= divisor
+            row["offset"] = row["offset"] / divisor + z
 
 
 def barotropic_offsets(draft, start, row, probe) -> None:
-    """What turns a pressure into gauge pressure or head, and the profile's mass per length at the place."""
+    """Offsets that convert pressure to gauge pressure or head, and the profile's mass per length at the probe."""
     if row["kind"] == rec.DEVICE_VALUE:
         return
     if row["kind"] in (rec.PIPE_PRESSURE, rec.PIPE_FLOW):

@@ -1,4 +1,4 @@
-"""The steady profile that a run starts from, filled into the tables of a draft. Knows its order; solves nothing."""
+"""Steady starting profile, filled into the tables of a draft."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from fvsolve.model.unsteady import add_terms
 
 
 def start_profile(draft) -> dict[str, Any]:
-    """Fill the profile's numbers into the tables of a scene; returns what `check` shows."""
+    """Fill the profile's numbers into the tables of a draft; return the facts for `check`."""
     if draft.case.law.linear:
         start = Start(draft)
     else:
-        from fvsolve.model.barotropic import BarotropicStart  # scenes under a linear law load none of it
+        from fvsolve.model.barotropic import BarotropicStart  # not loaded under the linear law
 
         start = BarotropicStart(draft)
     start.solve()
@@ -31,5 +31,5 @@ def start_profile(draft) -> dict[str, Any]:
     start.fill_valves()
     start.begin_devices()
     probe_offsets(draft, start)
-    remembered = add_terms(draft)
-    return {**start.report(), "unsteady": remembered, "creep": pace_creep(draft, remembered)}
+    unsteady = add_terms(draft)
+    return {**start.report(), "unsteady": unsteady, "creep": pace_creep(draft, unsteady)}

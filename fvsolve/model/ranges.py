@@ -1,4 +1,4 @@
-"""What is odd of the flow that a run starts from. Knows numbers of pipes."""
+"""Notices of unusual flows at the start."""
 
 from __future__ import annotations
 
@@ -8,19 +8,20 @@ import numpy as np
 
 from fvsolve.errors import Notice, listing
 
-QUICKEST = 60.0  # of pipe flow [m/s]: penstocks keep below 10, jets of 180 m of head reach it
-LAMINAR, AT_REST = 2000.0, 1.0  # Reynolds numbers below which a flow is laminar, and none at all
-WIDE, WATERY = 0.05, (950.0, 1050.0)  # pipes [m] and liquids [kg/m3] in which flow is turbulent: mains, not oil drives
+QUICKEST = 60.0  # of pipe flow [m/s]: penstocks are below 10, jets of 180 m of head reach it
+LAMINAR, AT_REST = 2000.0, 1.0  # Reynolds numbers below which a flow is laminar, or negligible
+# pipes [m] and liquids [kg/m3] with normally turbulent flow: water mains, not oil hydraulics
+WIDE, WATERY = 0.05, (950.0, 1050.0)
 
 
 def flow_notices(draft: Any) -> list[Notice]:
-    """Notices of velocity and of laminar water; one each for all pipes, at the worst of them."""
+    """Notices of high velocity and of laminar water; one of each for all pipes, with the worst pipe."""
     moving = _moving(draft)
     return [*_quick(draft, *moving), *_laminar(draft, *moving)]
 
 
 def _moving(draft: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Names of the pipes and rigid columns of the file, their flows at the start [kg/s] and areas [m2]."""
+    """Pipes and rigid columns of the file : (names, flows at the start [kg/s], areas [m2])."""
     tables = ((draft.pipe_names, draft.pipe_table), (draft.column_names, draft.column_table))
     rows = [(name, row["flow"], row["area"]) for names, table in tables for name, row in zip(names, table, strict=True)
             if name in draft.case.links]  # fmt: skip
@@ -32,14 +33,14 @@ def _quick(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -> 
     if not (speed > QUICKEST).any():
         return []
     worst = int(np.argmax(speed))
-    found, most = (draft.case.amount(one, "velocity") for one in (speed[worst], QUICKEST))
-    text = (f"{_all(names, speed > QUICKEST)}: {found} at the start in {names[worst]}, above "
-            f"{most}; a flow or a diameter in other units?")  # fmt: skip
+    fastest, limit = (draft.case.amount(velocity, "velocity") for velocity in (speed[worst], QUICKEST))
+    text = (f"{_all(names, speed > QUICKEST)}: {fastest} at the start in {names[worst]}, above "
+            f"{limit}; check the units of flow and diameter")  # fmt: skip
     return [Notice("range", f"links.{names[worst]}", text, "flow", float(speed[worst]), QUICKEST)]
 
 
 def _laminar(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -> list[Notice]:
-    """Where the quickest flow of water in wide pipes is laminar: a flow or a viscosity in other units."""
+    """Notice if the fastest flow of water in wide pipes is laminar: probably units of flow or viscosity."""
     fluid = draft.fluid
     if not names or not fluid.viscosity or not WATERY[0] <= fluid.density <= WATERY[1]:
         return []
@@ -48,11 +49,11 @@ def _laminar(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -
     worst = int(np.argmax(reynolds))
     if not AT_REST < reynolds[worst] < LAMINAR:
         return []
-    text = (f"{names[worst]}: Reynolds number {reynolds[worst]:.4g} at the start, laminar as water hardly is in "
-            f"pipes this wide; are {draft.case.amount(abs(flow[worst]) / fluid.density, 'flow')} and a viscosity of "
-            f"{fluid.viscosity:.4g} Pa s right?")  # fmt: skip
+    text = (f"{names[worst]}: Reynolds number {reynolds[worst]:.4g} at the start, laminar, which is unusual for "
+            f"water in pipes this wide; check {draft.case.amount(abs(flow[worst]) / fluid.density, 'flow')} and a "
+            f"viscosity of {fluid.viscosity:.4g} Pa s")  # fmt: skip
     return [Notice("range", f"links.{names[worst]}", text, "reynolds", float(reynolds[worst]), LAMINAR)]
 
 
 def _all(names: list[str], chosen: np.ndarray) -> str:
-    return listing([name for name, one in zip(names, chosen, strict=True) if one], 6)
+    return listing([name for name, included in zip(names, chosen, strict=True) if included], 6)

@@ -1,4 +1,4 @@
-"""Where along a pipe a probe reads, and with which weights. Knows cells; knows no physics."""
+"""Cells of a pipe that a probe reads, and their weights."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ import numpy as np
 
 from fvsolve.schemes import SCHEMES
 
-TIE = 1e-6  # of a cell, within which two sets of cells are as near
+TIE = 1e-6  # in cells; two sets of cells that differ by less count as equally near
 
 
 def along(draft, row, fraction: float, degree: int | None = None) -> None:
-    """Where along its pipe a probe reads: an end, or cells by a polynomial, of the scheme's degree if left out."""
+    """Set the position of a probe along its pipe: an end, or cells and weights of a polynomial.
+
+    degree : of the polynomial; by default that of the scheme
+    """
     if fraction in (0.0, 1.0):
         row["side"] = -1 if fraction == 0.0 else 1
         return
@@ -25,10 +28,10 @@ def along(draft, row, fraction: float, degree: int | None = None) -> None:
 
 @functools.lru_cache(maxsize=4096)
 def around(x: float, degree: int, n: int) -> tuple[int, np.ndarray]:
-    """First of the cells that are read x cells from `from`, and their weights.
+    """First cell that is read at x cells from the `from` end, and weights of the cells.
 
-    They are the nearest degree + 1; where two such sets are as near, as on a face for an even degree, it is the mean
-    of both, so that a pipe drawn the other way reads the same.
+    The nearest degree + 1 cells are read. If two such sets are equally near, as at a face for an even degree, the
+    result is the mean of both, so that a pipe drawn in the opposite direction reads the same value.
     """
     middle = x - 0.5 * (degree + 1)
     firsts = sorted({int(np.clip(round(middle + side), 0, n - degree - 1)) for side in (-TIE, TIE)})

@@ -1,4 +1,4 @@
-"""The draft of a case made of that of another, where sizes of restrictions alone are other. Knows what may differ."""
+"""Model tables derived from those of another case that differs only in sizes of restrictions."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from fvsolve.case.case import Case
 from fvsolve.model.draft import Draft
 from fvsolve.model.lowering import lowering_of
 
-MOVED = ("nodes", "links", "raw", "read")  # fields of a case that was made of another by numbers of its parts
+MOVED = ("nodes", "links", "raw", "read")  # fields of a case that differ after a change of numbers of parts
 
 
 def resized(packed: Draft, case: Case) -> Draft | None:
-    """A packed draft with restrictions as a case has them; None where the case differs in anything else."""
+    """Copy of packed tables with the restrictions of a case; None if the case differs in anything else."""
     before = packed.case
     changed = changed_links(before, case)
     if changed is None or packed.plane_size or not all(name in packed.valve_names for name in changed):
@@ -27,8 +27,10 @@ def resized(packed: Draft, case: Case) -> Draft | None:
 
 
 def changed_links(before: Case, case: Case) -> list[str] | None:
-    """Names of links that are others than before; None where more is."""
-    same = all(getattr(before, one.name) is getattr(case, one.name) for one in fields(Case) if one.name not in MOVED)
+    """Names of links that changed; None if anything else changed."""
+    same = all(
+        getattr(before, field.name) is getattr(case, field.name) for field in fields(Case) if field.name not in MOVED
+    )
     if not same or before.settles or not alike(before.nodes, case.nodes) or before.links.keys() != case.links.keys():
         return None
     changed = [name for name, link in case.links.items() if link is not before.links[name]]
@@ -36,5 +38,5 @@ def changed_links(before: Case, case: Case) -> list[str] | None:
 
 
 def alike(before: dict[str, Any], now: dict[str, Any]) -> bool:
-    """Whether two tables hold the very same parts."""
+    """True if two tables hold the identical part objects."""
     return before.keys() == now.keys() and all(now[name] is part for name, part in before.items())

@@ -1,4 +1,4 @@
-"""Scalars lowered to rows of a table: their amounts as states, their values at places, what a run makes of them."""
+"""Scalar table: amounts as states, values at nodes, balances of a run."""
 
 from __future__ import annotations
 
@@ -41,26 +41,26 @@ def lower_scalars(draft) -> None:
 
 
 def explicit(method: str) -> bool:
-    """Whether no step of a method solves equations."""
+    """True if no step of a method solves equations."""
     return method in METHODS and METHODS[method].explicit
 
 
 def bounds(case, name: str) -> tuple[float, float]:
-    """Least and greatest value of a scalar that there can be, as nothing but what is stated is mixed."""
+    """Least and greatest possible value of a scalar: those stated in the case, as mixing stays between them."""
     scalar = case.scalars[name]
-    said = [scalar.initial] + [scalar.ambient] * (scalar.decay > 0.0)
+    values = [scalar.initial] + [scalar.ambient] * (scalar.decay > 0.0)
     patches = [patch for basin in case.meshes for patch in case.nodes[basin].patches.values()]
     for part in [*case.places.values(), *case.links.values(), *patches]:
         given = getattr(part, "scalars", {}).get(name)
-        said += np.ravel(getattr(given, "value", given)).tolist() if given is not None else []
+        values += np.ravel(getattr(given, "value", given)).tolist() if given is not None else []
     for basin, mesh in case.meshes.items():
         if name in case.nodes[basin].scalars:
-            said += means(samples(case.nodes[basin].scalars[name], mesh)).tolist()
-    return min(said), max(said)
+            values += means(samples(case.nodes[basin].scalars[name], mesh)).tolist()
+    return min(values), max(values)
 
 
 def settle_scalars(draft) -> None:
-    """Masses of the profile per length, and sizes that states are measured against, once the profile is known."""
+    """Set masses per length of the profile, and scales of amounts, from the starting profile."""
     profile, rho = draft.tables.profile, draft.fluid.density
     for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) else ()):
         strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
@@ -78,26 +78,26 @@ def settle_scalars(draft) -> None:
 
 
 def places_of(draft, row) -> np.ndarray:
-    """Of a scalar at every node, where its amount or its schedule is."""
+    """State of the amount, or schedule, of a scalar at every node."""
     return np.array(draft.integers[row["places"] : row["places"] + len(draft.node_table)], dtype=int)
 
 
-def start_amounts(draft, found: np.ndarray) -> None:
-    """Amounts of all scalars at the start, into the state."""
+def start_amounts(draft, y: np.ndarray) -> None:
+    """Write amounts of all scalars at the start into a state."""
     case, profile = draft.case, draft.tables.profile
     for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
         for pipe, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
             cells = np.arange(mesh.cells)
             value = case.links[mesh.name].scalars.get(name, scalar.initial)
-            found[row["y"] + pipe["cell"] + cells] = value * profile[pipe["center"] + cells]
+            y[row["y"] + pipe["cell"] + cells] = value * profile[pipe["center"] + cells]
         for node, part, place in zip(draft.node_table, case.places.values(), places_of(draft, row), strict=True):
             if node["kind"] in STORES:
                 value = part.scalars[name].first if name in part.scalars else scalar.initial
-                found[place] = value * node["mass"]
+                y[place] = value * node["mass"]
 
 
 def amounts(model) -> np.ndarray:
-    """Places of all amounts in the state."""
+    """Indices of all amounts in pipes and nodes in the state."""
     if not len(model.tables.scalars):
         return np.zeros(0, dtype=int)
     count = model.cells + int(np.isin(model.tables.nodes["kind"], STORES).sum())
@@ -106,17 +106,17 @@ def amounts(model) -> np.ndarray:
 
 def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
     """Values of all scalars in the cells of pipe k."""
-    pipe, found = model.tables.pipes[k], {}
+    pipe, values = model.tables.pipes[k], {}
     n, o = int(pipe["cells"]), int(pipe["y"])
     for row, name in zip(model.tables.scalars, model.case.scalars, strict=True):
         base, at = int(pipe["center"]), int(row["y"] + pipe["cell"])
         mass = model.tables.profile[base : base + n] + (y[o : o + n] + y[o + n : o + 2 * n]) / pipe["speed"]
-        found[name] = y[at : at + n] / mass
-    return found
+        values[name] = y[at : at + n] / mass
+    return values
 
 
 def node_values(model, i: int, out: np.ndarray) -> dict[str, float]:
-    """Values of all scalars at node i, by what the right-hand side wrote beside its rates."""
+    """Values of all scalars at node i, from `out` of the right-hand side."""
     at, nodes = int(model.layout["value"]), len(model.node_names)
     return {name: float(out[at + q * nodes + i]) for q, name in enumerate(model.case.scalars)}
 
@@ -134,31 +134,33 @@ def amount(model, q: int, y: np.ndarray) -> float:
 
 
 def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
-    """Of each scalar: stored, come in, gone out, decayed, and the remainder [kg, times its unit].
+    """Balance of each scalar: initial, final, inflow, outflow, decayed, remainder [kg, times its unit].
 
-    ledger : float64[2, m]  what came in, and, negative, what went out
+    ledger : float64[2, m]  inflow, and outflow as a negative number
     """
-    found, n = {}, len(model.node_names)
+    ledgers, n = {}, len(model.node_names)
     for q, (name, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
-        both = ledger[:, n + q * n : n + (q + 1) * n]
-        lost = ledger[:, n * (1 + len(model.case.scalars)) + row["loss"] :]
-        decayed = -float(np.sum(lost[:, : row["losses"]]))
+        flows = ledger[:, n + q * n : n + (q + 1) * n]
+        decay = ledger[:, n * (1 + len(model.case.scalars)) + row["loss"] :]
+        decayed = -float(np.sum(decay[:, : row["losses"]]))
         initial, final = amount(model, q, model.start), amount(model, q, y)
-        remainder = final - initial - (float(np.sum(both)) - decayed)
-        moved = max(abs(initial), abs(final), float(np.sum(np.abs(both))) + abs(decayed))
-        found[name] = {
+        remainder = final - initial - (float(np.sum(flows)) - decayed)
+        turnover = max(abs(initial), abs(final), float(np.sum(np.abs(flows))) + abs(decayed))
+        ledgers[name] = {
             "initial": initial,
             "final": final,
-            "inflow": float(both[0].sum()),
-            "outflow": float(0.0 - both[1].sum()),
+            "inflow": float(flows[0].sum()),
+            "outflow": float(0.0 - flows[1].sum()),
             "decayed": decayed,
-            "by_node": {node: float(x) for node, x in zip(model.node_names, both.sum(axis=0), strict=True) if x != 0.0},
+            "by_node": {
+                node: float(x) for node, x in zip(model.node_names, flows.sum(axis=0), strict=True) if x != 0.0
+            },
             "nodes": {
                 node: {"inflow": float(x), "outflow": float(0.0 - y)}
-                for node, x, y in zip(model.node_names, *both, strict=True)
+                for node, x, y in zip(model.node_names, *flows, strict=True)
                 if x != 0.0 or y != 0.0
             },
             "remainder": remainder,
-            "relative": abs(remainder) / moved if moved > 0.0 else 0.0,
+            "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
         }
-    return found
+    return ledgers

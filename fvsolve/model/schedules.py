@@ -1,4 +1,4 @@
-"""Schedules lowered to pieces, and the times at which no step may straddle them. Knows no parts."""
+"""Schedules as polynomial pieces for kernels, and times at which steps must end."""
 
 from __future__ import annotations
 
@@ -9,28 +9,28 @@ import numpy as np
 from fvsolve.kernels.records import PIECE_COLUMNS, SCHEDULE
 from fvsolve.kernels.schedules import CREST, POWER, WAVE
 
-AWAKE = 8  # steps in a period at least
-LONG = 32  # more entries than this are samples of something smooth
-MARKED = 0.2  # change of slope, relative to the greatest, that forces a step in samples
+AWAKE = 8  # least number of steps in a period
+LONG = 32  # schedules with more entries are samples of a smooth function
+MARKED = 0.2  # for samples, change of slope, relative to the greatest slope, at which a step must end
 
 
 @dataclass
 class Schedules:
-    """The table of all schedules of a model, filled one by one.
+    """Table of all schedules of a model, filled one by one.
 
-    span : times between which what repeats itself has kinks [s]
+    span : time span in which kinks of periodic schedules are listed [s]
     """
 
     span: tuple[float, float] = (0.0, 0.0)
 
     records: list[tuple[int, int]] = field(default_factory=list)
     rows: list[list[float]] = field(default_factory=list)
-    breaks: dict[float, bool] = field(default_factory=dict)  # time -> whether a value jumps there
-    spacing: float = np.inf  # greatest step that does not leap over samples [s]
-    given: dict[tuple[int, float], float] = field(default_factory=dict)  # (index, time) -> values, once all are added
+    breaks: dict[float, bool] = field(default_factory=dict)  # time -> True if a value jumps
+    spacing: float = np.inf  # greatest step that does not skip samples [s]
+    given: dict[tuple[int, float], float] = field(default_factory=dict)  # (index, time) -> value, after all are added
 
     def add(self, schedule, scale: float = 1.0, offset: float = 0.0) -> int:
-        """Index of a schedule whose value is scale * value + offset."""
+        """Index of a new schedule whose value is scale * value + offset."""
         if schedule.kind == "constant":
             pieces = [[-np.inf, 0.0, 0.0, schedule.first * scale + offset, *(0.0 * scale,) * 3]]
         else:
@@ -48,7 +48,7 @@ class Schedules:
         return len(self.records) - 1
 
     def add_part(self, schedule, side: int) -> int:
-        """Index of the positive part of side * value; where it leaves and meets zero are kinks."""
+        """Index of the positive part of side * value; it has kinks where it reaches zero."""
         index = self.add(schedule, side)
         first, count = self.records[index]
         if schedule.kind == "harmonic":
@@ -62,13 +62,16 @@ class Schedules:
         return index
 
     def tables(self) -> tuple[np.ndarray, np.ndarray]:
-        """The two arrays that kernels read."""
+        """Arrays that kernels read : (schedules, pieces)."""
         rows = np.array(self.rows, dtype=np.float64).reshape(-1, PIECE_COLUMNS)
         return np.array(self.records, dtype=[("first", "i8"), ("pieces", "i8")]).astype(SCHEDULE), rows
 
 
 def lower(schedule) -> np.ndarray:
-    """float64[pieces, 7]: start, kind, origin, then a, b, c, d of a polynomial or v0, v1, duration, exponent."""
+    """Pieces of a schedule : float64[pieces, 7].
+
+    Columns: start, kind, origin, then a, b, c, d of a polynomial, or v0, v1, duration, exponent of a power.
+    """
     t, v = schedule.time, schedule.value
     if schedule.kind == "harmonic":
         mean, amplitude, period, phase = schedule.wave
@@ -95,18 +98,18 @@ def lower(schedule) -> np.ndarray:
 
 def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
     """Coefficients of scale * value + offset."""
-    values, kept = pieces[:, 3:] * scale, pieces[:, 1] != 0
+    values, nonpolynomial = pieces[:, 3:] * scale, pieces[:, 1] != 0
     values[:, 0] += offset
-    if not kept.any():
+    if not nonpolynomial.any():
         return values
     power = pieces[:, 1] == POWER
     values[power, 1] += offset
-    values[kept, 2:] = pieces[kept, 5:]
+    values[nonpolynomial, 2:] = pieces[nonpolynomial, 5:]
     return values
 
 
 def break_times(schedule) -> list[tuple[float, bool]]:
-    """(time, whether the value jumps) of all kinks and jumps that steps must end at."""
+    """Times of kinks and jumps at which steps must end : (time, True if the value jumps)."""
     t, v = schedule.time, schedule.value
     if schedule.kind in ("constant", "harmonic"):
         return []
@@ -123,7 +126,7 @@ def break_times(schedule) -> list[tuple[float, bool]]:
     else:
         change = np.diff(np.concatenate(([0.0], slope, [0.0])))
     least = (MARKED if len(t) > LONG else 1e-9) * np.max(np.abs(slope), initial=0.0)
-    return [(float(time), False) for time, step in zip(t, change, strict=True) if abs(step) > least]
+    return [(float(time), False) for time, slope_change in zip(t, change, strict=True) if abs(slope_change) > least]
 
 
 def piece_slope(piece: np.ndarray, t: float) -> float:
@@ -133,33 +136,33 @@ def piece_slope(piece: np.ndarray, t: float) -> float:
 
 
 def positive_part(pieces: np.ndarray) -> tuple[list[list[float]], list[float]]:
-    """Pieces of max(0, value), and the times at which a piece crosses zero between its ends."""
+    """Pieces of max(0, value), and times at which a piece crosses zero between its ends."""
     rows, crossings = [], []
     for k, piece in enumerate(pieces):
         start, end = piece[0], pieces[k + 1, 0] if k + 1 < len(pieces) else np.inf
-        near = 1e-12 * max(abs(start), abs(end), end - start) if np.isfinite([start, end]).all() else 0.0
-        inside = [t for t in piece_roots(piece) if start + near < t < end - near]
+        tolerance = 1e-12 * max(abs(start), abs(end), end - start) if np.isfinite([start, end]).all() else 0.0
+        inside = [t for t in piece_roots(piece) if start + tolerance < t < end - tolerance]
         crossings += inside
         for low, high in zip([start, *inside], [*inside, end], strict=True):
             middle = 0.5 * (low + high) if np.isfinite([low, high]).all() else piece[2]
-            held = piece_value(piece, middle) > 0.0
-            rows.append([low, *piece[1:]] if held else [low, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+            positive = piece_value(piece, middle) > 0.0
+            rows.append([low, *piece[1:]] if positive else [low, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     return rows, crossings
 
 
 def wave_roots(piece: list[float], span: tuple[float, float]) -> list[float]:
-    """Times between both at which a wave is zero, rising."""
-    mean, amplitude, often, phase = piece[3:]
+    """Times between both ends of `span` at which a wave is zero, increasing."""
+    mean, amplitude, frequency, phase = piece[3:]
     if abs(mean) >= abs(amplitude):
         return []
     up = np.arcsin(-mean / amplitude)
-    found = []
+    roots = []
     for angle in (up, np.pi - up):
-        first, last = ((often * t + phase - angle) / (2.0 * np.pi) for t in span)
-        found += [
-            (angle - phase + 2.0 * np.pi * k) / often for k in range(int(np.ceil(first)), int(np.floor(last)) + 1)
+        first, last = ((frequency * t + phase - angle) / (2.0 * np.pi) for t in span)
+        roots += [
+            (angle - phase + 2.0 * np.pi * k) / frequency for k in range(int(np.ceil(first)), int(np.floor(last)) + 1)
         ]
-    return sorted(found)
+    return sorted(roots)
 
 
 def piece_value(piece: np.ndarray, t: float) -> float:
@@ -171,9 +174,9 @@ def piece_value(piece: np.ndarray, t: float) -> float:
 
 
 def piece_roots(piece: np.ndarray) -> list[float]:
-    """Times at which a piece is zero, rising; none of one that is constant."""
+    """Times at which a piece is zero, increasing; none for a constant piece."""
     if piece[1] == 1:
         v0, v1, duration, exponent = piece[3:]
         return [piece[2] + duration * (1.0 - (v1 / (v1 - v0)) ** (1.0 / exponent))] if v0 * v1 < 0.0 else []
-    found = np.roots(piece[:2:-1]) if np.any(piece[4:]) else np.zeros(0)
-    return sorted(piece[2] + float(s.real) for s in found if abs(s.imag) <= 1e-9 * abs(s))
+    roots = np.roots(piece[:2:-1]) if np.any(piece[4:]) else np.zeros(0)
+    return sorted(piece[2] + float(s.real) for s in roots if abs(s.imag) <= 1e-9 * abs(s))

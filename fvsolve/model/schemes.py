@@ -1,4 +1,4 @@
-"""Schemes and limiters as the numbers that kernels read. Knows codes and weights; knows no fields."""
+"""Schemes and limiters as the codes and weights that kernels read."""
 
 import functools
 
@@ -7,26 +7,26 @@ from fvsolve.kernels.ends import difference_rows
 from fvsolve.schemes import LIMITERS, SCHEMES
 
 FAMILIES = {"upwind": rec.UPWIND, "linear": rec.LINEAR, "muscl": rec.MUSCL, "weno5": rec.WENO5}
-CODES = {name: code for code, name in enumerate(LIMITERS)}  # of limiters
+CODES = {name: code for code, name in enumerate(LIMITERS)}  # codes of limiters
 
 
 def family(scheme: str) -> int:
-    """The code of the kernel that computes a scheme."""
+    """Code of the kernel that computes a scheme."""
     return FAMILIES[SCHEMES[scheme].family]
 
 
 def scheme_settings(settings, scheme: str, limiter: str) -> None:
     """Write family, weights, degree and limiter into the settings record."""
-    one, settings["limiter"] = SCHEMES[scheme], CODES[limiter]
-    settings["scheme"], settings["degree"] = family(scheme), one.degree
+    row, settings["limiter"] = SCHEMES[scheme], CODES[limiter]
+    settings["scheme"], settings["degree"] = family(scheme), row.degree
     if settings["scheme"] == rec.LINEAR:
-        for k, weight in enumerate(one.weights):
+        for k, weight in enumerate(row.weights):
             settings[f"w{k}"] = float(weight)
         settings["inside"], settings["enter"], settings["leave"] = differences(scheme)
 
 
 @functools.cache
 def differences(scheme: str) -> tuple:
-    """What a linear scheme makes of the difference of two faces, see `records.SETTINGS`."""
-    one = SCHEMES[scheme]
-    return difference_rows([float(w) for w in one.weights], one.degree)
+    """Weights of a linear scheme for the difference of two faces, see `records.SETTINGS`."""
+    row = SCHEMES[scheme]
+    return difference_rows([float(w) for w in row.weights], row.degree)

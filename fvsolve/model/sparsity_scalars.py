@@ -1,4 +1,4 @@
-"""Which states rates of scalars can depend on: beside cells and masses, the flows that carry them. Knows indices."""
+"""States that rates of scalars can depend on: in addition to cells and masses, the flows that carry scalars."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from fvsolve.model.scalars import STORES
 from fvsolve.model.sparsity import Pairs, ends_of, every, states
 from fvsolve.steady import union
 
-NEAR = 2  # cells that a limited value at a face reads on each side, and one more at an end
+NEAR = 2  # cells that a limited value at a face reads on each side; at an end of a pipe, 1 more
 
 
 class Carriage:
-    """Couplings of one scalar, on top of those of the model that carries it."""
+    """Couplings of one scalar, in addition to those of the flow that carries it."""
 
     def __init__(self, couplings, model, q: int) -> None:
         self.of, self.row = couplings, model.tables.scalars[q]
@@ -25,7 +25,9 @@ class Carriage:
         self.places = model.tables.integers[self.row["places"] : self.row["places"] + nodes]
         self.stores = np.isin(of.nodes["kind"], STORES)
         self.wide = max(NEAR, of.reach.behind, of.reach.ahead)
-        self.through = [[] for _ in range(nodes)]  # of each node, what sets flows there, and values at ends of pipes
+        self.through = [
+            [] for _ in range(nodes)
+        ]  # for each node, states that set flows there, and values at ends of pipes
         for pipe in of.pipes:
             for right, i in enumerate(ends_of(pipe)):
                 self.through[i] += [of.sets[i], of.offered(pipe, right), *self.edge(pipe, right)]
@@ -37,7 +39,7 @@ class Carriage:
         self.values = self.mixed()
 
     def own(self, i: int) -> list:
-        """States that set the value of a node which stores, or of a patch."""
+        """States that set the value of a node that stores, or of a patch."""
         if i in self.of.patches:
             return [self.behind(i), self.of.behind(i, 1)]
         return [self.places[i], self.of.own(i)] if self.stores[i] else []
@@ -49,13 +51,13 @@ class Carriage:
         return pattern.amounts(self.of.basins[row["basin"]], self.q, cells)
 
     def edge(self, pipe, right: int) -> list[np.ndarray]:
-        """Amounts and waves of the cells at an end of a pipe that its value there is made of."""
+        """Amounts and waves of the cells that give the value at an end of a pipe."""
         n = int(pipe["cells"])
         cells = np.arange(n)[::-1][: NEAR + 1] if right else np.arange(n)[: NEAR + 1]
         return [self.row["y"] + pipe["cell"] + cells, pipe["y"] + cells, pipe["y"] + n + cells]
 
     def mixed(self) -> list[np.ndarray]:
-        """Of each node, the states that set its value: its own, or all that flows into its group."""
+        """For each node, the states that set its value: its own, or all that flow into its group."""
         inner, valves = self.of.inner, [ends_of(valve) for valve in self.of.valves]
         group = union(len(inner), [(i, j) for i, j in valves if inner[i] and inner[j]])
         enter: list[list] = [[] for _ in group]
@@ -64,19 +66,19 @@ class Carriage:
         for i, j in valves:
             enter[group[i]] += self.own(j)
             enter[group[j]] += self.own(i)
-        joined = [states(*some) for some in enter]
+        joined = [states(*parts) for parts in enter]
         return [joined[group[i]] if inner[i] else states(*self.own(i)) for i in range(len(group))]
 
     def pairs(self) -> Iterator[Pairs]:
-        """All couplings but those of a state with itself."""
-        brought = [[self.values[i], *self.through[i]] for i in range(len(self.values))]
+        """All couplings except those of a state with itself."""
+        sources = [[self.values[i], *self.through[i]] for i in range(len(self.values))]
         for valve in self.of.valves:
             i, j = ends_of(valve)
-            brought[i].append(self.values[j])
-            brought[j].append(self.values[i])
-        for i, felt in enumerate(brought):
-            gets = [self.places[i]] if self.stores[i] else [self.behind(i)] if i in self.of.patches else []
-            yield every(states(*gets, self.ledger + i), states(*felt))
+            sources[i].append(self.values[j])
+            sources[j].append(self.values[i])
+        for i, read in enumerate(sources):
+            affected = [self.places[i]] if self.stores[i] else [self.behind(i)] if i in self.of.patches else []
+            yield every(states(*affected, self.ledger + i), states(*read))
         if self.q == 0:
             yield from map(pattern.carried, self.of.basins)
         for basin in self.of.basins:
@@ -90,16 +92,16 @@ class Carriage:
                 yield every(self.close(pipe, right), self.read(pipe, right, i))
 
     def passing(self, basin) -> Iterator[Pairs]:
-        """What passes the open boundary of a basin, booked to its patches, on the cells there."""
+        """Flow through the open boundary of a basin, booked to its patches, on the cells there."""
         nodes = [i for i, row in self.of.patches.items() if self.of.basins[row["basin"]] is basin]
         if basin.row["through"] >= 0:
             behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
             cells = pattern.about(pattern.looked_at(basin), np.concatenate(behind))
-            felt = states(pattern.amounts(basin, self.q, cells), pattern.of_cells(basin, cells))
-            yield every(self.ledger + np.array(nodes), felt)
+            read = states(pattern.amounts(basin, self.q, cells), pattern.of_cells(basin, cells))
+            yield every(self.ledger + np.array(nodes), read)
 
     def lost(self) -> Iterator[Pairs]:
-        """What decays, on the amounts and masses that it decays from: one row for all, or one a state."""
+        """Decay, on the amounts and masses that decay: a single row for all, or a row for each state."""
         rows = self.loss + np.arange(self.row["losses"])
         pick = (lambda k: rows[k]) if rows.size > 1 else (lambda k: np.repeat(rows, np.size(k)))
         for pipe in self.of.pipes:
@@ -107,15 +109,15 @@ class Carriage:
             for first in (self.row["y"] + pipe["cell"], pipe["y"], pipe["y"] + pipe["cells"]):
                 yield pick(pipe["cell"] + cells), first + cells
         for i in np.flatnonzero(self.stores):
-            felt = states(*self.own(i))
-            yield every(np.atleast_1d(pick(self.places[i] - self.row["y"])), felt)
+            read = states(*self.own(i))
+            yield every(np.atleast_1d(pick(self.places[i] - self.row["y"])), read)
         for basin in self.of.basins:
             cells = np.arange(basin.n)
             for first in (pattern.amounts(basin, self.q, 0), *([basin.row["y"]] if basin.quantities else [])):
                 yield pick(basin.row["lost"] + cells), first + cells
 
     def inside(self, pipe) -> Iterator[Pairs]:
-        """Cells on their neighbours: amounts, masses, and the flows between them."""
+        """Cells on their neighbours: amounts, masses, and the flows between cells."""
         n = int(pipe["cells"])
         cells, at = np.arange(n), self.row["y"] + pipe["cell"]
         for offset in range(-self.wide, self.wide + 1):
@@ -124,12 +126,12 @@ class Carriage:
                 yield at + here, first + here + offset
 
     def close(self, pipe, right: int) -> np.ndarray:
-        """Cells whose flows the end of a pipe takes part in."""
+        """Cells whose flows depend on the end of a pipe."""
         cells = self.row["y"] + pipe["cell"] + np.arange(pipe["cells"])
         return (cells[::-1] if right else cells)[: self.wide]
 
     def read(self, pipe, right: int, i: int) -> np.ndarray:
-        """What these flows are made of beside the cells next to them."""
+        """States that enter these flows in addition to adjacent cells."""
         enters, leaves = self.of.sides(pipe, right)
         reach = self.of.reach
         return states(self.of.sets[i], self.of.offered(pipe, right), enters[: reach.entering], leaves[: reach.leaving])

@@ -1,4 +1,4 @@
-"""The profile a run starts from and whose deviation is the state: pressures, flows, what will move."""
+"""Starting profile of a run, from which the state deviates: pressures, flows, and motions at the start."""
 
 from __future__ import annotations
 
@@ -23,16 +23,17 @@ from fvsolve.model.rides import driven_at_start
 from fvsolve.model.slate import wiped
 from fvsolve.steady import Edge, solve_steady, union
 
-HELD = (rec.FIXED, rec.TANK, rec.PATCH)  # at a pressure that flows do not change
+HELD = (rec.FIXED, rec.TANK, rec.PATCH)  # nodes whose pressure does not depend on flows
 STORED = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
-REVISIONS = 200  # of what devices do, at most
-AT_ONCE, ROUND = 10, 20  # of these, all of them together; after which those that regulate begin elsewhere
+REVISIONS = 200  # greatest number of revisions of devices
+# revisions in which all devices change together; interval at which regulating devices restart at random
+AT_ONCE, ROUND = 10, 20
 PRESSURE_SCALE = 1e5
-SNAP = 1e-12  # flows below this share of the scene's are zero
+SNAP = 1e-12  # flows below this share of the flow scale are zero
 
 
 class Start:
-    """The steady problem of one scene and its answer, at one density in all drops."""
+    """Steady flow problem of a case and its solution, with the same density in all pressure drops."""
 
     def __init__(self, draft) -> None:
         self.draft, self.case, self.law = draft, draft.case, draft.case.law
@@ -48,66 +49,72 @@ class Start:
         ]
         sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
         self.flow_scale = max(sizes)
-        self.extra: dict[str, float] = {}  # drop beside the law's [Pa], of laws with a changing density
-        self.jets: dict[str, tuple[float, float]] = {}  # of pipes: what leaves them at their ends loses these M^2 [Pa]
-        self.dense_of: dict[int, tuple[float, float]] = {}  # of valves: density over reference, drive over potential
-        self.factor: dict[int, float] = {}  # on the conductance of valves, likewise
-        self.ratio: dict[int, float] = {}  # of what drives valves to the change of potential, likewise
+        self.extra: dict[str, float] = {}  # pressure drop in addition to the law's [Pa], for laws with changing density
+        self.jets: dict[
+            str, tuple[float, float]
+        ] = {}  # of pipes: loss of the flow that leaves at each end, per M^2 [Pa]
+        self.dense_of: dict[
+            int, tuple[float, float]
+        ] = {}  # of valves: density relative to reference, driving pressure drop relative to potential drop
+        self.factor: dict[int, float] = {}  # factor on the conductance of valves, likewise
+        self.ratio: dict[
+            int, float
+        ] = {}  # ratio of the pressure drop that drives a valve to its drop of potential, likewise
         self.moving: list[str] = []
         self.shut: set[int] = set()  # valves that a device holds shut
-        self.modes: dict[int, str] = {}  # as what those stand that regulate
-        self.loads: dict[int, float] = {}  # of shut chambers, pressures that hold bodies [Pa]
+        self.modes: dict[int, str] = {}  # modes of valves that regulate
+        self.loads: dict[int, float] = {}  # of closed chambers: pressures that support bodies [Pa]
 
     @cached_property
     def out(self) -> np.ndarray:
-        """What the rhs writes beside dydt, where nothing has moved."""
+        """Values that the right-hand side writes in addition to dydt, for zero deviations."""
         return np.zeros(int(self.draft.tables.layout[0]["size"]))
 
     @cached_property
     def slate(self) -> rec.Written:
-        """What runs write, where nothing has happened."""
+        """Arrays that runs write, before any event."""
         return wiped(self.draft.shapes)
 
     @cached_property
     def handle(self) -> np.ndarray:
-        """The tables as compiled laws take them."""
+        """Handle of the tables for compiled laws."""
         return make_handle((*self.draft.tables, *self.slate))
 
     def pressure(self, i: int) -> float:
-        """Pressure [Pa] at node i, as it was just found."""
+        """Pressure [Pa] at node i in the latest solution."""
         return self.law.pressure_of(self.answer.potential[i], self.nodes["elevation"][i])
 
     def density_at(self, i: int) -> float:
-        """Density [kg/m3] at node i; before anything is found that of reference."""
+        """Density [kg/m3] at node i; the reference density before a solution exists."""
         return self.law.density(self.pressure(i)) if hasattr(self, "answer") else self.law.rho
 
     def given(self, schedule: int) -> float:
-        """What a schedule gives up to the start."""
-        known, key = self.draft.schedules.given, (int(schedule), self.t)
-        if key not in known:
+        """Value of a schedule up to the start."""
+        values, key = self.draft.schedules.given, (int(schedule), self.t)
+        if key not in values:
             schedules, pieces = self.draft.tables.schedules, self.draft.tables.pieces
-            known[key] = float(value_until(schedules, pieces, key[0], self.t, self.t))
-        return known[key]
+            values[key] = float(value_until(schedules, pieces, key[0], self.t, self.t))
+        return values[key]
 
     def solve(self) -> None:
-        """The steady state in which every device is as its pressures and flows ask for."""
+        """Solve the steady state in which the state of every device agrees with its pressures and flows."""
         random, devices = Random(0), list(zip(self.draft.devices, self.draft.device_table, strict=True))
         for turn in range(REVISIONS):
             self.balance()
             revised = (device.revise(self, part, row) for (_, part, device), row in devices)
-            if not (any(revised) if turn > AT_ONCE else sum(revised)):  # later one by one, lest they go in rounds
+            if not (any(revised) if turn > AT_ONCE else sum(revised)):  # later one by one, to avoid cycles
                 return self.report_faults(self.held)
             random.shuffle(devices)
             if turn % ROUND == ROUND - 1:
                 self.scatter(random)
         self.report_faults(self.held)
         names = listing([name for name, _, device in self.draft.devices])
-        self.draft.fault("numerics.initial", f"no steady state was found in which {names} stay as they are; "
+        self.draft.fault("numerics.initial", f"no steady state was found: the states of {names} keep changing; "
                          'try initial = "rest"')  # fmt: skip
         self.draft.check()
 
     def scatter(self, random: Random) -> None:
-        """Let those that regulate stand as chance has it: from where they stood no revision led on."""
+        """Set regulating devices to random states: revisions from their states did not converge."""
         for k in sorted(self.modes):
             if random.random() < 0.5:
                 self.shut = self.shut | {k}
@@ -116,20 +123,20 @@ class Start:
                 del self.modes[k]
 
     def across(self, k: int) -> tuple[float, float]:
-        """Potentials just found at both ends of valve k [Pa]; where demands go unserved there is none left."""
-        found = []
+        """Potentials at both ends of valve k in the latest solution [Pa]; -inf where demands are not supplied."""
+        potentials = []
         for i in (int(self.valves[k][end]) for end in ("from_node", "to_node")):
             unserved = i in self.answer.no_solution
             drawn = sum(self.demand[self.answer.no_solution]) if unserved else 0.0
-            found.append(-math.copysign(math.inf, drawn) if unserved else float(self.answer.potential[i]))
-        return found[0], found[1]
+            potentials.append(-math.copysign(math.inf, drawn) if unserved else float(self.answer.potential[i]))
+        return potentials[0], potentials[1]
 
     def valve_flows(self) -> np.ndarray:
-        """Flows of valves as they were just found [kg/s]."""
+        """Flows of valves in the latest solution [kg/s]."""
         return self.answer.flow[len(self.pipes) + len(self.columns) :][: len(self.valves)]
 
     def balance(self) -> None:
-        """The steady state with devices as they are now."""
+        """Solve the steady state with devices in their present states."""
         self.held, self.demand = self.givens()
         held = self.held
         pipes = [self.wall_edge(mesh.name, row, mesh.length) for mesh, row in
@@ -152,7 +159,7 @@ class Start:
         self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
 
     def givens(self) -> tuple[np.ndarray, np.ndarray]:
-        """Potentials that are held (nan: to be found) and demands of junctions [kg/s]."""
+        """Fixed potentials (nan where unknown) and demands of junctions [kg/s]."""
         held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             if row["kind"] == rec.JUNCTION:
@@ -164,22 +171,22 @@ class Start:
         return held, np.zeros_like(demand) if self.rest else demand
 
     def hold_loads(self, pressures: dict[int, float]) -> bool:
-        """Let shut chambers have pressures that hold what stands on them; whether there are any."""
+        """Set pressures of closed chambers that support bodies; True if there are any."""
         self.loads = pressures
         return bool(pressures)
 
     def reaches(self, i: int) -> list[int]:
-        """Nodes that open links join to node i, itself among them."""
+        """Nodes that open links join to node i, including node i."""
         group = union(len(self.nodes), [(edge.i, edge.j) for edge in self.edges if not edge.shut])
         return [j for j in range(len(self.nodes)) if group[j] == group[i]]
 
     def touched(self, i: int) -> bool:
-        """Whether a link of the fluid joins node i."""
+        """True if a pipe, column or valve joins node i."""
         tables = (self.pipes, self.columns, self.valves)
         return any(np.any((table["from_node"] == i) | (table["to_node"] == i)) for table in tables)
 
     def wall_edge(self, name: str, row, length: float) -> Edge:
-        """A pipe or column: drop = (L / A) drag(M)."""
+        """Edge of a pipe or column: drop = (L / A) drag(M)."""
         law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
         per = length / row["area"]
         least = drag_slope(*law, 1e-6 * self.draft.fluid.density * float(row["area"]))
@@ -200,11 +207,12 @@ class Start:
         if link.initial_flow is not None:
             return Edge(i, j, None, link.initial_flow * self.draft.fluid.density, drop=drop)
         free = row["friction"] == rec.FRICTION_NONE
-        first = 0.0 if free else self.draft.fluid.density * row["area"]  # so that free loops get the least norm
+        # so that loops without friction get the solution of least norm
+        first = 0.0 if free else self.draft.fluid.density * row["area"]
         return Edge(i, j, newton, first, drop=drop)
 
     def valve_edge(self, k: int) -> Edge:
-        """A valve: M |M| = G dP, with the chord of the root as slope."""
+        """Edge of a valve: M |M| = G dP, with the chord of the root as slope."""
         row = self.valves[k]
         own = self.lowered(k).edge(self, k)
         if own is not None:
@@ -231,24 +239,24 @@ class Start:
         return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
 
     def lowered(self, k: int):
-        """What says how valve k stands, if not its schedule alone."""
+        """Lowering that sets the state of valve k: that of its device, or of its own part."""
         if self.valves[k]["device"] >= 0:
             return self.draft.devices[self.valves[k]["device"]][2]
         link = self.case.conduits[self.draft.valve_names[k]]
         return lowering_of(type(link)).of(link)
 
     def conductance(self, k: int) -> float:
-        """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its own open or shut."""
+        """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its valve open or shut."""
         row = self.valves[k]
         if row["device"] >= 0:
             return 0.0 if k in self.shut else float(row["conductance"])
         opening = self.given(row["schedule"])
-        if row["characteristic"] == 0:  # as `conductance_of` has it, which wants all tables
+        if row["characteristic"] == 0:  # as `conductance_of`, which needs all tables
             return float(row["conductance"]) * opening * opening
         return conductance_of(self.draft.tables, k, opening)
 
     def leak_edge(self, k: int) -> Edge:
-        """What leaks past a piston: M = rho leakage dP."""
+        """Edge of the leakage past a piston: M = rho leakage dP."""
         row = self.pistons[k]
         g = row["leakage"] * self.draft.fluid.density * self.factor.get(len(self.valves) + k, 1.0)
         i, j = int(row["a"]), int(row["b"])
@@ -257,26 +265,26 @@ class Start:
         return Edge(i, j, lambda flow, present: (1.0 / g, 1.0, present - flow / g))
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
-        """Mass flow from A to B past a piston, as kernels.masses.leak_flow has it [kg/s]."""
+        """Mass flow from A to B past a piston, as `kernels.mass_dynamics.leak_flow` [kg/s]."""
         return self.law.density(max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
 
     def report_faults(self, held) -> None:
-        """What no steady state can meet, each by its name."""
+        """Faults of parts for which no steady state exists, by name."""
         names = list(self.case.places)
         for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
             drawn = self.demand[i] / self.draft.fluid.density
-            what = f"{self.case.amount(drawn, 'flow')} are drawn here but every way to it" if drawn > 0.0 else (
+            reason = f"{self.case.amount(drawn, 'flow')} are drawn here but every way to it" if drawn > 0.0 else (
                 f"{self.case.amount(-drawn, 'flow')} come in here but every way out")  # fmt: skip
             self.draft.fault(
                 f"nodes.{names[i]}",
-                f'no steady state: {what} is shut; open a valve, or use initial = "rest"',
+                f'no steady state: {reason} is shut; open a valve, or use initial = "rest"',
             )
         for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
             ends = [int(row["from_node"]), int(row["to_node"])]
             free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
             if free and not self.rest and abs(held[ends[0]] - held[ends[1]]) > 1e-6 * PRESSURE_SCALE:
                 a, b = ((held[k] - self.case.ambient_pressure) / self.weight for k in ends)
-                a, b = (self.case.amount(one, "head", 6) for one in (a, b))
+                a, b = (self.case.amount(head, "head", 6) for head in (a, b))
                 self.draft.fault(
                     f"links.{name}",
                     f"no steady state: it has no friction, and heads of {a} and {b} at its ends; "
@@ -288,32 +296,36 @@ class Start:
         self.draft.check()
 
     def report_split(self) -> None:
-        """Columns that no flow holds still, and the loops in which no friction says how the flow divides."""
-        held = {i: -1 for i, given in enumerate(self.held) if not np.isnan(given)}  # all of them one: ways between them
+        """Notices of frictionless columns between unequal heads, and of loops without friction.
+
+        In such loops friction does not set the flow split.
+        """
+        # fixed nodes count as a single node: paths between them close loops
+        merged = {i: -1 for i, potential in enumerate(self.held) if not np.isnan(potential)}
         rows = [*zip(self.draft.pipe_names, self.pipes, strict=True),
                 *zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
-        ends = {name: [held.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")] for name, row in rows
-                if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
-        swing = [
+        ends = {name: [merged.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")]
+                for name, row in rows if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
+        swinging = [
             name
             for name, row in rows
             if name in ends
             and self.case.links[name].initial_flow is None
             and abs(self.held[int(row["from_node"])] - self.held[int(row["to_node"])]) > 1e-6 * PRESSURE_SCALE
         ]
-        for name in swing:
+        for name in swinging:
             text = f"{name}: without friction between unequal heads no flow is steady; it starts from rest and swings"
             self.draft.warnings.append(Notice("start", f"links.{name}", text))
-        loops, before = {name: pair for name, pair in ends.items() if name not in swing}, None
-        while self.answer.split and loops != before:  # what ends in a place that no other touches is in none
-            before, touched = loops, Counter(end for pair in loops.values() for end in pair)
-            loops = {name: pair for name, pair in loops.items() if min(touched[end] for end in pair) > 1}
-        if self.answer.split and (loops or not swing):
+        loops, before = {name: pair for name, pair in ends.items() if name not in swinging}, None
+        while self.answer.split and loops != before:  # a link to a node that no other link joins is in no loop
+            before, counts = loops, Counter(end for pair in loops.values() for end in pair)
+            loops = {name: pair for name, pair in loops.items() if min(counts[end] for end in pair) > 1}
+        if self.answer.split and (loops or not swinging):
             text = f"{listing(loops) or 'ways'}: loops without friction, in which flow is the least-norm split"
             self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
 
     def freeze_factors(self) -> None:
-        """`steady` friction by roughness: the factor of the starting flow, at rest the fully rough one."""
+        """Set factors of `steady` friction by roughness: at the starting flow; at rest, fully rough."""
         rows = [*zip(self.draft.pipe_names, self.pipes, self.pipe_flow, strict=True),
                 *zip(self.draft.column_names, self.columns, self.column_flow, strict=True)]  # fmt: skip
         for name, row, flow in rows:
@@ -345,7 +357,7 @@ class Start:
         return drag(*law)
 
     def fill_pipes(self) -> None:
-        """Straight lines between the pressures of the ends; what friction does not hold of them drives the flow."""
+        """Set pressure profiles linear between the ends; pressure that friction does not balance drives the flow."""
         profile, self.driven = self.draft.tables.profile, {}
         for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
             row["flow"] = self.pipe_flow[k]
@@ -358,11 +370,11 @@ class Start:
             profile[cells] = (self.draft.fluid.vapor_pressure - pressure) * row["admittance"]
 
     def drive_pipe(self, mesh, row, change: float) -> bool:
-        """Let a pipe hold a change of potential [Pa] that its friction does not; False where friction does."""
-        beyond = change - row["drag"] / row["area"] * mesh.length
-        if abs(beyond) <= 1e-10 * (PRESSURE_SCALE + abs(change)):
+        """Set a pipe's drag to a drop of potential [Pa] that friction does not balance; False if friction does."""
+        excess = change - row["drag"] / row["area"] * mesh.length
+        if abs(excess) <= 1e-10 * (PRESSURE_SCALE + abs(change)):
             return False
-        self.driven[mesh.name] = beyond
+        self.driven[mesh.name] = excess
         row["drag"] = change * row["area"] / mesh.length
         return True
 
@@ -406,20 +418,20 @@ class Start:
                 row["drop"] = abs(flow) * flow / here
 
     def begin_devices(self) -> None:
-        """Let every device fill in what depends on the profile."""
+        """Fill in data of every device that depend on the profile."""
         for (_, part, device), row in zip(self.draft.devices, self.draft.device_table, strict=True):
             self.moving += device.begin(self, part, row)
 
     def slack(self, end: str) -> float:
-        """Error of what a device keeps as set that is rounding: of a pressure [Pa] at an end, else of a flow [kg/s]."""
+        """Tolerance for a set point, from rounding: pressure [Pa] if `end` is given, else flow [kg/s]."""
         return 1e-6 * PRESSURE_SCALE if end else 1e-6 * self.flow_scale
 
     def drive_of(self, k: int) -> tuple[float, float]:
-        """(the drop that drives valve k in the profile [Pa], density that it meets over that of reference)."""
+        """Drive of valve k in the profile : (drop [Pa], density in the valve relative to reference)."""
         return float(self.valves[k]["drop"]), 1.0
 
     def law_of(self, k: int) -> tuple[float, float]:
-        """(conductance of valve k, whole, at the density that it meets, the drop that drives it) in the profile."""
+        """Law of valve k in the profile : (conductance fully open at the density in the valve, drop that drives it)."""
         drop, denser = self.drive_of(k)
         return float(self.valves[k]["conductance"]) * denser, drop
 
@@ -434,19 +446,21 @@ class Start:
             if inflow != 0.0:
                 text = lowering_of(type(node)).moves(name, node, row, inflow, inflow / fluid.density, self.case.amount)
                 moving += [text] if text else []
-        told = self.case.amount
+        amount = self.case.amount
         for name, pressure in self.driven.items():
-            moving.append(f"pipe {name}: {told(pressure, 'pressure', span=True)} drive it, unbalanced by friction")
+            moving.append(f"pipe {name}: {amount(pressure, 'pressure', span=True)} drive it, unbalanced by friction")
         for name, row in zip(self.draft.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
-                moving.append(f"rigid column {name}: {told(row['offset'], 'pressure', span=True)} drive it unbalanced")
+                moving.append(
+                    f"rigid column {name}: {amount(row['offset'], 'pressure', span=True)} drive it unbalanced"
+                )
         for k, (name, row) in enumerate(zip(self.draft.valve_names, self.valves, strict=True)):
             if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
                 if self.conductance(k) > 0.0:
                     moving.append(
-                        f"valve {name}: open with {told(row['drop'], 'pressure', span=True)} across it and no flow"
+                        f"valve {name}: open with {amount(row['drop'], 'pressure', span=True)} across it and no flow"
                     )
         if self.case.numerics.initial == "equilibrium":
             for text in moving:
-                self.draft.fault("numerics.initial", f'"equilibrium" wants nothing to move, but {text}')
+                self.draft.fault("numerics.initial", f'"equilibrium" expects that nothing moves, but {text}')
         return {"moving": moving}

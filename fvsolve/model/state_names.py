@@ -1,4 +1,4 @@
-"""Names of states, those of cells made when they are asked for: a plane has millions. Knows words; knows no tables."""
+"""Names of states; those of cells are made on request, as a mesh can have millions of cells."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 
 
 class Numbered(Sequence):
-    """`stem[0]`, `stem[1]` and so on, so many."""
+    """Sequence `stem[0]`, `stem[1]` and so on, of a given length."""
 
-    def __init__(self, stem: str, many: int) -> None:
-        self.stem, self.many = stem, many
+    def __init__(self, stem: str, count: int) -> None:
+        self.stem, self.many = stem, count
 
     def __len__(self) -> int:
         return self.many
@@ -32,7 +32,7 @@ class StateNames(Sequence):
         self.many = 0
 
     def add(self, names: Sequence[str]) -> None:
-        """Put names behind the others."""
+        """Append names."""
         self.parts.append(names)
         self.firsts.append(self.many)
         self.many += len(names)
@@ -61,7 +61,7 @@ class StateNames(Sequence):
         return repr(list(self))
 
     def single(self) -> Iterator[tuple[int, str]]:
-        """Number and name of those that are given one by one, not by cells."""
+        """Index and name of states that are not numbered cells."""
         for first, part in zip(self.firsts, self.parts, strict=True):
             if not isinstance(part, Numbered):
                 yield from enumerate(part, first)

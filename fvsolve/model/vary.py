@@ -1,4 +1,4 @@
-"""The model of a case with some keys changed, made of the one that is there. Knows no file."""
+"""Model of a case with changed keys, derived from an existing model."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from fvsolve.model.model import Model
 
 @door(model=made(Model), set=TABLE)
 def vary(model: Model, set: Mapping[str, Any]) -> Model:
-    """The model of the same case with keys changed, for example `{"links.valve.area": 0.002}`.
+    """Build the model of the same case with changed keys, for example `{"links.valve.area": 0.002}`.
 
-    To the bit what a fresh run makes, with its faults and notices: read again is what the keys touch, and what asks for
-    a file or a signal. The profile is solved from the beginning, as the last digits of an answer found from another
-    would be others. `model` stays as it is. Raises CaseError.
+    The result is identical to the bit to that of a fresh build, with its faults and notices. Only the parts that the
+    keys affect are read again, and those that read a file or a signal. The starting profile is solved from scratch, so
+    that its last digits do not depend on the earlier model. `model` is not changed. Raises CaseError.
     """
     case = load(model.case, dict(set))
     try:

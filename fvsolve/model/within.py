@@ -1,4 +1,4 @@
-"""What states may not leave: depths zero, amounts of scalars the bounds of all values. Knows tables; knows no step."""
+"""Bounds of states: depths are at least 0; amounts of scalars stay within the bounds of all values."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ NOBODY = -1
 
 
 def within(model) -> tuple[np.ndarray, np.ndarray]:
-    """(at, by) as `steppers.rows.keep_within` takes them; depths come before what they are the whole of."""
+    """Bounds (at, by) as arguments of `steppers.output_rows.limit_to_bounds`; depths before the amounts they bound."""
     rows = [*depths(model)]
     for q in range(len(model.tables.scalars)):
         rows += [*in_pipes(model, q), *in_nodes(model, q), *in_basins(model, q)]
     if not rows:
         return np.zeros(0, dtype=np.int64), np.zeros((0, 4))
-    at, by = (np.concatenate(one) for one in zip(*rows, strict=True))
+    at, by = (np.concatenate(column) for column in zip(*rows, strict=True))
     return at.ravel(), by
 
 
 def table(states, first, second, base, gain, least, most) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of states, as arrays or what is the same for all of them."""
+    """Rows of bounds for states; arguments are arrays, or numbers for all states."""
     at = np.column_stack(np.broadcast_arrays(states, first, second)).astype(np.int64)
     return at, np.column_stack(np.broadcast_arrays(base, gain, least, most, np.zeros(len(at)))[:4])
 
 
 def depths(model):
-    """The depth of water in cells is no less than none."""
+    """Depth of water in cells is at least 0."""
     for basin in model.basins:
         if basin.deep:
             states = int(basin.row["y"]) + np.arange(basin.n)
@@ -35,7 +35,7 @@ def depths(model):
 
 
 def in_pipes(model, q: int):
-    """Amounts per length, of the mass per length that both waves make."""
+    """Amounts per length, bounded by the mass per length of both waves."""
     row, profile = model.tables.scalars[q], model.tables.profile
     for pipe in model.tables.pipes:
         n, k = int(pipe["cells"]), np.arange(pipe["cells"])
@@ -45,7 +45,7 @@ def in_pipes(model, q: int):
 
 
 def in_nodes(model, q: int):
-    """Amounts in tanks and chambers, of the mass there."""
+    """Amounts in tanks and chambers, bounded by the mass there."""
     row, nodes = model.tables.scalars[q], model.tables.nodes
     places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
     for node, place in zip(nodes, places, strict=True):
@@ -54,11 +54,11 @@ def in_nodes(model, q: int):
 
 
 def in_basins(model, q: int):
-    """Amounts per area, of the depth."""
+    """Amounts per area, bounded by the depth."""
     row = model.tables.scalars[q]
     for basin in model.basins:
         if basin.row["carried"] < 0:
             continue
         states = int(basin.row["carried"]) + q * basin.n + np.arange(basin.n)
-        of = (int(basin.row["y"]) + np.arange(basin.n), basin.depth) if basin.deep else (NOBODY, 1.0)
-        yield table(states, of[0], NOBODY, of[1], 1.0, row["least"], row["greatest"])
+        reference = (int(basin.row["y"]) + np.arange(basin.n), basin.depth) if basin.deep else (NOBODY, 1.0)
+        yield table(states, reference[0], NOBODY, reference[1], 1.0, row["least"], row["greatest"])

@@ -1,4 +1,4 @@
-"""The public `run()`: case in, result out, files and pictures where asked. Knows no physics."""
+"""Public `run()` and `open_run()`: from a case to its result, files and pictures."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ def run(
     threads: int = 1,
     pictures: bool = True,
 ) -> Result:
-    """Solve a case from its start to its end and hand back what it has to show.
+    """Solve a case from its start to its end and return its result.
 
     `case` is a path, a dict shaped like the file, a `Case` or a `Model`; `set` overrides keys, for example
-    `{"links.main.cells": 400}`. With `out` a run directory is written (docs/results.md); an earlier run in
-    it is only replaced with `force`, and goes on from its last checkpoint with `resume`; `pictures` are drawn there.
-    With `threads` above one, rows of basins are shared out among so many threads, to the same bits (docs/threads.md).
-    `progress(t, seconds, steps)` is called about ten times a second; KeyboardInterrupt raised there ends the
-    run cleanly. A run that stops early still returns, `ok` False and its `reason` said.
-    Under MPI rank 0 does all this, and the others, which follow it, get None.
+    `{"links.main.cells": 400}`. With `out` a run directory is written (docs/results.md). An earlier run in it is
+    replaced with `force` only, and continued from its last checkpoint with `resume`; `pictures` are drawn there.
+    With `threads` above 1, rows of basins are distributed over threads, with identical results (docs/threads.md).
+    `progress(t, seconds, steps)` is called about ten times a second; a KeyboardInterrupt raised in it ends the run in
+    order. A run that stops early also returns a result, with `ok` False and its `reason`.
+    Under MPI rank 0 does all this; the other ranks take part in the computation and return None.
     Raises CaseError, FluidError, RunError.
     """
     begun, comm = time.perf_counter(), ranks.world()
@@ -59,18 +59,18 @@ def run(
 
 @door(directory=PATH)
 def open_run(directory: str | Path) -> Result:
-    """Read a run directory back; RunError where it holds no run that ended, or one of another version."""
+    """Read a run directory. Raises RunError if it holds no finished run, or a run of another version."""
     from fvsolve.run.complete import check
 
-    said = read_directory(Path(directory))
-    check(said[0], Path(directory) / ENDED)
-    return Result(*said)
+    contents = read_directory(Path(directory))
+    check(contents[0], Path(directory) / ENDED)
+    return Result(*contents)
 
 
 def model_of(case, set: Mapping | None = None, like=None):
-    """The model of what `run` takes; what cannot start is a fault with its line, as what cannot be read is.
+    """Model of the `case` argument of `run`. Faults of its start refer to lines of the file.
 
-    like : a model, as `model.build.built` has it
+    like : a model, as for `model.build.build_like`
     """
     from fvsolve.case import Case, load, located
     from fvsolve.model import Model
@@ -84,26 +84,26 @@ def model_of(case, set: Mapping | None = None, like=None):
         except CaseError as error:
             raise located(error, case) from None
         except MemoryError:
-            raise RunError(f"{case.name}: memory is too small for its model; wanted fewer cells") from None
+            raise RunError(f"{case.name}: memory is too small for its model; expected fewer cells") from None
     if set:
-        raise RunError("a Model is made and cannot be overridden; give set= together with the case")
+        raise RunError("keys of a Model cannot be overridden; give set= together with a case")
     return case
 
 
 def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: int = 1):
-    """Where a run goes: memory, or a run directory, which is ours until it is closed."""
+    """Output of a run: memory, or a run directory, which is locked until it is closed."""
     with ranks.leading(comm := ranks.world()):
         if comm is not None and threads > 1:
-            raise RunError(f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread; leave it out")
+            raise RunError(f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread; omit threads")
         if out is not None:
             return RunDirectory(Path(out), model, force, resume)
         if resume:
-            raise RunError("a run goes on in its directory: state it with out=")
+            raise RunError("resume needs the directory of the run; give it by out=")
         return MemorySink(model)
 
 
 def solved(model, sink, progress=None, threads: int = 1, begun: float | None = None) -> Result:
-    """What a run has to show, all of it but pictures written; `begun` as time.perf_counter() said."""
+    """Solve and return the result; all files are written except pictures. begun : start by time.perf_counter()."""
     begun, comm = time.perf_counter() if begun is None else begun, ranks.world()
     if not sink.ended:
         return _result(model, _solve(model, sink, progress, threads, comm), sink, begun)
@@ -113,22 +113,22 @@ def solved(model, sink, progress=None, threads: int = 1, begun: float | None = N
 
 
 def draw(result: Result, painter: Painter) -> None:
-    """Write the pictures of a run directory that are not there; a warning of what fails."""
-    there = None if result.directory is None else pictures_there(result.directory)
-    wanted, failed = [], {}
+    """Write missing pictures of a run directory; warns of pictures that fail."""
+    missing = None if result.directory is None else pictures_there(result.directory)
+    pictures, failed = [], {}
     for name, function, drawn in (("history.png", "history_figure", result.history_drawn),
                                   ("envelope.png", "envelope_figure", result.envelope_drawn)):  # fmt: skip
-        if there is None or name in there:
+        if missing is None or name in missing:
             continue
         path = result.directory / name
         try:
             arguments = drawn()
-        except Exception as error:  # whatever it is, the numbers are there
+        except Exception as error:  # any exception: the numbers are complete without pictures
             failed[path] = f"{type(error).__name__}: {error}"
         else:
-            wanted += [Picture(path, function, arguments)] if arguments else []
-    for path, why in (failed | painter.draw(wanted)).items():
-        warnings.warn(f"{path} could not be drawn: {why}", RuntimeWarning, stacklevel=3)
+            pictures += [Picture(path, function, arguments)] if arguments else []
+    for path, reason in (failed | painter.draw(pictures)).items():
+        warnings.warn(f"{path} could not be drawn: {reason}", RuntimeWarning, stacklevel=3)
 
 
 def _solve(model, sink, progress, threads, comm):
@@ -138,8 +138,8 @@ def _solve(model, sink, progress, threads, comm):
 
     if comm is not None:
         threads, comm = comm.size, ranks.gathered(comm, model)
-    kept = sink.restart
-    state = initial_state(model) if kept is None else State(kept.t, kept.y, kept.memory)
+    restart = sink.restart
+    state = initial_state(model) if restart is None else State(restart.t, restart.y, restart.memory)
     sink.begin(model, state)
     if comm is not None and sink.folder is not None:
         sink.among(comm, ranks.rows_of(model, comm.size))
@@ -150,14 +150,14 @@ def _solve(model, sink, progress, threads, comm):
 
 
 def _result(model, summary, sink, begun: float) -> Result:
-    said = described(summary, model)
-    result = Result(said, sink.table, sink.envelope, sink.folder)
+    facts = described(summary, model)
+    result = Result(facts, sink.table, sink.envelope, sink.folder)
     result.case = model.case
-    said |= claims(model, summary, result)
-    said["versions"] = identity(model.case)
-    said["ended"] = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
+    facts |= claims(model, summary, result)
+    facts["versions"] = identity(model.case)
+    facts["ended"] = time.strftime("%Y-%m-%d %H:%M UTC", time.gmtime())
     if sink.folder is not None:
-        said["files"] = sink.files()
-        said["seconds_total"] = time.perf_counter() - begun
-        write_summary(sink.folder / "summary.json", said)
+        facts["files"] = sink.files()
+        facts["seconds_total"] = time.perf_counter() - begun
+        write_summary(sink.folder / "summary.json", facts)
     return result

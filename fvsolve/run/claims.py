@@ -1,4 +1,4 @@
-"""What a case claims, held against a run. Knows numbers over time; starts no run."""
+"""Comparison of a run with the claims of its case: expectations, limits, measured series."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from fvsolve.run.verdicts import places, verdict
 
 
 def claims(model, summary, result) -> dict:
-    """`expectations`, `comparisons` and `verdicts` of a run; `result` has rows, and gets the places of limits."""
-    columns = {one.name: one for one in probe_columns(model)}
+    """`expectations`, `comparisons` and `verdicts` of a run; also sets the `places` of limits in `result`."""
+    columns = {column_.name: column_ for column_ in probe_columns(model)}
     case = model.case
     result.places = places(model, summary)
     return {
@@ -27,10 +27,10 @@ def claims(model, summary, result) -> dict:
 
 
 def expectations(model, summary, result) -> list[dict]:
-    """What the case claims, line by line."""
-    columns = {one.name: one for one in probe_columns(model)}
+    """Expectations of the case, in the order of the file."""
+    columns = {column_.name: column_ for column_ in probe_columns(model)}
     first = min((mark.time for mark in summary.marks), default=math.inf)
-    found = []
+    rows = []
     for text, expect in model.case.expect.items():
         if expect.extent is None:
             shown = columns[expect.probe.text]
@@ -39,23 +39,23 @@ def expectations(model, summary, result) -> list[dict]:
             shown = column(text, expect.extent.dimension, model.case)
             value, time = _whole(model, summary, expect)
         value = value if time < summary.invalid_from else math.nan
-        found.append(expectation(text, expect, shown, value, bool(summary.ok and time < first)))
-    return found
+        rows.append(expectation(text, expect, shown, value, bool(summary.ok and time < first)))
+    return rows
 
 
-def expectation(text: str, expect, column: UnitColumn, found: float, sound: bool) -> dict:
-    """One line of `[expect]`: claimed, found, tolerance in the unit of the probe, and its state, as that of a limit.
+def expectation(text: str, expect, column: UnitColumn, value: float, complete: bool) -> dict:
+    """Entry of `[expect]`: claimed, found, tolerance in the unit of the probe, and its state, as for limits.
 
-    `max` and `min` are over all steps and rows, as are `greatest` and `least`, over all places of a part as well;
-    `mean` is over time (trapezoids), `at` is between rows. `error` is for who asks how far `found` is off.
+    `max` and `min` are over all steps and rows, as are `greatest` and `least`, these over all places of a part as well.
+    `mean` is over time (trapezoids), `at` is interpolated between rows. `error` is filled in by an error estimate.
     """
     tolerance = expect.atol + expect.rtol * abs(expect.value)
-    known = math.isfinite(found)
-    state = FAILS if known and abs(found - expect.value) > tolerance else HOLDS if known and sound else OPEN
+    known = math.isfinite(value)
+    state = FAILS if known and abs(value - expect.value) > tolerance else HOLDS if known and complete else OPEN
     return {
         "text": text,
         "claimed": float(column.from_si(expect.value)),
-        "found": float(column.from_si(found)) if known else None,
+        "found": float(column.from_si(value)) if known else None,
         "tolerance": float(column.span_from_si(tolerance)),
         "unit": column.unit,
         "state": state,
@@ -65,21 +65,21 @@ def expectation(text: str, expect, column: UnitColumn, found: float, sound: bool
 
 
 def _whole(model, summary, expect) -> tuple[float, float]:
-    """Greatest or least of all places of an extent, and when."""
+    """Greatest or least value of all places of an extent, and its time."""
     extent, low = expect.extent, expect.function == "least"
     values, times = [], []
     for part in met(model, summary, extent):
-        one = part.least if low else part.greatest
+        extreme = part.least if low else part.greatest
         times.append(part.t_least if low else part.t_greatest)
         values.append(
-            in_quantity(model, extent.quantity, one, part.elevation) if extent.quantity in OF_PRESSURE else one
+            in_quantity(model, extent.quantity, extreme, part.elevation) if extent.quantity in OF_PRESSURE else extreme
         )
     at = int((np.argmin if low else np.argmax)(np.concatenate(values)))
     return float(np.concatenate(values)[at]), float(np.concatenate(times)[at])
 
 
 def _found(expect, probe: str, summary, result) -> tuple[float, float]:
-    """The value of a probe that a claim asks for, and when it was; the end of the run of a mean."""
+    """Value of a probe for a claim, and its time; for a mean the end of the run."""
     if expect.function in ("min", "least"):
         return summary.extremes[probe][:2]
     if expect.function in ("max", "greatest"):

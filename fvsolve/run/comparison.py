@@ -1,4 +1,4 @@
-"""Series held against each other: measured ones against a run, a run against a run. Starts no run."""
+"""Comparison of series: measured ones with a run, a run with a run."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ FOUND = (
 
 
 def comparison(compare, column: UnitColumn, result) -> dict:
-    """One line of `[compare]`: differences at the measured times within the run, and the two peaks.
+    """Entry of `[compare]`: differences at the measured times within the run, and both peaks.
 
-    Differences (computed less measured) and peaks in the unit of the probe, times in s; all None where no
-    measured time lies within the run.
+    Differences (computed minus measured) and peaks in the unit of the probe, times in s; all None if no measured time
+    is within the run.
     """
     t, computed = result.seconds, result[column.name]
     time, measured = compare.t + compare.shift, column.from_si(compare.v)
@@ -40,28 +40,28 @@ def comparison(compare, column: UnitColumn, result) -> dict:
     overlap = (t >= time.min()) & (t <= time.max())
     peak, top = int(np.argmax(measured)), int(np.argmax(np.where(overlap, computed, -np.inf)))
     worst = int(np.argmax(np.abs(difference)))
-    found = [np.sqrt(np.mean(difference**2)), difference[worst], time[worst]]
-    found += [measured[peak], time[peak], computed[top], t[top]]
-    return head | dict(zip(FOUND, map(float, found), strict=True))
+    values = [np.sqrt(np.mean(difference**2)), difference[worst], time[worst]]
+    values += [measured[peak], time[peak], computed[top], t[top]]
+    return head | dict(zip(FOUND, map(float, values), strict=True))
 
 
-def interpolated(t: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """`values` at times `wanted`, linear between rows; at a jump, two rows of one time, the later one."""
-    wanted = np.asarray(wanted, float)
-    after = np.clip(np.searchsorted(t, wanted, side="right"), 1, max(len(t) - 1, 1))
+def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Values at given times, linear between rows; at a jump (two rows with the same time) the later row."""
+    times = np.asarray(times, float)
+    after = np.clip(np.searchsorted(t, times, side="right"), 1, max(len(t) - 1, 1))
     if len(t) == 1:
-        return np.full(wanted.shape, values[0])
+        return np.full(times.shape, values[0])
     before = after - 1
     gap = t[after] - t[before]
-    part = np.where(gap > 0.0, (wanted - t[before]) / np.where(gap > 0.0, gap, 1.0), 1.0)
+    part = np.where(gap > 0.0, (times - t[before]) / np.where(gap > 0.0, gap, 1.0), 1.0)
     exact = values[before] + part * (values[after] - values[before])
     return np.where(part >= 1.0, values[after], np.where(part <= 0.0, values[before], exact))
 
 
 def differences(a, b) -> dict:
-    """How far two runs are apart, per probe that both have: greatest and rms difference, b - a.
+    """Differences of two runs, for each probe that both have: greatest and rms difference, b - a.
 
-    In the units of `a`, at the rows of `a` within both runs; `b` is interpolated where its times are others.
+    In the units of `a`, at the rows of `a` within both runs; `b` is interpolated where its times differ.
     """
     shared = [probe for probe in a.probes if probe in b.units]
     return {

@@ -1,4 +1,4 @@
-"""Processes of this machine that do chunks of work, each started anew where it ended. Knows no work."""
+"""Pool of worker processes on this machine; a process that ends is replaced."""
 
 from __future__ import annotations
 
@@ -15,77 +15,80 @@ from typing import Any
 from fvsolve.errors import RunError
 
 READY = "ready"
-THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # of linear algebra, in every process
-NOT_STARTED = 'another process could not be started; a script that asks for jobs stands under if __name__ == "__main__"'
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")  # threads of linear algebra in every process
+NOT_STARTED = 'a worker process could not be started; a script that uses jobs needs if __name__ == "__main__"'
 
 
 class Crew:
-    """So many processes, started when they are first needed; one that is killed costs what it was doing."""
+    """Pool of up to `size` processes, started when needed; if a process is killed, only its chunk is lost."""
 
-    def __init__(self, work: Any, room: int) -> None:
-        self.work, self.room = work, room
+    def __init__(self, work: Any, size: int) -> None:
+        self.work, self.room = work, size
         self.context = get_context("spawn")
         self.idle: list[Worker] = []
         self.busy: list[Worker] = []
 
     def give(self, chunk: int, tasks: list) -> None:
-        """Let a process do a chunk."""
+        """Start a chunk in a process."""
         worker = self.idle.pop() if self.idle else Worker(self.context, self.work)
         self.busy.append(worker)
         worker.give(chunk, tasks)
 
     def take(self) -> tuple[int, list | None, float]:
-        """The next chunk that is done; what a process raised is raised here."""
+        """Next finished chunk : (number, answers or None if its process ended, seconds).
+
+        Raises an exception of the process.
+        """
         while True:
             ready = wait([worker.pipe for worker in self.busy])
-            worker = next(one for one in self.busy if one.pipe in ready)
-            said = worker.hear()
-            if said == READY:
+            worker = next(candidate for candidate in self.busy if candidate.pipe in ready)
+            message = worker.hear()
+            if message == READY:
                 continue
             self.busy.remove(worker)
-            if said is None:
+            if message is None:
                 worker.end()
                 if not worker.started:
                     raise RunError(NOT_STARTED)
                 return worker.chunk, None, 0.0
             self.idle.append(worker)
-            answers, seconds = said
+            answers, seconds = message
             if isinstance(answers, BaseException):
                 raise answers
             return worker.chunk, answers, seconds
 
     def close(self) -> None:
-        """End all: they are idle, or what they do is not wanted any more."""
+        """End all processes; unfinished chunks are dropped."""
         for worker in (*self.idle, *self.busy):
             worker.end()
 
 
 class Worker:
-    """One process and the pipe to it."""
+    """Process and the pipe to it."""
 
     def __init__(self, context, work: Any) -> None:
-        self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=serve, args=(theirs, work), daemon=True)
+        self.pipe, far_end = context.Pipe()
+        self.process = context.Process(target=serve, args=(far_end, work), daemon=True)
         self.started, self.chunk = False, -1
         with _no_interrupts(), _one_thread():
             self.process.start()
-        theirs.close()  # so that the pipe ends with the process
+        far_end.close()  # so that the pipe ends with the process
 
     def give(self, chunk: int, tasks: list) -> None:
         self.chunk = chunk
         try:
             self.pipe.send(tasks)
-        except OSError:  # it has just ended, as `hear` will find
+        except OSError:  # the process has just ended; `receive` will detect it
             pass
 
     def hear(self) -> Any:
-        """What it says next; None where it has ended."""
+        """Next message of the process; None if it has ended."""
         try:
-            said = self.pipe.recv()
+            message = self.pipe.recv()
         except (EOFError, OSError):
             return None
         self.started = True
-        return said
+        return message
 
     def end(self) -> None:
         self.process.terminate()
@@ -94,8 +97,9 @@ class Worker:
 
 
 def serve(pipe: Connection, work: Any) -> None:
-    """Do chunks that come by a pipe, until its other end is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all of a terminal: who started this one ends it
+    """Compute chunks received by a pipe, until its other end is closed."""
+    # Ctrl-C reaches all processes of a terminal; the parent process ends this process
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=follow, daemon=True).start()
     try:
         pipe.send(READY)
@@ -107,24 +111,24 @@ def serve(pipe: Connection, work: Any) -> None:
 
 
 def follow() -> None:
-    """End with the process that started this one, however that ends: nobody wants the chunk any more."""
+    """End this process when its parent process ends."""
     parent_process().join()
     os._exit(1)
 
 
 def done(work: Any, tasks: list) -> tuple[Any, float]:
-    """(answers to tasks, or what was raised; seconds)."""
+    """Compute tasks : (answers or the exception raised, seconds)."""
     began = time.perf_counter()
     try:
         answers = [work(task) for task in tasks]
-    except Exception as error:  # whatever it is, the one who asked gets it
+    except Exception as error:  # any exception is returned to the parent process
         return error, 0.0
     return answers, time.perf_counter() - began
 
 
 @contextmanager
 def _no_interrupts() -> Iterator[None]:
-    """Processes that are started meanwhile do not hear Ctrl-C until they say how they take it."""
+    """Block Ctrl-C in processes started within the context, until they set their own handler."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -137,11 +141,11 @@ def _no_interrupts() -> Iterator[None]:
 
 @contextmanager
 def _one_thread() -> Iterator[None]:
-    """Processes that are started meanwhile do linear algebra on one thread, if nobody has said on how many."""
-    said = [name for name in THREADS if name not in os.environ]
-    os.environ.update(dict.fromkeys(said, "1"))
+    """Limit linear algebra to 1 thread in processes started within the context, unless the environment sets it."""
+    unset = [name for name in THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(unset, "1"))
     try:
         yield
     finally:
-        for name in said:
+        for name in unset:
             del os.environ[name]

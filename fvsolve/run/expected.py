@@ -1,22 +1,22 @@
-"""What a run will take, said before it starts. Knows estimates; starts no run."""
+"""Estimate of duration and size of a run, before it starts."""
 
 from __future__ import annotations
 
 from fvsolve.case.size import on_disk, size
 
-LONG, LARGE = 180.0, 1e9  # [s], [B] from which a word is due
+LONG, LARGE = 180.0, 1e9  # [s], [B] above which an estimate is printed
 UNITS = ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"))
 
 
 def expected(model) -> str:
-    """About how long and how large, "" where that is nothing to speak of."""
+    """Text of the expected duration and size, "" if both are small."""
     seconds, bytes_ = model.checks["expected_seconds"] or 0.0, on_disk(model.case)
-    said = [duration(seconds)] if seconds > LONG else []
-    said += [f"{size(bytes_)} on disk"] if bytes_ > LARGE else []
-    return f"{model.case.name} will take about {' and '.join(said)}" if said else ""
+    parts = [duration(seconds)] if seconds > LONG else []
+    parts += [f"{size(bytes_)} on disk"] if bytes_ > LARGE else []
+    return f"{model.case.name} will take about {' and '.join(parts)}" if parts else ""
 
 
 def duration(seconds: float) -> str:
-    """A time as people say it."""
-    length, name = next((one for one in UNITS if seconds >= 2.0 * one[0]), (1.0, "s"))
+    """Duration in a suitable unit."""
+    length, name = next((unit for unit in UNITS if seconds >= 2.0 * unit[0]), (1.0, "s"))
     return f"{seconds / length:.2g} {name}"

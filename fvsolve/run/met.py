@@ -1,4 +1,4 @@
-"""Extremes over all steps of what an extent names, place by place. Knows what a run kept; starts no run."""
+"""Extremes over all steps at the places of an extent."""
 
 from __future__ import annotations
 
@@ -14,8 +14,10 @@ ALONG = ("distance", "elevation", "least_pressure", "t_least", "greatest_pressur
 
 @dataclass(frozen=True)
 class Met:
-    """Places of one part: distance from a pipe's `from` end (nan of others), elevation [m], extremes [SI], pressures
-    absolute, and their times [s] : float64[places]."""
+    """Extremes at the places of a part : float64[places] each.
+
+    distance from a pipe's `from` end (nan for other parts), elevation [m], extremes [SI], pressures absolute, times [s]
+    """
 
     group: str
     part: str
@@ -28,26 +30,26 @@ class Met:
 
 
 def met(model, summary, extent) -> list[Met]:
-    """Of every part of an extent what its places met."""
-    pressed = extent.quantity in OF_PRESSURE
+    """Extremes of every part of an extent."""
+    is_pressure = extent.quantity in OF_PRESSURE
     pipes = {pipe.name: pipe for pipe in model.pipes}
-    whole = with_start(summary, model) if pressed else {}
-    quantity = "pressure" if pressed else extent.quantity
-    rows: dict[str, list] = {}  # of what is watched along pipes
-    for one in model.watched:
-        if one.straight and one.quantity == quantity:
-            rows.setdefault(one.name, []).append(one)
-    made = []
+    envelope = with_start(summary, model) if is_pressure else {}
+    quantity = "pressure" if is_pressure else extent.quantity
+    rows: dict[str, list] = {}  # watched probes along pipes
+    for probe in model.watched:
+        if probe.straight and probe.quantity == quantity:
+            rows.setdefault(probe.name, []).append(probe)
+    parts = []
     for group, name in extent.parts:
-        if group == "links" and name in whole:
-            made.append(Met(group, name, *(np.asarray(whole[name][key]) for key in ALONG)))
+        if group == "links" and name in envelope:
+            parts.append(Met(group, name, *(np.asarray(envelope[name][key]) for key in ALONG)))
         elif group == "links" and name in rows:
-            made.append(along(summary, pipes[name], rows[name]))
+            parts.append(along(summary, pipes[name], rows[name]))
         else:
             z = model.elevation.get(name, np.nan) if group == "nodes" else np.nan
-            found = summary.watched[f"{group}.{name}.{quantity}"]
-            made.append(Met(group, name, np.array([np.nan]), np.array([z]), *np.array([found]).T))
-    return made if np.isinf(summary.invalid_from) else [valid(one, summary.invalid_from) for one in made]
+            extremes = summary.watched[f"{group}.{name}.{quantity}"]
+            parts.append(Met(group, name, np.array([np.nan]), np.array([z]), *np.array([extremes]).T))
+    return parts if np.isinf(summary.invalid_from) else [valid(probe, summary.invalid_from) for probe in parts]
 
 
 def valid(part: Met, until: float) -> Met:
@@ -58,14 +60,14 @@ def valid(part: Met, until: float) -> Met:
 
 
 def along(summary, pipe, rows: list) -> Met:
-    """Of what is watched along a pipe."""
-    distance = np.array([one.fraction for one in rows]) * pipe.length
-    found = np.array([summary.watched[one.text] for one in rows])
-    return Met("links", pipe.name, distance, pipe.height(distance), *found.T)
+    """Extremes of watched probes along a pipe."""
+    distance = np.array([probe.fraction for probe in rows]) * pipe.length
+    extremes = np.array([summary.watched[probe.text] for probe in rows])
+    return Met("links", pipe.name, distance, pipe.height(distance), *extremes.T)
 
 
 def in_quantity(model, quantity: str, pressure, elevation):
-    """Absolute pressures [Pa] as a quantity of pressure [SI], rising with it."""
+    """Absolute pressures [Pa] as a quantity of pressure [SI]; increasing with pressure."""
     if quantity == "pressure":
         return pressure
     if quantity == "gauge_pressure":
@@ -75,7 +77,7 @@ def in_quantity(model, quantity: str, pressure, elevation):
 
 
 def pressure_of(model, quantity: str, value: float, elevation):
-    """The absolute pressure [Pa] of a quantity of pressure [SI]; nan below what the fluid can have."""
+    """Absolute pressure [Pa] for a quantity of pressure [SI]; nan below the least pressure of the fluid."""
     if quantity == "pressure":
         return value
     if quantity == "gauge_pressure":

@@ -1,4 +1,4 @@
-"""A run under MPI: who leads, who follows, and that all have one case. Knows processes; knows no physics."""
+"""Run under MPI: rank 0 and the other ranks, with a check that all have the same case."""
 
 from __future__ import annotations
 
@@ -15,45 +15,46 @@ from fvsolve.solve.bands import cut, threads_of
 from fvsolve.solve.loop import Loop
 from fvsolve.solve.soundness import Soundness
 
-SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PALS_SIZE")  # how MPI's starters say how many processes there are
+# environment variables by which MPI launchers state the number of processes
+SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PALS_SIZE")
 EXTRA = 'pip install "fvsolve[mpi]"'
 
 
 @cache
 def world():
-    """MPI's communicator of all ranks where there are several, None else; FvsolveError without mpi4py."""
-    many = max(int(os.environ.get(name, "1")) for name in SIZES)
-    if many < 2:
+    """MPI's communicator of all ranks, None for a single process. Raises FvsolveError without mpi4py."""
+    count = max(int(os.environ.get(name, "1")) for name in SIZES)
+    if count < 2:
         return None
     try:
         from mpi4py import MPI
     except ImportError as error:
         raise FvsolveError(
-            f"MPI started {many} processes, and there is no mpi4py ({error}); {EXTRA} brings it"
+            f"MPI started {count} processes, but mpi4py is not installed ({error}); {EXTRA} installs it"
         ) from None
     if MPI.COMM_WORLD.size < 2:
-        text = f"MPI started {many} processes that mpi4py's own MPI takes for one each"
-        raise FvsolveError(f"{text}; start them with the mpiexec of the MPI that mpi4py finds, {EXTRA} brings one")
+        text = f"MPI started {count} processes, but the MPI of mpi4py sees each of them as a single process"
+        raise FvsolveError(f"{text}; start them with the mpiexec of the MPI that mpi4py uses; {EXTRA} installs one")
     return MPI.COMM_WORLD
 
 
 def follows() -> bool:
-    """Whether this is a rank that follows another."""
+    """True for ranks other than 0."""
     return (comm := world()) is not None and comm.rank > 0
 
 
 def digest(model) -> str:
-    """The same for the same model."""
-    found = hashlib.sha256()
+    """Hash of a model, equal for equal models."""
+    hashed = hashlib.sha256()
     for array in (*model.tables, model.start, model.scale):
-        found.update(array.tobytes())
+        hashed.update(array.tobytes())
     numerics = model.case.numerics
-    return found.hexdigest() + repr(numerics)
+    return hashed.hexdigest() + repr(numerics)
 
 
 @contextmanager
 def leading(comm):
-    """What rank 0 does before all run; where it fails the others are let go."""
+    """Context of rank 0 before all ranks run; releases the other ranks if it fails."""
     try:
         yield
     except BaseException:
@@ -63,14 +64,14 @@ def leading(comm):
 
 
 def gathered(comm, model):
-    """The communicator, once all ranks have the model; None where rank 0 steps it alone.
+    """Communicator after all ranks have the model; None if rank 0 runs alone.
 
-    Rank 0 has compiled before the others begin. Raises FvsolveError where one cannot, or has another case.
+    Rank 0 compiles before the others begin. Raises FvsolveError if a rank fails, or has another case.
     """
     with leading(comm):
-        many = threads_of(model, comm.size)[0]
+        count = threads_of(model, comm.size)[0]
         Loop(model)
-    if many == 1:
+    if count == 1:
         comm.bcast(None)
         return None
     comm.bcast(digest(model))
@@ -81,24 +82,24 @@ def gathered(comm, model):
     return comm
 
 
-def rows_of(model, many: int) -> dict:
-    """First rows of ranks, and how many there are, of the basins that they share out : name -> int64[many + 1]."""
-    found = cut(model, many)
-    return {model.basins[b].name: rows for b, rows in zip(found.basins, found.firsts, strict=True)}
+def rows_of(model, count: int) -> dict:
+    """Basin -> first row of each rank, and number of rows, of distributed basins : name -> int64[count + 1]."""
+    partition = cut(model, count)
+    return {model.basins[b].name: rows for b, rows in zip(partition.basins, partition.firsts, strict=True)}
 
 
 def follow(make: Callable) -> None:
-    """What a rank does that follows rank 0 through one run, of the model that `make` gives."""
+    """Take part in a run as a rank other than 0; make : function that returns the model."""
     comm = world()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # rank 0 hears it
-    wanted = comm.bcast(None)
-    if wanted is None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # rank 0 handles it
+    expected = comm.bcast(None)
+    if expected is None:
         return
     model, fault = None, ""
     try:
         model = make()
-        if digest(model) != wanted:
-            fault = f"rank {comm.rank} has another case than rank 0; wanted the same file and the same --set on all"
+        if digest(model) != expected:
+            fault = f"rank {comm.rank} has another case than rank 0; expected the same file and the same --set on all"
     except Exception as error:
         fault = f"rank {comm.rank}: {error}"
     comm.gather(fault)
@@ -108,6 +109,6 @@ def follow(make: Callable) -> None:
         loop = Loop(model, comm=comm)
         loop.stepper.largest = Soundness(loop.slate).watched
         loop.team.serve(*loop.functions)
-    except BaseException as error:  # the others wait for this one
+    except BaseException as error:  # the other ranks wait for this rank
         print(f"fvsolve: rank {comm.rank}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)
         comm.Abort(1)

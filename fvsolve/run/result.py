@@ -1,4 +1,4 @@
-"""What a run has to show: probes over time, extremes, claims. Knows arrays and words; starts no run."""
+"""Result of a run: probes over time, extremes, verdicts, pictures."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ HOLDS, OPEN, FAILS = "holds", "open", "fails"  # states of a limit
 IN_WORDS = {HOLDS: "holds", OPEN: "open", FAILS: "FAILS"}
 
 
-def not_valid(said: dict) -> str:
-    """From when on the numbers of a run that blew up are no results, by its summary; "" of another."""
-    if said["invalid_from"] is None:
+def not_valid(summary: dict) -> str:
+    """Text of the time from which the numbers of a diverged run are not valid, from its summary; "" for other runs."""
+    if summary["invalid_from"] is None:
         return ""
-    clock = UnitColumn("t", "time", said["time_unit"])
-    return f"not valid from t = {float(clock.from_si(said['invalid_from'])):.6g} {clock.unit} on"
+    clock = UnitColumn("t", "time", summary["time_unit"])
+    return f"not valid from t = {float(clock.from_si(summary['invalid_from'])):.6g} {clock.unit} on"
 
 
 class ResultMark(NamedTuple):
-    """First place and time [s] of what the model cannot follow: do not trust results from there on."""
+    """First place and time [s] at which the model does not hold: results are not valid from there on."""
 
     what: str
     place: str
@@ -40,9 +40,9 @@ class ResultMark(NamedTuple):
 
 
 class Extremes(NamedTuple):
-    """Least and greatest over all accepted steps and rows, in the unit of the probe, and when [s].
+    """Least and greatest over all accepted steps and rows, in the unit of the probe, and their times [s].
 
-    None of what a run that blew up came to where it is not valid.
+    Values of a diverged run from the time at which it is not valid are left out.
     """
 
     least: float
@@ -52,10 +52,10 @@ class Extremes(NamedTuple):
 
 
 class Expectation(NamedTuple):
-    """A claim of the case; `claimed`, `found`, `tolerance` and `error` in `unit`.
+    """Claim of the case; `claimed`, `found`, `tolerance` and `error` in `unit`.
 
-    state : `holds`, `fails`, or `open` where the run cannot tell; ok : whether it holds
-    error : how far `found` may be off, None where nobody asked
+    state : `holds`, `fails`, or `open` if the run cannot decide; ok : True if it holds
+    error : bound of the error of `found`, None without an error estimate
     """
 
     text: str
@@ -69,13 +69,13 @@ class Expectation(NamedTuple):
 
 
 class LimitVerdict(NamedTuple):
-    """A limit of the case, and the place that decides it; lengths in m, times in s, else `unit`.
+    """Limit of the case, and the place that decides it; lengths in m, times in s, else `unit`.
 
-    state : `holds`; `fails` where it is passed; `open` where a run cannot tell, or the error of a place is more than
-    its margin; ok : whether it holds; margin : how far from the limit, negative beyond it
-    bound : "least" or "greatest"; until : when the run ended
-    error : how far `value` may be off, None where nobody asked; reason : why it is wide or not known
-    worst : the same of the worst places, a row for each bound of each part
+    state : `holds`; `fails` if it is exceeded; `open` if the run cannot decide, or if the error at a place exceeds its
+    margin; ok : True if it holds; margin : distance from the limit, negative beyond it
+    bound : "least" or "greatest"; until : end time of the run
+    error : bound of the error of `value`, None without an error estimate; reason : cause of a large or unknown error
+    worst : entries of the worst places, a row for each bound of each part
     """
 
     name: str
@@ -98,12 +98,12 @@ class LimitVerdict(NamedTuple):
 
     @property
     def doubtful(self) -> bool:
-        """True if it is not passed, but its value may be off by more than its margin."""
+        """True if the limit is not exceeded, but the error of its value is greater than its margin."""
         return self.state == OPEN and None not in (self.error, self.margin) and self.margin < self.error
 
 
 class Comparison(NamedTuple):
-    """A measured series held against its probe: differences and peaks in `unit`, times in s."""
+    """Comparison of a measured series with its probe: differences and peaks in `unit`, times in s."""
 
     probe: str
     unit: str
@@ -120,12 +120,12 @@ class Comparison(NamedTuple):
 
 
 class Result(Shown):
-    """Probes over time and what is to be said about them, in the units of `[output]`.
+    """Probes over time, and facts about the run, in the units of `[output]`.
 
     `result.t` [s], `result["gate.pressure"]` float64[rows] in `result.units["gate.pressure"]`, `.probes`,
     `.reason`, `.ok`, `.marks`, `.warnings`, `.ledger`, `.extremes`, `.envelope`, `.routes`, `.expectations`,
-    `.verdicts`, `.comparisons`; all but the arrays as plain data in `result.summary`. `result.directory` is where it is
-    on disk, or None.
+    `.verdicts`, `.comparisons`; all except the arrays as plain data in `result.summary`. `result.directory` is its
+    directory on disk, or None.
     """
 
     def __init__(
@@ -138,60 +138,60 @@ class Result(Shown):
         self.summary = summary
         self.units = {name: probe["unit"] for name, probe in summary["probes"].items()}
         self.directory = directory
-        self.places: list[list[dict]] | None = None  # rows of every limit (`verdicts.places`); None if read back
+        self.places: list[list[dict]] | None = None  # rows of every limit (`verdicts.places`); None if read from files
         self._read_table = table
         self._read_envelope = envelope
 
     @property
     def reason(self) -> str:
-        """`finished`, or why the run ended before its end."""
+        """`finished`, or the reason of an early end."""
         return self.summary["reason"]
 
     @property
     def ok(self) -> bool:
-        """True if the run came to its end, and no warning says that its numbers are wrong."""
+        """True if the run reached its end, and no warning marks its numbers as wrong."""
         return self.summary["ok"]
 
     @property
     def marks(self) -> list[ResultMark]:
-        """First place and time from which results are not to be trusted, one per cause."""
-        return [ResultMark(**one) for one in self.summary["marks"]]
+        """First place and time from which results are not valid, one for each cause."""
+        return [ResultMark(**mark) for mark in self.summary["marks"]]
 
     @property
     def warnings(self) -> list[Notice]:
-        """What is legal but to be known; one whose `ok` is False makes the run's False."""
-        return [Notice(**one) for one in self.summary["warnings"]]
+        """Notices of legal but noteworthy facts; a notice with `ok` False makes that of the run False."""
+        return [Notice(**notice) for notice in self.summary["warnings"]]
 
     @property
     def ledger(self) -> dict:
-        """What came in, went out and is stored, and the remainder, per ledger (`mass` [kg])."""
+        """Inflow, outflow, storage and remainder of each ledger (`mass` [kg])."""
         return self.summary["ledgers"]
 
     @property
     def extremes(self) -> dict[str, Extremes]:
-        """Least and greatest of each probe, and when."""
+        """Least and greatest value of each probe, with times."""
         return {
-            name: Extremes(*(one[key] for key in Extremes._fields)) for name, one in self.summary["extremes"].items()
+            name: Extremes(*(row[key] for key in Extremes._fields)) for name, row in self.summary["extremes"].items()
         }
 
     @property
     def expectations(self) -> list[Expectation]:
-        """What the case claims, and whether it holds."""
-        return [Expectation(**one) for one in self.summary["expectations"]]
+        """Claims of the case, with their states."""
+        return [Expectation(**row) for row in self.summary["expectations"]]
 
     @property
     def verdicts(self) -> list[LimitVerdict]:
-        """What `[limits]` ask for, whether it holds, and where and when it is nearest to failing."""
-        return [LimitVerdict(**one) for one in self.summary["verdicts"]]
+        """Verdicts of `[limits]`, each with the place and time nearest to failure."""
+        return [LimitVerdict(**row) for row in self.summary["verdicts"]]
 
     @property
     def comparisons(self) -> list[Comparison]:
-        """How far each measured series is from its probe."""
-        return [Comparison(**one) for one in self.summary["comparisons"]]
+        """Differences of each measured series from its probe."""
+        return [Comparison(**row) for row in self.summary["comparisons"]]
 
     @cached_property
     def case(self):
-        """The case as resolved, read back from the run directory where it is not at hand."""
+        """Case as resolved, read from the run directory if necessary."""
         from fvsolve.case import load
 
         return load(self.directory / "case.toml")
@@ -199,11 +199,11 @@ class Result(Shown):
     @cached_property
     def envelope(self) -> dict:
         """Pipe -> distance, elevation, least and greatest pressure and head, times: float64[cells]."""
-        found = self._read_envelope()
-        for arrays in found.values():
+        tables = self._read_envelope()
+        for arrays in tables.values():
             for array in arrays.values():
                 array.flags.writeable = False
-        return found
+        return tables
 
     @cached_property
     def routes(self) -> dict:
@@ -221,13 +221,13 @@ class Result(Shown):
     def _table(self) -> np.ndarray:
         table = self._read_table()
         if table.shape[1] != 1 + len(self.units):
-            raise RunError(f"history.csv has {table.shape[1]} columns; wanted the time and {len(self.units)} probes")
+            raise RunError(f"history.csv has {table.shape[1]} columns; expected the time and {len(self.units)} probes")
         table.flags.writeable = False
         return table
 
     @property
     def t(self) -> np.ndarray:
-        """Times of the rows, in s unless `[output]` says otherwise; at a jump two rows have the same time."""
+        """Times of the rows, in s or the unit of `[output]`; at a jump two rows have the same time."""
         return self._table[:, 0]
 
     @property
@@ -248,7 +248,7 @@ class Result(Shown):
         return probe
 
     def frame(self):
-        """The table as a pandas DataFrame, time as index; FvsolveError where pandas is not installed."""
+        """Table as a pandas DataFrame, time as index. Raises FvsolveError if pandas is not installed."""
         try:
             import pandas
         except ImportError:
@@ -259,17 +259,17 @@ class Result(Shown):
 
     @door(path=PATH)
     def plot(self, path=None):
-        """The probes over time as a matplotlib Figure, also written to `path` where one is given."""
+        """Figure (matplotlib) of the probes over time, also written to `path` if given."""
         from fvsolve.draw.plot import history_figure
 
         return kept(history_figure(**self.history_drawn()), path)
 
     def history_drawn(self) -> dict[str, Any]:
-        """What the picture of the history shows, nothing where no probe was asked for."""
+        """Arguments of the history figure, empty without probes."""
         if not self.probes:
             return {}
-        marks = [(self._time.from_si(one.time), f"{one.place} {one.what}") for one in self.marks]
-        marks += [(self.t[0], f"{one.place} {one.kind}") for one in self.warnings if not one.ok and len(self.t)]
+        marks = [(self._time.from_si(item.time), f"{item.place} {item.what}") for item in self.marks]
+        marks += [(self.t[0], f"{item.place} {item.kind}") for item in self.warnings if not item.ok and len(self.t)]
         return {
             "t": self.t, "values": self._table[:, 1:], "probes": list(self.units.items()),
             "time_unit": self._time.unit, "marks": marks, "measured": self._measured(), "title": self.summary["title"],
@@ -277,13 +277,13 @@ class Result(Shown):
 
     @door(path=PATH)
     def plot_envelope(self, path=None):
-        """Least and greatest head along the pipes as a matplotlib Figure, also written to `path`."""
+        """Figure (matplotlib) of least and greatest head along the pipes, also written to `path` if given."""
         from fvsolve.draw.plot import envelope_figure
 
         return kept(envelope_figure(**self.envelope_drawn()), path)
 
     def envelope_drawn(self) -> dict[str, Any]:
-        """What the picture of the envelope shows, nothing where there are no pipes."""
+        """Arguments of the envelope figure, empty without pipes."""
         if not self.envelope:
             return {}
         return {
@@ -292,26 +292,26 @@ class Result(Shown):
 
     @door(time=NUMBER, field=TEXT, path=PATH, contours=AMOUNT)
     def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:
-        """Draw `field` at the frame nearest to `time` [s] (the last by default) with PyVista; its path.
+        """Draw `field` at the frame nearest to `time` [s] (default: the last) with PyVista; return its path.
 
-        Left out, `field` is pressure, or where there are no pipes the first of the first basin, and of a case without
-        pipes, basins and bodies its parts alone; `contours` are lines of equal values. RunError where there are no
-        frames, FvsolveError where nothing can be drawn.
+        By default `field` is pressure; without pipes, the first field of the first basin; without pipes, basins and
+        bodies, only the parts are drawn. `contours` : number of contour lines. Raises RunError without frames,
+        FvsolveError if drawing is not possible.
         """
         if field is None and self._lumped:
             return self._draw([], "parts", path, ".png", 0)
         times = [t for t, _ in self._frames()]
-        t = times[-1] if time is None else min(times, key=lambda one: abs(one - time))
+        t = times[-1] if time is None else min(times, key=lambda frame_time: abs(frame_time - time))
         return self._draw([t], field, path, ".png", contours)
 
     @door(path=PATH, field=TEXT, contours=AMOUNT)
     def animate(self, path=None, field: str | None = None, contours: int = 0) -> Path:
-        """Draw all frames as `view` does, as a .gif or .mp4; its path."""
+        """Draw all frames as `view` does, as a .gif or .mp4; return its path."""
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
 
     @property
     def _lumped(self) -> bool:
-        """Whether there is nothing that has fields."""
+        """True if no part has fields."""
         kinds = {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
         return self.directory is not None and not kinds & FIELDED
 
@@ -324,7 +324,7 @@ class Result(Shown):
         return frames
 
     def _no_frames(self) -> str:
-        """The reason why a run has no frames."""
+        """Reason for a run without frames."""
         if self.directory is None:
             return "nothing was written; give the run a directory"
         if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & FIELDED:
@@ -345,33 +345,33 @@ class Result(Shown):
             field = "speed" if bodies and not pipes and not basins else field
         out = Path(path) if path else self.directory / f"view-{field}{suffix}"
         frames = self._frames() if times else []
-        found = [(t, [file for at, file in frames if at == t]) for t in times]
-        view(scene_of(self.case, self.summary["title"], field, found, contours), out)
+        drawn = [(t, [file for at, file in frames if at == t]) for t in times]
+        view(scene_of(self.case, self.summary["title"], field, drawn, contours), out)
         return out
 
     def _measured(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         compared = self.case.compare if self.comparisons else {}
         return {
-            one.probe.text: (
-                self._time.from_si(one.t + one.shift),
-                self.column(one.probe.text).from_si(one.v),
+            series.probe.text: (
+                self._time.from_si(series.t + series.shift),
+                self.column(series.probe.text).from_si(series.v),
             )
-            for one in compared.values()
+            for series in compared.values()
         }
 
     def column(self, probe: str) -> UnitColumn:
-        """Name, dimension and unit of a probe, with the way to and from SI."""
+        """Name, dimension and unit of a probe, with conversions to and from SI."""
         return UnitColumn(self._known(probe), **self.summary["probes"][probe], ambient=self.summary["ambient_pressure"])
 
     def si(self, probe: str) -> np.ndarray:
-        """One probe in SI, pressures absolute: float64[rows]."""
+        """Values of a probe in SI, pressures absolute: float64[rows]."""
         return self.column(probe).to_si(self[probe])
 
     def said(self) -> str:
-        said = self.summary
-        return f"{said['case']!r}: {self.reason}, t = {said['t']:g} s, {len(self.units)} probes"
+        summary = self.summary
+        return f"{summary['case']!r}: {self.reason}, t = {summary['t']:g} s, {len(self.units)} probes"
 
     def listed(self) -> dict[str, list]:
-        """Of every probe: unit, least and greatest with their times."""
-        found = {"probe": self.probes, "unit": list(self.units.values())}
-        return found | {key: [getattr(one, key) for one in self.extremes.values()] for key in Extremes._fields}
+        """Unit, least and greatest of every probe, with times."""
+        columns = {"probe": self.probes, "unit": list(self.units.values())}
+        return columns | {key: [getattr(row, key) for row in self.extremes.values()] for key in Extremes._fields}

@@ -1,6 +1,6 @@
-"""All machine code that runs may ask for, compiled ahead by several processes. Knows what is compiled; runs no case.
+"""Compilation of all machine code for later runs, by several processes.
 
-What is kept, code and fluid properties, lies in the cache folder, which may be copied to machines of the same kind.
+Code and fluid properties are stored in the cache folder, which can be copied to machines of the same kind.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ STEPS = ("explicit", "damped", "diagonal", "full", "linear")  # kinds of methods
 
 @dataclass(frozen=True)
 class Warmed:
-    """What is there now: the folder of this machine's code, what machine that is, and how much.
+    """State of the cache: folder of this machine's code, kind of machine, and amounts.
 
-    compiled : functions that were not there before; functions, bytes : of all that are kept
+    compiled : number of functions that were added; functions, bytes : of all stored functions
     """
 
     directory: str
@@ -37,11 +37,11 @@ class Warmed:
 
 def warm(
     cases: Sequence[Path], whole: bool, jobs: int | None = None,
-    progress: Callable[[int, int, str], None] = lambda done, total, what: None,
+    progress: Callable[[int, int, str], None] = lambda done, total, task: None,
 ) -> Warmed:  # fmt: skip
-    """Compile what these cases ask for, and with `whole` all kinds of steps too, `jobs` at a time.
+    """Compile the code that these cases need, with `whole` also all kinds of steps, by `jobs` processes.
 
-    progress(done, total, what) is called as they are done. Raises CaseError, FvsolveError.
+    progress(done, total, task) is called after each task. Raises CaseError, FvsolveError.
     """
     folder, began = _folder(), time.perf_counter()
     before = kept(folder)
@@ -50,9 +50,11 @@ def warm(
         + [("attempt", kind) for kind in STEPS if whole]
         + [("algebra", kind) for kind in LINEAR if whole]
     )
-    _all(tasks, jobs or processors(), lambda done, what: progress(done, len(tasks) + len(cases), what))
-    found = [("case", str(path)) for path in cases]
-    _all(found, jobs or processors(), lambda done, what: progress(len(tasks) + done, len(tasks) + len(cases), what))
+    _all(tasks, jobs or processors(), lambda done, task: progress(done, len(tasks) + len(cases), task))
+    case_tasks = [("case", str(path)) for path in cases]
+    _all(
+        case_tasks, jobs or processors(), lambda done, task: progress(len(tasks) + done, len(tasks) + len(cases), task)
+    )
     after = kept(folder)
     return Warmed(
         str(folder), store.target()["name"], len(after.keys() - before.keys()), len(after), sum(after.values()),
@@ -61,12 +63,14 @@ def warm(
 
 
 def _folder() -> Path:
-    """Where code is kept; FvsolveError where none can be, or not where it was asked for."""
+    """Folder of compiled code. Raises FvsolveError if there is none, or if the requested one cannot be used."""
     if not jit.COMPILING:
-        raise FvsolveError("NUMBA_DISABLE_JIT is set, so nothing is compiled; wanted it unset")
-    asked, found = os.environ.get("FVSOLVE_CACHE"), jit.cache_folder()
-    if asked and Path(asked).expanduser().absolute() != found:
-        raise FvsolveError(f"FVSOLVE_CACHE = {asked}: cannot be written; wanted a folder with room for compiled code")
+        raise FvsolveError("NUMBA_DISABLE_JIT is set, so nothing is compiled; expected it to be unset")
+    requested, folder = os.environ.get("FVSOLVE_CACHE"), jit.cache_folder()
+    if requested and Path(requested).expanduser().absolute() != folder:
+        raise FvsolveError(
+            f"FVSOLVE_CACHE = {requested}: cannot be written; expected a writable folder for compiled code"
+        )
     return jit.code_folder()
 
 
@@ -76,31 +80,31 @@ def kept(folder: Path) -> dict[str, int]:
 
 
 def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str], None]) -> None:
-    """Do tasks, each in some process; those that take longest stand first."""
-    crew, given = Crew(do, min(jobs, len(tasks))), 0
+    """Run tasks in a process pool; the longest tasks are first."""
+    pool, started = Crew(do, min(jobs, len(tasks))), 0
     progress(0, "compiling")
     try:
         for count in range(len(tasks)):
-            while given < len(tasks) and given - count < crew.room:
-                crew.give(given, [tasks[given]])
-                given += 1
-            at, answers, _ = crew.take()
+            while started < len(tasks) and started - count < pool.room:
+                pool.give(started, [tasks[started]])
+                started += 1
+            at, answers, _ = pool.take()
             kind, name = tasks[at]
             if answers is None:
-                raise RunError(f"the process that compiled {kind} {name} has ended; was memory too small?")
+                raise RunError(f"the process that compiled {kind} {name} has ended; possibly memory was too small")
             progress(count + 1, Path(name).stem if kind == "case" else f"{kind} {name}".strip())
     finally:
-        crew.close()
+        pool.close()
 
 
 def do(task: tuple[str, str]) -> None:
-    """Compile what a task names, in this process."""
+    """Compile the code of a task in this process."""
     kind, name = task
     TASKS[kind](name)
 
 
 def steps(_: str) -> None:
-    """The time loop and what stands in for linear algebra."""
+    """Time loop, and the replacement of linear algebra for methods without it."""
     from fvsolve.steppers.march import compiled, compiled_attempt
     from fvsolve.steppers.signatures import no_algebra
 
@@ -108,14 +112,14 @@ def steps(_: str) -> None:
 
 
 def attempt(kind: str) -> None:
-    """The step of a kind of methods."""
+    """Step of a kind of methods."""
     from fvsolve.steppers.stepper import attempt_of
 
     attempt_of(kind)
 
 
 def algebra(kind: str) -> None:
-    """Factors and solutions of a kind, for real and complex shifts."""
+    """Factorisations and solutions of a kind, for real and complex shifts."""
     from fvsolve.steppers.structure import functions
 
     for complex in (False, True):
@@ -123,19 +127,19 @@ def algebra(kind: str) -> None:
 
 
 def case(path: str) -> None:
-    """What a case asks for: its start, its checks, its first steps, its energies."""
+    """Code that a case needs: its start, checks, first steps and energies."""
     from fvsolve.output.memory import MemorySink
     from fvsolve.run import model_of
     from fvsolve.solve import initial_state, solve
 
-    def enough(t: float, seconds: float, steps: int) -> None:
+    def stop(t: float, seconds: float, steps: int) -> None:
         raise KeyboardInterrupt
 
     model = model_of(path)
     _ = model.checks, model.functions.energies
     sink, state = MemorySink(model), initial_state(model)
     sink.begin(model, state)
-    solve(model, state, sink, enough)
+    solve(model, state, sink, stop)
 
 
 TASKS = {"steps": steps, "attempt": attempt, "algebra": algebra, "case": case}

@@ -277,10 +277,10 @@ def test_links_that_cannot_be_are_refused_by_name(text):
 def test_what_a_joint_holds_and_energy_are_refused_where_a_link_joins_a_basin_that_rides(link):
     case = changed(twins({"kind": "fixed"}, COLUMN), {"b": {"at": [2, 0, 0]} if link["type"] == "valve" else {}}, {})
     case["links"]["duct"] = changed({"nodes": {}, "links": {"duct": case["links"]["duct"]}}, {}, link)["links"]["duct"]
-    with pytest.raises(FvsolveError, match="not booked; links.duct: what passes a.gap is not felt by its body yet"):
+    with pytest.raises(FvsolveError, match="not supported; links.duct: what passes a.gap is not felt by its body yet"):
         energy(case)
     case["output"]["probes"] = ["hull.joint_fx"]
-    with pytest.raises(CaseError, match="what passes a.gap is not felt .* a probe asks what joints hold"):
+    with pytest.raises(CaseError, match="what passes a.gap is not felt .* a probe reads forces of joints"):
         fv.build(fv.load(case))
 
 

@@ -774,12 +774,12 @@ CANNOT_START = {
     "what moves": (
         SCENE.replace("courant = 0.9", 'initial = "equilibrium"').replace('"junction"', '"tank"\nlevel = 1\narea = 1'),
         {},
-        'line 44: numerics.initial: "equilibrium" wants nothing to move',
+        'line 44: numerics.initial: "equilibrium" expects that nothing moves',
     ),
     "what moves, set": (
         SCENE.replace('"junction"', '"tank"\nlevel = 1\narea = 1'),
         {"numerics.initial": "equilibrium"},
-        '--set numerics.initial: "equilibrium" wants nothing to move',
+        '--set numerics.initial: "equilibrium" expects that nothing moves',
     ),
     "no viscosity": (
         SCENE.replace("viscosity = 1e-3\n", ""),

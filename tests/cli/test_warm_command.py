@@ -36,7 +36,10 @@ def test_what_has_been_warmed_is_compiled_no_more():
 @pytest.mark.parametrize(
     "environment, named",
     [
-        ({"FVSOLVE_CACHE": os.devnull + "/code"}, "FVSOLVE_CACHE = /dev/null/code: cannot be written; wanted a folder"),
+        (
+            {"FVSOLVE_CACHE": os.devnull + "/code"},
+            "FVSOLVE_CACHE = /dev/null/code: cannot be written; expected a writable folder",
+        ),
         ({"NUMBA_DISABLE_JIT": "1"}, "NUMBA_DISABLE_JIT is set"),
     ],
 )

@@ -41,7 +41,7 @@ BAD = {
 def test_states_of_another_size_or_kind_are_refused(name, model):
     y = BAD[name](model.start)
     for door in (model.rhs, model.evaluate, model.jacobian, model.observe):
-        with pytest.raises(FvsolveError, match="y .*; wanted a number for each|is not made of real numbers"):
+        with pytest.raises(FvsolveError, match="y .*; expected a number for each|does not consist of real numbers"):
             door(0.0, y)
     out = model.new_out()
     for door in (lambda y: model.fields(y, out), model.contents, lambda y: advance(model, State(0.0, y), 0.1)):
@@ -52,7 +52,7 @@ def test_states_of_another_size_or_kind_are_refused(name, model):
 @pytest.mark.parametrize("t", [np.nan, np.inf, "0", None, 1j, [0.0, 1.0]])
 def test_times_that_are_none_are_refused(t, model):
     for door in (model.rhs, model.evaluate, model.observe, State):
-        with pytest.raises(FvsolveError, match=r"t = .* (is no time|is not made of real numbers)"):
+        with pytest.raises(FvsolveError, match=r"t = .* (is not a time|does not consist of real numbers)"):
             door(t, model.start)
     with pytest.raises(FvsolveError, match="until = "):
         advance(model, initial_state(model), t)

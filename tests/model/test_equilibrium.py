@@ -287,7 +287,9 @@ def test_a_tank_on_two_sides_and_its_duct_do_not_move_where_their_levels_agree()
     result = fvsolve.run(balanced(nodes, {"duct": duct}, ["hull.angle", "duct.flow"]))
     assert result["hull.angle"] == approx(0.0, abs=1e-12) and result["duct.flow"] == approx(0.0, abs=1e-9)
     nodes["hull"]["centre_of_mass"] = [0, 0.05, -1.1]
-    with pytest.raises(CaseError, match="wants nothing to move, but rigid column duct: 4777 Pa drive it unbalanced"):
+    with pytest.raises(
+        CaseError, match="expects that nothing moves, but rigid column duct: 4777 Pa drive it unbalanced"
+    ):
         built(balanced(nodes, {"duct": duct}))
 
 
@@ -455,8 +457,8 @@ def test_oil_that_is_shut_in_is_the_spring_of_both_chambers(law):
 def test_what_nothing_holds_finds_no_balance_and_is_named():
     with pytest.raises(CaseError) as told:
         built(balanced({"stone": body(2.0, [1, 1, 1], {"kind": "free"})}))
-    assert 'nodes.stone: "equilibrium" finds no place where its forces balance: 19.61 N are left' in str(told.value)
-    assert "hold it by a spring" in str(told.value)
+    assert 'nodes.stone: "equilibrium" finds no position where its forces balance: 19.61 N remain' in str(told.value)
+    assert "support it by a spring" in str(told.value)
 
 
 def test_a_hull_that_would_turn_over_with_its_water_is_a_fault():
@@ -467,7 +469,7 @@ def test_a_hull_that_would_turn_over_with_its_water_is_a_fault():
 
 
 def test_what_moves_at_a_stated_rate_is_a_fault_as_before():
-    with pytest.raises(CaseError, match="wants nothing to move, but body arm turns at 2 rad/s"):
+    with pytest.raises(CaseError, match="expects that nothing moves, but body arm turns at 2 rad/s"):
         built(balanced({"arm": pendulum(1.0, rate=2.0)}))
 
 

@@ -96,5 +96,5 @@ def test_behind_a_servo_valve_at_rest_one_chamber_is_at_half_the_supply_and_the_
 
 
 def test_a_shut_chamber_that_would_have_to_pull_holds_no_mass():
-    with pytest.raises(CaseError, match="nodes.load.* N are left"):
+    with pytest.raises(CaseError, match="nodes.load.* N remain"):
         fvsolve.build(fvsolve.load(standing(-20000.0, "equilibrium", initial_pressure_A=2e6)))

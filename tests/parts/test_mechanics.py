@@ -148,7 +148,7 @@ def test_what_moves_is_said_and_equilibrium_refuses_it():
     moving = fvsolve.build(fvsolve.load(case)).checks["moving"]
     assert "mass load moves at 0.5 m/s" in moving and "mass load accelerates at 60 m/s2" in moving
     assert any(text.startswith("chamber cyl.A: pressure changes by -") for text in moving)
-    with pytest.raises(fvsolve.CaseError, match="wants nothing to move, but mass load accelerates at 60 m/s2"):
+    with pytest.raises(fvsolve.CaseError, match="expects that nothing moves, but mass load accelerates at 60 m/s2"):
         fvsolve.build(fvsolve.load(case, {"numerics.initial": "equilibrium"}))
 
 

@@ -103,7 +103,7 @@ def test_a_limit_on_force_is_held_against_every_step_and_leg() -> None:
 
 
 def test_what_has_no_force_is_named() -> None:
-    with pytest.raises(fvsolve.CaseError, match="its force is asked for"):
+    with pytest.raises(fvsolve.CaseError, match="its force is requested"):
         fvsolve.run(shut(), set={"numerics.line": "delay", "numerics.method": "rk4"})
     case = shut()
     case["links"]["main"]["bends"] = [600.0, 900.0]

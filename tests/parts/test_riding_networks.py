@@ -434,7 +434,7 @@ def test_energy_and_joints_of_what_bodies_would_not_feel_are_refused_by_name(wha
     with pytest.raises(CaseError) as caught:
         fv.run(case)
     (fault,) = (one for one in caught.value.faults if one.place == place)
-    assert text in fault.message and "asks what joints hold" in fault.message
+    assert text in fault.message and "reads forces of joints" in fault.message
 
 
 def test_a_tank_that_falls_ends_the_run_by_name():

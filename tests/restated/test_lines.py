@@ -49,7 +49,7 @@ def told_lines(case: dict):
     try:
         return told(case)
     except fvsolve.CaseError as error:
-        if not all("does not fit" in str(fault) for fault in error.faults):
+        if not all("is not possible" in str(fault) for fault in error.faults):
             raise
         return None
 

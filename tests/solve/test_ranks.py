@@ -127,7 +127,7 @@ from mpi4py import MPI
 cases["run"]["nodes"]["pool"]["manning"] += 0.01 * MPI.COMM_WORLD.rank
 for name""", 1)  # fmt: skip
     found = ranks(2, sys.executable, "-c", differing, json.dumps({"run": water()}), tmp_path, "{}")
-    assert found.returncode != 0 and "rank 1 has another case than rank 0; wanted the same file" in found.stderr
+    assert found.returncode != 0 and "rank 1 has another case than rank 0; expected the same file" in found.stderr
 
 
 def test_a_rank_that_cannot_read_its_case_ends_all_with_its_message(tmp_path):
@@ -166,7 +166,7 @@ def test_more_ranks_than_rows_threads_of_ranks_and_a_fault_are_said_once(tmp_pat
 def test_mpi_without_mpi4py_is_named(tmp_path):
     without = "import sys; sys.modules['mpi4py'] = None\n" + SCRIPT
     found = ranks(2, sys.executable, "-c", without, json.dumps({"run": water()}), tmp_path, "{}")
-    assert found.returncode != 0 and "MPI started 2 processes, and there is no mpi4py" in found.stderr
+    assert found.returncode != 0 and "MPI started 2 processes, but mpi4py is not installed" in found.stderr
     assert 'pip install "fvsolve[mpi]"' in found.stderr
 
 

@@ -130,5 +130,5 @@ def test_a_train_too_long_for_its_energy_norm_is_refused(monkeypatch):
     from fvsolve.model import energy
 
     monkeypatch.setattr(energy, "TOGETHER", 1)
-    with pytest.raises(FvsolveError, match="2 masses hang together"):
+    with pytest.raises(FvsolveError, match="2 positions are joined by springs"):
         stability(masses(), steps=50)
