@@ -8,7 +8,8 @@ process of its own with an empty cache of compiled code. Of each case are compar
 - the right-hand side in full (`dydt` and all that it writes beside), by a time and a state and by what a state
   remembers, and all probes: at the start, at a quarter of the run and at its end as `advance` gives them, again at the
   start, and halfway between start and end;
-- the files of the run: history, envelope, routes, fields and lines of all frames, the summary, the resolved case.
+- the files of the run: history, envelope, routes, fields and lines of all frames, the summary, the resolved case;
+  cases in `dump_cases.ENDS` end earlier than they are shipped.
 
 Not compared are times of the clock, costs, versions and hashes in the summary, the checkpoint, and pictures. Texts for
 people (titles, notices, reasons after their first word) are compared by number and kind, not by their words.
