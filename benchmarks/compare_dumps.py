@@ -21,7 +21,7 @@ DOTTED = re.compile(rf"{WORD.pattern}(?:\.{WORD.pattern})*")
 PROSE = ("title", "description", "source", "text", "why")
 REASON = "reason"
 LABELS = "expectations"  # where `text` is an expression of the case file, no prose
-MANY = 6  # renamed words in one place, above which they are taken as renamed all or none
+MANY = 6  # words of a place; if the map renames more of them, it renames all or none
 
 
 class Difference(NamedTuple):
@@ -54,7 +54,7 @@ class Names:
             raise ValueError("\n".join(faults))
 
     def _add(self, number: int, line: str) -> str:
-        """Add a line; the text of its fault, "" without."""
+        """Add a line and return the text of its fault, "" for a good one."""
         if not line.strip() or line.startswith("#"):
             return ""
         fields = [field.strip() for field in line.split("\t")]
@@ -79,18 +79,18 @@ class Names:
         return ""
 
     def spellings(self, name: str) -> list[str]:
-        """A name of Python or of a key, and all names that lead to it or come from it, itself first."""
+        """A name of Python or of a key, then all names that the map renames to it or from it."""
         if name in self.known:
             return self.known[name]
         pairs = self.python + [(a[-1], b[-1]) for entries in self.words.values() for a, b in entries]
         self.known[name] = found = [name]
-        for one in found:  # which grows meanwhile
+        for one in found:  # the list grows in the loop
             pairs_of = [b for a, b in pairs if a == one] + [a for a, b in pairs if b == one]
             found += [other for other in dict.fromkeys(pairs_of) if other not in found]
         return found
 
     def renamed(self, words: list[str]) -> list[str]:
-        """New words of a row of old ones; an entry of several parts holds where the others come before, in order."""
+        """New words of a list of old words. The parts of an entry must stand among them in order."""
         found = list(words)
         for at, word in enumerate(words):
             for before, after in self.words.get(word, ()):  # the most parts last
@@ -103,12 +103,12 @@ class Names:
         return found
 
     def unused(self) -> list[str]:
-        """Public names that no place and no text has had."""
+        """Public names of the map that no place and no text has used."""
         known = {".".join(before) for entries in self.words.values() for before, _ in entries}
         return sorted((known | self.whole.keys()) - self.used)
 
     def places(self, place: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-        """New places that an old one may have: all words renamed, then some, last none."""
+        """Possible new places of an old place: all words renamed, then some words, then none."""
         if any(part in self.whole for part in place):
             self.used.update(part for part in place if part in self.whole)
             yield tuple(self.whole.get(part, part) for part in place)
@@ -125,7 +125,7 @@ class Names:
             yield tuple(WORD.sub(lambda _, left=left: next(left), part) for part in place)
 
     def same_text(self, place: tuple[str, ...], old: str, new: str) -> bool:
-        """True if the texts are equal, or each word is the old one or its new name."""
+        """True if each word of the new text is the old word or its new name."""
         if self.whole.get(old) == new:
             self.used.add(old)
             return True
@@ -138,7 +138,7 @@ class Names:
 
 
 def compare(old: Dump, new: Dump, names: Names) -> list[Difference]:
-    """All differences of two dumps, in the order of the old one; places that the old one lacks come last."""
+    """All differences of two dumps, in the order of the old dump; places of the new dump alone come last."""
     pairs, left = _paired(old, new, names)
     found = []
     for place, other in pairs.items():
@@ -157,7 +157,7 @@ def count(dump: Dump) -> int:
 
 
 def _paired(old: Dump, new: Dump, names: Names) -> tuple[dict, list]:
-    """Old place -> new place or None, and new places that are left."""
+    """Old place -> new place or None, and the new places without an old place."""
     free, pairs = dict.fromkeys(new), {}
     candidates = {place: list(names.places(place)) for place in old}
     for place, likely in candidates.items():
@@ -172,7 +172,7 @@ def _paired(old: Dump, new: Dump, names: Names) -> tuple[dict, list]:
 
 
 def _different(place: tuple[str, ...], old: Any, new: Any, names: Names) -> tuple[str, str, str] | None:
-    """Where within a place two values differ and both as text; None where they are equal."""
+    """Position in a place at which two values differ, and both values as text; None for equal values."""
     if type(old) is not type(new):
         return "", _shown(old), _shown(new)
     if isinstance(old, np.ndarray):
@@ -185,6 +185,7 @@ def _different(place: tuple[str, ...], old: Any, new: Any, names: Names) -> tupl
 
 
 def _different_texts(place, old: str, new: str, names: Names) -> tuple[str, str, str] | None:
+    """Line that differs; None for equal texts and for prose."""
     known = [set(names.spellings(key)) for key in PROSE]
     if any(place[-1] in key for key in known) and not any(one in place for one in names.spellings(LABELS)):
         return None
@@ -200,6 +201,7 @@ def _different_texts(place, old: str, new: str, names: Names) -> tuple[str, str,
 
 
 def _different_arrays(old: np.ndarray, new: np.ndarray) -> tuple[str, str, str] | None:
+    """Index of the first number that differs, and how many more differ."""
     if old.dtype != new.dtype or old.shape != new.shape:
         return "", f"{old.dtype}{list(old.shape)}", f"{new.dtype}{list(new.shape)}"
     a, b = (np.ascontiguousarray(one).reshape(-1) for one in (old, new))
@@ -213,7 +215,7 @@ def _different_arrays(old: np.ndarray, new: np.ndarray) -> tuple[str, str, str] 
 
 
 def _shown(value: Any) -> str:
-    """A value as text; a float to the bit."""
+    """A value as text, a float with its hexadecimal form."""
     if isinstance(value, float):
         return f"{value!r} ({value.hex() if value == value else _bits(value).hex()})"
     if isinstance(value, np.ndarray):
@@ -227,7 +229,7 @@ def _bits(value: float) -> bytes:
 
 
 def _above(words: list[str], parts: list[str]) -> list[int] | None:
-    """Where the parts stand among the words, in order, each as far behind as it can; None where one lacks."""
+    """Positions of the parts among the words, in order, each the last possible one; None if a part is missing."""
     places, at = [], len(words)
     for part in reversed(parts):
         at = next((k for k in range(at - 1, -1, -1) if words[k] == part), -1)
@@ -238,5 +240,6 @@ def _above(words: list[str], parts: list[str]) -> list[int] | None:
 
 
 def _ends(many: int) -> Iterator[tuple[bool, ...]]:
+    """All true, then all false."""
     yield (True,) * many
     yield (False,) * many

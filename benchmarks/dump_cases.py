@@ -2,8 +2,9 @@
 
     python -P dump_cases.py CHECKOUT MAP
 
-Each line of standard input is a case file and the file of its dump, with a tab between; a line of standard output says
-that it is written. Names of fvsolve are looked up through the map, so that both commits can spell them their own way.
+Each line of standard input is a case file and the file of its dump, with a tab between. The program writes the dump,
+then a line on standard output. It looks up names of fvsolve through the map, because two commits may spell them
+differently.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ import numpy as np
 sys.path.append(str(Path(__file__).resolve().parent))
 from compare_dumps import Dump, Names  # noqa: E402
 
-# Keys of summary.json that are times of the clock, versions, hashes or what hangs on these.
+# Keys of summary.json that hold times of the clock, versions and hashes.
 LEFT_OUT = ("seconds", "seconds_setup", "seconds_total", "cost", "ended", "versions")
-# Files of a run directory that hold the state and the versions of a checkpoint, which are written by the clock.
+# A run writes its checkpoint by the clock, with versions and hashes.
 UNREAD = ("restart.npz",)
 # Earlier ends of cases that take more than half a minute [s].
 ENDS = {"tracer-basin": 150.0}
-PART = 0.25  # of the run, where the rates are looked at too
+PART = 0.25  # of the run, after which the rates are evaluated too
 
 
 class Named:
-    """Attributes of an object by the name that its commit has for them."""
+    """Attributes of an object, under any name that the map has for them."""
 
     def __init__(self, one, names: Names) -> None:
         self.one, self.names = one, names
@@ -61,7 +62,8 @@ def dump(path: Path, names: Names, fvsolve) -> Dump:
         silent = next(one for one in names.spellings("pictures") if one in inspect.signature(api.run).parameters)
         api.run(model, None, Path(folder) / "run", **{silent: False})
         found |= directory(Path(folder) / "run", names)
-        end = json.loads((Path(folder) / "run" / "summary.json").read_text(encoding="utf-8"))["t"]
+    times = [(one,) for one in names.spellings("t")]
+    end = next(value for (file, *key), value in found.items() if file.endswith(".json") and tuple(key) in times)
     begin = Named(start, names).t
     try:
         part = api.advance(model, start, begin + PART * (end - begin))
@@ -87,7 +89,7 @@ def shorter(path: Path, names: Names) -> dict | None:
 
 
 def state_values(label: str, model, state, names: Names) -> Dump:
-    """A state, the rates and the other values there, the rates by its memory, all probes."""
+    """A state, the right-hand side by its time and vector and by its memory, all probes."""
     own, of = Named(state, names), Named(model, names)
     found = {(label, "t"): float(own.t), (label, "y"): own.y.copy(), (label, "memory"): own.memory.copy()}
     found |= rates(label, model, own.t, own.y, names)
@@ -95,7 +97,7 @@ def state_values(label: str, model, state, names: Names) -> Dump:
 
 
 def rates(label: str, model, t: float, y, names: Names) -> Dump:
-    """What the right-hand side writes at (t, y)."""
+    """Right-hand side at (t, y) with all that it writes beside."""
     dydt, out = Named(model, names).evaluate(t, y)
     return {(label, "dydt"): dydt, (label, "out"): out}
 
@@ -112,17 +114,19 @@ def directory(folder: Path, names: Names) -> Dump:
 
 
 def summary(path: Path, names: Names) -> Dump:
+    """Values of summary.json but for the keys that are left out."""
     left = {spelling for key in LEFT_OUT for spelling in names.spellings(key)}
     said = json.loads(path.read_text(encoding="utf-8"))
     return dict(leaves({key: value for key, value in said.items() if key not in left}))
 
 
 def case(path: Path, names: Names) -> Dump:
+    """Values of a case file."""
     return dict(leaves(tomllib.loads(path.read_text(encoding="utf-8"))))
 
 
 def leaves(value, place: tuple[str, ...] = ()):
-    """(place, value) of all that tables and lists hold; a list of floats is an array, and an empty one a text."""
+    """(place, value) of all values in tables and lists; a list of floats is an array, an empty list a text."""
     if isinstance(value, list) and value and all(type(one) is float for one in value):
         yield place, np.array(value)
     elif isinstance(value, (dict, list)) and value:
@@ -164,6 +168,7 @@ def frame(path: Path, names: Names) -> Dump:
 
 
 def series(path: Path, names: Names) -> Dump:
+    """Times and files of the frames."""
     root = ElementTree.parse(path).getroot()
     return {(str(k), key): text for k, one in enumerate(root.iter("DataSet")) for key, text in one.attrib.items()}
 
