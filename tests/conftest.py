@@ -1,8 +1,7 @@
 """Fixtures of all tests, the choice between quick tests and all tests, and what every test restores.
 
 `pytest` without paths runs the quick tests: all but those that `tests/durations.json` lists as slow. `pytest --full`
-and `pytest PATH` run every test. `tests/quick.py` writes the list from a recording. Under NUMBA_DISABLE_JIT=1 `pytest`
-runs the small set of quick tests that the file lists as uncompiled.
+and `pytest PATH` run every test. `tests/choose_quick_tests.py` writes the list from a recording.
 """
 
 from __future__ import annotations
@@ -24,10 +23,7 @@ from fvsolve.steppers.tableau import METHODS
 os.environ.setdefault("MPLBACKEND", "Agg")
 signal.signal(signal.SIGINT, signal.default_int_handler)  # background jobs of a shell ignore the signal
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # matrices are small: more threads are slower
-LISTS = json.loads((Path(__file__).parent / "durations.json").read_text(encoding="utf-8"))
-UNCOMPILED = (
-    frozenset(LISTS["uncompiled"]) if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0") else frozenset()
-)
+SLOW = json.loads((Path(__file__).parent / "durations.json").read_text(encoding="utf-8"))["slow"]
 TIER, TALLY, UNCOVERED = pytest.StashKey[str](), pytest.StashKey[Tally](), pytest.StashKey[list]()
 SELECTIONS = ("quick", "keyword", "markexpr", "lf", "deselect", "collectonly")  # options that leave out tests
 fix_constants()
@@ -64,7 +60,9 @@ def pytest_collection_modifyitems(config, items):
     drawing = {item for item in items if getattr(getattr(item, "function", None), "hypothesis", None)}
     for item in drawing if not NEW else ():
         hypothesis.seed(zlib.crc32(item.originalname.encode()))(item.function)
-    quick = {item for item in items if (item.nodeid in UNCOMPILED if UNCOMPILED else item.nodeid not in LISTS["slow"])}
+    quick = {item for item in items if item.nodeid not in SLOW}
+    if config.stash[TIER] != "full":
+        config.stash[TALLY].names["unknown"] = {*SLOW} - {item.nodeid for item in items}
     chosen = {"quick": quick, "rest": {*items} - quick | drawing, "full": {*items}}[config.stash[TIER]]
     config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
     items[:] = [item for item in items if item in chosen]
@@ -85,7 +83,6 @@ def pytest_sessionfinish(session, exitstatus):
         config.workeroutput["tally"] = config.stash[TALLY].plain()
     elif (
         config.stash[TIER] == "quick"
-        and not UNCOMPILED
         and not exitstatus
         and not any(config.getoption(name, None) for name in SELECTIONS)
     ):

@@ -33,9 +33,10 @@ class Tally:
         return {kind: sorted(names) for kind, names in self.names.items()}
 
     def missing(self) -> list[str]:
-        """One line for each kind of which a name was not run."""
+        """One line for each kind with a name that was not run, and for each listed test that does not exist."""
         lines = {kind: sorted(names - self.names[kind]) for kind, names in expected().items()}
-        return [f"{kind}: {', '.join(names)}" for kind, names in lines.items() if names]
+        unknown = [f"tests/durations.json: {name} is not a test" for name in sorted(self.names["unknown"])]
+        return [f"{kind}: {', '.join(names)}" for kind, names in lines.items() if names] + unknown
 
     def _add(self, kind: str, *names: str) -> None:
         self.names[kind].update(names)

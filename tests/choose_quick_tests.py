@@ -1,6 +1,6 @@
 """Choose the quick tests: record what each test costs, and write the others to `tests/durations.json`.
 
-    python tests/quick.py [--seconds 480] [--recording FOLDER]
+    python tests/choose_quick_tests.py [--seconds 480] [--recording FOLDER]
 
 A test costs its own processor time and its share of compiling: the time to compile a function, divided by the number of
 quick tests that call it. The dearest test goes, again and again, until the rest takes the time that is given. A test
@@ -141,7 +141,19 @@ def record(folder: Path) -> None:
     """Run all tests from a cold cache, and record each."""
     with tempfile.TemporaryDirectory(prefix="fvsolve-cache-") as cache:
         environment = os.environ | {FOLDER: str(folder), "FVSOLVE_CACHE": cache, "PYTHONPATH": str(LIST.parent)}
-        command = [sys.executable, "-m", "pytest", "-q", "-n", "2", "--dist", "worksteal", "--full", "-p", "quick"]
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-n",
+            "2",
+            "--dist",
+            "worksteal",
+            "--full",
+            "-p",
+            "choose_quick_tests",
+        ]
         subprocess.run(command, cwd=LIST.parents[1], env=environment, check=False)
 
 
