@@ -1,4 +1,4 @@
-"""One diagonally implicit Runge-Kutta step, its stages solved in turn by simplified Newton. Knows arrays."""
+"""One diagonally implicit Runge-Kutta step; simplified Newton solves one stage after another."""
 
 from __future__ import annotations
 
@@ -48,9 +48,10 @@ from fvsolve.steppers.structure import STARTS
 
 @inner
 def predict(b, c, x, first, vectors, k):
-    """k <- slope at x last steps beyond the last one's end, by the parabola through its ends and the slope at its end.
+    """k <- predicted slope at x last steps beyond the end of the last step.
 
-    That slope is the last stage's where it lies there, else f: a stiff f magnifies what Newton left.
+    The prediction is a parabola through both ends of the last step with the slope at its end. That slope is the slope
+    of the last stage if c_s = 1, else f: re-evaluating a stiff f would amplify the Newton residual.
     """
     s, n = b.size, k.size
     slopes = vectors[s - 1] if c[s - 1] == 1.0 else first
@@ -67,30 +68,30 @@ def predict(b, c, x, first, vectors, k):
 def solve_stage(
     rhs, solve, handle, shape, t, h_gamma, i, k, y_stage, supply, where, out, orders, memory, nnz, work, vectors, store
 ):  # fmt: skip
-    """k[i] = f(t, base + h gamma k[i]) by Newton; returns CONVERGED or FAILED.
+    """Solve k[i] = f(t, base + h gamma k[i]) by Newton; returns CONVERGED or FAILED.
 
-    With its last increment d the stage is f + J d, to the bit: what is conserved by f and J is conserved.
+    The stored stage is f + J d with the last increment d, to the bit: quantities that f and J conserve are conserved.
     """
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
-    before, why, shift, ki = 0.0, FAILED, 1.0 / h_gamma, k[i]
+    before, status, shift, ki = 0.0, FAILED, 1.0 / h_gamma, k[i]
     for turn in range(MOST):
         evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
         solve(shape, store, d)
         for j in range(n):
             ki[j] += shift * d[j]
         size = sqrt(size_of(d, weights) / max(n, 1))
-        done, why = verdict(turn, size, before, orders, work)
+        done, status = verdict(turn, size, before, orders, work)
         before = size
         if done:
             break
-    if why == FAILED:
+    if status == FAILED:
         find_worst(d, f, weights, memory)
     elif supply.shape[1] > 0:
         for m in range(supply.shape[1]):
             supply[i, m] = out[where + m]
         book_increment(shape, nnz, d, supply, i, work)
-    return why
+    return status
 
 
 @inner
@@ -98,7 +99,7 @@ def try_stages(
     rhs, factor, solve, handle, coefficients, shape, t, h, y, y_stage, k, supply, where, out, scale, orders, memory,
     nnz, work, vectors, store,
 ):  # fmt: skip
-    """All stages in turn with the Jacobian at hand, damped where it is fresh; returns CONVERGED or FAILED."""
+    """Solve all stages with the current Jacobian, with damping where it is fresh; returns CONVERGED or FAILED."""
     s, fresh = k.shape[0], work[MADE] == memory[STEPS]
     c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
     for i in range(1, s):
@@ -122,19 +123,19 @@ def try_stages(
         else:
             for j in range(y.size):
                 k[i, j] = k[i - 1, j]
-        why = solve_stage(
+        status = solve_stage(
             rhs, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y_stage, supply, where, out, orders, memory,
             nnz, work, vectors, store,
         )  # fmt: skip
-        if why == FAILED and fresh:
+        if status == FAILED and fresh:
             if orders[CONTROL] == TOLERANCE:
                 for j in range(y.size):
                     k[i, j] = shift * (y[j] - base[j])
-            why = reach(
+            status = reach(
                 rhs, factor, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y, y_stage, supply, where, out,
                 scale, orders, memory, nnz, work, vectors, store,
             )  # fmt: skip
-        if why == FAILED:
+        if status == FAILED:
             return FAILED
     return CONVERGED
 
@@ -144,9 +145,9 @@ def attempt(
     rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
     new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
 ):  # fmt: skip
-    """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
+    """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    Of the linear algebra the real part is used. Returns NEWTON_FAILED where a fresh Jacobian does not help.
+    Uses the real part of the linear algebra. Returns NEWTON_FAILED where a fresh Jacobian does not help.
     """
     s = k.shape[0]
     nnz = shape[shape[STARTS] + shape[STATES]]
@@ -157,11 +158,11 @@ def attempt(
                 rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
                 vectors[s + RATE],
             )  # fmt: skip
-        why = try_stages(
+        status = try_stages(
             rhs, factor, solve, handle, coefficients, shape, t, h, y[now], y[3], k, supply, where, out, scale, orders,
             memory, nnz, work, vectors, store,
         )  # fmt: skip
-        if why == CONVERGED:
+        if status == CONVERGED:
             break
         if work[MADE] == memory[STEPS]:
             return NEWTON_FAILED

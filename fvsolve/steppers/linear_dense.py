@@ -1,6 +1,6 @@
-"""Dense factors of shift I - J, row by row, with partial pivoting. Knows arrays; for some dozen states.
+"""Dense LU factors of shift I - J with partial pivoting, row by row, for a few dozen states at most.
 
-The store holds the rows of L and U, 1 / U_ii on the diagonal, and behind them the row that each pivot came from.
+The store holds the rows of L and U, with 1 / U_ii on the diagonal, then the original row of each pivot.
 """
 
 import numpy as np
@@ -10,15 +10,15 @@ from fvsolve.steppers.structure import ROWS, SIZE, STARTS
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(nothing that the functions need beyond the pattern, length of the store)."""
+    """(no data beyond the pattern, length of the store)."""
     n = pattern.shape[1]
     return np.zeros(0, dtype=np.int64), n * n + n
 
 
 def factor(shape, jacobian, shift, store):
-    """store <- L U of shift I - J, rows exchanged; returns 0, or 1 + the column without a pivot."""
+    """store <- L U of shift I - J, with row exchanges; returns 0, or 1 + the column without a pivot."""
     n = shape[SIZE]
-    starts, rows, came = shape[shape[STARTS] :], shape[shape[ROWS] :], store[n * n :]
+    starts, rows, pivots = shape[shape[STARTS] :], shape[shape[ROWS] :], store[n * n :]
     a = store[: n * n].reshape((n, n))
     for e in range(n * n):
         store[e] = 0.0
@@ -30,12 +30,12 @@ def factor(shape, jacobian, shift, store):
     for k in range(n):
         best, pivot = size_of(a[k, k]), k
         for i in range(k + 1, n):
-            here = size_of(a[i, k])
-            if here > best:
-                best, pivot = here, i
+            size = size_of(a[i, k])
+            if size > best:
+                best, pivot = size, i
         if not LEAST < best < 1.0 / LEAST:
             return k + 1
-        came[k] = pivot
+        pivots[k] = pivot
         if pivot != k:
             for j in range(n):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
@@ -52,9 +52,9 @@ def factor(shape, jacobian, shift, store):
 def solve(shape, store, x):
     """x <- (shift I - J)^-1 x."""
     n = shape[SIZE]
-    came = store[n * n :]
+    pivots = store[n * n :]
     for k in range(n):
-        i = int(came[k].real)
+        i = int(pivots[k].real)
         x[k], x[i] = x[i], x[k]
     for i in range(1, n):
         row, total = store[i * n : i * n + n], x[i]
