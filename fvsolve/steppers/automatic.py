@@ -46,12 +46,12 @@ def wants_change(stepper: Stepper) -> bool:
 
 def change(stepper: Stepper) -> tuple[float, float, float]:
     """Switch to the other method; returns time [s], spectral radius [1/s] and last step [s] at the switch."""
-    memory = stepper.memory
+    loop_state = stepper.memory
     implicit = implicit_method(stepper.orders[slots.SIZE])
     stepper.use(method_named(implicit if stepper.method.explicit else EXPLICIT))
-    memory[slots.SWITCHES] += 1.0
-    memory[slots.CASES] = 0.0
-    return float(memory[slots.T]), float(memory[slots.RADIUS]), float(memory[slots.LAST])
+    loop_state[slots.SWITCHES] += 1.0
+    loop_state[slots.CASES] = 0.0
+    return float(loop_state[slots.T]), float(loop_state[slots.RADIUS]), float(loop_state[slots.LAST])
 
 
 def account(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:

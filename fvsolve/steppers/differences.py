@@ -9,7 +9,7 @@ LEAST = 2.0**-34
 
 
 @njit(forceinline=True)
-def differences(rhs, handle, shape, where, t, y, f, rates0, scale, y_work, f_work, out, jacobian):
+def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y_work, f_work, out, jacobian):
     """jacobian <- d(f, ledger rates)/dy by one-sided differences; returns the number of rhs calls.
 
     f, rates0 : float64[n], float64[m]  f(t, y) and out[ledger_offset : ledger_offset + m] at y, freshly evaluated, not
@@ -18,13 +18,13 @@ def differences(rhs, handle, shape, where, t, y, f, rates0, scale, y_work, f_wor
     states marked fine in the structure
     jacobian : float64[nnz]  in the order of the pattern, column by column
     """
-    n = shape[SIZE]
-    starts, rows = shape[shape[STARTS] :], shape[shape[ROWS] :]
-    color_starts, columns = shape[shape[COLOR_STARTS] :], shape[shape[COLOR_COLUMNS] :]
-    fine = shape[shape[FINE] :]
+    n = structure[SIZE]
+    starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
+    color_starts, columns = structure[structure[COLOR_STARTS] :], structure[structure[COLOR_COLUMNS] :]
+    fine = structure[structure[FINE] :]
     for j in range(n):
         y_work[j] = y[j]
-    for color in range(shape[COLORS]):
+    for color in range(structure[COLORS]):
         for e in range(color_starts[color], color_starts[color + 1]):
             j = columns[e]
             if scale[j] < 0.0:
@@ -37,18 +37,18 @@ def differences(rhs, handle, shape, where, t, y, f, rates0, scale, y_work, f_wor
             per = 1.0 / (y_work[j] - y[j])  # the increment as rounded in the sum
             for p in range(starts[j], starts[j + 1]):
                 i = rows[p]
-                change = f_work[i] - f[i] if i < n else out[where + i - n] - rates0[i - n]
+                change = f_work[i] - f[i] if i < n else out[ledger_offset + i - n] - rates0[i - n]
                 jacobian[p] = change * per
             y_work[j] = y[j]
-    return shape[COLORS]
+    return structure[COLORS]
 
 
 @njit
-def multiply(shape, jacobian, x, product):
+def multiply(structure, jacobian, x, product):
     """product <- J x : float64[n + m], rows of states, then ledger rows."""
-    n = shape[SIZE]
-    starts, rows = shape[shape[STARTS] :], shape[shape[ROWS] :]
-    for i in range(n + shape[LEDGERS]):
+    n = structure[SIZE]
+    starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
+    for i in range(n + structure[LEDGERS]):
         product[i] = 0.0
     for j in range(n):
         for p in range(starts[j], starts[j + 1]):

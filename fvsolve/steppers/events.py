@@ -47,8 +47,9 @@ def nearness(g, g_new):
 
 @njit
 def locate(
-    attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle, coefficients, shape, spans, sums,
-    h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new, e,
+    attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle, coefficients, structure,
+    row_blocks, sums, h, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
+    factors, complex_factors, g, g_new, e,
 ):  # fmt: skip
     """(length, error) of the step that ends just past the first event, by the Illinois rule; y[new] is its end.
 
@@ -56,7 +57,7 @@ def locate(
     The error is NEWTON_FAILED where a stage could not be solved, or where a given step jumps across the event: then its
     stages have several solutions, those of a shorter step only one.
     """
-    t, low, high, at_low, past = memory[T], 0.0, h, 1.0, nearness(g, g_new)
+    t, low, high, at_low, past = loop_state[T], 0.0, h, 1.0, nearness(g, g_new)
     guess, at_high, side = h, past, 0
     for turn in range(101):
         done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
@@ -69,8 +70,9 @@ def locate(
         if done:
             guess = high
         e = attempt(
-            rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, guess,
-            y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+            rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums,
+            t, guess, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
+            factors, complex_factors,
         )  # fmt: skip
         if e == NEWTON_FAILED:
             break
@@ -84,7 +86,7 @@ def locate(
         else:
             low, at_low = guess, here
             at_high, side = 0.5 * at_high if side < 0 else at_high, -1
-    fixed = orders[KIND] == NEWTON_SOLVED and orders[CONTROL] != TOLERANCE
-    if fixed and past < -JUMP and high > JUMP * memory[STEP]:
+    fixed = controls[KIND] == NEWTON_SOLVED and controls[CONTROL] != TOLERANCE
+    if fixed and past < -JUMP and high > JUMP * loop_state[STEP]:
         e = NEWTON_FAILED
     return high, e

@@ -118,18 +118,21 @@ def predict(coefficients, h, h_last, s, buffer, vectors):
 
 
 @inner
-def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n):
+def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, factors, complex_factors, n):
     """Factor every block of L / h and store the factors one after another; returns their number, 0 if a pivot fails."""
     q, blocks, b, real, pair, count = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
     jacobian, size = work[HEADER:], int(work[STORE])
     while b < q:
         shift = blocks[b * q + b] / h
         if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
-            if factor_complex(shape, jacobian, complex(shift, blocks[(b + 1) * q + b] / h), store_complex[pair:]) != 0:
+            if (
+                factor_complex(structure, jacobian, complex(shift, blocks[(b + 1) * q + b] / h), complex_factors[pair:])
+                != 0
+            ):
                 return 0
             b, pair = b + 2, pair + size
         else:
-            if factor(shape, jacobian, shift, store[real:]) != 0:
+            if factor(structure, jacobian, shift, factors[real:]) != 0:
                 return 0
             b, real = b + 1, real + size
         count += 1
@@ -137,31 +140,31 @@ def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store
 
 
 @inner
-def solve_blocks(solve, solve_complex, shape, coefficients, s, size, store, store_complex, vectors):
+def solve_blocks(solve, solve_complex, structure, coefficients, s, size, factors, complex_factors, vectors):
     """Solve (L / h x I - I x J) dW = R in place of R."""
     q, blocks, b, real, n = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, vectors.shape[1]
-    first, pair, both = s + STAGES + R * q, n, store_complex[:n]
+    first, pair, both = s + STAGES + R * q, n, complex_factors[:n]
     while b < q:
         if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
             u, v = vectors[first + b], vectors[first + b + 1]
             for e in range(n):
                 both[e] = complex(u[e], v[e])
-            solve_complex(shape, store_complex[pair:], both)
+            solve_complex(structure, complex_factors[pair:], both)
             for e in range(n):
                 u[e], v[e] = both[e].real, both[e].imag
             b, pair = b + 2, pair + size
         else:
-            solve(shape, store[real:], vectors[first + b])
+            solve(structure, factors[real:], vectors[first + b])
             b, real = b + 1, real + size
 
 
 @inner
 def iterate(
-    rhs, solve, solve_complex, handle, coefficients, shape, t, h, y, y_stage, k0, supply, where, out, orders, memory,
-    work, vectors, store, store_complex,
+    rhs, solve, solve_complex, handle, coefficients, structure, t, h, y, y_stage, k0, ledger_rates, ledger_offset, out,
+    controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
     """Newton iterations for W; returns CONVERGED or FAILED."""
-    s, n = supply.shape[0], y.size
+    s, n = ledger_rates.shape[0], y.size
     q, c, weights = s - 1, nodes_of(coefficients, s), vectors[s + WEIGHTS]
     t_matrix, back, blocks = matrix(coefficients, s, T), matrix(coefficients, s, BACK), matrix(coefficients, s, BLOCKS)
     start = matrix(coefficients, s, START)
@@ -171,10 +174,10 @@ def iterate(
         for i in range(q):
             blend(1.0, y, t_matrix, i * q, q, w_at, vectors, y_stage)
             rhs(t + c[i + 1] * h, y_stage, vectors[f_at + i], out, handle)
-            for m in range(supply.shape[1]):
-                supply[i + 1, m] = out[where + m]
-        memory[CALLS] += q
-        memory[NEWTON] += 1.0
+            for m in range(ledger_rates.shape[1]):
+                ledger_rates[i + 1, m] = out[ledger_offset + m]
+        loop_state[CALLS] += q
+        loop_state[NEWTON] += 1.0
         for i in range(q):
             blend(start[i], k0, back, i * q, q, f_at, vectors, vectors[r_at + i])
             j = i
@@ -186,7 +189,9 @@ def iterate(
             r, wi, wj = vectors[r_at + i], vectors[w_at + i], vectors[w_at + j]
             for e in range(n):
                 r[e] += own * wi[e] + other * wj[e]
-        solve_blocks(solve, solve_complex, shape, coefficients, s, int(work[STORE]), store, store_complex, vectors)
+        solve_blocks(
+            solve, solve_complex, structure, coefficients, s, int(work[STORE]), factors, complex_factors, vectors
+        )
         total = 0.0
         for e in range(n):
             per, part = weights[e], 0.0
@@ -196,7 +201,7 @@ def iterate(
                 part += r * r
             total += per * per * part
         size = sqrt(total / max(q * n, 1))
-        done, status = verdict(turn, size, before, orders, work)
+        done, status = verdict(turn, size, before, controls, work)
         before = size
         if done:
             break
@@ -206,12 +211,12 @@ def iterate(
         for i in range(1, q):
             for e in range(n):
                 f[e] += vectors[f_at + i, e]
-        find_worst(vectors[r_at], f, weights, memory)
+        find_worst(vectors[r_at], f, weights, loop_state)
     return status
 
 
 @inner
-def finish(coefficients, shape, nnz, h, k, supply, work, vectors):
+def finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors):
     """Compute the slopes k of the stages from W, and add the last Newton increment to their ledger rates."""
     s = k.shape[0]
     q, d = s - 1, vectors[s + INCREMENT]
@@ -220,14 +225,31 @@ def finish(coefficients, shape, nnz, h, k, supply, work, vectors):
         buffer[e] = slopes[e] / h
     for i in range(q):
         blend(-start[q + i], k[0], buffer, i * q, q, s + STAGES + W * q, vectors, k[i + 1])
-        if supply.shape[1] > 0:
+        if ledger_rates.shape[1] > 0:
             blend(0.0, k[0], matrix(coefficients, s, T), i * q, q, s + STAGES + R * q, vectors, d)
-            book_increment(shape, nnz, d, supply, i + 1, work)
+            book_increment(structure, nnz, d, ledger_rates, i + 1, work)
 
 
 @inner
 def filtered_error(
-    rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store, retry
+    rhs,
+    solve,
+    handle,
+    structure,
+    coefficients,
+    t,
+    h,
+    y,
+    now,
+    new,
+    k,
+    out,
+    scale,
+    controls,
+    loop_state,
+    vectors,
+    factors,
+    retry,
 ):
     """Norm of the embedded error estimate, smoothed by the first factor; repeated from the filtered state if retry.
 
@@ -244,10 +266,10 @@ def filtered_error(
             for j in range(1, s):
                 total += error[j] * k[j, e]
             d[e] = total * shift
-        solve(shape, store, d)
+        solve(structure, factors, d)
         norm = 0.0
         for e in range(n):
-            w = d[e] / (orders[SIZE] * small(scale[e], max(abs(y[now, e]), abs(y[new, e]))))
+            w = d[e] / (controls[SIZE] * small(scale[e], max(abs(y[now, e]), abs(y[new, e]))))
             norm += w * w
         norm = sqrt(norm / max(n, 1))
         if norm < 1.0 or turn == 1 or not retry:
@@ -255,12 +277,30 @@ def filtered_error(
         for e in range(n):
             y[3, e] = y[now, e] + d[e]
         rhs(t, y[3], f, out, handle)
-        memory[CALLS] += 1.0
+        loop_state[CALLS] += 1.0
     return norm
 
 
 @inner
-def unseen(rhs, solve, handle, shape, coefficients, t, h, y, new, k, out, scale, orders, memory, work, vectors, store):
+def unseen(
+    rhs,
+    solve,
+    handle,
+    structure,
+    coefficients,
+    t,
+    h,
+    y,
+    new,
+    k,
+    out,
+    scale,
+    controls,
+    loop_state,
+    work,
+    vectors,
+    factors,
+):
     """Greatest defect of the collocation polynomial p just before the end of a step, in units of the tolerance.
 
     Where an opening closes at the end, a stiff state becomes free between the stages: e = h g (p' - f(p + d)), with
@@ -282,15 +322,15 @@ def unseen(rhs, solve, handle, shape, coefficients, t, h, y, new, k, out, scale,
         total = 0.0
         for turn in range(2):
             rhs(t + (1.0 + x) * h, y[3], f, out, handle)
-            memory[CALLS] += 1.0
+            loop_state[CALLS] += 1.0
             for e in range(n):
                 d[e] = -f[e]
                 for j in range(q):
                     d[e] += buffer[q + j] * k[j + 1, e]
-                w = step * d[e] / (orders[SIZE] * small(scale[e], abs(y[new, e])))
+                w = step * d[e] / (controls[SIZE] * small(scale[e], abs(y[new, e])))
                 total = total + w * w if turn == 1 else 0.0
             if turn == 0:
-                solve(shape, store, d)
+                solve(structure, factors, d)
                 for e in range(n):
                     y[3, e] += d[e]
         greatest = max(greatest, sqrt(total / max(n, 1)))
@@ -299,53 +339,55 @@ def unseen(rhs, solve, handle, shape, coefficients, t, h, y, new, k, out, scale,
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
-    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
+    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
     """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
     Returns NEWTON_FAILED where a fresh Jacobian does not help.
     """
     s, n = k.shape
-    nnz = shape[shape[STARTS] + shape[STATES]]
+    nnz = structure[structure[STARTS] + structure[STATES]]
     q, error = s - 1, error_of(coefficients, s)
-    retry = work[SEEN] == memory[STEPS] or work[SEEN] < 0.0  # a repeated step, or the first after a kink
-    begin(k, y[now], scale, orders, memory, work, vectors)
+    retry = work[SEEN] == loop_state[STEPS] or work[SEEN] < 0.0  # a repeated step, or the first after a kink
+    begin(k, y[now], scale, controls, loop_state, work, vectors)
     while True:
         if work[HAS] == 0.0:
             renew(
-                rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
-                vectors[s + RATE],
+                rhs, handle, structure, ledger_offset, t, y[now], k[0], ledger_rates[0], scale, out, loop_state, work,
+                vectors[s + MOVED], vectors[s + RATE],
             )  # fmt: skip
-            if orders[WATCH] != 0.0:
-                memory[RADIUS] = spectral_radius(shape, work, nnz, scale, vectors[s + INCREMENT])
+            if controls[WATCH] != 0.0:
+                loop_state[RADIUS] = spectral_radius(structure, work, nnz, scale, vectors[s + INCREMENT])
         status = FAILED
         if work[SHIFT] != 1.0 / h:
             known, work[SHIFT] = work[SHIFT] == -1.0 / h, 0.0
-            count = factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n)
-            memory[FACTORS] += 0.0 if known else count
+            count = factor_blocks(
+                factor, factor_complex, structure, coefficients, s, h, work, factors, complex_factors, n
+            )
+            loop_state[FACTORS] += 0.0 if known else count
             if count > 0:
                 work[SHIFT] = 1.0 / h
         if work[SHIFT] != 0.0:
             # high powers of h / h_last extrapolate badly
-            if work[KNOWN] > 0.0 and (q < 5 or h <= 2.0 * memory[LAST]):
-                predict(coefficients, h, memory[LAST], s, work[work.size - q * q :], vectors)
+            if work[KNOWN] > 0.0 and (q < 5 or h <= 2.0 * loop_state[LAST]):
+                predict(coefficients, h, loop_state[LAST], s, work[work.size - q * q :], vectors)
             else:
                 for i in range(q):
                     for e in range(n):
                         vectors[s + STAGES + i, e] = 0.0
             status = iterate(
-                rhs, solve, solve_complex, handle, coefficients, shape, t, h, y[now], y[3], k[0], supply, where, out,
-                orders, memory, work, vectors, store, store_complex,
+                rhs, solve, solve_complex, handle, coefficients, structure, t, h, y[now], y[3], k[0], ledger_rates,
+                ledger_offset, out, controls, loop_state, work, vectors, factors, complex_factors,
             )  # fmt: skip
         if status == CONVERGED:
-            finish(coefficients, shape, nnz, h, k, supply, work, vectors)
+            finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors)
             break
-        if work[MADE] == memory[STEPS]:
+        if work[MADE] == loop_state[STEPS]:
             low, first_row = matrix(coefficients, s, LOWER), s + STAGES + W * q
             status = sweep(
-                rhs, factor, solve, handle, coefficients, low, shape, t, h, y[now], y[3], k, supply, where, out, scale,
-                orders, memory, nnz, first_row, work, vectors, store,
+                rhs, factor, solve, handle, coefficients, low, structure, t, h, y[now], y[3], k, ledger_rates,
+                ledger_offset, out, scale, controls, loop_state, nnz, first_row, work, vectors, factors,
             )  # fmt: skip
             work[SHIFT] = 0.0  # the factors are those of a stage
             if status == FAILED:
@@ -353,23 +395,24 @@ def attempt(
             break
         work[HAS] = 0.0
     combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
-    if orders[CONTROL] != TOLERANCE:
+    if controls[CONTROL] != TOLERANCE:
         return 0.0
     collocates = error[0] != 0.0 and matrix(coefficients, s, START)[0] == 0.0
-    if work[DAMPED] == memory[STEPS]:
+    if work[DAMPED] == loop_state[STEPS]:
         error_size = smoothed_error(
-            rhs, factor, solve, handle, shape, where, t, h, y[now], y[new], k, supply, error,
-            matrix(coefficients, s, BLOCKS)[0] / h, scale, out, orders, memory, work, vectors, store,
+            rhs, factor, solve, handle, structure, ledger_offset, t, h, y[now], y[new], k, ledger_rates, error,
+            matrix(coefficients, s, BLOCKS)[0] / h, scale, out, controls, loop_state, work, vectors, factors,
         )  # fmt: skip
     elif collocates:
         error_size = filtered_error(
-            rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store,
-            retry,
+            rhs, solve, handle, structure, coefficients, t, h, y, now, new, k, out, scale, controls, loop_state,
+            vectors, factors, retry,
         )  # fmt: skip
     else:
-        error_size = error_norm(h, error, k, y[now], y[new], scale, orders[SIZE])
-    if collocates and 0.0 <= error_size <= 1.0 and h >= (orders[END] - t) * (1.0 - 1e-9):
+        error_size = error_norm(h, error, k, y[now], y[new], scale, controls[SIZE])
+    if collocates and 0.0 <= error_size <= 1.0 and h >= (controls[END] - t) * (1.0 - 1e-9):
         error_size = max(error_size, PLAIN * unseen(
-            rhs, solve, handle, shape, coefficients, t, h, y, new, k, out, scale, orders, memory, work, vectors, store,
+            rhs, solve, handle, structure, coefficients, t, h, y, new, k, out, scale, controls, loop_state, work,
+            vectors, factors,
         ))  # fmt: skip
     return error_size

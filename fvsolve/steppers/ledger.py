@@ -32,7 +32,7 @@ def weight(theta, dense, j):
 
 
 @njit
-def brought(theta, total, r0, r1, m, supply, dense):
+def brought(theta, total, r0, r1, m, ledger_rates, dense):
     """(amount of rate m up to theta, rate at theta) over h: the method's polynomial, else the cubic through both ends.
 
     total : amount of the step over h; r0, r1 : rates at its ends
@@ -44,21 +44,24 @@ def brought(theta, total, r0, r1, m, supply, dense):
     amount, rate = 0.0, 0.0
     for j in range(dense.shape[0]):
         w, slope = weight(theta, dense, j)
-        amount += w * supply[j, m]
-        rate += slope * supply[j, m]
+        amount += w * ledger_rates[j, m]
+        rate += slope * ledger_rates[j, m]
     return amount, rate
 
 
 @njit
-def lesser(total, r0, r1, m, supply, dense):
+def lesser(total, r0, r1, m, ledger_rates, dense):
     """Size, over h, of the smaller of the positive and negative parts of a step; its rate m changes sign, r0 to r1."""
     low, high = 0.0, 1.0
-    at_low, at_high = brought(0.0, total, r0, r1, m, supply, dense)[1], brought(1.0, total, r0, r1, m, supply, dense)[1]
+    at_low, at_high = (
+        brought(0.0, total, r0, r1, m, ledger_rates, dense)[1],
+        brought(1.0, total, r0, r1, m, ledger_rates, dense)[1],
+    )
     if at_low * at_high >= 0.0:
         return 0.0
     for _ in range(TURNS):
         middle = high - at_high * (high - low) / (at_high - at_low)
-        rate, before = brought(middle, total, r0, r1, m, supply, dense)[1], high
+        rate, before = brought(middle, total, r0, r1, m, ledger_rates, dense)[1], high
         if rate * at_high < 0.0:
             low, at_low = high, at_high
         else:
@@ -66,27 +69,27 @@ def lesser(total, r0, r1, m, supply, dense):
         high, at_high = middle, rate
         if abs(high - before) <= NEAR or abs(high - low) <= NEAR:
             break
-    first = brought(high, total, r0, r1, m, supply, dense)[0]
+    first = brought(high, total, r0, r1, m, ledger_rates, dense)[0]
     return max(0.0, min(abs(first), abs(total - first)))
 
 
 @njit
-def book_error(h, error, k, stored, supply, tolerance, ledger):
+def book_error(h, error, k, stored, ledger_rates, tolerance, ledger):
     """Greatest error of the amounts of a step, over the tolerance of all amounts so far.
 
     Amounts that enter stored states have the errors of those states, which the state error covers already. Amounts that
     bypass stored states, or enter at fixed values, are not covered.
     stored : int64[q]  columns of those states in k : float64[s, n]
     """
-    s, count = supply.shape
+    s, count = ledger_rates.shape
     worst, reference, covered = 0.0, LEAST, 0.0
     for i in stored:
         covered += abs(combined(error, k, i))
     for m in range(count):
         peak = 0.0
         for i in range(s):
-            peak = max(peak, abs(supply[i, m]))
-        worst = max(worst, abs(combined(error, supply, m)))
+            peak = max(peak, abs(ledger_rates[i, m]))
+        worst = max(worst, abs(combined(error, ledger_rates, m)))
         reference += ledger[m] - ledger[count + m] + h * peak
     return h * max(0.0, worst - covered) / (SHARE * tolerance * reference)
 
@@ -109,17 +112,17 @@ def add(ledger, m, at, part):
 
 
 @njit
-def book(h, b, supply, dense, use_stage_rates, known, end, ledger):
+def book(h, b, ledger_rates, dense, use_stage_rates, known, end, ledger):
     """Add an accepted step of length h to the ledger, after its end state is known to be valid.
 
     end : rates at the end of the step
     use_stage_rates : use the rates of the last stage at the end, and at the start too if `known`, because f amplifies
     the Newton residual
     """
-    s, count = supply.shape
+    s, count = ledger_rates.shape
     for m in range(count):
-        total = combined(b, supply, m)
-        r0, r1, part, gross = supply[0, m], end[m], 0.0, ledger[m] - ledger[count + m]
+        total = combined(b, ledger_rates, m)
+        r0, r1, part, gross = ledger_rates[0, m], end[m], 0.0, ledger[m] - ledger[count + m]
         side, threshold, direction = 0 if total > 0.0 else 1, NOISE * gross, r0 + r1
         if direction == 0.0:
             direction = ledger[m] + ledger[count + m]
@@ -127,10 +130,10 @@ def book(h, b, supply, dense, use_stage_rates, known, end, ledger):
             side = 0 if direction > 0.0 else 1
             threshold = max(threshold, STRAY * abs(ledger[side * count + m]))
         if use_stage_rates:
-            r0, r1 = ledger[4 * count + m] if known else r0, supply[s - 1, m]
-        ledger[4 * count + m] = supply[s - 1, m]
+            r0, r1 = ledger[4 * count + m] if known else r0, ledger_rates[s - 1, m]
+        ledger[4 * count + m] = ledger_rates[s - 1, m]
         if r0 * r1 < 0.0:
-            part = lesser(total, r0, r1, m, supply, dense)
+            part = lesser(total, r0, r1, m, ledger_rates, dense)
         up, down = part + max(total, 0.0), part - min(total, 0.0)
         if h * (down if side == 0 else up) <= threshold:
             add(ledger, m, side, h * total)

@@ -64,28 +64,28 @@ def subtract(factor, x, y, chunks):
         y[4 * c], y[4 * c + 1], y[4 * c + 2], y[4 * c + 3] = a, b, d, e
 
 
-def factor(shape, jacobian, shift, store):
+def factor(structure, jacobian, shift, factors):
     """store <- L U of shift I - J, with row exchanges; returns 0, or 1 + the state without a pivot."""
-    n, own = shape[SIZE], shape[shape[OWN] :]
+    n, own = structure[SIZE], structure[structure[OWN] :]
     below, above, width, order = own[BELOW], own[ABOVE], own[WIDTH], own[ORDER:]
-    place, lower = order[n:], store[n * width :]
+    place, lower = order[n:], factors[n * width :]
     pivots = lower[n * below :]
-    bad = bad_row(shape, jacobian)
+    bad = bad_row(structure, jacobian)
     if bad > 0:
         return bad
     for e in range(n * width):
-        store[e] = 0.0
-    for p in range(shape[shape[STARTS] + n]):
-        store[place[p]] = -jacobian[p]
+        factors[e] = 0.0
+    for p in range(structure[structure[STARTS] + n]):
+        factors[place[p]] = -jacobian[p]
     for i in range(n):
-        store[i * width + below] += shift
+        factors[i * width + below] += shift
     last = 0  # last column that exchanged rows have filled
     for k in range(n):
         at, rest = k * width + below, min(below, n - 1 - k)
-        here, pivot = size_of(store[at]), 0
+        here, pivot = size_of(factors[at]), 0
         best = here
         for d in range(1, rest + 1):
-            size = size_of(store[at + d * (width - 1)])
+            size = size_of(factors[at + d * (width - 1)])
             if size > best:
                 best, pivot = size, d
         if here >= STAYS * best:
@@ -96,25 +96,25 @@ def factor(shape, jacobian, shift, store):
         if pivot > 0:
             exchanged = at + pivot * (width - 1)
             for e in range(below + above + 1):
-                store[at + e], store[exchanged + e] = store[exchanged + e], store[at + e]
+                factors[at + e], factors[exchanged + e] = factors[exchanged + e], factors[at + e]
             last = max(last, k + pivot + above)
         chunks = (max(above, last - k) + CHUNK - 1) // CHUNK
-        per = reciprocal(store[at])
-        store[at] = per
+        per = reciprocal(factors[at])
+        factors[at] = per
         for d in range(rest):
             row = at + (d + 1) * (width - 1)
-            share = store[row] * per
+            share = factors[row] * per
             lower[k * below + d] = share
-            subtract(share, store[at + 1 :], store[row + 1 :], chunks)
+            subtract(share, factors[at + 1 :], factors[row + 1 :], chunks)
     pivots[2 * n] = above if last == 0 else above + below
     return 0
 
 
-def solve(shape, store, x):
+def solve(structure, factors, x):
     """x <- (shift I - J)^-1 x."""
-    n, own = shape[SIZE], shape[shape[OWN] :]
+    n, own = structure[SIZE], structure[structure[OWN] :]
     below, width, order = own[BELOW], own[WIDTH], own[ORDER:]
-    lower = store[n * width :]
+    lower = factors[n * width :]
     pivots = lower[n * below :]
     work, reach = pivots[n:], int(pivots[2 * n].real)
     for i in range(n):
@@ -129,6 +129,6 @@ def solve(shape, store, x):
     for i in range(n - 1, -1, -1):
         at, total = i * width + below, work[i]
         for d in range(min(reach, n - 1 - i), 0, -1):
-            total -= store[at + d] * work[i + d]
-        total *= store[at]
+            total -= factors[at + d] * work[i + d]
+        total *= factors[at]
         work[i] = x[order[i]] = total

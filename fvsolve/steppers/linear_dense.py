@@ -15,13 +15,13 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
     return np.zeros(0, dtype=np.int64), n * n + n
 
 
-def factor(shape, jacobian, shift, store):
+def factor(structure, jacobian, shift, factors):
     """store <- L U of shift I - J, with row exchanges; returns 0, or 1 + the column without a pivot."""
-    n = shape[SIZE]
-    starts, rows, pivots = shape[shape[STARTS] :], shape[shape[ROWS] :], store[n * n :]
-    a = store[: n * n].reshape((n, n))
+    n = structure[SIZE]
+    starts, rows, pivots = structure[structure[STARTS] :], structure[structure[ROWS] :], factors[n * n :]
+    a = factors[: n * n].reshape((n, n))
     for e in range(n * n):
-        store[e] = 0.0
+        factors[e] = 0.0
     for j in range(n):
         for p in range(starts[j], starts[j + 1]):
             if rows[p] < n:
@@ -49,20 +49,20 @@ def factor(shape, jacobian, shift, store):
     return 0
 
 
-def solve(shape, store, x):
+def solve(structure, factors, x):
     """x <- (shift I - J)^-1 x."""
-    n = shape[SIZE]
-    pivots = store[n * n :]
+    n = structure[SIZE]
+    pivots = factors[n * n :]
     for k in range(n):
         i = int(pivots[k].real)
         x[k], x[i] = x[i], x[k]
     for i in range(1, n):
-        row, total = store[i * n : i * n + n], x[i]
+        row, total = factors[i * n : i * n + n], x[i]
         for j in range(i):
             total -= row[j] * x[j]
         x[i] = total
     for i in range(n - 1, -1, -1):
-        row, total = store[i * n : i * n + n], x[i]
+        row, total = factors[i * n : i * n + n], x[i]
         for j in range(i + 1, n):
             total -= row[j] * x[j]
         x[i] = total * row[i]

@@ -126,9 +126,9 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
 
 
 @njit(forceinline=True)
-def place(shape, index):
+def place(structure, index):
     """Offset of a list of this solver in the structure."""
-    return shape[OWN] + shape[shape[OWN] + index]
+    return structure[OWN] + structure[structure[OWN] + index]
 
 
 @njit(forceinline=True)
@@ -137,20 +137,20 @@ def clear(block):
     block[0] = block[1] = block[2] = block[3] = 0.0
 
 
-def factor(shape, jacobian, shift, store):
+def factor(structure, jacobian, shift, factors):
     """store <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
 
     The pivot of a diagonal block is good if its determinant is at least 1e-13 of its value before elimination and of
     its two terms: a measure that does not depend on the units of states.
     """
-    count, order = shape[shape[OWN]], shape[place(shape, ORDER) :]
-    l_starts, l_columns = shape[place(shape, L_STARTS) :], shape[place(shape, L_COLUMNS) :]
-    u_starts, u_columns = shape[place(shape, U_STARTS) :], shape[place(shape, U_COLUMNS) :]
-    starts, places = shape[place(shape, J_STARTS) :], shape[place(shape, J_PLACES) :]
-    entries = shape[place(shape, J_ENTRIES) :]
-    lower, upper = store, store[4 * l_starts[count] :]
+    count, order = structure[structure[OWN]], structure[place(structure, ORDER) :]
+    l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
+    u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
+    starts, places = structure[place(structure, J_STARTS) :], structure[place(structure, J_PLACES) :]
+    entries = structure[place(structure, J_ENTRIES) :]
+    lower, upper = factors, factors[4 * l_starts[count] :]
     inverse, row = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
-    bad = bad_row(shape, jacobian)
+    bad = bad_row(structure, jacobian)
     if bad > 0:
         return bad
     for e in range(4 * count):
@@ -191,12 +191,12 @@ def factor(shape, jacobian, shift, store):
     return 0
 
 
-def solve(shape, store, x):
+def solve(structure, factors, x):
     """x <- (shift I - J)^-1 x."""
-    count, order = shape[shape[OWN]], shape[place(shape, ORDER) :]
-    l_starts, l_columns = shape[place(shape, L_STARTS) :], shape[place(shape, L_COLUMNS) :]
-    u_starts, u_columns = shape[place(shape, U_STARTS) :], shape[place(shape, U_COLUMNS) :]
-    lower, upper = store, store[4 * l_starts[count] :]
+    count, order = structure[structure[OWN]], structure[place(structure, ORDER) :]
+    l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
+    u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
+    lower, upper = factors, factors[4 * l_starts[count] :]
     inverse, work = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
     for i in range(count):
         a, b = x[order[2 * i]], x[order[2 * i + 1]]

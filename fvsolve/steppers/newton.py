@@ -64,42 +64,44 @@ def forget(work: np.ndarray) -> None:
 
 
 @inner
-def begin(k, y, scale, orders, memory, work, vectors):
+def begin(k, y, scale, controls, loop_state, work, vectors):
     """At the first try of a step: keep the last stages to go on from; judge the Jacobian by their iterations."""
     s, n = k.shape
-    if work[SEEN] == memory[STEPS]:
+    if work[SEEN] == loop_state[STEPS]:
         return
-    tolerance = orders[SIZE] if orders[CONTROL] == TOLERANCE else FIXED
+    tolerance = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
     weights, first, last = vectors[s + WEIGHTS], vectors[s + FIRST], vectors[0]
     for i in range(n):
         weights[i] = 1.0 / (tolerance * small(scale[i], y[i]))
         last[i], first[i] = first[i], k[0, i]
     for j in range(1, s):
         copy(k[j], vectors[j])
-    goes_on = work[SEEN] == memory[STEPS] - 1.0 and memory[LAST] > 0.0
+    goes_on = work[SEEN] == loop_state[STEPS] - 1.0 and loop_state[LAST] > 0.0
     work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if goes_on else 0.0
     if work[RATIO] > STALE:
         work[HAS] = 0.0
-    work[SEEN], work[RATIO] = memory[STEPS], 0.0
+    work[SEEN], work[RATIO] = loop_state[STEPS], 0.0
 
 
 @inner
-def renew(rhs, handle, shape, where, t, y, f, supply, scale, out, memory, work, moved, rate):
+def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, out, loop_state, work, moved, rate):
     """The Jacobian at y, from the fresh f and ledger rates there; moved, rate : room for a state and its rates."""
-    calls = differences(rhs, handle, shape, where, t, y, f, supply, scale, moved, rate, out, work[HEADER:])
-    memory[CALLS] += calls
-    memory[JACOBIANS] += 1.0
-    work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, memory[STEPS], 0.0, 0.0
+    calls = differences(
+        rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, moved, rate, out, work[HEADER:]
+    )
+    loop_state[CALLS] += calls
+    loop_state[JACOBIANS] += 1.0
+    work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, loop_state[STEPS], 0.0, 0.0
 
 
 @inner
-def spectral_radius(shape, work, nnz, scale, v):
+def spectral_radius(structure, work, nnz, scale, v):
     """Largest |eigenvalue| of the Jacobian, about, by five turns of the power method."""
     n, product, before, now = v.size, work[HEADER + nnz :], 0.0, 0.0
     for e in range(n):
         v[e] = scale[e] if e % 2 == 0 else -scale[e]
     for _ in range(5):
-        multiply(shape, work[HEADER : HEADER + nnz], v, product)
+        multiply(structure, work[HEADER : HEADER + nnz], v, product)
         total = 0.0
         for e in range(n):
             total += (product[e] / scale[e]) * (product[e] / scale[e])
@@ -147,39 +149,39 @@ def shortened(part, ahead, size):
 
 
 @inner
-def goal(orders):
+def goal(controls):
     """(increment at which Newton may stop, and at which what is left is rounding), in units of the tolerance."""
-    if orders[CONTROL] == TOLERANCE:
-        enough = max(1e-15 / orders[SIZE], ENOUGH)
+    if controls[CONTROL] == TOLERANCE:
+        enough = max(1e-15 / controls[SIZE], ENOUGH)
         return enough, enough
     return 1.0, ROUNDED / FIXED
 
 
 @inner
-def tight(orders):
+def tight(controls):
     """The same where Newton is damped, and what it must reach where nothing gains any more.
 
     As accurate as where the step is given, for f magnifies what is left.
     """
-    unit = orders[SIZE] if orders[CONTROL] == TOLERANCE else FIXED
-    floor = goal(orders)[1] if orders[CONTROL] == TOLERANCE else FLOOR / unit
+    unit = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
+    floor = goal(controls)[1] if controls[CONTROL] == TOLERANCE else FLOOR / unit
     return FIXED / unit, min(ROUNDED / unit, floor), floor
 
 
 @inner
-def find_worst(d, f, weights, memory):
+def find_worst(d, f, weights, loop_state):
     """Note the component whose rate is no number, else the one that moves most against its tolerance."""
     worst = -1.0
     for i in range(weights.size):
         e = abs(d[i] * weights[i]) if abs(f[i]) < np.inf else np.inf
         if e > worst:  # a rate that is no number makes increments of others none too
-            worst, memory[WORST] = e, i
+            worst, loop_state[WORST] = e, i
 
 
 @inner
-def verdict(turn, size, before, orders, work):
+def verdict(turn, size, before, controls, work):
     """(whether to stop, why) after iteration `turn` with an increment of `size`, the one before it of `before`."""
-    enough, rounded = goal(orders)
+    enough, rounded = goal(controls)
     if not size < np.inf:
         return True, FAILED
     if turn > 0:
@@ -200,60 +202,75 @@ def verdict(turn, size, before, orders, work):
 
 
 @inner
-def book_increment(shape, nnz, d, supply, i, work):
+def book_increment(structure, nnz, d, ledger_rates, i, work):
     """Add to the ledger rates of stage i what the last increment d of its state changes in them, by that Jacobian."""
     n, product = d.size, work[HEADER + nnz :]
-    multiply(shape, work[HEADER : HEADER + nnz], d, product)
-    for m in range(supply.shape[1]):
-        supply[i, m] += product[n + m]
+    multiply(structure, work[HEADER : HEADER + nnz], d, product)
+    for m in range(ledger_rates.shape[1]):
+        ledger_rates[i, m] += product[n + m]
 
 
 @inner
-def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, residual):
+def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, residual):
     """f at the stage whose slope is ki, and f - ki."""
     for j in range(ki.size):
         y_stage[j] = base[j] + h_gamma * ki[j]
     rhs(t, y_stage, f, out, handle)
-    memory[CALLS] += 1.0
-    memory[NEWTON] += 1.0
+    loop_state[CALLS] += 1.0
+    loop_state[NEWTON] += 1.0
     for j in range(ki.size):
         residual[j] = f[j] - ki[j]
 
 
 @inner
 def damp(
-    rhs, factor, solve, handle, shape, t, h_gamma, i, k, y_stage, supply, where, out, scale, orders, memory, nnz, work,
-    vectors, store,
+    rhs, factor, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, scale, controls,
+    loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
     """k[i] = f(t, base + h gamma k[i]) by damped Newton, a Jacobian for every iterate; returns CONVERGED or FAILED."""
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
     other, shift, ki = vectors[s + MOVED], 1.0 / h_gamma, k[i]
-    enough, rounded, floor = tight(orders)
+    enough, rounded, floor = tight(controls)
     before = np.inf
-    evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
+    evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, d)
     for turn in range(MOST_DAMPED):
-        for m in range(supply.shape[1]):
-            supply[i, m] = out[where + m]
-        renew(rhs, handle, shape, where, t, y_stage, f, supply[i], scale, out, memory, work, other, d)
-        memory[FACTORS] += 1.0
-        if factor(shape, work[HEADER:], shift, store) != 0:
+        for m in range(ledger_rates.shape[1]):
+            ledger_rates[i, m] = out[ledger_offset + m]
+        renew(
+            rhs,
+            handle,
+            structure,
+            ledger_offset,
+            t,
+            y_stage,
+            f,
+            ledger_rates[i],
+            scale,
+            out,
+            loop_state,
+            work,
+            other,
+            d,
+        )
+        loop_state[FACTORS] += 1.0
+        if factor(structure, work[HEADER:], shift, factors) != 0:
             break
         work[SHIFT] = shift
         for j in range(n):
             d[j] = f[j] - ki[j]
-        solve(shape, store, d)
+        solve(structure, factors, d)
         size = sqrt(size_of(d, weights) / max(n, 1))
         done = size <= enough or size <= rounded and size >= 0.5 * before or size <= floor and turn == MOST_DAMPED - 1
         part, tried, length, before = 1.0, 0.0, 0.0, size
         while not done and part != tried and part > LEAST_PART:
             for j in range(n):
                 ki[j] += shift * (part - tried) * d[j]
-            evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, other)
+            evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, other)
             if size <= rounded:  # which way the next increment goes says nothing
                 tried = part
                 break
-            solve(shape, store, other)
+            solve(structure, factors, other)
             ahead, length = along(d, other, weights)
             tried, part = part, shortened(part, ahead, length)
         if part != tried and size <= floor and length < np.inf:  # rounding, or a kink that no iterate sees through
@@ -261,27 +278,27 @@ def damp(
         if done:
             for j in range(n):
                 ki[j] += shift * (1.0 - tried) * d[j]
-            book_increment(shape, nnz, d, supply, i, work)
-            work[DAMPED], work[RATIO], work[SURE] = memory[STEPS], 1.0, 1.0
+            book_increment(structure, nnz, d, ledger_rates, i, work)
+            work[DAMPED], work[RATIO], work[SURE] = loop_state[STEPS], 1.0, 1.0
             return CONVERGED
         if part != tried or not size < np.inf:
             break
-    find_worst(d, f, weights, memory)
+    find_worst(d, f, weights, loop_state)
     work[HAS] = 0.0
     return FAILED
 
 
 @inner
 def reach(
-    rhs, factor, solve, handle, shape, t, h_gamma, i, k, y, y_stage, supply, where, out, scale, orders, memory, nnz,
-    work, vectors, store,
+    rhs, factor, solve, handle, structure, t, h_gamma, i, k, y, y_stage, ledger_rates, ledger_offset, out, scale,
+    controls, loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
     """The same by `damp`; where that fails and the step is given from the stage y, and last along h gamma.
 
     There the slope of a step of no length is followed as it grows. Under a tolerance a shorter step is cheaper.
     """
     base, known, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + REACHED], k[i]
-    done, part, turn, worst = 0.0, 1.0, 0, memory[WORST]  # as plain Newton left it
+    done, part, turn, worst = 0.0, 1.0, 0, loop_state[WORST]  # as plain Newton left it
     while part >= LEAST_WAY:
         if turn == 1:
             for j in range(ki.size):
@@ -289,30 +306,30 @@ def reach(
         elif turn > 1:
             copy(known, ki)
         why = damp(
-            rhs, factor, solve, handle, shape, t, h_gamma * (done + part), i, k, y_stage, supply, where, out, scale,
-            orders, memory, nnz, work, vectors, store,
+            rhs, factor, solve, handle, structure, t, h_gamma * (done + part), i, k, y_stage, ledger_rates,
+            ledger_offset, out, scale, controls, loop_state, nnz, work, vectors, factors,
         )  # fmt: skip
         if why == CONVERGED:
             done += part
             if done == 1.0:
                 return CONVERGED
             copy(ki, known)
-        elif orders[CONTROL] == TOLERANCE:
+        elif controls[CONTROL] == TOLERANCE:
             return FAILED
         elif turn == 0:
             for j in range(ki.size):
                 known[j] = 0.0
         else:
             part *= 0.5
-        memory[WORST] = worst
+        loop_state[WORST] = worst
         turn += 1
     return FAILED
 
 
 @inner
 def smoothed_error(
-    rhs, factor, solve, handle, shape, where, t, h, y, y_new, k, supply, error, shift, scale, out, orders, memory,
-    work, vectors, store,
+    rhs, factor, solve, handle, structure, ledger_offset, t, h, y, y_new, k, ledger_rates, error, shift, scale, out,
+    controls, loop_state, work, vectors, factors,
 ):  # fmt: skip
     """Error of a damped step, (I - J / shift)^-1 h sum e_j k_j with J from its start, in units of the tolerance.
 
@@ -321,19 +338,34 @@ def smoothed_error(
     """
     s, n = k.shape
     d, f, whole, dot, smooth = vectors[s + INCREMENT], vectors[s + RATE], 0.0, 0.0, 0.0
-    renew(rhs, handle, shape, where, t, y, k[0], supply[0], scale, out, memory, work, vectors[s + MOVED], f)
-    memory[FACTORS] += 1.0
+    renew(
+        rhs,
+        handle,
+        structure,
+        ledger_offset,
+        t,
+        y,
+        k[0],
+        ledger_rates[0],
+        scale,
+        out,
+        loop_state,
+        work,
+        vectors[s + MOVED],
+        f,
+    )
+    loop_state[FACTORS] += 1.0
     work[RATIO] = 1.0
-    if factor(shape, work[HEADER:], shift, store) != 0:
+    if factor(structure, work[HEADER:], shift, factors) != 0:
         return NEWTON_FAILED
     for i in range(n):
         f[i] = 0.0
         for j in range(s):
             f[i] += h * error[j] * k[j, i]
         d[i] = shift * f[i]
-    solve(shape, store, d)
+    solve(structure, factors, d)
     for i in range(n):
-        w = 1.0 / (orders[SIZE] * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
+        w = 1.0 / (controls[SIZE] * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
         whole += (w * f[i]) * (w * f[i])
         dot += (w * f[i]) * (w * d[i])
         smooth += (w * d[i]) * (w * d[i])

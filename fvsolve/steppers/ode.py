@@ -57,10 +57,10 @@ def integrate(
     size = step if step is not None else (1e-6 if rtol is None else rtol)
     scale = np.ones(y0.size) if atol is None or step is not None else _scale(atol, size, y0.size)
     stepper = Stepper(method, y0.size, 0, lambda: _full(y0.size), scale)
-    orders, memory = stepper.orders, stepper.memory
-    stepper.y[0], memory[slots.T] = y0, t[0]
-    orders[slots.CONTROL] = slots.FIXED_STEP if step is not None else slots.TOLERANCE
-    orders[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
+    controls, loop_state = stepper.orders, stepper.memory
+    stepper.y[0], loop_state[slots.T] = y0, t[0]
+    controls[slots.CONTROL] = slots.FIXED_STEP if step is not None else slots.TOLERANCE
+    controls[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
     if watched:
         automatic.watch(stepper, _full(y0.size))
     key = next(_KEYS)
@@ -76,21 +76,21 @@ def integrate(
 
 def _stepped(stepper: Stepper, functions: tuple, key: int, t, y0) -> np.ndarray:
     """States at t : float64[len(t), n]."""
-    orders, memory, flags = stepper.orders, stepper.memory, stepper.flags
+    controls, loop_state, progress = stepper.orders, stepper.memory, stepper.flags
     stepper.times, stepper.rows = np.ascontiguousarray(t[1:]), np.zeros((t.size, y0.size + 1))
     found = np.empty((t.size, y0.size))
     found[0] = y0
-    orders[slots.END] = t[-1]
-    flags[slots.PHASE], flags[slots.BEHIND] = slots.FRESH, 0
+    controls[slots.END] = t[-1]
+    progress[slots.PHASE], progress[slots.BEHIND] = slots.FRESH, 0
     code = slots.CHUNK
     while code == slots.CHUNK:
         if automatic.wants_change(stepper):
             automatic.change(stepper)
-        orders[slots.BUDGET] = NO_LIMIT
+        controls[slots.BUDGET] = NO_LIMIT
         code = stepper.call(*functions, np.array([key]), WHERE, stepper.none)
     if code != slots.DONE:
-        raise FvsolveError(_failure(stepper.method, code, memory)) from _RAISED.get(key)
-    found[1:-1], found[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[flags[slots.NOW]]
+        raise FvsolveError(_failure(stepper.method, code, loop_state)) from _RAISED.get(key)
+    found[1:-1], found[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[progress[slots.NOW]]
     return found
 
 
@@ -113,10 +113,10 @@ def _full(n):
     return Structure.full(n)
 
 
-def _failure(method, code, memory) -> str:
-    when = f"{method.name} stopped at t = {memory[slots.T]:.6g}: "
+def _failure(method, code, loop_state) -> str:
+    when = f"{method.name} stopped at t = {loop_state[slots.T]:.6g}: "
     if code == slots.NEWTON_STUCK:
-        return when + f"Newton did not converge, worst in y[{int(memory[slots.WORST])}]; try another rtol or method"
+        return when + f"Newton did not converge, worst in y[{int(loop_state[slots.WORST])}]; try another rtol or method"
     return when + "the solution is not finite or the step shrank to nothing; try a smaller step or a larger rtol"
 
 

@@ -19,10 +19,10 @@ def reciprocal(x):
 
 
 @njit
-def bad_row(shape, jacobian):
+def bad_row(structure, jacobian):
     """0, or 1 + the state of the first row with an entry that is not finite (or beyond all use)."""
-    n = shape[SIZE]
-    last, rows, good = shape[shape[STARTS] + n], shape[shape[ROWS] :], True
+    n = structure[SIZE]
+    last, rows, good = structure[structure[STARTS] + n], structure[structure[ROWS] :], True
     for p in range(last):
         good &= abs(jacobian[p]) < 1.0 / LEAST
     if not good:

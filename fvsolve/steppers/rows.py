@@ -38,27 +38,27 @@ LITTLE = 1e-9  # of what there are shares of, too little to tell them by
 
 
 @njit(forceinline=True)
-def output_due(orders, memory, count_at, every, limit):
+def output_due(controls, loop_state, count_at, every, limit):
     """Time of the next row or field: START + count * every, or infinity."""
-    if every <= 0.0 or memory[count_at] > limit:
+    if every <= 0.0 or loop_state[count_at] > limit:
         return 1e308
-    return orders[START] + memory[count_at] * every
+    return controls[START] + loop_state[count_at] * every
 
 
 @njit(forceinline=True)
-def row_due(orders, memory, times):
+def row_due(controls, loop_state, times):
     """Time of the next row: the next of `times` where there are any [s]."""
     if times.size == 0:
-        return output_due(orders, memory, NEXT_OUTPUT, orders[EVERY], 1e300)
-    count = int(memory[NEXT_OUTPUT])
+        return output_due(controls, loop_state, NEXT_OUTPUT, controls[EVERY], 1e300)
+    count = int(loop_state[NEXT_OUTPUT])
     return times[count] if count < times.size else 1e308
 
 
 @njit(forceinline=True)
-def next_due(orders, memory, times):
+def next_due(controls, loop_state, times):
     """Time of whatever is to be written next [s]."""
-    row = row_due(orders, memory, times)
-    return min(row, output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT]))
+    row = row_due(controls, loop_state, times)
+    return min(row, output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT]))
 
 
 @njit(forceinline=True)
@@ -90,17 +90,18 @@ def keep_within(at, by, y_old, y, out):
 
 
 @njit(forceinline=True)
-def comes_apart(orders, work):
+def comes_apart(controls, work):
     """Whether rows within the step behind come from steps of their own, see `slots.APART`."""
-    if orders[CONTROL] == TOLERANCE or orders[APART] == NEVER_APART:
+    if controls[CONTROL] == TOLERANCE or controls[APART] == NEVER_APART:
         return False
-    return orders[APART] == ALWAYS_APART or work[KNOWN] < 2.0
+    return controls[APART] == ALWAYS_APART or work[KNOWN] < 2.0
 
 
 @njit
 def step_apart(
-    attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y,
-    old, new, supply, where, out, scale, orders, memory, work, spare, spare_flat, spare_complex,
+    attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums,
+    t, h, y, old, new, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, spare, spare_flat,
+    spare_complex,
 ):  # fmt: skip
     """y[new] at t + h by a step of the method from y[old], as from a start; True where it could be solved.
 
@@ -108,49 +109,49 @@ def step_apart(
     rows; what it costs is counted.
     supply : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + store]
     """
-    s, worst, radius = supply.shape[0], memory[WORST], memory[RADIUS]
+    s, worst, radius = ledger_rates.shape[0], loop_state[WORST], loop_state[RADIUS]
     if work.size > 0:  # no Jacobian, no stages to go on from
         spare_flat[:STORE] = 0.0
         spare_flat[HAS], spare_flat[SEEN], spare_flat[DAMPED], spare_flat[SURE] = 0.0, -1.0, -1.0, 1.0
         spare_flat[STORE] = work[STORE]
     rhs(t, y[old], spare[0], out, handle)
-    memory[CALLS] += 1.0
-    for m in range(supply.shape[1]):
-        supply[0, m] = out[where + m]
+    loop_state[CALLS] += 1.0
+    for m in range(ledger_rates.shape[1]):
+        ledger_rates[0, m] = out[ledger_offset + m]
     e = attempt(
-        rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, old,
-        new, spare[:s], supply, where, out, scale, orders, memory, spare_flat[: work.size], spare[s:],
-        spare_flat[work.size :], spare_complex,
+        rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t,
+        h, y, old, new, spare[:s], ledger_rates, ledger_offset, out, scale, controls, loop_state,
+        spare_flat[: work.size], spare[s:], spare_flat[work.size :], spare_complex,
     )  # fmt: skip
-    memory[WORST], memory[RADIUS] = worst, radius
+    loop_state[WORST], loop_state[RADIUS] = worst, radius
     return e != NEWTON_FAILED
 
 
 @njit
 def emit(
-    attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums,
-    orders, memory, times, flags, t_old, y, now, old, f_old, f, k, where, dense, bend, scale, out, y_out, rows,
-    within_at, within_by, work, spare, spare_supply, spare_flat, spare_complex,
+    attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure,
+    row_blocks, sums, controls, loop_state, times, progress, t_old, y, now, old, f_old, f, k, ledger_offset, dense,
+    bend, scale, out, y_out, rows, within_at, within_by, work, spare, spare_ledger_rates, spare_flat, spare_complex,
 ):  # fmt: skip
     """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
-    t, h, apart = memory[T], memory[T] - t_old, comes_apart(orders, work)
+    t, h, apart = loop_state[T], loop_state[T] - t_old, comes_apart(controls, work)
     while True:
-        row = row_due(orders, memory, times)
-        field = output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT])
+        row = row_due(controls, loop_state, times)
+        field = output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT])
         due = min(row, field)
-        if due > t or (due >= orders[STOP_AT]):
+        if due > t or (due >= controls[STOP_AT]):
             return DONE
-        if row <= due and flags[ROWS] == rows.shape[0]:
+        if row <= due and progress[ROWS] == rows.shape[0]:
             return ROWS_FULL
         solved, new = False, 3 - now - old
         if apart and due < t - AT_END * h:
             solved = step_apart(
-                attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans,
-                sums, t_old, due - t_old, y, old, new, spare_supply, where, out, scale, orders, memory, work, spare,
-                spare_flat, spare_complex,
+                attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure,
+                row_blocks, sums, t_old, due - t_old, y, old, new, spare_ledger_rates, ledger_offset, out, scale,
+                controls, loop_state, work, spare, spare_flat, spare_complex,
             )  # fmt: skip
-        for m in range(spans.shape[0]):
-            begin, end = spans[m, BEGIN], spans[m, STOP]
+        for m in range(row_blocks.shape[0]):
+            begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
             if solved:
                 copy(y[new, begin:end], y_out[begin:end])
             elif apart:
@@ -162,10 +163,10 @@ def emit(
         keep_within(within_at, within_by, y[old], y[now], y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
-            rows[flags[ROWS], 0] = due
-            observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
-            flags[ROWS] += 1
-            memory[NEXT_OUTPUT] += 1.0
+            rows[progress[ROWS], 0] = due
+            observe(due, y_out, out, handle, rows[progress[ROWS], 1:])
+            progress[ROWS] += 1
+            loop_state[NEXT_OUTPUT] += 1.0
         if field <= due:
-            memory[NEXT_FIELD] += 1.0
+            loop_state[NEXT_FIELD] += 1.0
             return FIELD

@@ -28,8 +28,8 @@ def settle(begin, end, b, quick, k):
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
-    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
+    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
     """y[new] and the stages k from y[now] and k[0] = f(t, y[now]), a stage of no weight; k[1] is that divided.
 
@@ -37,21 +37,21 @@ def attempt(
     where nothing is quick; what else other methods need is not looked at.
     """
     s, b, c, n = k.shape[0], weights_of(coefficients, k.shape[0]), nodes_of(coefficients, k.shape[0]), scale.size
-    for m in range(spans.shape[0]):
-        copy(k[0, spans[m, BEGIN] : spans[m, STOP]], k[1, spans[m, BEGIN] : spans[m, STOP]])
-    for m in range(supply.shape[1]):
-        supply[1, m] = supply[0, m]
-    damp_in_turn(h, y[now], k[1], store[:n], handle)
+    for m in range(row_blocks.shape[0]):
+        copy(k[0, row_blocks[m, BEGIN] : row_blocks[m, STOP]], k[1, row_blocks[m, BEGIN] : row_blocks[m, STOP]])
+    for m in range(ledger_rates.shape[1]):
+        ledger_rates[1, m] = ledger_rates[0, m]
+    damp_in_turn(h, y[now], k[1], factors[:n], handle)
     for i in range(2, s):
-        for m in range(spans.shape[0]):
-            combine(spans[m, BEGIN], spans[m, STOP], y[now], h, row_of(coefficients, s, i), i, k, y[3])
+        for m in range(row_blocks.shape[0]):
+            combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, row_of(coefficients, s, i), i, k, y[3])
         rhs(t + c[i] * h, y[3], k[i], out, handle)
-        for m in range(supply.shape[1]):
-            supply[i, m] = out[where + m]
-        damp_in_turn(h, y[3], k[i], store[:n] if i == 2 else store[n:], handle)
-    for m in range(spans.shape[0]):
+        for m in range(ledger_rates.shape[1]):
+            ledger_rates[i, m] = out[ledger_offset + m]
+        damp_in_turn(h, y[3], k[i], factors[:n] if i == 2 else factors[n:], handle)
+    for m in range(row_blocks.shape[0]):
         if s > 2:
-            settle(spans[m, BEGIN], spans[m, STOP], b, store[:n], k)
-        combine(spans[m, BEGIN], spans[m, STOP], y[now], h, b, s, k, y[new])
-    memory[CALLS] += s - 2.0
+            settle(row_blocks[m, BEGIN], row_blocks[m, STOP], b, factors[:n], k)
+        combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, b, s, k, y[new])
+    loop_state[CALLS] += s - 2.0
     return 0.0

@@ -67,12 +67,12 @@ def addresses(functions: tuple):
     return np.array([one.address for one in functions]) if COMPILING else functions
 
 
-def no_factor(shape, jacobian, shift, store):
+def no_factor(structure, jacobian, shift, factors):
     """In place of a factorisation, where nothing is solved."""
     return 0
 
 
-def no_solve(shape, store, x):
+def no_solve(structure, factors, x):
     """In place of a solution, where nothing is solved."""
 
 
@@ -83,7 +83,7 @@ def no_algebra():
     return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((no_factor, no_solve) * 2, letters, strict=True))
 
 
-def alone(sums, spans, handle):
+def alone(sums, row_blocks, handle):
     """In place of a joint, where one band is all there is."""
 
 

@@ -43,15 +43,15 @@ def error_norm(h, error, k, y, y_new, scale, tolerance):
 
 
 @njit
-def error_of_bands(join, handle, spans, sums, h, error, k, y, y_new, scale, tolerance):
+def error_of_bands(join, handle, row_blocks, sums, h, error, k, y, y_new, scale, tolerance):
     """The same by rows, which bands tell each other; sums : room for these."""
-    for m in range(spans.shape[0]):
-        begin, many = spans[m, BEGIN], spans[m, SUMS]
-        long = (spans[m, STOP] - begin) // many
+    for m in range(row_blocks.shape[0]):
+        begin, many = row_blocks[m, BEGIN], row_blocks[m, SUMS]
+        long = (row_blocks[m, STOP] - begin) // many
         for r in range(many):
             at = begin + r * long
-            sums[spans[m, FIRST] + r] = squares(at, at + long, h, error, k, y, y_new, scale, tolerance)
-    join(sums, spans, handle)
+            sums[row_blocks[m, FIRST] + r] = squares(at, at + long, h, error, k, y, y_new, scale, tolerance)
+    join(sums, row_blocks, handle)
     total = 0.0
     for r in range(sums.size):
         total += sums[r]
@@ -116,7 +116,7 @@ def interpolate(begin, end, theta, h, y, f, y_new, f_new, k, dense, bend, out):
 
 
 @njit
-def all_finite(join, handle, spans, sums, y, formed, looked):
+def all_finite(join, handle, row_blocks, sums, y, formed, looked):
     """Whether all values of all bands are, and their squares; sums : room for what bands tell each other.
 
     A single sum is that of one band, of all. formed : see `kernels.sums`; looked : whether who found rates has looked
@@ -129,21 +129,21 @@ def all_finite(join, handle, spans, sums, y, formed, looked):
     elif sums.size == 1:
         bad = endless(0, y.size, y)
     else:
-        for m in range(spans.shape[0]):
-            bad += endless(spans[m, BEGIN], spans[m, STOP], y)
-    return sum_of_bands(bad, join, handle, spans, sums) == 0.0
+        for m in range(row_blocks.shape[0]):
+            bad += endless(row_blocks[m, BEGIN], row_blocks[m, STOP], y)
+    return sum_of_bands(bad, join, handle, row_blocks, sums) == 0.0
 
 
 @njit(forceinline=True)
-def sum_of_bands(own, join, handle, spans, sums):
+def sum_of_bands(own, join, handle, row_blocks, sums):
     """Sum over all bands of a number that each has; sums : room for what bands tell each other."""
     if sums.size == 1:
         return float(own)
-    for m in range(spans.shape[0]):
-        for r in range(spans[m, FIRST], spans[m, FIRST] + spans[m, SUMS]):
+    for m in range(row_blocks.shape[0]):
+        for r in range(row_blocks[m, FIRST], row_blocks[m, FIRST] + row_blocks[m, SUMS]):
             sums[r] = 0.0
-    sums[spans[spans.shape[0] - 1, FIRST]] = own  # of rows of this band, or of what all have
-    join(sums, spans, handle)
+    sums[row_blocks[row_blocks.shape[0] - 1, FIRST]] = own  # of rows of this band, or of what all have
+    join(sums, row_blocks, handle)
     total = 0.0
     for r in range(sums.size):
         total += sums[r]
@@ -151,13 +151,13 @@ def sum_of_bands(own, join, handle, spans, sums):
 
 
 @njit
-def exceeded(join, handle, spans, sums, y, largest):
+def exceeded(join, handle, row_blocks, sums, y, largest):
     """True if a state of any band is beyond its largest, or not a number."""
     beyond = 0
-    for m in range(spans.shape[0]):
-        for i in range(spans[m, BEGIN], spans[m, STOP]):
+    for m in range(row_blocks.shape[0]):
+        for i in range(row_blocks[m, BEGIN], row_blocks[m, STOP]):
             beyond += not abs(y[i]) <= largest[i]
-    return sum_of_bands(beyond, join, handle, spans, sums) > 0.0
+    return sum_of_bands(beyond, join, handle, row_blocks, sums) > 0.0
 
 
 @njit(forceinline=True)

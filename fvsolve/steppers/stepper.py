@@ -127,22 +127,22 @@ class Stepper:
             views += [self.work[: self.kept], self.vectors[self.k.shape[0]], self.k]
         return views
 
-    def remember(self, memory: np.ndarray) -> np.ndarray:
+    def remember(self, loop_state: np.ndarray) -> np.ndarray:
         """Take back what `memories` held, from one flat array; returns what is left of it."""
         for view in self.memories():
-            view[...] = memory[: view.size].reshape(view.shape)
-            memory = memory[view.size :]
+            view[...] = loop_state[: view.size].reshape(view.shape)
+            loop_state = loop_state[view.size :]
         if self.work.size:
             self.work[slots.SHIFT] = -abs(
                 self.work[slots.SHIFT]
             )  # to be factored once more, which is not counted again
-        return memory
+        return loop_state
 
     def counts(self) -> dict[str, int]:
         """How much work the run was."""
         return {name: int(self.memory[at]) for name, at in slots.COUNTS.items()}
 
-    def once(self, rhs, handle, where: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
+    def once(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
         """The state after a single step of h from y at t, whatever step was before; NaN where it is not to be had.
 
         Of what is remembered a Newton step takes the Jacobian alone, a linearly implicit one nothing.
@@ -150,15 +150,15 @@ class Stepper:
         self.y[0] = y
         self.memory[slots.STEPS] += 1.0
         rhs(t, self.y[0], self.k[0], self.out, handle)
-        self.supply[0] = self.out[where : where + self.supply.shape[1]]
+        self.supply[0] = self.out[ledger_offset : ledger_offset + self.supply.shape[1]]
         error = compiled_attempt()(
-            addresses((self.attempt, rhs, *self.algebra, self.join)), handle, self.coefficients, self.shape,
-            self.spans, self.sums, t, h, self.y, 0, 1, self.k, self.supply, where, self.out, self.scale, self.orders,
+            addresses((self.attempt, rhs, *self.algebra, self.join)), handle, self.coefficients, self.shape, self.spans,
+            self.sums, t, h, self.y, 0, 1, self.k, self.supply, ledger_offset, self.out, self.scale, self.orders,
             self.memory, self.work, self.vectors, self.store, self.store_complex,
         )  # fmt: skip
         return self.y[1].copy() if error != slots.NEWTON_FAILED else np.full(y.size, np.nan)
 
-    def call(self, leap, observe, record, events, rhs, handle, where: int, armed: np.ndarray) -> int:
+    def call(self, leap, observe, record, events, rhs, handle, ledger_offset: int, armed: np.ndarray) -> int:
         """March on; returns one of the codes of `steppers.orders`."""
         if self.orders[slots.APART] and self.orders[slots.CONTROL] != slots.TOLERANCE and not self.spare[0].size:
             flat = np.zeros(self.work.size + self.store.size)
@@ -167,7 +167,7 @@ class Stepper:
         return self.march(
             addresses((self.attempt, leap, observe, record, events, rhs, *self.algebra, self.join)), handle,
             self.coefficients, self.shape, self.spans, self.sums, self.dense, self.orders, self.memory, self.times,
-            self.flags, self.y, self.k, self.f_old, self.supply, where, self.ledger, self.scale, self.out,
+            self.flags, self.y, self.k, self.f_old, self.supply, ledger_offset, self.ledger, self.scale, self.out,
             self.out_row, self.values, self.g, self.g_new, armed, self.stored, self.carry, self.y_out, self.rows,
             *self.within, self.work, self.vectors, self.store, self.store_complex, *self.spare, self.largest,
         )  # fmt: skip

@@ -25,8 +25,8 @@ SLOW, FARTHEST = 0.4, 10.0  # what a sweep may leave of the change of the one be
 
 @inner
 def sweep(
-    rhs, factor, solve, handle, coefficients, low, shape, t, h, y, y_stage, k, supply, where, out, scale, orders,
-    memory, nnz, room, work, vectors, store,
+    rhs, factor, solve, handle, coefficients, low, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out,
+    scale, controls, loop_state, nnz, room, work, vectors, factors,
 ):  # fmt: skip
     """Slopes k of the stages and their ledger rates; returns CONVERGED or FAILED.
 
@@ -35,8 +35,8 @@ def sweep(
     """
     s, n = k.shape
     q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
-    enough, rounded, floor = tight(orders)
-    still = floor if orders[CONTROL] == TOLERANCE else rounded
+    enough, rounded, floor = tight(controls)
+    still = floor if controls[CONTROL] == TOLERANCE else rounded
     before = 0.0
     for i in range(1, s):
         if low[(i - 1) * s] == 0.0:
@@ -59,8 +59,8 @@ def sweep(
                 for e in range(n):
                     k[i, e] = (y[e] - base[e]) / own
             if reach(
-                rhs, factor, solve, handle, shape, t + c[i] * h, own, i, k, y, y_stage, supply, where, out, scale,
-                orders, memory, nnz, work, vectors, store,
+                rhs, factor, solve, handle, structure, t + c[i] * h, own, i, k, y, y_stage, ledger_rates, ledger_offset,
+                out, scale, controls, loop_state, nnz, work, vectors, factors,
             ) == FAILED:  # fmt: skip
                 return FAILED
             last = vectors[room + i - 1]
