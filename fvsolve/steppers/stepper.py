@@ -92,8 +92,8 @@ class Stepper:
     @property
     def dense_order(self) -> int:
         """Order of what stands between steps: of the method's polynomial, else of the cubic through both ends."""
-        more = self.method.kind == "full" and bent(self.method).size > 0
-        return min(self.dense.shape[1] + more, self.method.order) if self.dense.size else 3
+        extra = self.method.kind == "full" and bent(self.method).size > 0
+        return min(self.dense.shape[1] + extra, self.method.order) if self.dense.size else 3
 
     @property
     def apart(self) -> int:
@@ -140,7 +140,7 @@ class Stepper:
 
     def counts(self) -> dict[str, int]:
         """How much work the run was."""
-        return {name: int(self.memory[at]) for name, at in slots.COUNTS.items()}
+        return {name: int(self.memory[index]) for name, index in slots.COUNTS.items()}
 
     def once(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
         """The state after a single step of h from y at t, whatever step was before; NaN where it is not to be had.
@@ -189,10 +189,10 @@ def attempt_of(kind: str, algebra: str = ""):
 
     A second process compiles the linear algebra meanwhile, for real shifts and those of full methods.
     """
-    room = f"fvsolve.steppers.{KINDS[kind][0]}"
+    module = f"fvsolve.steppers.{KINDS[kind][0]}"
     if not algebra:
-        return compiled_step(importlib.import_module(room).attempt)
+        return compiled_step(importlib.import_module(module).attempt)
     shifts = {False, kind == "full"}
     code = f"from fvsolve.steppers.structure import functions; [functions({algebra!r}, of) for of in {shifts}]"
     with beside(code, "factor"):
-        return compiled_step(importlib.import_module(room).attempt)
+        return compiled_step(importlib.import_module(module).attempt)
