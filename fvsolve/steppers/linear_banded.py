@@ -1,6 +1,6 @@
 """Banded LU factors of shift I - J with partial pivoting, for models that are a single line of cells.
 
-States are reordered so that neighbours are adjacent. The store holds the rows of U from the first column that
+States are reordered so that neighbours are adjacent. The array `factors` holds the rows of U from the first column that
 they can reach, multipliers column by column, the original row of each pivot, a work vector, and the upper
 bandwidth of U.
 """
@@ -20,7 +20,7 @@ STAYS = 0.1
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(bandwidths, order of the states, place of every Jacobian entry in the store; length of the store)."""
+    """(bandwidths, order of the states, place of every Jacobian entry in the factors; length of the factors)."""
     n = pattern.shape[1]
     order, below, above = band(pattern)
     width = below + 1 + CHUNK * -(-(below + above) // CHUNK)
@@ -65,7 +65,7 @@ def subtract(factor, x, y, chunks):
 
 
 def factor(structure, jacobian, shift, factors):
-    """store <- L U of shift I - J, with row exchanges; returns 0, or 1 + the state without a pivot."""
+    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the state without a pivot."""
     n, own = structure[SIZE], structure[structure[OWN] :]
     below, above, width, order = own[BELOW], own[ABOVE], own[WIDTH], own[ORDER:]
     place, lower = order[n:], factors[n * width :]

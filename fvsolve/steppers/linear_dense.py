@@ -1,6 +1,6 @@
 """Dense LU factors of shift I - J with partial pivoting, row by row, for a few dozen states at most.
 
-The store holds the rows of L and U, with 1 / U_ii on the diagonal, then the original row of each pivot.
+The array `factors` holds the rows of L and U, with 1 / U_ii on the diagonal, then the original row of each pivot.
 """
 
 import numpy as np
@@ -10,13 +10,13 @@ from fvsolve.steppers.structure import ROWS, SIZE, STARTS
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(no data beyond the pattern, length of the store)."""
+    """(no data beyond the pattern, length of the factors)."""
     n = pattern.shape[1]
     return np.zeros(0, dtype=np.int64), n * n + n
 
 
 def factor(structure, jacobian, shift, factors):
-    """store <- L U of shift I - J, with row exchanges; returns 0, or 1 + the column without a pivot."""
+    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the column without a pivot."""
     n = structure[SIZE]
     starts, rows, pivots = structure[structure[STARTS] :], structure[structure[ROWS] :], factors[n * n :]
     a = factors[: n * n].reshape((n, n))

@@ -1,7 +1,7 @@
 """Sparse LU factors of shift I - J on a fixed pattern of 2 x 2 blocks, with pivots on the diagonal.
 
 States are grouped in pairs, pairs in an order that keeps the factors sparse; the pattern of the factors is computed
-once. The store holds the blocks of L and U by rows, the inverses of the diagonal blocks, and a work row; a block
+once. The array `factors` holds the blocks of L and U by rows, the inverses of the diagonal blocks, and a work row; a block
 is four numbers, row by row.
 """
 
@@ -20,7 +20,7 @@ LOST = 1e-13  # least determinant of a diagonal block, relative to its value bef
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(order of the states, patterns of L, U and J by rows, all behind their offsets; length of the store)."""
+    """(order of the states, patterns of L, U and J by rows, all behind their offsets; length of the factors)."""
     members, rows, columns, places = blocks(pattern)
     count = len(members)
     order = minimum_degree(pattern_of(rows, columns, count))
@@ -138,7 +138,7 @@ def clear(block):
 
 
 def factor(structure, jacobian, shift, factors):
-    """store <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
+    """factors <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
 
     The pivot of a diagonal block is good if its determinant is at least 1e-13 of its value before elimination and of
     its two terms: a measure that does not depend on the units of states.
