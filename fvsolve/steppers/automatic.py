@@ -56,12 +56,12 @@ def change(stepper: Stepper) -> tuple[float, float, float]:
 
 def account(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:
     """List the methods used: start time, method, reason."""
-    entries = [{"time": start, "method": EXPLICIT, "why": "until the spectrum forbids it"}]
+    entries = [{"time": start, "method": EXPLICIT, "why": "until stability limits the explicit steps"}]
     for k, (t, radius, h) in enumerate(changes):
         if k % 2 == 0:
-            reason = (f"stability held explicit steps to {h:.3g} s"
+            reason = (f"stability limited explicit steps to {h:.3g} s"
                    + (f", at rates of about {radius:.3g} 1/s" if radius > 0 else "")
-                   + f"; an implicit step costs about {price:.2g} of them")  # fmt: skip
+                   + f"; an implicit step costs about {price:.2g} explicit steps")  # fmt: skip
         else:
             reason = f"rates of about {radius:.3g} 1/s allow explicit steps near {h:.3g} s again"
         entries.append({"time": t, "method": EXPLICIT if k % 2 else implicit_method(rtol), "why": reason})

@@ -159,14 +159,14 @@ class Stepper:
         )  # fmt: skip
         return self.y[1].copy() if error != slots.NEWTON_FAILED else np.full(y.size, np.nan)
 
-    def call(self, leap, observe, record, events, rhs, handle, ledger_offset: int, armed: np.ndarray) -> int:
+    def call(self, fused_step, observe, record, events, rhs, handle, ledger_offset: int, armed: np.ndarray) -> int:
         """Continue the time loop; returns a code of `steppers.slots`, from DONE to CHATTERS."""
         if self.orders[slots.APART] and self.orders[slots.CONTROL] != slots.TOLERANCE and not self.spare[0].size:
             flat = np.zeros(self.work.size + self.store.size)
             spare = np.zeros((len(self.k) + len(self.vectors), self.scale.size))
             self.spare = spare, np.zeros_like(self.supply), flat, self.store_complex.copy()
         return self.march(
-            addresses((self.attempt, leap, observe, record, events, rhs, *self.algebra, self.join)), handle,
+            addresses((self.attempt, fused_step, observe, record, events, rhs, *self.algebra, self.join)), handle,
             self.coefficients, self.shape, self.spans, self.sums, self.dense, self.orders, self.memory, self.times,
             self.flags, self.y, self.k, self.f_old, self.supply, ledger_offset, self.ledger, self.scale, self.out,
             self.out_row, self.values, self.g, self.g_new, armed, self.stored, self.carry, self.y_out, self.rows,
