@@ -98,11 +98,11 @@ def own_modes(model) -> Modes:
 
     def rates(moved: np.ndarray) -> np.ndarray:
         found = np.zeros(model.y_size)
-        model.functions.rhs(t, moved, found, out, slate.handle)
+        model.functions.rhs(t, moved, found, out, run_data.handle)
         return found[which]
 
-    with model.slate() as slate:
-        slate.evaluate(t, y, np.inf)  # which sets what holds there
+    with model.slate() as run_data:
+        run_data.evaluate(t, y, np.inf)  # which sets what holds there
         for k, i in enumerate(which):
             high, low = y.copy(), y.copy()
             high[i], low[i] = y[i] + width[i], y[i] - width[i]

@@ -47,7 +47,7 @@ class Room(NamedTuple):
 
 
 def step_limits(
-    model, rates: dict[str, float] | None = None, astray: float | None = None, slate: Slate | None = None
+    model, rates: dict[str, float] | None = None, astray: float | None = None, run_data: Slate | None = None
 ) -> list[Notice]:
     """A notice for the pipe, for every basin, and for what is no wave, whose step is beyond its limit.
 
@@ -64,7 +64,7 @@ def step_limits(
         return lines
     try:
         rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
-        h = first_step(model, slate)
+        h = first_step(model, run_data)
         modes = lumped_modes(model, method.name, h) if h > 0.0 else []
         growing = swings(model, method.name, h, span(model)) if h > 0.0 else []
     except FvsolveError:  # a method whose stability function is not to be had
@@ -75,16 +75,16 @@ def step_limits(
     return found + [of_mode(model.case, h, mode, method.name, astray, jumps) for mode in modes] + growing + lines
 
 
-def first_step(model, slate: Slate | None = None) -> float:
+def first_step(model, run_data: Slate | None = None) -> float:
     """The step of a run, by Courant number that of its start; 0 where none is known [s]."""
     numerics = model.case.numerics
     if numerics.step is not None:
         return numerics.step
-    if slate is None or model.basins:  # which keep more on a slate than flags
+    if run_data is None or model.basins:  # which keep more on a slate than flags
         rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
     else:
-        rate = float(slate.evaluate(numerics.start, model.start, math.inf)[1][rec.RATE])
-        slate.blank()
+        rate = float(run_data.evaluate(numerics.start, model.start, math.inf)[1][rec.RATE])
+        run_data.blank()
     return numerics.courant / rate if rate > 0.0 else 0.0
 
 

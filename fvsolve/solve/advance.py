@@ -79,38 +79,38 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
             near = nearest(str(name), known)
             hint = f'; did you mean "{near}"?' if near else f"; inputs are {', '.join(known)}"
             raise FvsolveError(f"no input named {show(name)}{hint}")
-        one = known[name]
-        found = checked(name, value, one)
-        if one.node >= 0 and not linear:  # what is linear in it is made one of pressure, else it stays a head
-            nodes["head_given"][one.node] = one.sort is HEAD
+        target = known[name]
+        converted = checked(name, value, target)
+        if target.node >= 0 and not linear:  # what is linear in it is made one of pressure, else it stays a head
+            nodes["head_given"][target.node] = target.sort is HEAD
         else:
-            found = one.scale * found + one.offset
-        parts = [(one.schedule, found)]
-        if one.other >= 0:
-            parts = [(one.schedule, max(found, 0.0)), (one.other, max(-found, 0.0))]
+            converted = target.scale * converted + target.offset
+        parts = [(target.schedule, converted)]
+        if target.other >= 0:
+            parts = [(target.schedule, max(converted, 0.0)), (target.other, max(-converted, 0.0))]
         for schedule, part in parts:
             schedules[schedule] = (len(pieces) + len(rows), 1)
             rows.append([-np.inf, 0.0, 0.0, part, 0.0, 0.0, 0.0])
-        if one.scalar >= 0:  # which no value may leave
-            bounds = scalars[one.scalar]
-            bounds["least"], bounds["greatest"] = min(bounds["least"], found), max(bounds["greatest"], found)
+        if target.scalar >= 0:  # which no value may leave
+            bounds = scalars[target.scalar]
+            bounds["least"], bounds["greatest"] = min(bounds["least"], converted), max(bounds["greatest"], converted)
     pieces = np.vstack([pieces, rows])
     return replace(model, tables=tables._replace(schedules=schedules, nodes=nodes, scalars=scalars, pieces=pieces))
 
 
-def checked(name: str, value: float, one: Input) -> float:
+def checked(name: str, value: float, target: Input) -> float:
     """The value of an input [SI]; FvsolveError where it is no number or none that the part can have."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise FvsolveError(f"{name} = {show(value)} is no number; wanted {one.sort.wanted}")
-    found = float(value)
-    if not math.isfinite(found):
-        raise FvsolveError(f"{name} = {found} is not finite; wanted {one.sort.wanted}")
-    if not one.sort.least <= found <= one.sort.greatest:
-        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {one.sort.wanted}")
-    pressure = one.scale * found + one.offset
-    if one.node >= 0 and not pressure > 0.0:
-        said = f"{name} = {found:g}" + (f" is {pressure:.4g} Pa absolute" if one.sort is HEAD else " is a vacuum")
-        raise FvsolveError(f"{said}; wanted {one.sort.wanted}")
-    return found
+        raise FvsolveError(f"{name} = {show(value)} is no number; wanted {target.sort.wanted}")
+    number = float(value)
+    if not math.isfinite(number):
+        raise FvsolveError(f"{name} = {number} is not finite; wanted {target.sort.wanted}")
+    if not target.sort.least <= number <= target.sort.greatest:
+        raise FvsolveError(f"{name} = {number:g} is out of range; wanted {target.sort.wanted}")
+    pressure = target.scale * number + target.offset
+    if target.node >= 0 and not pressure > 0.0:
+        text = f"{name} = {number:g}" + (f" is {pressure:.4g} Pa absolute" if target.sort is HEAD else " is a vacuum")
+        raise FvsolveError(f"{text}; wanted {target.sort.wanted}")
+    return number

@@ -38,51 +38,51 @@ class Cut:
 
     def alike(self) -> list[tuple[int, int]]:
         """Where states lie that all bands step."""
-        found, at = [], 0
+        runs, start = [], 0
         for b in sorted(self.basins, key=lambda b: self.model.tables.basins[b]["y"]):
             row = self.model.tables.basins[b]
-            found.append((at, int(row["y"])))
-            at = int(row["y"] + quantities(self.model, b) * row["n"])
-        found.append((at, self.model.y_size))
-        return [one for one in found if one[1] > one[0]] or [(0, 0)]
+            runs.append((start, int(row["y"])))
+            start = int(row["y"] + quantities(self.model, b) * row["n"])
+        runs.append((start, self.model.y_size))
+        return [run for run in runs if run[1] > run[0]] or [(0, 0)]
 
     def spans(self, k: int) -> np.ndarray:
         """What band k steps, as `steppers.step` has it, those that are alike first : int64[q, 4]."""
         alike = self.alike()
-        found, first = [(*one, m, 1) for m, one in enumerate(alike)], len(alike)
+        blocks, first = [(*run, m, 1) for m, run in enumerate(alike)], len(alike)
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
             n, nx, ny, y = (int(basin[key]) for key in ("n", "nx", "ny", "y"))
             for q in range(quantities(self.model, b)):
                 begin, stop = (y + q * n + nx * int(row) for row in rows[k : k + 2])
-                found.append((begin, stop, first + int(rows[k]), int(rows[k + 1] - rows[k])))
+                blocks.append((begin, stop, first + int(rows[k]), int(rows[k + 1] - rows[k])))
                 first += ny
-        return np.array(found, dtype=np.int64)
+        return np.array(blocks, dtype=np.int64)
 
     def bands(self, k: int) -> np.ndarray:
         """Rows of all basins that band k steps, as `Slate` has them : int64[2 basins]."""
         table = self.model.tables.basins
-        found = np.zeros((len(table), 2), dtype=np.int64)
-        found[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
+        rows_of = np.zeros((len(table), 2), dtype=np.int64)
+        rows_of[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
         for rows, b in zip(self.firsts, self.basins, strict=True):
-            found[b] = rows[k : k + 2]
-        return found.ravel()
+            rows_of[b] = rows[k : k + 2]
+        return rows_of.ravel()
 
     def states(self, k: int) -> np.ndarray:
         """Runs of states that band k takes from others, (owner, first, beyond the last) : int64[r, 3]."""
-        found = []
+        parts = []
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
             nx, ny = int(basin["nx"]), int(basin["ny"])
             near = np.arange(max(rows[k] - REACH, 0), min(rows[k + 1] + REACH, ny))
             cells = [(nx * near[:, None] + np.arange(nx)).ravel(), *looked_at(self.model, b)]
             for q in range(quantities(self.model, b)):
-                found.append(runs(np.concatenate(cells), nx, rows, k, int(basin["y"] + q * basin["n"])))
-        return np.concatenate(found)
+                parts.append(runs(np.concatenate(cells), nx, rows, k, int(basin["y"] + q * basin["n"])))
+        return np.concatenate(parts)
 
     def flows(self, k: int) -> np.ndarray:
         """Likewise of flows through open boundaries, which lie in `work`."""
-        found = [np.zeros((0, 3), dtype=np.int64)]
+        parts = [np.zeros((0, 3), dtype=np.int64)]
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
             nx, ny, at = int(basin["nx"]), int(basin["ny"]), int(basin["through"])
@@ -90,8 +90,8 @@ class Cut:
                 continue
             row = np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
             owner = np.searchsorted(rows, row, "right") - 1
-            found.append(joined(np.arange(row.size), owner, k, at))
-        return np.concatenate(found)
+            parts.append(joined(np.arange(row.size), owner, k, at))
+        return np.concatenate(parts)
 
     @property
     def together(self) -> bool:
@@ -130,11 +130,11 @@ def joined(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.ndarray
     return np.column_stack([owner[np.append(0, new)], at + first, at + last + 1]).astype(np.int64)
 
 
-def cut(model: Model, many: int) -> Cut:
+def cut(model: Model, count: int) -> Cut:
     """A model's basins that can be cut, in so many bands of as many rows each."""
-    which = tuple(b for b, basin in enumerate(model.basins) if not basin.whole)
-    rows = model.tables.basins["ny"][[*which]] if which else np.zeros(0, dtype=np.int64)
-    return Cut(model, many, which, np.arange(many + 1) * rows[:, None] // many)
+    basins = tuple(b for b, basin in enumerate(model.basins) if not basin.whole)
+    rows = model.tables.basins["ny"][[*basins]] if basins else np.zeros(0, dtype=np.int64)
+    return Cut(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
 
 
 def alone(model: Model) -> str:
@@ -154,23 +154,23 @@ def said_whole(model: Model) -> str:
 
 def shared(model: Model) -> dict:
     """What threads can share out: rows of basins, at most so many threads, and why not of others; for `check`."""
-    why = alone(model)
-    rows = {} if why else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.whole}
-    kept = {basin.name: basin.whole for basin in model.basins if basin.whole}
-    return {"rows": rows, "whole": kept, "most": min(rows.values(), default=1), "why": why}
+    reason = alone(model)
+    rows = {} if reason else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.whole}
+    undivided = {basin.name: basin.whole for basin in model.basins if basin.whole}
+    return {"rows": rows, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
 
 
 def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
     """How many threads step a model that is given so many, and what is to be known; FvsolveError where too many."""
     if threads == 1:
         return 1, []
-    found = shared(model)
-    if why := found["why"]:
-        return 1, [Notice("threads", "numerics", f"one thread steps it, not {threads}: {why}", "threads")]
-    few = [f"{name} has {rows} rows" for name, rows in found["rows"].items() if rows < threads]
+    divisible = shared(model)
+    if reason := divisible["why"]:
+        return 1, [Notice("threads", "numerics", f"one thread steps it, not {threads}: {reason}", "threads")]
+    few = [f"{name} has {rows} rows" for name, rows in divisible["rows"].items() if rows < threads]
     if few:
         raise FvsolveError(
-            f"threads = {threads}: {listing(few)}, and each thread needs one; wanted {found['most']} at most"
+            f"threads = {threads}: {listing(few)}, and each thread needs one; wanted {divisible['most']} at most"
         )
     text = f"each thread steps the whole of {said_whole(model)}"
-    return threads, [Notice("threads", "numerics", text, "threads")] if found["whole"] else []
+    return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []

@@ -35,13 +35,13 @@ class Halves:
     its least and its greatest: what a resumed run needs
     """
 
-    def __init__(self, slate) -> None:
-        model, self.step = slate.model, float(slate.clock["step"])
+    def __init__(self, run_data) -> None:
+        model, self.step = run_data.model, float(run_data.clock["step"])
         numerics = model.case.numerics
         method = method_named(automatic.first_method(numerics.method))
         lines = model.tables.pipes["y"][model.tables.pipes["delay"] >= 0]  # what they hold moves nothing
-        which = lumped(model) if method.explicit else np.setdiff1d(np.arange(model.y_size), lines)
-        self.model, self.which = model, which[: None if self.step > 0.0 else 0]
+        states = lumped(model) if method.explicit else np.setdiff1d(np.arange(model.y_size), lines)
+        self.model, self.which = model, states[: None if self.step > 0.0 else 0]
         self.kept = np.zeros(4 + 5 * self.which.size)
         self.error, self.astray, self.sums, self.least, self.greatest = self.kept[4:].reshape(5, -1)
         self.least[:] = self.greatest[:] = model.start[self.which]
@@ -70,20 +70,20 @@ class Halves:
             return
         self.kept[1] = steps + 1.0  # the next one, if this says nothing
         end = loop.orders[slots.END]
-        whole = self.step if loop.t < end else min(self.step, end - memory[slots.T_MARK])
-        if h < WHOLE * whole or mended(loop):
+        full_step = self.step if loop.t < end else min(self.step, end - memory[slots.T_MARK])
+        if h < WHOLE * full_step or mended(loop):
             return
         before, now = loop.before[self.which], loop.now[self.which]
         t = loop.t - h
         middle = self.stepped(loop, t, loop.before, 0.5 * h, fresh=True)
-        halves = self.stepped(loop, t + 0.5 * h, middle, 0.5 * h)
-        if not np.all(np.isfinite(halves)):  # such a step is not to be had
+        half_steps = self.stepped(loop, t + 0.5 * h, middle, 0.5 * h)
+        if not np.all(np.isfinite(half_steps)):  # such a step is not to be had
             return
         for state in (before, now):
             np.fmin(self.least, state, out=self.least)
             np.fmax(self.greatest, state, out=self.greatest)
         with np.errstate(over="ignore", invalid="ignore"):  # of what grows beyond all numbers
-            self.gather(loop, h, steps - self.kept[2], halves - loop.now)
+            self.gather(loop, h, steps - self.kept[2], half_steps - loop.now)
         self.kept[:3] = self.kept[0] + 1.0, steps + self.every, steps
 
     def gather(self, loop, h: float, steps: float, error: np.ndarray) -> None:
@@ -92,16 +92,16 @@ class Halves:
         size = float(np.linalg.norm(own / widths))
         if size > ROUNDING:
             moved = self.stepped(loop, loop.t - h, loop.before + error, h) - loop.now
-            left = float(np.linalg.norm(moved[self.which] / widths)) / size
-            self.kept[3] = left if left < 1.0 else 1.0
-        left = self.kept[3]
-        after = left ** (steps - 1.0)
-        many = steps - 1.0 if left > 1.0 - ROUNDING else (1.0 - after) / (1.0 - left)
-        self.astray[:] = left * (after * self.astray + many * np.fmin(own, self.error)) + own
+            remaining = float(np.linalg.norm(moved[self.which] / widths)) / size
+            self.kept[3] = remaining if remaining < 1.0 else 1.0
+        remaining = self.kept[3]
+        power = remaining ** (steps - 1.0)
+        sum_of_powers = steps - 1.0 if remaining > 1.0 - ROUNDING else (1.0 - power) / (1.0 - remaining)
+        self.astray[:] = remaining * (power * self.astray + sum_of_powers * np.fmin(own, self.error)) + own
         self.error[:] = own
         self.sums += self.astray
 
-    def stepped(self, loop, t: float, y: np.ndarray, h: float, fresh=False) -> np.ndarray:
+    def stepped(self, loop, t: float, y: np.ndarray, h: float, first=False) -> np.ndarray:
         """One step of the run's method from a state, as devices stand now; `fresh` for the first at a place."""
         if self.stepper is None:
             model = self.model
@@ -114,7 +114,7 @@ class Halves:
                 model.damped,
             )
             self.stepper.out = model.new_out()
-        if fresh:
+        if first:
             self.stepper.forget()
         self.stepper.orders[:] = loop.orders
         return self.stepper.once(loop.rhs, loop.slate.handle, int(self.model.layout["supply"]), t, h, y)
@@ -138,10 +138,10 @@ class Halves:
         if not DOUBTFUL <= share < np.inf:  # what is not finite has stopped the run
             return None
         ok = share < WRONG
-        said = "it may be wrong" if ok else "the numbers are not to be trusted"
+        verdict = "it may be wrong" if ok else "the numbers are not to be trusted"
         steps = self.model.case.step_amount(self.step)
         text = (f"{place}: steps of {steps} leave it about {100 * share:.2g} % of its range astray, on "
-                f"average, by where two halves of them end; {said}; halve the step")  # fmt: skip
+                f"average, by where two halves of them end; {verdict}; halve the step")  # fmt: skip
         key = "step" if self.model.case.numerics.step is not None else "courant"
         return Notice("step-error", place, text, key, share, WRONG, ok)
 

@@ -44,8 +44,8 @@ class Loop:
         self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
         self.rhs, self.observe, self.record, self.events = call.rhs, call.observe, call.record, call.events
-        leaps = leap_allowed(model, method)
-        self.leap = leap_function(leaps)
+        fused_allowed = leap_allowed(model, method)
+        self.leap = leap_function(fused_allowed)
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
         sums = [
@@ -69,7 +69,7 @@ class Loop:
         self.orders[slots.STEP_MAX] = (
             min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT
         )
-        self.orders[slots.STOP_AT], self.orders[slots.LEAPS] = NO_LIMIT, leaps
+        self.orders[slots.STOP_AT], self.orders[slots.LEAPS] = NO_LIMIT, fused_allowed
         for control, key in ((slots.COURANT, "courant"), (slots.FIXED_STEP, "step"), (slots.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[slots.CONTROL], self.orders[slots.SIZE] = control, getattr(numerics, key)
@@ -80,12 +80,12 @@ class Loop:
             self.orders[slots.SIZE] = numerics.courant / model.wave_rate
         given = self.orders[slots.CONTROL] == slots.FIXED_STEP
         self.slate.clock["step"] = self.orders[slots.SIZE] if given else 0.0
-        self.team, one = None, cut(model, 1)
+        self.team, single_band = None, cut(model, 1)
         if method.explicit and numerics.method != automatic.AUTO:
-            stepper.shape = formed(one, 0)
+            stepper.shape = formed(single_band, 0)
             self.slate.written = self.slate.written._replace(sums=stepper.shape)
         if numerics.rtol is not None:  # errors are summed by rows
-            stepper.spans, stepper.sums = one.spans(0), np.zeros(one.sums)
+            stepper.spans, stepper.sums = single_band.spans(0), np.zeros(single_band.sums)
         if comm is not None:
             from fvsolve.solve.ranks import Ranks
 
@@ -126,9 +126,9 @@ class Loop:
 
     def run(self, budget: float) -> int:
         """Take at most `budget` steps; returns one of the codes of `steppers.orders`."""
-        while (room := self.slate.room()) < budget:
-            code = self.steps(room)
-            left, budget = self.orders[slots.BUDGET], budget - room
+        while (capacity := self.slate.room()) < budget:
+            code = self.steps(capacity)
+            left, budget = self.orders[slots.BUDGET], budget - capacity
             if code != slots.CHUNK or left != 0.0 or automatic.wants_change(self.stepper):
                 return code
         return self.steps(budget)
@@ -166,8 +166,8 @@ class Loop:
 
     def note(self, before: np.ndarray) -> None:
         """List the events that have happened since the flags were `before`, and do what they do at once."""
-        first, many = limits.EVENTS * self.tanks.size, len(self.model.events)
-        now = self.armed[first : first + many] > before[first : first + many]
+        first, count = limits.EVENTS * self.tanks.size, len(self.model.events)
+        now = self.armed[first : first + count] > before[first : first + count]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
         self.settle()
 
@@ -205,7 +205,7 @@ class Loop:
         """
         if not len(self.model.tables.columns) and not self.armed.size:  # nor is there an event to be noted
             return []
-        found, out, layout = [], self.evaluate(limit), self.model.layout
+        stopped, out, layout = [], self.evaluate(limit), self.model.layout
         while (event := let_go(self.slate, self.t, self.now, out)) is not None:
             before = self.armed.copy()
             self.armed[event], self.armed[event + 1] = 1.0, 0.0
@@ -214,11 +214,11 @@ class Loop:
         places = shut_places(self.model, out)
         for k, row in enumerate(self.model.tables.columns):
             flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
-            meets = out[layout["led"] + k] == 0.0 and (row["from_node"] in places or row["to_node"] in places)
-            if flow != new and (meets or new == 0.0):
+            collides = out[layout["led"] + k] == 0.0 and (row["from_node"] in places or row["to_node"] in places)
+            if flow != new and (collides or new == 0.0):
                 self.now[row["y"]] = new - row["flow"]
-                found.append((k, flow - new))
-        return found
+                stopped.append((k, flow - new))
+        return stopped
 
     def take_rows(self) -> np.ndarray:
         """Rows written since the last call, as a copy."""
@@ -238,8 +238,8 @@ class Loop:
 
 def longest_step(model: Model) -> float:
     """Step that delay lines are cut for [s]."""
-    asked = model.tables.pipes["delay"] >= 0
-    return float(1.0 / model.wave_rates[asked].max()) if asked.any() else np.inf
+    delay_lines = model.tables.pipes["delay"] >= 0
+    return float(1.0 / model.wave_rates[delay_lines].max()) if delay_lines.any() else np.inf
 
 
 def leap_allowed(model: Model, method: Method) -> bool:

@@ -36,9 +36,9 @@ class Exchange:
         """Bring what others have into place."""
         from mpi4py import MPI
 
-        asked = [self.comm.Irecv(self.rooms[k], k) for k, at in self.takes.items() if at.size]
-        asked += [self.comm.Isend(values[at], k) for k, at in self.gives.items() if at.size]
-        MPI.Request.Waitall(asked)
+        requests = [self.comm.Irecv(self.rooms[k], k) for k, at in self.takes.items() if at.size]
+        requests += [self.comm.Isend(values[at], k) for k, at in self.gives.items() if at.size]
+        MPI.Request.Waitall(requests)
         for k, at in self.takes.items():
             values[at] = self.rooms[k]
 
@@ -62,18 +62,18 @@ class Ranks:
         ranks = range(comm.size)
         self.exchanges = Exchange(comm, [cut.states(k) for k in ranks]), Exchange(comm, [cut.flows(k) for k in ranks])
         self.others = np.ones(cut.sums, dtype=bool)
-        for _, _, first, many in self.member.stepper.spans[len(cut.alike()) if comm.rank > 0 else 0 :]:
-            self.others[first : first + many] = False
-        self.rows = [[slice(*one[:2]) for one in cut.spans(k)[len(cut.alike()) :].tolist()] for k in ranks]
+        for _, _, first, count in self.member.stepper.spans[len(cut.alike()) if comm.rank > 0 else 0 :]:
+            self.others[first : first + count] = False
+        self.rows = [[slice(*block[:2]) for block in cut.spans(k)[len(cut.alike()) :].tolist()] for k in ranks]
         self.stale = True
 
-    def tell_others(self, what: int, address: int, size: int) -> None:
+    def tell_others(self, request: int, address: int, size: int) -> None:
         """What compiled code calls in the middle of a step; all ranks do, or none goes on."""
         try:
             values = np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
-            if what in (joint.OF_STATES, joint.OF_FLOWS):
-                self.exchanges[what](values)
-            elif what == joint.OF_RATES:
+            if request in (joint.OF_STATES, joint.OF_FLOWS):
+                self.exchanges[request](values)
+            elif request == joint.OF_RATES:
                 values[0] = self.greatest(values[0])
             else:
                 values[self.others] = 0.0
@@ -94,13 +94,13 @@ class Ranks:
         """March on with all ranks; returns one of the codes of `steppers.slots`."""
         loop = self.loop
         now = loop.flags[slots.NOW]
-        whole = [(0, loop.model.y_size)] if self.stale else self.cut.alike()
+        runs = [(0, loop.model.y_size)] if self.stale else self.cut.alike()
         small = {name: getattr(loop.stepper, name) for name in SMALL}
         written = {name: getattr(loop.slate.written, name) for name in WRITTEN}
-        states = [loop.stepper.y[now, begin:stop] for begin, stop in whole]
+        states = [loop.stepper.y[now, begin:stop] for begin, stop in runs]
         self.stale = False
         with undisturbed():
-            self.comm.bcast((MARCH, (small, written, whole, states)))
+            self.comm.bcast((MARCH, (small, written, runs, states)))
             code = self.member.march(functions, where)
             self.gather("y", loop.flags[slots.NOW])
             if code == slots.FIELD:
@@ -112,12 +112,12 @@ class Ranks:
         """Bring the rows of all ranks to rank 0."""
         values = getattr(self.loop.stepper, name)[at]
         if self.comm.rank > 0:
-            for one in self.rows[self.comm.rank]:
-                self.comm.Send(values[one], 0)
+            for rows in self.rows[self.comm.rank]:
+                self.comm.Send(values[rows], 0)
             return
         for k in range(1, self.comm.size):
-            for one in self.rows[k]:
-                self.comm.Recv(values[one], k)
+            for rows in self.rows[k]:
+                self.comm.Recv(values[rows], k)
 
     def whole(self, at: int) -> None:
         """Bring row `at` of the states of all ranks to rank 0."""
@@ -134,25 +134,25 @@ class Ranks:
         """Follow rank 0 until it has no more to ask."""
         stepper = self.loop.stepper
         while True:
-            asked, given = self.comm.bcast(None)
-            if callable(asked):  # by whom rank 0 writes to
-                asked(self.comm, self.loop.model, *given)
+            request, argument = self.comm.bcast(None)
+            if callable(request):  # by whom rank 0 writes to
+                request(self.comm, self.loop.model, *argument)
                 continue
-            if asked == CLOSE:
+            if request == CLOSE:
                 return
-            if asked == WHOLE:
-                self.gather("y", given)
+            if request == WHOLE:
+                self.gather("y", argument)
                 continue
-            small, others, whole, states = given
+            small, written, runs, states = argument
             for name, array in small.items():
                 getattr(stepper, name)[...] = array
-            for name, array in others.items():
+            for name, array in written.items():
                 self.member.take(name, array)
-            for (begin, stop), values in zip(whole, states, strict=True):
+            for (begin, stop), values in zip(runs, states, strict=True):
                 stepper.y[stepper.flags[slots.NOW], begin:stop] = values
-            before = time.thread_time()
+            start_time = time.thread_time()
             code = self.member.march(functions, where)
             self.gather("y", stepper.flags[slots.NOW])
             if code == slots.FIELD:
                 self.gather("y_out", ...)
-            self.comm.gather(time.thread_time() - before)
+            self.comm.gather(time.thread_time() - start_time)

@@ -65,12 +65,12 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
         raise FvsolveError(f"threads = {show(threads)} is no number of threads; wanted a whole number, 1 or more")
     if comm is not None and not callable(getattr(comm, "bcast", None)):
         raise FvsolveError(f"comm = {show(comm)} is none of MPI's; wanted mpi4py's MPI.COMM_WORLD, or None")
-    lacks = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
+    missing = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
     try:
         model.given(state.t, state.y)
         run = Run(model, state, sink, progress, threads, comm)
-        if lacks:
-            raise FvsolveError(f"sink = {show(sink)} is none: it has no {listing(lacks)}()")
+        if missing:
+            raise FvsolveError(f"sink = {show(sink)} is none: it has no {listing(missing)}()")
     except BaseException:
         if comm is not None:
             comm.bcast(FAREWELL)
@@ -105,7 +105,7 @@ class Run:
         self.loop.now[:] = state.y
         self.loop.memory[slots.T] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
-        self.watches = [one for basin in model.basins for one in basin.watches(basin.of(model.start))]
+        self.watches = [watch for basin in model.basins for watch in basin.watches(basin.of(model.start))]
         self.soundness = Soundness(self.slate)
         self.loop.stepper.largest = self.soundness.watched
         if self.soundness.close:
@@ -127,18 +127,18 @@ class Run:
 
     def memory(self) -> np.ndarray:
         """Everything that a resumed run needs beside t and y, flat."""
-        kept = [getattr(self.slate, name).ravel() for name in PERSISTENT]
+        arrays = [getattr(self.slate, name).ravel() for name in PERSISTENT]
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
         crowd = self.loop.crowd
         own += [float(len(switched)), *switched, float(len(crowd)), *crowd, self.loop.last_switch, self.loop.at_once]
-        own += [x for one in self.watches for x in one.kept]
-        own += [self.soundness.rates.get(one.name, 0.0) for one in self.soundness.moving]
+        own += [x for watch in self.watches for x in watch.kept]
+        own += [self.soundness.rates.get(watch.name, 0.0) for watch in self.soundness.moving]
         views = (view.ravel() for view in self.loop.stepper.memories())
         own += self.soundness.unfelt.kept.ravel().tolist()
         past = self.slate.past
-        return np.concatenate([own, *views, *kept, self.soundness.halves.kept, past, [float(past.size)]])
+        return np.concatenate([own, *views, *arrays, self.soundness.halves.kept, past, [float(past.size)]])
 
     def remember(self, memory: np.ndarray) -> None:
         memory, past = without_past(memory)
@@ -157,22 +157,25 @@ class Run:
         crowd, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
         self.loop.crowd.extend(crowd.tolist())
         self.loop.last_switch, self.loop.at_once, memory = float(memory[0]), int(memory[1]), memory[2:]
-        for one in self.watches:
-            one.kept[:], memory = memory[: one.kept.size], memory[one.kept.size :]
+        for watch in self.watches:
+            watch.kept[:], memory = memory[: watch.kept.size], memory[watch.kept.size :]
         for basin in self.soundness.moving:
             self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
-        risen = self.soundness.unfelt.kept.ravel()
-        risen[:], memory = memory[: risen.size], memory[risen.size :]
-        seen = self.soundness.halves.kept
-        known = [getattr(self.slate, name) for name in PERSISTENT] + [*self.loop.stepper.memories(), seen]
-        if memory.size != sum(array.size for array in known):
+        sloshing_data = self.soundness.unfelt.kept.ravel()
+        sloshing_data[:], memory = memory[: sloshing_data.size], memory[sloshing_data.size :]
+        step_doubling_data = self.soundness.halves.kept
+        arrays = [getattr(self.slate, name) for name in PERSISTENT] + [
+            *self.loop.stepper.memories(),
+            step_doubling_data,
+        ]
+        if memory.size != sum(array.size for array in arrays):
             raise ValueError("as many numbers as there is nothing for")
         memory = self.loop.stepper.remember(memory)
         for name in PERSISTENT:
             array = getattr(self.slate, name).ravel()
             array[:] = memory[: array.size]
             memory = memory[array.size :]
-        seen[:] = memory
+        step_doubling_data[:] = memory
 
     def state(self) -> State:
         return State(self.loop.t, self.loop.now.copy(), self.memory())
@@ -197,18 +200,18 @@ class Run:
         least, t_least, greatest, t_greatest = self.slate.extremes
         t, values = rows[:, 0], rows[:, 1:]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
-        lower = (found := values[at, each]) < least
+        lower = (extreme := values[at, each]) < least
         if lower.any():
-            least[lower], t_least[lower] = found[lower], t[at][lower]
+            least[lower], t_least[lower] = extreme[lower], t[at][lower]
         at = values.argmax(axis=0)
-        higher = (found := values[at, each]) > greatest
+        higher = (extreme := values[at, each]) > greatest
         if higher.any():
-            greatest[higher], t_greatest[higher] = found[higher], t[at][higher]
+            greatest[higher], t_greatest[higher] = extreme[higher], t[at][higher]
 
     def look(self, t: float, y: np.ndarray) -> None:
         """Let what watches basins see a state."""
-        for one in self.watches:
-            one.look(t, y)
+        for watch in self.watches:
+            watch.look(t, y)
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.look(t, y)
@@ -356,13 +359,15 @@ class Run:
         if code == slots.CHATTERS:
             first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at one time, or crowded over a span
             names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})
-            found = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
-            who = listing(names) if names else "a leak, or a demand that follows the pressure,"
-            remedy = ", or ".join(found) or "give its place the volume of a chamber"
-            return f"stopped: {who} opens and shuts without end at {when}; {remedy}"
+            remedies = {
+                device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
+            }
+            parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
+            remedy = ", or ".join(remedies) or "give its place the volume of a chamber"
+            return f"stopped: {parts_text} opens and shuts without end at {when}; {remedy}"
         if code == slots.STOPPED:
-            what = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
-            return f"stopped: {what} at {when}, as below_vapor asks"
+            event = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
+            return f"stopped: {event} at {when}, as below_vapor asks"
         if code in (slots.BAD_VALUE, slots.BAD_STATUS):
             loop.step_back()
         if code == slots.NEWTON_STUCK:
@@ -378,9 +383,9 @@ class Run:
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_ROOM:
             return f"stopped: the wall has left no room{place} at {when}; give its mass an end-stop, or a wider zone"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WEIGHT:
-            which = int(loop.out[rec.WHERE])
+            index = int(loop.out[rec.WHERE])
             names = [*(basin.name for basin in model.basins), *model.node_names]
-            name = names[which].removesuffix(".inside")
+            name = names[index].removesuffix(".inside")
             return f"stopped: the water in {name} has no weight left at {when}; wanted a body that falls less fast"
         if code == slots.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
@@ -402,12 +407,12 @@ class Run:
         ledger = loop.stepper.ledger.reshape(SUMS, -1)[:2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
-        told = [notice for one in self.watches for notice in one.notices()]
-        warnings = [*self.told, *told, *self.soundness.warnings(ledgers), *run_downs(self.slate),
+        basin_notices = [entry for entry in self.watches for entry in entry.notices()]
+        warnings = [*self.told, *basin_notices, *self.soundness.warnings(ledgers), *run_downs(self.slate),
                     *spills(self.slate)]  # fmt: skip
         warnings += drifts(model, loop.now)
         warnings += parted(model.case.numerics, loop.stepper.counts())
-        ok = reason == "finished" and all(one.ok for one in warnings)
+        ok = reason == "finished" and all(entry.ok for entry in warnings)
         summary = Summary(
             reason, ok, loop.t, find_marks(self.slate), ledgers, find_extremes(self.slate),
             find_envelope(self.slate), find_points(self.slate), find_watched(self.slate),

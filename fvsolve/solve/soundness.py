@@ -24,13 +24,13 @@ class Soundness:
     sound : time of the last state looked at that showed no growth [s]
     """
 
-    def __init__(self, slate) -> None:
-        self.slate, self.model = slate, slate.model
+    def __init__(self, run_data) -> None:
+        self.slate, self.model = run_data, run_data.model
         model = self.model
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
-        self.predicted = step_limits(model, slate=slate)
-        self.halves = Halves(slate)
+        self.predicted = step_limits(model, run_data=run_data)
+        self.halves = Halves(run_data)
         self.unfelt = Unfelt(model)
         self.largest = MOST * drives(model)
         self.grown: Notice | None = None
@@ -57,26 +57,26 @@ class Soundness:
             self.sound = t
         if not np.any(ratio > 1.0):
             return ""
-        at = int(np.argmax(ratio))
-        name, times = self.model.state_names[at], MOST * float(ratio[at])
+        worst = int(np.argmax(ratio))
+        name, times = self.model.state_names[worst], MOST * float(ratio[worst])
         text = (f"{name} has grown to {times:.3g} times what drives it at t = "
                 f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the method's limit: halve it")  # fmt: skip
         self.grown = Notice(
-            "growth", name.partition("[")[0], text, None, float(abs(y[at])), float(self.largest[at]), False
+            "growth", name.partition("[")[0], text, None, float(abs(y[worst])), float(self.largest[worst]), False
         )
         return f"stopped: {text}"
 
     def warnings(self, ledgers: dict) -> list[Notice]:
         """All notices of a run that ended."""
-        found = list(self.predicted)
-        if self.model.case.numerics.step is not None and (found or self.moving):  # now with what the run has shown
-            found = step_limits(self.model, self.rates, np.inf if self.grown else self.halves.worst()[1])
-        astray = self.halves.notice()
-        found += [] if astray is None else [astray]
-        found += crowded(self.slate.past)
-        found += self.unfelt.notices()
-        found += [] if self.grown is None else [self.grown]
-        return found + [one for name, ledger in ledgers.items() for one in unclosed(name, ledger)]
+        notices = list(self.predicted)
+        if self.model.case.numerics.step is not None and (notices or self.moving):  # now with what the run has shown
+            notices = step_limits(self.model, self.rates, np.inf if self.grown else self.halves.worst()[1])
+        step_error = self.halves.notice()
+        notices += [] if step_error is None else [step_error]
+        notices += crowded(self.slate.past)
+        notices += self.unfelt.notices()
+        notices += [] if self.grown is None else [self.grown]
+        return notices + [notice for name, ledger in ledgers.items() for notice in unclosed(name, ledger)]
 
 
 def parted(numerics, counts: dict[str, int]) -> list[Notice]:

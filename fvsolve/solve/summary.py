@@ -86,16 +86,16 @@ class Summary:
         return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
 
 
-def find_marks(slate: Slate) -> list[Mark]:
+def find_marks(run_data: Slate) -> list[Mark]:
     """First time and place of everything the model cannot really follow; cavities are none where the law has them, nor
     is what tanks spill, which is in the ledger."""
-    model, marks = slate.model, slate.marks
+    model, marks = run_data.model, run_data.marks
     if np.isnan(marks).all():
         return []
     pipes, nodes = model.pipes, model.node_names
     kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
-    kinds += [(what, f"nodes.{name}") for what in ("below vapor pressure", "dry", "spilling") for name in nodes]
-    kinds = [(what, place.removesuffix(".inside")) for what, place in kinds]
+    kinds += [(kind, f"nodes.{name}") for kind in ("below vapor pressure", "dry", "spilling") for name in nodes]
+    kinds = [(kind, place.removesuffix(".inside")) for kind, place in kinds]
     kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
     kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
@@ -115,40 +115,40 @@ def find_marks(slate: Slate) -> list[Mark]:
         "dry": "no water is left where outflow is asked for; what flows is made up",
     }
     return [
-        Mark(what, place, float(time), f"{place.split('.', 1)[1]}: {texts[what]}")
-        for (what, place), time in zip(kinds, marks[: len(kinds)], strict=True)
-        if np.isfinite(time) and what in texts and not (what == "below vapor pressure" and model.cavitates)
+        Mark(kind, place, float(time), f"{place.split('.', 1)[1]}: {texts[kind]}")
+        for (kind, place), time in zip(kinds, marks[: len(kinds)], strict=True)
+        if np.isfinite(time) and kind in texts and not (kind == "below vapor pressure" and model.cavitates)
     ]
 
 
-def spills(slate: Slate) -> list[Notice]:
+def spills(run_data: Slate) -> list[Notice]:
     """Tanks that were full to their height, from when on."""
-    model, found = slate.model, []
+    model, notices = run_data.model, []
     first = len(model.pipes) + 2 * len(model.node_names)
-    for node, time in zip(model.node_names, slate.marks[first:], strict=False):
+    for node, time in zip(model.node_names, run_data.marks[first:], strict=False):
         if np.isfinite(time):
             name = node.removesuffix(".inside")
             when = model.case.amount(float(time), "time", 6)
             text = f"{name}: full to its height, it spills from {when} on; the mass ledger has what is lost"
-            found.append(Notice("spilling", f"nodes.{name}", text, "height", float(time)))
-    return found
+            notices.append(Notice("spilling", f"nodes.{name}", text, "height", float(time)))
+    return notices
 
 
-def run_downs(slate: Slate) -> list[Notice]:
+def run_downs(run_data: Slate) -> list[Notice]:
     """What devices outside their laws have to say that is no mark: pumps that ran down, or whose curve goes on."""
-    model, marks = slate.model, slate.marks
+    model, marks = run_data.model, run_data.marks
     first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
     times = marks[first + len(model.devices) :]
     return [
-        made.passing(model, name, part, float(time))
-        for (name, part, made), time in zip(model.devices, times, strict=False)
+        device.passing(model, name, part, float(time))
+        for (name, part, device), time in zip(model.devices, times, strict=False)
         if np.isfinite(time)
     ]
 
 
 def drifts(model: Model, y: np.ndarray) -> list[Notice]:
     """Bodies whose Euler parameters are no longer of length 1, as steps leave them: a measure of these, no more."""
-    found = []
+    notices = []
     for name, row in zip(model.body_names, model.tables.bodies, strict=True):
         if row["joint"] not in (rec.BALL, rec.FREE):
             continue
@@ -158,41 +158,41 @@ def drifts(model: Model, y: np.ndarray) -> list[Notice]:
         if abs(length - 1.0) > DRIFT:
             text = (f"{name}: its Euler parameters have drifted to a length of {length:.9g}, by which they are "
                     "divided; its attitude is off by about as much, and gauss-4 would keep it")  # fmt: skip
-            found.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
-    return found
+            notices.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
+    return notices
 
 
-def find_cavities(slate: Slate) -> list[Cavity]:
+def find_cavities(run_data: Slate) -> list[Cavity]:
     """Every pipe in which pressure fell below twice the vapour pressure: more vapour than gas between the liquid."""
-    model, marks, found = slate.model, slate.marks, []
+    model, marks, cavities = run_data.model, run_data.marks, []
     for k, pipe in enumerate(model.pipes if model.cavitates else ()):
         share, volume, t_volume = (float(x) for x in marks[marks.size - 3 * (len(model.pipes) - k) :][:3])
         if np.isfinite(share):
             time, distance = float(marks[k]), share * pipe.length
-            told = model.case.amount
-            text = (f"{pipe.name}: a cavity opened {told(distance, 'length')} from {pipe.from_} at "
-                    f"{told(time, 'time', 6)}; at most {told(volume, 'volume', silent='l')} at "
-                    f"{told(t_volume, 'time', 6)}")  # fmt: skip
-            found.append(Cavity(f"links.{pipe.name}", time, distance, volume, t_volume, text))
-    return found
+            amount = model.case.amount
+            text = (f"{pipe.name}: a cavity opened {amount(distance, 'length')} from {pipe.from_} at "
+                    f"{amount(time, 'time', 6)}; at most {amount(volume, 'volume', silent='l')} at "
+                    f"{amount(t_volume, 'time', 6)}")  # fmt: skip
+            cavities.append(Cavity(f"links.{pipe.name}", time, distance, volume, t_volume, text))
+    return cavities
 
 
-def find_extremes(slate: Slate) -> dict[str, tuple[float, float, float, float]]:
+def find_extremes(run_data: Slate) -> dict[str, tuple[float, float, float, float]]:
     """Probe -> (least, its time, greatest, its time), over all accepted steps and rows."""
-    table = slate.extremes
-    return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(slate.model.probes)}
+    table = run_data.extremes
+    return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(run_data.model.probes)}
 
 
-def find_watched(slate: Slate) -> dict[str, tuple[float, float, float, float]]:
+def find_watched(run_data: Slate) -> dict[str, tuple[float, float, float, float]]:
     """The same of what is watched beside the probes."""
-    table, few = slate.extremes, len(slate.model.probes)
-    return {probe.text: tuple(map(float, table[:, few + k])) for k, probe in enumerate(slate.model.watched)}
+    table, probe_count = run_data.extremes, len(run_data.model.probes)
+    return {probe.text: tuple(map(float, table[:, probe_count + k])) for k, probe in enumerate(run_data.model.watched)}
 
 
-def find_points(slate: Slate) -> dict[str, dict[str, np.ndarray]]:
+def find_points(run_data: Slate) -> dict[str, dict[str, np.ndarray]]:
     """What `find_envelope` says of cells, and the pressure at the start, of watched places along pipes: their ends and
     the points of profiles."""
-    model, few, found = slate.model, len(slate.model.probes), {}
+    model, probe_count, points = run_data.model, len(run_data.model.probes), {}
     rows: dict[str, list[int]] = {}
     for k in np.flatnonzero(np.isfinite(model.watched_start)):
         rows.setdefault(model.watched[k].name, []).append(int(k))
@@ -200,21 +200,21 @@ def find_points(slate: Slate) -> dict[str, dict[str, np.ndarray]]:
         if not (own := rows.get(pipe.name)):
             continue
         distance = np.array([model.watched[k].fraction * pipe.length for k in own])
-        low, t_low, high, t_high = slate.extremes[:, few + np.array(own)]
-        found[pipe.name] = described(model, pipe, distance, pipe.height(distance), (low, t_low, high, t_high))
-        found[pipe.name]["initial_pressure"] = model.watched_start[own]
-    return found
+        low, t_low, high, t_high = run_data.extremes[:, probe_count + np.array(own)]
+        points[pipe.name] = described(model, pipe, distance, pipe.height(distance), (low, t_low, high, t_high))
+        points[pipe.name]["initial_pressure"] = model.watched_start[own]
+    return points
 
 
-def find_envelope(slate: Slate) -> dict[str, dict[str, np.ndarray]]:
+def find_envelope(run_data: Slate) -> dict[str, dict[str, np.ndarray]]:
     """Pipe -> distance, elevation [m], least and greatest pressure [Pa] and head [m] with their times [s]."""
-    model, envelope, found = slate.model, slate.envelope, {}
+    model, envelope, result = run_data.model, run_data.envelope, {}
     for k, pipe in enumerate(model.pipes):
         cells = model.tables.pipes[k]["cell"] + np.arange(pipe.cells)
         least, greatest = (model.cell_pressure(k, envelope[row, cells]) for row in (0, 2))
         extremes = least, envelope[1, cells], greatest, envelope[3, cells]
-        found[pipe.name] = described(model, pipe, pipe.x, pipe.elevation, extremes)
-    return found
+        result[pipe.name] = described(model, pipe, pipe.x, pipe.elevation, extremes)
+    return result
 
 
 def described(model: Model, pipe, distance, elevation, extremes) -> dict[str, np.ndarray]:
@@ -241,9 +241,13 @@ def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, An
     initial, change = model.contents(y)
     passes = {int(row["node"]) for row in model.tables.patches if row["open"]}
     own = [kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)]  # that make up for it
-    words = [("made_up", "spilled") if within else ("inflow", "outflow") for within in own]
+    words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
     rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)
-    nodes = {name: {come: float(x), gone: float(0.0 - y)} for name, (come, gone), x, y in rows if x != 0.0 or y != 0.0}
+    nodes = {
+        name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
+        for name, (inflow_word, outflow_word), x, y in rows
+        if x != 0.0 or y != 0.0
+    }
     total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}
     remainder = change - float(np.sum(ledger))
     terms = {word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")}

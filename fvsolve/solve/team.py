@@ -45,9 +45,9 @@ class Member:
     team : a `Team` of threads or `Ranks`: board, room, yielding and tell are what `kernels.joint` is to know of it
     """
 
-    def __init__(self, team, k: int, slate: Slate, stepper: Stepper) -> None:
+    def __init__(self, team, k: int, run_data: Slate, stepper: Stepper) -> None:
         cut, loop = team.cut, team.loop
-        self.loop, self.number, self.slate, self.stepper = loop, k, slate, stepper
+        self.loop, self.number, self.slate, self.stepper = loop, k, run_data, stepper
         self.stepper.join, self.stepper.spans = team.join, cut.spans(k)
         self.stepper.sums = np.zeros(cut.sums)
         self.own = [slice(begin, stop) for begin, stop, *_ in self.stepper.spans[len(cut.alike()) :].tolist()]
@@ -61,12 +61,12 @@ class Member:
         self.mine = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.shape}
         self.called = team.functions.calls, team.functions.hooks
         self.open()
-        at, by = loop.stepper.within
-        mine = np.zeros(loop.model.y_size, dtype=bool)
+        at, bounds = loop.stepper.within
+        own_states = np.zeros(loop.model.y_size, dtype=bool)
         for begin, stop, *_ in self.stepper.spans.tolist():
-            mine[begin:stop] = True
-        kept = mine[at[::3]]
-        self.within = np.ascontiguousarray(at.reshape(-1, 3)[kept]).ravel(), by[kept]
+            own_states[begin:stop] = True
+        owned = own_states[at[::3]]
+        self.within = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
 
     def open(self) -> None:
         """What is written here, and the handle that opens it: anew where a past of delay lines has more room."""
@@ -89,8 +89,8 @@ class Member:
             self.take(name, getattr(self.loop.slate.written, name))
         self.stepper.times, self.stepper.largest = self.loop.stepper.times, self.loop.stepper.largest
         now = self.loop.flags[slots.NOW]
-        for one in states:
-            self.stepper.y[now, one] = self.loop.stepper.y[now, one]
+        for rows in states:
+            self.stepper.y[now, rows] = self.loop.stepper.y[now, rows]
 
     def march(self, functions: tuple, where: int) -> int:
         """Go on until there is something to do, and bring what the loop has not."""
@@ -105,25 +105,25 @@ class Member:
     def bring(self, name: str, at) -> None:
         """Copy the rows of this band to the arrays of the loop."""
         if self.number > 0:
-            mine, whole = getattr(self.stepper, name)[at], getattr(self.loop.stepper, name)[at]
-            for one in self.own:
-                whole[one] = mine[one]
+            source, target = getattr(self.stepper, name)[at], getattr(self.loop.stepper, name)[at]
+            for rows in self.own:
+                target[rows] = source[rows]
 
 
 def twin(stepper: Stepper) -> Stepper:
     """Another of the same method, with arrays of its own but for what steps only read."""
-    found = Stepper(stepper.method, stepper.scale.size, stepper.supply.shape[1], stepper.structure, stepper.scale,
+    copy = Stepper(stepper.method, stepper.scale.size, stepper.supply.shape[1], stepper.structure, stepper.scale,
                     stepper.damped)  # fmt: skip
-    found.stored, found.carry, found.within = stepper.stored, stepper.carry.copy(), stepper.within
+    copy.stored, copy.carry, copy.within = stepper.stored, stepper.carry.copy(), stepper.within
     for name in ("out", "out_row", "values", "g", "g_new", "rows"):
-        setattr(found, name, getattr(stepper, name).copy())
-    return found
+        setattr(copy, name, getattr(stepper, name).copy())
+    return copy
 
 
 def banded(cut: Cut) -> tuple:
     """Functions of a model whose bands tell each other, and by what they bring sums together."""
-    cast = replace(cut.model.functions.cast, bands=True, together=cut.together)
-    return functions(cast), compiled_as(joint.share, JOIN)
+    features = replace(cut.model.functions.cast, bands=True, together=cut.together)
+    return functions(features), compiled_as(joint.share, JOIN)
 
 
 class Team:
@@ -140,14 +140,14 @@ class Team:
         self.asked = [SimpleQueue() for _ in self.members]
         self.answers: SimpleQueue = SimpleQueue()
         tasks = zip(self.members, self.asked, strict=True)
-        self.threads = [threading.Thread(target=self.serve, args=one, daemon=True, name="band") for one in tasks]
+        self.threads = [threading.Thread(target=self.serve, args=task, daemon=True, name="band") for task in tasks]
         for thread in self.threads:
             thread.start()
 
-    def serve(self, member: Member, asked: SimpleQueue) -> None:
+    def serve(self, member: Member, requests: SimpleQueue) -> None:
         """What a thread does: march when it is asked to."""
-        while (task := asked.get()) is not None:
-            before = time.thread_time()
+        while (task := requests.get()) is not None:
+            start = time.thread_time()
             try:
                 answer = member.march(*task)
                 member.bring("y", member.stepper.flags[slots.NOW])
@@ -155,17 +155,17 @@ class Team:
                     member.bring("y_out", ...)
             except BaseException as error:  # for whoever asked
                 answer = error
-            self.answers.put((answer, time.thread_time() - before))
+            self.answers.put((answer, time.thread_time() - start))
 
     def call(self, functions: tuple, where: int) -> int:
         """March on with all members; returns one of the codes of `steppers.slots`."""
         for member in self.members:
-            alike = [slice(*one) for one in self.cut.alike()]
+            alike = [slice(*block) for block in self.cut.alike()]
             member.follow(alike + (member.own if self.stale else []))
         self.stale = False
         with undisturbed():
-            for asked in self.asked:
-                asked.put((functions, where))
+            for requests in self.asked:
+                requests.put((functions, where))
             answers = [self.answers.get() for _ in self.members]
         self.seconds += sum(seconds for _, seconds in answers)
         for answer, _ in answers:
@@ -180,8 +180,8 @@ class Team:
 
     def close(self) -> None:
         """Let the threads end."""
-        for asked in self.asked:
-            asked.put(None)
+        for requests in self.asked:
+            requests.put(None)
         for thread in self.threads:
             thread.join()
 
@@ -192,11 +192,11 @@ def undisturbed():
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard, before = [], signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, lambda *given: heard.append(given))
+    signals, before = [], signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, lambda *arguments: signals.append(arguments))
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-    if heard and callable(before):
-        before(*heard[0])
+    if signals and callable(before):
+        before(*signals[0])

@@ -40,13 +40,13 @@ class Unfelt:
         if not self.tanks:
             return ""
         out = self.model.evaluate(t, y)[1]
-        for (name, modal, about, *lifting), kept in zip(self.tanks, self.kept, strict=True):
+        for (name, modal, about, *lifting), record in zip(self.tanks, self.kept, strict=True):
             if modal:
-                keep(kept[RISE], rise(y, *lifting), t)
-            felt, meant = self.weight(out, *about, modal)
-            if felt <= NONE * meant:
+                keep(record[RISE], rise(y, *lifting), t)
+            weight, reference = self.weight(out, *about, modal)
+            if weight <= NONE * reference:
                 return f"stopped: {WEIGHTLESS.format(name=name, when=self.model.case.amount(t, 'time', 6))}"
-            keep(kept[LOSS], abs(felt / meant - 1.0), t)
+            keep(record[LOSS], abs(weight / reference - 1.0), t)
         return ""
 
     def weight(
@@ -60,35 +60,37 @@ class Unfelt:
         turn, gravity = row[room.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
         spin, arm, up = row[room.SPIN :][:3], turn @ place, turn @ normal
         down = np.cross(spin, np.cross(spin, arm)) + (0.0, 0.0, gravity)
-        felt, held = (
+        weight, reference = (
             up @ (row[a:][:3] + np.cross(row[b:][:3], arm) + down)
             for a, b in ((room.ACCELERATION, room.TURNING), (room.BIAS, room.SPIN_BIAS))
         )
-        return float(felt), gravity if modal else float(held)
+        return float(weight), gravity if modal else float(reference)
 
     def notices(self) -> list[Notice]:
         """Waves that were not small, and weight that they did not feel."""
-        found, told = [], self.model.case.amount
-        for (name, *_), (high, when, lost, then) in zip(self.tanks, self.kept.tolist(), strict=True):
-            if high > SMALL:
-                text = f"{name}: at {told(when, 'time')} its water rises by {high:.2g} of its depth, and modes are "
+        notices, amount = [], self.model.case.amount
+        for (name, *_), (height, rise_time, change, change_time) in zip(self.tanks, self.kept.tolist(), strict=True):
+            if height > SMALL:
+                text = f"{name}: at {amount(rise_time, 'time')} its water rises by {height:.2g} of its depth, and modes are "
                 text += 'linear; sloshing = "cells" knows great waves where water is shallow'
-                found.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", high, SMALL))
-            if lost > LIGHT:
-                text = f"{name}: at {told(then, 'time')} its body's rise or fall changes what its "
-                text += f"water weighs by {lost:.2g} of that, which its waves do not feel: they swing as if it did not"
-                found.append(Notice("weight", f"nodes.{name}", text, None, lost, LIGHT))
-        return found
+                notices.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", height, SMALL))
+            if change > LIGHT:
+                text = f"{name}: at {amount(change_time, 'time')} its body's rise or fall changes what its "
+                text += (
+                    f"water weighs by {change:.2g} of that, which its waves do not feel: they swing as if it did not"
+                )
+                notices.append(Notice("weight", f"nodes.{name}", text, None, change, LIGHT))
+        return notices
 
 
 def rises(model, name: str) -> tuple:
     """Of water in modes: its states, their values at the start, by what share of the depth each lifts it, its shape."""
     case = model.case
     basin, mesh = case.nodes[name], case.lumped[name]
-    every = sloshing.made(basin, mesh, case.properties.density, case.gravity)
-    rows = [model.tables.bodies[model.body_names.index(sloshing.slider(name, one))] for one in every]
-    lifts = np.zeros((2, len(every)))
-    lifts[[one.along for one in every], range(len(every))] = [one.rise for one in every]
+    modes = sloshing.made(basin, mesh, case.properties.density, case.gravity)
+    rows = [model.tables.bodies[model.body_names.index(sloshing.slider(name, mode))] for mode in modes]
+    lifts = np.zeros((2, len(modes)))
+    lifts[[mode.along for mode in modes], range(len(modes))] = [mode.rise for mode in modes]
     at, start = [int(row["y"]) for row in rows], np.array([row["start"][0] for row in rows])
     return np.array(at), start, lifts / sloshing.depth_of(basin, mesh), sloshing.outline_of(mesh).is_round
 
@@ -99,7 +101,7 @@ def rise(y: np.ndarray, at: np.ndarray, start: np.ndarray, lifts: np.ndarray, is
     return float(np.hypot(along, across)) if is_round else float(along + across)
 
 
-def keep(kept: np.ndarray, value: float, t: float) -> None:
+def keep(record: np.ndarray, value: float, t: float) -> None:
     """Note what is greater than before."""
-    if value > kept[0]:
-        kept[:] = value, t
+    if value > record[0]:
+        record[:] = value, t

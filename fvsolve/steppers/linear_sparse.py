@@ -1,8 +1,8 @@
 """Sparse LU factors of shift I - J on a fixed pattern of 2 x 2 blocks, with pivots on the diagonal.
 
 States are grouped in pairs, pairs in an order that keeps the factors sparse; the pattern of the factors is computed
-once. The array `factors` holds the blocks of L and U by rows, the inverses of the diagonal blocks, and a work row; a block
-is four numbers, row by row.
+once. The array `factors` holds the blocks of L and U by rows, the inverses of the diagonal blocks, and a work row; a
+block is four numbers, row by row.
 """
 
 import numpy as np
