@@ -407,7 +407,7 @@ class Run:
         ledger = loop.stepper.ledger.reshape(SUMS, -1)[:2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
-        basin_notices = [entry for entry in self.watches for entry in entry.notices()]
+        basin_notices = [notice for entry in self.watches for notice in entry.notices()]
         warnings = [*self.told, *basin_notices, *self.soundness.warnings(ledgers), *run_downs(self.slate),
                     *spills(self.slate)]  # fmt: skip
         warnings += drifts(model, loop.now)
