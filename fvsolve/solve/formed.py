@@ -1,4 +1,4 @@
-"""Which sums of stages are formed beside the rates of a model, and which steps form themselves. Knows tables."""
+"""Stage sums in cache blocks: sums that the rates of a model form, and sums that steps form themselves."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from fvsolve.basins.bands import REACH
 from fvsolve.kernels import sums
 from fvsolve.solve.bands import Cut, looked_at, quantities
 
-BLOCK = 4096  # cells at a time: their arrays and what rates work in fit a second-level cache
-FEWEST = 2**17  # states of a basin that all passes of a step find in the second-level cache anyway
+BLOCK = 4096  # cells of a block: their arrays and the work arrays of the rates fit into a second-level cache
+FEWEST = 2**17  # least number of states of a basin: smaller basins stay in the second-level cache during a step
 
 
 def formed(cut: Cut, k: int) -> np.ndarray:
-    """`sums` of band k, see `kernels.sums`; empty where nothing is formed so : int64[...]."""
+    """Table `sums` of band k, see `kernels.sums`; empty if no stages are formed in blocks : int64[...]."""
     model = cut.model
     blocked_basins = [
         b for b in cut.basins if model.basins[b].sums_rows and quantities(model, b) * model.basins[b].n >= FEWEST
@@ -38,14 +38,14 @@ def formed(cut: Cut, k: int) -> np.ndarray:
 
 
 def rows_at(model, b: int, q: int, first: int, stop: int) -> tuple[int, int]:
-    """Where rows of a quantity of a basin lie."""
+    """(first, one beyond the last) state of rows of a quantity of a basin."""
     basin = model.tables.basins[b]
     at, nx = int(basin["y"] + q * basin["n"]), int(basin["nx"])
     return at + nx * first, at + nx * stop
 
 
 def cells_at(model, b: int, q: int, first: int, stop: int) -> list[tuple[int, int]]:
-    """Where a quantity of cells lies that all look at, of these rows."""
+    """Runs of states, within these rows, of cells that all bands read."""
     begin, end = rows_at(model, b, q, first, stop)
     at = begin - int(model.tables.basins[b]["nx"]) * first
     cells = at + np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *looked_at(model, b)]))

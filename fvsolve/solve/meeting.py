@@ -1,4 +1,4 @@
-"""What happens at once where rigid columns alone meet: an impulse of pressure, or air. Knows flows; takes no step."""
+"""Collision and separation of rigid columns at nodes without other flow: pressure impulses, admission of air."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from fvsolve.kernels.rigid import gate_inflow
 from fvsolve.model import Model, Slate
 
-NONE = 1e-9  # of a small flow: columns that part no quicker are rounding
+NONE = 1e-9  # relative to a small flow: columns that separate more slowly separate by rounding
 
 
 def shut_places(model: Model, out: np.ndarray) -> list[int]:
-    """Places where rigid columns, one or more, meet nothing but shut valves."""
+    """Nodes that join rigid columns and otherwise only shut valves."""
     places, nodes, at = [], model.tables.nodes, model.layout["conductance"]
     for i in np.flatnonzero(nodes["gates"] >= 0):
         if not out[at + gates_of(model, i)].any():
@@ -20,13 +20,13 @@ def shut_places(model: Model, out: np.ndarray) -> list[int]:
 
 
 def gates_of(model: Model, i: int) -> np.ndarray:
-    """Valves at such a place."""
+    """Valves at such a node."""
     row = model.tables.nodes[i]
     return model.tables.integers[row["gates"] : row["gates"] + row["gate_count"]]
 
 
 def air_valve_of(model: Model, i: int) -> int | None:
-    """The first event function of the air valve at a place: that it opens; None where there is none."""
+    """Number of the first event function, opening, of the air valve at a node; None without an air valve."""
     valves, devices = model.tables.valves, model.tables.devices
     for device in valves["device"][gates_of(model, i)]:
         if device >= 0 and devices[device]["row"] >= 0:
@@ -35,7 +35,7 @@ def air_valve_of(model: Model, i: int) -> int | None:
 
 
 def brought(run_data: Slate, t: float, y: np.ndarray) -> np.ndarray:
-    """What columns have carried up to t more than in the profile [kg/s]; at the start, their states."""
+    """Flow of the columns just before t, less the flow of the profile [kg/s]; at the start, their states."""
     model = run_data.model
     before, columns = model.new_out(), model.tables.columns
     if t <= model.case.numerics.start:
@@ -47,10 +47,11 @@ def brought(run_data: Slate, t: float, y: np.ndarray) -> np.ndarray:
 
 
 def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[int]) -> np.ndarray:
-    """Flow [kg/s] that an impulse of pressure at each place stops there; below zero where columns part.
+    """Flow [kg/s] that a pressure impulse J stops at each node; negative where columns separate.
 
-    sum of A / L (J - J_far) = sum of the flows that columns bring: momentum is kept, and columns that their valves
-    still lead keep their flow. carried : as of `brought`.
+    sum of A / L (J - J_far) = sum of the inflows of the columns: momentum is conserved. Columns that are controlled by
+    their valves keep their flow.
+    carried : float64[columns]  result of `flow_before`
     """
     sums = np.array([model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places])
     matrix = np.zeros((len(places), len(places)))
@@ -70,7 +71,7 @@ def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[in
 
 
 def let_go(run_data: Slate, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
-    """The event of the air valve where columns part the most, which air lets go on; None where none part."""
+    """Opening event of the air valve where columns separate fastest; None where no columns separate."""
     model = run_data.model
     places = shut_places(model, out)
     events = [air_valve_of(model, i) for i in places]

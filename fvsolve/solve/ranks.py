@@ -1,7 +1,7 @@
-"""Processes that step bands of one state together, by messages of MPI. Knows arrays; knows no physics.
+"""MPI processes that step bands of a state in parallel.
 
-Rank 0 runs; the others follow: each takes what Python may have changed there, marches when rank 0 does, and sends its
-rows when both are back. So what a clock or a signal decides is decided in one place.
+Rank 0 runs the case; the other ranks follow. Each receives what Python may have changed on rank 0, runs the time loop
+together with rank 0, and sends its rows afterwards. So decisions by clock or signal are made only on rank 0.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from fvsolve.solve.team import SMALL, WRITTEN, Member, banded, undisturbed, yiel
 from fvsolve.steppers import slots
 
 TOLD = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
-MARCH, WHOLE, CLOSE = range(3)  # what rank 0 asks for
+MARCH, WHOLE, CLOSE = range(3)  # requests of rank 0: run the time loop, send states, end
 FAREWELL = CLOSE, None
 
 
 class Exchange:
-    """Places of an array that ranks take from each other, and what they are sent in."""
+    """Exchange of array entries between ranks, with buffers for them."""
 
     def __init__(self, comm, runs: list[np.ndarray]) -> None:
         me, self.comm = comm.rank, comm
@@ -33,7 +33,7 @@ class Exchange:
         self.rooms = {k: np.zeros(at.size) for k, at in self.takes.items()}
 
     def __call__(self, values: np.ndarray) -> None:
-        """Bring what others have into place."""
+        """Exchange the entries; received entries are written into `values`."""
         from mpi4py import MPI
 
         requests = [self.comm.Irecv(self.rooms[k], k) for k, at in self.takes.items() if at.size]
@@ -44,18 +44,18 @@ class Exchange:
 
 
 def places(runs: np.ndarray, owner: int) -> np.ndarray:
-    """All places of the runs that are an owner's : int64[n]."""
+    """All places in the runs of an owner : int64[n]."""
     mine = runs[runs[:, 0] == owner]
     return np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(begin, stop) for _, begin, stop in mine)])
 
 
 class Ranks:
-    """The bands of all ranks, as seen by one of them: rank 0's loop calls, the others `serve`."""
+    """Bands of all ranks, on a single rank: the loop of rank 0 calls, the other ranks `serve`."""
 
     def __init__(self, loop, cut: Cut, comm) -> None:
         self.loop, self.cut, self.comm, self.seconds = loop, cut, comm, 0.0
         self.functions, self.join = banded(cut)
-        self.told = TOLD(self.tell_others)  # which lives as long as its address is known
+        self.told = TOLD(self.tell_others)  # kept as long as compiled code has its address
         self.tell, self.yielding = ctypes.cast(self.told, ctypes.c_void_p).value, yielding()
         self.board = self.room = np.zeros(0)
         self.member = Member(self, comm.rank, loop.slate, loop.stepper)
@@ -68,7 +68,7 @@ class Ranks:
         self.stale = True
 
     def tell_others(self, request: int, address: int, size: int) -> None:
-        """What compiled code calls in the middle of a step; all ranks do, or none goes on."""
+        """Exchange values of the given kind within a step; compiled code on all ranks must call it."""
         try:
             values = np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
             if request in (joint.OF_STATES, joint.OF_FLOWS):
@@ -85,13 +85,13 @@ class Ranks:
             self.comm.Abort(1)
 
     def greatest(self, rate: float) -> float:
-        """Of all ranks; infinite where one has no number."""
+        """Greatest rate of all ranks; infinite if a rank has NaN."""
         from mpi4py import MPI
 
         return self.comm.allreduce(math.inf if math.isnan(rate) else float(rate), MPI.MAX)
 
     def call(self, functions: tuple, where: int) -> int:
-        """March on with all ranks; returns one of the codes of `steppers.slots`."""
+        """Run the time loop on all ranks; returns a code of `steppers.slots`."""
         loop = self.loop
         now = loop.flags[slots.NOW]
         runs = [(0, loop.model.y_size)] if self.stale else self.cut.alike()
@@ -105,11 +105,11 @@ class Ranks:
             self.gather("y", loop.flags[slots.NOW])
             if code == slots.FIELD:
                 self.gather("y_out", ...)
-            self.seconds += sum(self.comm.gather(0.0))  # beside its own
+            self.seconds += sum(self.comm.gather(0.0))  # CPU time of the other ranks
         return code
 
     def gather(self, name: str, at) -> None:
-        """Bring the rows of all ranks to rank 0."""
+        """Send the rows of all ranks to rank 0."""
         values = getattr(self.loop.stepper, name)[at]
         if self.comm.rank > 0:
             for rows in self.rows[self.comm.rank]:
@@ -120,22 +120,22 @@ class Ranks:
                 self.comm.Recv(values[rows], k)
 
     def whole(self, at: int) -> None:
-        """Bring row `at` of the states of all ranks to rank 0."""
+        """Send row `at` of the states of all ranks to rank 0."""
         with undisturbed():
             self.comm.bcast((WHOLE, int(at)))
             self.gather("y", at)
 
     def close(self) -> None:
-        """Let the other ranks go."""
+        """End the other ranks."""
         with undisturbed():
             self.comm.bcast(FAREWELL)
 
     def serve(self, functions: tuple, where: int) -> None:
-        """Follow rank 0 until it has no more to ask."""
+        """Execute the requests of rank 0 until it ends the run."""
         stepper = self.loop.stepper
         while True:
             request, argument = self.comm.bcast(None)
-            if callable(request):  # by whom rank 0 writes to
+            if callable(request):  # a sink of rank 0 that writes on all ranks
                 request(self.comm, self.loop.model, *argument)
                 continue
             if request == CLOSE:

@@ -1,8 +1,8 @@
-"""Threads that step bands of one state together, all by the same compiled loop. Knows arrays; knows no physics.
+"""Threads that step bands of a state in parallel, all by the same compiled loop.
 
-Every member has arrays of its own, of the size of all, of which only what it looks at is ever touched. Python works on
-those of the loop, which are the first member's; before members go on they take from there what Python may have changed,
-and when they come back each brings its rows.
+Every worker has its own arrays, of full size, and uses only the parts that its band reads. Python works on the arrays
+of the loop, which are those of the first worker. Before the workers continue, they copy from there what Python may have
+changed; afterwards each copies its rows back.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes"
 
 
 def yielding() -> int:
-    """Address of the system's function that lets other threads run."""
+    """Address of the system function that lets other threads run."""
     name = "SwitchToThread" if os.name == "nt" else "sched_yield"
     library = ctypes.windll.kernel32 if os.name == "nt" else ctypes.CDLL(None)
     return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
 
 
 class Member:
-    """One band: its arrays, and the handle that opens them.
+    """Worker of a band: its arrays, and the handle through which compiled code reads them.
 
-    team : a `Team` of threads or `Ranks`: board, room, yielding and tell are what `kernels.joint` is to know of it
+    team : a `ThreadTeam` or `Ranks`, with the addresses and arrays for the exchange in `kernels.joint`
     """
 
     def __init__(self, team, k: int, run_data: Slate, stepper: Stepper) -> None:
@@ -69,18 +69,18 @@ class Member:
         self.within = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
 
     def open(self) -> None:
-        """What is written here, and the handle that opens it: anew where a past of delay lines has more room."""
+        """Collect the written arrays and make their handle; repeated when the history of delay lines has grown."""
         self.written = self.slate.written._replace(**self.mine)
         self.handle = self.slate.linked(self.written, self.called)
 
     def take(self, name: str, values: np.ndarray) -> None:
-        """Take over one of `WRITTEN`."""
+        """Copy values into an array of `WRITTEN`."""
         if name == "past" and values.size != self.slate.past.size:
             self.slate.past = values.copy()
         getattr(self.slate.written, name)[...] = values
 
     def follow(self, states: list[slice]) -> None:
-        """Take over what Python may have changed in the arrays of the loop, and these states."""
+        """Copy from the loop the arrays that Python may have changed, and these states."""
         if self.number == 0:
             return
         for name in SMALL:
@@ -93,7 +93,7 @@ class Member:
             self.stepper.y[now, rows] = self.loop.stepper.y[now, rows]
 
     def march(self, functions: tuple, where: int) -> int:
-        """Go on until there is something to do, and bring what the loop has not."""
+        """Run the time loop on this band; returns its code."""
         stepper = self.stepper
         if self.slate.past is not self.written.past:
             self.open()
@@ -111,7 +111,7 @@ class Member:
 
 
 def twin(stepper: Stepper) -> Stepper:
-    """Another of the same method, with arrays of its own but for what steps only read."""
+    """Copy of an integrator, with its own arrays except those that steps only read."""
     copy = Stepper(stepper.method, stepper.scale.size, stepper.supply.shape[1], stepper.structure, stepper.scale,
                     stepper.damped)  # fmt: skip
     copy.stored, copy.carry, copy.within = stepper.stored, stepper.carry.copy(), stepper.within
@@ -121,13 +121,13 @@ def twin(stepper: Stepper) -> Stepper:
 
 
 def banded(cut: Cut) -> tuple:
-    """Functions of a model whose bands tell each other, and by what they bring sums together."""
+    """(functions of a model with exchange between bands, compiled function that combines partial sums)."""
     features = replace(cut.model.functions.cast, bands=True, together=cut.together)
     return functions(features), compiled_as(joint.share, JOIN)
 
 
 class Team:
-    """All members of a loop, each but none of them in the thread that asks."""
+    """Workers of a loop, each in its own thread; the calling thread waits for them."""
 
     def __init__(self, loop, cut: Cut) -> None:
         self.loop, self.cut, self.yielding, self.tell, self.seconds = loop, cut, yielding(), 0, 0.0
@@ -136,7 +136,7 @@ class Team:
         self.room = lined(2 * cut.sums)
         self.members = [Member(self, 0, loop.slate, loop.stepper)]
         self.members += [Member(self, k, Slate(loop.model), twin(loop.stepper)) for k in range(1, cut.many)]
-        self.stale = True  # whether rows of the loop are not those of the members
+        self.stale = True  # True where the workers do not have the present rows of the loop
         self.asked = [SimpleQueue() for _ in self.members]
         self.answers: SimpleQueue = SimpleQueue()
         tasks = zip(self.members, self.asked, strict=True)
@@ -145,7 +145,7 @@ class Team:
             thread.start()
 
     def serve(self, member: Member, requests: SimpleQueue) -> None:
-        """What a thread does: march when it is asked to."""
+        """Serve the requests of a thread: run the time loop for each, until the request is None."""
         while (task := requests.get()) is not None:
             start = time.thread_time()
             try:
@@ -153,12 +153,12 @@ class Team:
                 member.bring("y", member.stepper.flags[slots.NOW])
                 if answer == slots.FIELD:
                     member.bring("y_out", ...)
-            except BaseException as error:  # for whoever asked
+            except BaseException as error:  # raised again in the calling thread
                 answer = error
             self.answers.put((answer, time.thread_time() - start))
 
     def call(self, functions: tuple, where: int) -> int:
-        """March on with all members; returns one of the codes of `steppers.slots`."""
+        """Run the time loop on all bands; returns a code of `steppers.slots`."""
         for member in self.members:
             alike = [slice(*block) for block in self.cut.alike()]
             member.follow(alike + (member.own if self.stale else []))
@@ -174,12 +174,12 @@ class Team:
         return answers[0][0]
 
     def whole(self, at: int) -> None:
-        """Bring row `at` of the states of all members to the loop."""
+        """Copy row `at` of the states of all workers to the loop."""
         for member in self.members:
             member.bring("y", at)
 
     def close(self) -> None:
-        """Let the threads end."""
+        """End the threads."""
         for requests in self.asked:
             requests.put(None)
         for thread in self.threads:
@@ -188,7 +188,7 @@ class Team:
 
 @contextmanager
 def undisturbed():
-    """Put off Ctrl-C until all members are back, who wait for each other."""
+    """Postpone Ctrl-C until all workers have returned, because they wait for each other."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
