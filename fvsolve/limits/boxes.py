@@ -24,8 +24,8 @@ def value(g: Matrix, x: Fraction, y: Fraction) -> Fraction:
     total = Fraction(0)
     for row in reversed(g):
         inner = Fraction(0)
-        for one in reversed(row):
-            inner = inner * y + one
+        for coefficient in reversed(row):
+            inner = inner * y + coefficient
         total = total * x + inner
     return total
 
@@ -35,7 +35,7 @@ def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, 
     boxes, seen = [(_bernstein(g, low, high), low, high, Fraction(0), Fraction(1))], 0
     while boxes:
         b, x0, x1, y0, y1 = boxes.pop()
-        if all(one >= 0 for one in b.flat):
+        if all(left >= 0 for left in b.flat):
             continue
         for corner, x, y in ((b[0, 0], x0, y0), (b[0, -1], x0, y1), (b[-1, 0], x1, y0), (b[-1, -1], x1, y1)):
             if corner < 0 and value(g, x, y) < 0:
@@ -44,19 +44,19 @@ def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, 
         if seen > MOST_BOXES:
             return "open"
         if _bends(b) >= _bends(b.T):
-            one, two = _halves(b)
+            left, right = _halves(b)
             middle = (x0 + x1) / 2
-            boxes += [(one, x0, middle, y0, y1), (two, middle, x1, y0, y1)]
+            boxes += [(left, x0, middle, y0, y1), (right, middle, x1, y0, y1)]
         else:
-            one, two = _halves(b.T)
+            left, right = _halves(b.T)
             middle = (y0 + y1) / 2
-            boxes += [(one.T, x0, x1, y0, middle), (two.T, x0, x1, middle, y1)]
+            boxes += [(left.T, x0, x1, y0, middle), (right.T, x0, x1, middle, y1)]
     return None
 
 
 def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
     """Coefficients on low..high x 0..1, rounded down; positive factors are left out."""
-    a = np.array([[Fraction(one) for one in row] for row in g], dtype=object)
+    a = np.array([[Fraction(entry) for entry in row] for row in g], dtype=object)
     for k in range(a.shape[0] - 1):  # x = low + s: Horner's scheme, again and again
         for m in range(a.shape[0] - 2, k - 1, -1):
             a[m] = a[m] + low * a[m + 1]
@@ -64,8 +64,10 @@ def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
     for m in range(a.shape[0]):
         a[m], power = a[m] * power, power * width
     a = _to_bernstein(_to_bernstein(a).T).T
-    largest = max(abs(one) for one in a.flat) or Fraction(1)
-    scaled = [(one.numerator << BITS) * largest.denominator // (one.denominator * largest.numerator) for one in a.flat]
+    largest = max(abs(entry) for entry in a.flat) or Fraction(1)
+    scaled = [
+        (entry.numerator << BITS) * largest.denominator // (entry.denominator * largest.numerator) for entry in a.flat
+    ]
     return np.array(scaled, dtype=object).reshape(a.shape)
 
 
@@ -89,4 +91,4 @@ def _bends(b: np.ndarray) -> int:
     """How far the coefficients are from a straight line along the first axis, over the whole degree."""
     if b.shape[0] < 3:
         return 0
-    return max(abs(one) for one in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2
+    return max(abs(difference) for difference in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2

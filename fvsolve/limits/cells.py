@@ -29,7 +29,7 @@ def cell_modes(model) -> Modes:
 
 def rubbed(model) -> Modes:
     """Waves of pipes against friction, at the flow of the start."""
-    scheme, found = model.case.numerics.scheme, []
+    scheme, modes = model.case.numerics.scheme, []
     weights = SCHEMES[scheme].smooth.weights
     symbols = {n: between_ends(tuple(weights), n) for n in {mesh.cells for mesh in model.pipes}}
     for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
@@ -37,29 +37,29 @@ def rubbed(model) -> Modes:
         if g > 0.0 and row["delay"] < 0:
             z = symbols[mesh.cells]  # between ends no wave is quite two cells long
             root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
-            found.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
-    return found
+            modes.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
+    return modes
 
 
 @functools.lru_cache(maxsize=256)
 def between_ends(weights: tuple, n: int) -> np.ndarray:
     """The symbol of waves between the ends of n cells."""
-    found = symbol(weights, PHASES * (1.0 - 0.5 / n))
-    found.flags.writeable = False
-    return found
+    values = symbol(weights, PHASES * (1.0 - 0.5 / n))
+    values.flags.writeable = False
+    return values
 
 
 def remembered(model) -> Modes:
     """Unsteady friction, and walls that creep: the quickest term, with the gain of all of them and the friction."""
-    found, floats = [], model.tables.floats
+    modes, floats = [], model.tables.floats
     for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
         if row["terms"] > 0:
             gain, rate = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2).T
-            found.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - slope(row)])))
+            modes.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - slope(row)])))
         if row["elements"] > 0:
             gain, rate = elements(floats, row).T
-            found.append((f"{mesh.name}.creep", np.array([-rate.max() - gain.sum()])))
-    return found
+            modes.append((f"{mesh.name}.creep", np.array([-rate.max() - gain.sum()])))
+    return modes
 
 
 def slope(row) -> float:
@@ -69,13 +69,13 @@ def slope(row) -> float:
 
 def carried(model) -> Modes:
     """Scalars in pipes, at the flow of the start."""
-    found, rho = [], model.case.properties.density
+    modes, rho = [], model.case.properties.density
     for name, scalar in model.case.scalars.items():
         for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
             q = abs(float(row["flow"])) / (rho * row["area"] * row["dx"])
             s = -q * (1.0 - np.exp(-1j * PHASES)) - 2.0 * scalar.diffusivity / row["dx"] ** 2 * SHORT - scalar.decay
-            found.append((f"{mesh.name}.{name}", s))
-    return found
+            modes.append((f"{mesh.name}.{name}", s))
+    return modes
 
 
 def spread(model) -> Modes:
@@ -100,6 +100,6 @@ def shortest(mesh) -> float:
     through = coo_array((near, (left, right)), shape=(n, n))
     sides = np.bincount(left, near, n) + np.bincount(right, near, n)
     root = diags_array(1.0 / np.sqrt(mesh.area))
-    whole = root @ (diags_array(sides) - through - through.T) @ root
+    operator = root @ (diags_array(sides) - through - through.T) @ root
     start = np.random.default_rng(1).standard_normal(n)
-    return float(eigsh(whole.tocsr(), k=1, which="LM", tol=1e-3, v0=start, return_eigenvectors=False)[0])
+    return float(eigsh(operator.tocsr(), k=1, which="LM", tol=1e-3, v0=start, return_eigenvectors=False)[0])

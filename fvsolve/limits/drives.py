@@ -10,7 +10,7 @@ DRIVES = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flo
 
 def drives(model) -> np.ndarray:
     """The largest of what drives each state of pipes and basins; of others what is small, times FAR : float64[n]."""
-    found, linear = FAR * model.scale, model.case.properties
+    largest, linear = FAR * model.scale, model.case.properties
     pressure, flow = given(model)
     pipes = model.tables.pipes
     flow = max([flow, *np.abs(pipes["flow"])])
@@ -19,16 +19,16 @@ def drives(model) -> np.ndarray:
     for mesh, row in zip(model.pipes, pipes, strict=True):
         if row["delay"] >= 0:  # what it holds beside the profile
             waves = pressure * float(row["admittance"]) * mesh.length / float(row["speed"])
-            found[row["y"]] = FAR * max(found[row["y"]], waves)
+            largest[row["y"]] = FAR * max(largest[row["y"]], waves)
             continue
         own = slice(row["y"], row["y"] + 2 * mesh.cells)
-        found[own] = np.maximum(max(pressure * float(row["admittance"]), flow), model.scale[own])
+        largest[own] = np.maximum(max(pressure * float(row["admittance"]), flow), model.scale[own])
     for basin in model.basins:
-        states, scales = basin.own(found), basin.own(model.scale)
+        states, scales = basin.own(largest), basin.own(model.scale)
         ratio = 1.0 + pressure / (linear.density * model.case.gravity)
         for own, scale, start in zip(states, scales, basin.own(model.start), strict=True):
             own[:] = np.maximum(ratio * scale, np.ptp(start))
-    return found
+    return largest
 
 
 def given(model) -> tuple[float, float]:
@@ -58,8 +58,8 @@ def lumped(model) -> np.ndarray:
 
 def spreads(model, share: float = 1.0) -> np.ndarray:
     """What vessels hold more or less over the range of pressures; a share of what is small elsewhere : float64[n]."""
-    found, spread = share * model.scale, given(model)[0]
+    ranges, spread = share * model.scale, given(model)[0]
     for row in model.tables.nodes:
         if row["y"] >= 0 and row["stiffness"] > 0.0 and spread > 0.0:
-            found[row["y"]] = spread / row["stiffness"]
-    return found
+            ranges[row["y"]] = spread / row["stiffness"]
+    return ranges

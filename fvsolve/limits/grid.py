@@ -81,10 +81,10 @@ class AdvectionLimit:
 
     def plain(self) -> dict:
         """As JSON says it: None for infinity."""
-        found = asdict(self)
-        found["limit"] = _finite(self.limit)
-        found["stable"] = [[low, _finite(high)] for low, high in self.stable]
-        return found
+        values = asdict(self)
+        values["limit"] = _finite(self.limit)
+        values["stable"] = [[low, _finite(high)] for low, high in self.stable]
+        return values
 
 
 @door(scheme=NAME, method=NAME, courant=POSITIVE)
@@ -118,8 +118,8 @@ WHOLE = Kind(
 @door(weights=WHOLE, scheme=TEXT, method=NAME, courant=POSITIVE)
 def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
     """The same for any face weights of cells u-2 .. u+2 that add up to one."""
-    known = method_named(method)
-    gaps, proved = _gaps(tuple(weights), *_rational(method), _is_a_stable(known))
+    tableau = method_named(method)
+    gaps, proved = _gaps(tuple(weights), *_rational(method), _is_a_stable(tableau))
     edge = gaps[0][1] if gaps and gaps[0][0].courant == 0 else None
     limit = edge.courant if edge else 0.0
     stable = tuple((low.courant, high.courant) for low, high in gaps)
@@ -131,7 +131,9 @@ def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: flo
         growth, fastest = (0.0, 0.0) if still else growth_of(weights, method, courant)
         steps = math.log(THOUSANDFOLD) / math.log1p(growth) if growth > 0 else None
     theta, wave = (None, None) if math.isinf(limit) else (edge.theta, edge.wave) if edge else (fastest, GROWS)
-    return AdvectionLimit(scheme, known.name, limit, theta, wave, stable, proved, known.digits, courant, growth, steps)
+    return AdvectionLimit(
+        scheme, tableau.name, limit, theta, wave, stable, proved, tableau.digits, courant, growth, steps
+    )
 
 
 def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple[float, float]:
@@ -151,14 +153,14 @@ def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) ->
     (r, _), a, q = _rational(method), real_part(weights), square(weights)
     theta = [k * math.pi / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
     for _ in range(SLOW_ZOOMS):
-        found = []
+        growths = []
         for x in theta:
             t = _dyadic(math.sin(x / 2) ** 2, 60)
             up, down = (_modulus(p, courant * a(t), courant**2 * q(t)) for p in (r.numerator, r.denominator))
-            found.append(float((up - down) / down))
-        at = int(np.argmax(found))
+            growths.append(float((up - down) / down))
+        at = int(np.argmax(growths))
         low, high = theta[max(at - 1, 0)], theta[min(at + 1, len(theta) - 1)]
-        best, most = theta[at], found[at]
+        best, most = theta[at], growths[at]
         theta = [low + (high - low) * k / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
     return most / (1 + math.sqrt(1 + most)), best
 
@@ -195,11 +197,11 @@ def _is_a_stable(method: Method) -> bool:
 
 def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
     """R with fractions alone, and the relative size below which a coefficient of E is rounding."""
-    known, r = method_named(method), _function(method)
+    tableau, r = method_named(method), _function(method)
     parts = (*r.numerator.coefficients, *r.denominator.coefficients)
     exact = all(isinstance(x, Fraction) for x in parts)
-    digits = known.digits - 2 if known.digits else ALGEBRAIC_DIGITS
-    tolerance = Fraction(0) if exact and not known.digits else Fraction(1, 10**digits)
+    digits = tableau.digits - 2 if tableau.digits else ALGEBRAIC_DIGITS
+    tolerance = Fraction(0) if exact and not tableau.digits else Fraction(1, 10**digits)
     if exact:
         return r, tolerance
     up, down = (Polynomial(_fraction(x) for x in p.coefficients) for p in (r.numerator, r.denominator))
@@ -226,16 +228,16 @@ def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: 
     for _ in range(2 * size):
         c.append(2 * a * c[-1] - q * c[-2])
         powers.append(powers[-1] * q)
-    found = []
+    rows = []
     for m in range(2 * size + 1):
         row, doubt = Polynomial([]), Polynomial([])
         for k in range(max(0, m - size), m // 2 + 1):
-            one = powers[k] * c[m - 2 * k]
+            factor = powers[k] * c[m - 2 * k]
             parts = [s * _at(p, k) * _at(p, m - k) * (1 if 2 * k == m else 2) for p, s in pairs]
-            row = row + sum(parts) * one
-            doubt = doubt + sum(map(abs, parts)) * Polynomial(map(abs, one.coefficients)) if tolerance else doubt
-        found.append(_chopped(row, doubt, tolerance))
-    return _reduced(found)
+            row = row + sum(parts) * factor
+            doubt = doubt + sum(map(abs, parts)) * Polynomial(map(abs, factor.coefficients)) if tolerance else doubt
+        rows.append(_chopped(row, doubt, tolerance))
+    return _reduced(rows)
 
 
 def _at(p: Polynomial, k: int) -> Fraction:
@@ -266,8 +268,8 @@ def _reduced(rows: list[Polynomial]) -> list[list[int]]:
     common = common if 1 in _signs(common) else -common
     rows = [p // common for p in rows]
     wide = max(p.degree for p in rows) + 1
-    whole = math.lcm(*(x.denominator for p in rows for x in p.coefficients))
-    return [[int(_at(p, i) * whole) for i in range(wide)] for p in rows]
+    denominator = math.lcm(*(x.denominator for p in rows for x in p.coefficients))
+    return [[int(_at(p, i) * denominator) for i in range(wide)] for p in rows]
 
 
 def _signs(p: Polynomial) -> set[int]:
@@ -300,13 +302,13 @@ def _gaps_of(weights: tuple, numerator: tuple, denominator: tuple, tolerance: Fr
     gaps: list = []
     for _ in range(TURNS):
         gaps = _candidates(g, sorted(rays))
-        found = [_refuted(g, low.courant, high.courant) for low, high in gaps]
-        points = [one for one in found if isinstance(one, tuple)]
+        counterexamples = [_refuted(g, low.courant, high.courant) for low, high in gaps]
+        points = [point for point in counterexamples if isinstance(point, tuple)]
         if not points:
-            return gaps, not any(found) and _fails_outside(g, gaps, rays)
+            return gaps, not any(counterexamples) and _fails_outside(g, gaps, rays)
         for _, t in points:
             rays |= {t, *(min(t * Fraction(k, 8), Fraction(1)) for k in (4, 6, 7, 9, 10, 16))}
-    return [gap for gap, one in zip(gaps, found, strict=True) if not isinstance(one, tuple)], False
+    return [gap for gap, point in zip(gaps, counterexamples, strict=True) if not isinstance(point, tuple)], False
 
 
 def _refuted(g, low: float, high: float):
@@ -315,9 +317,9 @@ def _refuted(g, low: float, high: float):
     if math.isfinite(high):
         return negative_point(g, start, Fraction(high) * (1 - MARGIN))
     middle = max(start, Fraction(1))
-    found = negative_point(g, start, middle) if start < middle else None
-    far = negative_point(g[::-1], Fraction(0), 1 / middle) if found is None else found
-    return (1 / far[0], far[1]) if isinstance(far, tuple) and found is None and far[0] else far
+    below = negative_point(g, start, middle) if start < middle else None
+    above = negative_point(g[::-1], Fraction(0), 1 / middle) if below is None else below
+    return (1 / above[0], above[1]) if isinstance(above, tuple) and below is None and above[0] else above
 
 
 def _fails_outside(g, gaps, rays) -> bool:
@@ -336,13 +338,13 @@ def _falls(g, t: Fraction) -> bool:
 
 def _candidates(g, rays: list[Fraction]):
     """Stable ranges as the rays show them, their ends sharpened between the rays."""
-    unstable = sorted(one for t in rays for one in _negative(_on(g, t)))
+    unstable = sorted(range_ for t in rays for range_ in _negative(_on(g, t)))
     gaps, at = [], 0.0
     for low, high in [*unstable, (math.inf, math.inf)]:
         if low > at * (1 + 1e-9):
             gaps.append((at, low))
         at = max(at, high)
-    return [one for low, high in gaps if (one := _sharpened(g, rays, low, high))]
+    return [range_ for low, high in gaps if (range_ := _sharpened(g, rays, low, high))]
 
 
 def _sharpened(g, rays, low: float, high: float):
@@ -369,13 +371,13 @@ def _edge(g, rays: list[Fraction], inside: float, side: int) -> RangeEnd:
     low, high = rays[max(at - 1, 0)], rays[min(at + 1, len(rays) - 1)]
     for _ in range(ZOOMS):
         points = [low + (high - low) * Fraction(k, ZOOM_RAYS - 1) for k in range(ZOOM_RAYS)]
-        found = [reach(t) for t in points]
-        k = int(np.argmin(found))
-        if found[k] < best:
-            best, where = float(found[k]), points[k]
+        reaches = [reach(t) for t in points]
+        k = int(np.argmin(reaches))
+        if reaches[k] < best:
+            best, where = float(reaches[k]), points[k]
         low, high = points[max(k - 1, 0)], points[min(k + 1, ZOOM_RAYS - 1)]
         low, high = _dyadic(low, 60), _dyadic(high, 60)
-    close = [abs(one - best) <= 1e-11 * abs(best) for one in (*ends, *all_of)]
+    close = [abs(reached - best) <= 1e-11 * abs(best) for reached in (*ends, *all_of)]
     if all(close):
         return RangeEnd(abs(best), Fraction(1), EVERY)
     for is_close, t, wave in ((close[0], Fraction(0), LONGEST), (close[1], Fraction(1), SHORTEST)):
@@ -393,14 +395,14 @@ def _on(g, t: Fraction) -> np.ndarray:
     powers = [1]  # of both terms of t, so that all stays whole
     for _ in range(len(g[0]) - 1):
         powers.append(powers[-1] * t.denominator)
-    found = []
+    coefficients = []
     for row in g:
         total = 0
-        for one, power in zip(reversed(row), powers, strict=True):
-            total = total * t.numerator + one * power
-        found.append(total)
-    largest = max(map(abs, found))
-    return np.array([x / largest for x in found]) if largest else np.zeros(1)
+        for entry, power in zip(reversed(row), powers, strict=True):
+            total = total * t.numerator + entry * power
+        coefficients.append(total)
+    largest = max(map(abs, coefficients))
+    return np.array([x / largest for x in coefficients]) if largest else np.zeros(1)
 
 
 def _negative(p: np.ndarray) -> list[tuple[float, float]]:
@@ -410,13 +412,13 @@ def _negative(p: np.ndarray) -> list[tuple[float, float]]:
     roots = np.roots(p[::-1])
     real = np.sort(roots.real[(np.abs(roots.imag) <= 1e-7 * np.abs(roots)) & (roots.real > 1e-13)])
     ends = [0.0, *map(float, real), math.inf]
-    found = []
+    ranges = []
     for low, high in zip(ends, ends[1:], strict=False):
         inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
         if high > low and np.polyval(p[::-1], inside) < 0:
-            joined = found and found[-1][1] == low
-            found[-1:] = [(found[-1][0], high)] if joined else [*found[-1:], (low, high)]
-    return found
+            joined = ranges and ranges[-1][1] == low
+            ranges[-1:] = [(ranges[-1][0], high)] if joined else [*ranges[-1:], (low, high)]
+    return ranges
 
 
 def _finite(x: float) -> float | None:

@@ -28,7 +28,7 @@ def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, st
 
     0 where nothing is known to grow.
     """
-    found = []
+    candidates = []
     if method.kind == "linear":  # Rosenbrock's, whose stages see what comes by its slope
         return 0.0, "", 0.0
     for name, row, a in stores(model, h):
@@ -37,10 +37,10 @@ def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, st
             round_trip = 2.0 * line["stretches"] * line["hold"]
             if LITTLE * a * span / round_trip < 1.0:
                 continue
-            takes = line["tau"] * line["stretches"] * float(drag_and_slope(pipe, float(pipe["flow"]))[1])
-            once = np.max(np.abs(given_back(method, a, steps)) * np.abs(read(steps))) * np.exp(-takes)
-            found.append((times(float(once) - 1.0, span / round_trip), name, a))
-    return max(found, default=(0.0, "", 0.0))
+            damping = line["tau"] * line["stretches"] * float(drag_and_slope(pipe, float(pipe["flow"]))[1])
+            once = np.max(np.abs(given_back(method, a, steps)) * np.abs(read(steps))) * np.exp(-damping)
+            candidates.append((times(float(once) - 1.0, span / round_trip), name, a))
+    return max(candidates, default=(0.0, "", 0.0))
 
 
 def line_growth(model, method: Method, h: float, span: float) -> list[Notice]:
@@ -84,10 +84,10 @@ def given_back(method: Method, a: float, steps: float) -> np.ndarray:
 
 def read(steps: float) -> np.ndarray:
     """What is read of waves that turn by ANGLES a step, so many steps after they were sent."""
-    whole = int(np.ceil(steps - 1e-9))
-    x = max(0.0, whole - steps)
-    weights = six(x) if whole >= 3 else four(x) if whole >= 2 else three(x)
+    steps_up = int(np.ceil(steps - 1e-9))
+    x = max(0.0, steps_up - steps)
+    weights = six(x) if steps_up >= 3 else four(x) if steps_up >= 2 else three(x)
     if x < 1e-9:
         weights = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    places = np.arange(-2, 4) - whole
+    places = np.arange(-2, 4) - steps_up
     return np.exp(1j * np.outer(ANGLES, places)) @ np.array(weights)

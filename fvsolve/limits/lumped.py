@@ -49,15 +49,15 @@ def lumped_modes(model, method: str, step: float) -> list[Mode]:
     span, fixed = numerics.end - numerics.start, numerics.step is not None
     own = own_modes(model) if fixed else []
     cells = cell_modes(model) if fixed else rubbed(model)  # a Courant number minds the rest
-    found = [quickest(r, modes, step, span, modes is own) for modes in (own, cells)]
-    return [mode for mode in found if mode is not None]
+    candidates = [quickest(r, modes, step, span, modes is own) for modes in (own, cells)]
+    return [mode for mode in candidates if mode is not None]
 
 
 def quickest(r, modes: Modes, step: float, span: float, own: bool, enough: float = GROWS) -> Mode | None:
     """What grows most of some modes, if any grows `enough` times within the span [s]."""
     if not modes:
         return None
-    s = np.concatenate([one for _, one in modes])
+    s = np.concatenate([values for _, values in modes])
 
     def grown(h: float) -> float:
         return times(float(beyond(r, s, h).max()), span / h)
@@ -71,7 +71,7 @@ def quickest(r, modes: Modes, step: float, span: float, own: bool, enough: float
         middle = 0.5 * (low + high)
         low, high = (middle, high) if grown(middle) < enough else (low, middle)
     worst = int(np.argmax(beyond(r, s, step)))
-    at = int(np.searchsorted(np.cumsum([one.size for _, one in modes]), worst, side="right"))
+    at = int(np.searchsorted(np.cumsum([values.size for _, values in modes]), worst, side="right"))
     frequency = abs(float(s[worst].imag)) / (2.0 * math.pi)
     return Mode(modes[at][0], grown(step), low, own, bool(abs(step * s[worst]) <= FOLLOWED), frequency)
 
@@ -79,8 +79,8 @@ def quickest(r, modes: Modes, step: float, span: float, own: bool, enough: float
 def beyond(r, s: np.ndarray, h: float) -> np.ndarray:
     """By how much more a step multiplies each mode than its own growth does, less one."""
     with np.errstate(over="ignore", invalid="ignore"):
-        found = np.abs(r(h * s)) / np.exp(np.maximum(h * s.real, 0.0))
-        return (found if np.isfinite(found).all() else np.nan_to_num(found, nan=np.inf)) - 1.0
+        ratio = np.abs(r(h * s)) / np.exp(np.maximum(h * s.real, 0.0))
+        return (ratio if np.isfinite(ratio).all() else np.nan_to_num(ratio, nan=np.inf)) - 1.0
 
 
 def times(excess: float, steps: float) -> float:
@@ -90,26 +90,26 @@ def times(excess: float, steps: float) -> float:
 
 def own_modes(model) -> Modes:
     """Of what is no cell's, at the start, each at the state that moves most."""
-    which = lumped(model)
-    if not 0 < which.size <= MOST:
+    states = lumped(model)
+    if not 0 < states.size <= MOST:
         return []
     t, y, width = float(model.case.numerics.start), model.start, SHARE * spreads(model)
-    out, j = model.new_out(), np.zeros((which.size, which.size))
+    out, j = model.new_out(), np.zeros((states.size, states.size))
 
     def rates(moved: np.ndarray) -> np.ndarray:
-        found = np.zeros(model.y_size)
-        model.functions.rhs(t, moved, found, out, run_data.handle)
-        return found[which]
+        result = np.zeros(model.y_size)
+        model.functions.rhs(t, moved, result, out, run_data.handle)
+        return result[states]
 
     with model.slate() as run_data:
         run_data.evaluate(t, y, np.inf)  # which sets what holds there
-        for k, i in enumerate(which):
+        for k, i in enumerate(states):
             high, low = y.copy(), y.copy()
             high[i], low[i] = y[i] + width[i], y[i] - width[i]
             j[:, k] = (rates(high) - rates(low)) / (2.0 * SHARE)
-    j /= spreads(model)[which][:, None]
+    j /= spreads(model)[states][:, None]
     if not np.all(np.isfinite(j)):
         return []
     values, vectors = np.linalg.eig(j)
-    most = which[np.argmax(np.abs(vectors), axis=0)]
+    most = states[np.argmax(np.abs(vectors), axis=0)]
     return [(model.state_names[i], values[k : k + 1]) for k, i in enumerate(most)]

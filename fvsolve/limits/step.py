@@ -47,7 +47,7 @@ class Room(NamedTuple):
 
 
 def step_limits(
-    model, rates: dict[str, float] | None = None, astray: float | None = None, run_data: Slate | None = None
+    model, rates: dict[str, float] | None = None, step_error: float | None = None, run_data: Slate | None = None
 ) -> list[Notice]:
     """A notice for the pipe, for every basin, and for what is no wave, whose step is beyond its limit.
 
@@ -63,16 +63,16 @@ def step_limits(
     if not method.explicit:
         return lines
     try:
-        rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
+        checks = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
         h = first_step(model, run_data)
         modes = lumped_modes(model, method.name, h) if h > 0.0 else []
         growing = swings(model, method.name, h, span(model)) if h > 0.0 else []
     except FvsolveError:  # a method whose stability function is not to be had
         return lines
-    found = [notice(model, room, method.name) for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
+    notices = [notice(model, check, method.name) for check in checks if check.courant > check.limit * (1.0 + SLACK)]
     jumps = any(jump for _, jump in model.breaks)
-    modes = [mode for mode in modes if mode.own or not found]  # of cells those that waves bring with them are known
-    return found + [of_mode(model.case, h, mode, method.name, astray, jumps) for mode in modes] + growing + lines
+    modes = [mode for mode in modes if mode.own or not notices]  # of cells those that waves bring with them are known
+    return notices + [of_mode(model.case, h, mode, method.name, step_error, jumps) for mode in modes] + growing + lines
 
 
 def first_step(model, run_data: Slate | None = None) -> float:
@@ -94,13 +94,13 @@ def given_step(model) -> float:
     return numerics.step if numerics.step is not None else numerics.courant / model.wave_rate
 
 
-def of_mode(case, h: float, mode: Mode, method: str, astray: float | None, jumps: bool) -> Notice:
+def of_mode(case, h: float, mode: Mode, method: str, step_error: float | None, jumps: bool) -> Notice:
     """What is to be said of what is no wave alone: before a run that it grows, after it whether that was seen."""
     numerics = case.numerics
-    seen = astray is None or not mode.own or astray >= WRONG or (mode.followed and astray > STILL)
+    seen = step_error is None or not mode.own or step_error >= WRONG or (mode.followed and step_error > STILL)
     enough = (GROWS if mode.followed else GROWS**2) if mode.own else GROWS**2 if jumps else SMOOTH
     wrong = seen and mode.grows >= enough
-    doubt = "it may be wrong" if seen or astray >= DOUBTFUL else "this run shows none"
+    doubt = "it may be wrong" if seen or step_error >= DOUBTFUL else "this run shows none"
     ends = "the numbers are not to be trusted" if wrong else doubt
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
     size = rounded_down(getattr(numerics, key) * mode.limit / h)
@@ -120,15 +120,17 @@ def pipe_rooms(model, method: str) -> list[Room]:
         courant = numerics.step * waves
     else:
         courant = numerics.courant * waves / (waves * model.tables.pipes["quicker"]).max()
-    cells, one = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
-    long = cells >= (ROOM if one.limited and one.shorter else LONG)  # at whose ends it is of a lower order where rough
+    cells, scheme = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
+    long = cells >= (
+        ROOM if scheme.limited and scheme.shorter else LONG
+    )  # at whose ends it is of a lower order where rough
     short = np.flatnonzero(own & ~long)
-    rooms = [room for k in short if (room := short_pipe(model, method, int(k), float(courant[k])))]
+    checks = [check for k in short if (check := short_pipe(model, method, int(k), float(courant[k])))]
     inner = own & (cells >= ROOM if proved(model) else long)  # what grows between the ends does so in few cells, too
     if inner.any():
         k = int(np.argmax(np.where(inner, courant, -1.0)))
-        rooms += long_pipe(model, method, k, float(courant[k]))
-    return sorted(rooms, key=lambda room: (not sound(room), room.courant / max(room.limit, 1e-300)))[-1:]
+        checks += long_pipe(model, method, k, float(courant[k]))
+    return sorted(checks, key=lambda check: (not sound(check), check.courant / max(check.limit, 1e-300)))[-1:]
 
 
 def long_pipe(model, method: str, k: int, courant: float) -> list[Room]:
@@ -136,11 +138,11 @@ def long_pipe(model, method: str, k: int, courant: float) -> list[Room]:
     scheme = frozen(model.case.numerics.scheme)[0]
     if holds_well(scheme, method, courant):
         return []
-    one = advection_limit(scheme, method)
-    grows = math.inf if one.limit > 0.0 else growth(scheme, method, courant, span(model) * model.wave_rates[k])
-    sure = one.proved and proved(model)
-    found = Room(f"links.{model.pipes[k].name}", courant, one.limit, scheme, sure, "on a long pipe", grows=grows)
-    return [found] if grows >= GROWS else []
+    result = advection_limit(scheme, method)
+    grows = math.inf if result.limit > 0.0 else growth(scheme, method, courant, span(model) * model.wave_rates[k])
+    sure = result.proved and proved(model)
+    check = Room(f"links.{model.pipes[k].name}", courant, result.limit, scheme, sure, "on a long pipe", grows=grows)
+    return [check] if grows >= GROWS else []
 
 
 def proved(model) -> bool:
@@ -150,8 +152,8 @@ def proved(model) -> bool:
 
 def short_pipe(model, method: str, k: int, courant: float) -> Room | None:
     """Pipe k of few cells, where its ends make its waves grow within the run: surely by what its own ends reflect."""
-    cells, one = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
-    scheme, limited = frozen(one.shorter if one.limited and one.shorter else one.name)
+    cells, own_scheme = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
+    scheme, limited = frozen(own_scheme.shorter if own_scheme.limited and own_scheme.shorter else own_scheme.name)
     steps = span(model) * model.wave_rates[k] / courant
     grows = times(pipe_growth(scheme, method, cells, courant), steps)
     if grows < GROWS:
@@ -177,7 +179,7 @@ def returned(model, k: int) -> tuple[float, ...]:
 
 def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
     """All basins, water's Courant numbers by parts of a cell as its steps count them."""
-    numerics, rooms = model.case.numerics, []
+    numerics, checks = model.case.numerics, []
     for basin, row in zip(model.basins, model.tables.basins, strict=True):
         rate, share = basin.pace(model.start)
         parts = float(row["unsplit"]) or 1.0
@@ -197,9 +199,9 @@ def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
         fixed = basin.is_grid and basin.even_paced
         grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, span(model) * rate)
         if grows >= GROWS:
-            rooms.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
+            checks.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
                               "in a wide basin", grows=grows))  # fmt: skip
-    return rooms
+    return checks
 
 
 def span(model) -> float:
@@ -212,28 +214,28 @@ def frozen(scheme: str) -> tuple[str, bool]:
     return SCHEMES[scheme].smooth.name, SCHEMES[scheme].limited
 
 
-def sound(room: Room) -> bool:
+def sound(check: Room) -> bool:
     """Whether a room beyond its limit is but doubtful: an estimate, hardly passed, or growth that is hardly seen."""
-    return not room.proved and (room.courant <= room.limit * (1.0 + room.share) or room.grows < GROWS**2)
+    return not check.proved and (check.courant <= check.limit * (1.0 + check.share) or check.grows < GROWS**2)
 
 
-def notice(model, room: Room, method: str) -> Notice:
+def notice(model, check: Room, method: str) -> Notice:
     """What is to be said of a room beyond its limit."""
     numerics = model.case.numerics
     scheme = model.case.numerics.scheme
-    about = f", where it is {room.scheme}," if room.scheme != scheme else ""
-    known = "proved" if room.proved else "an estimate"
+    about = f", where it is {check.scheme}," if check.scheme != scheme else ""
+    known = "proved" if check.proved else "an estimate"
     size = numerics.step if numerics.step is not None else numerics.courant
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
-    if room.limit > 0.0:
-        limit = f"{room.limit:.6g} is the limit {room.where} ({known})"
-        remedy = f"give numerics.{key} = {rounded_down(size * room.limit / room.courant):.4g}{unit} or less"
+    if check.limit > 0.0:
+        limit = f"{check.limit:.6g} is the limit {check.where} ({known})"
+        remedy = f"give numerics.{key} = {rounded_down(size * check.limit / check.courant):.4g}{unit} or less"
     else:
-        limit = f"there is none that does not grow {room.where} ({known})"
-        remedy = f"{room.scheme} wants another method, ssp-rk3 for example"
-    text = (f"{room.place}: Courant number {room.courant:.6g}: with {scheme}{about} and {method} {limit}; "
-            f"{'it may be wrong' if sound(room) else 'the numbers are not to be trusted'}; {remedy}")  # fmt: skip
-    return Notice("step-limit", room.place, text, key, room.courant, room.limit, sound(room))
+        limit = f"there is none that does not grow {check.where} ({known})"
+        remedy = f"{check.scheme} wants another method, ssp-rk3 for example"
+    text = (f"{check.place}: Courant number {check.courant:.6g}: with {scheme}{about} and {method} {limit}; "
+            f"{'it may be wrong' if sound(check) else 'the numbers are not to be trusted'}; {remedy}")  # fmt: skip
+    return Notice("step-limit", check.place, text, key, check.courant, check.limit, sound(check))
 
 
 def growth(scheme: str, method: str, courant: float, crossed: float) -> float:

@@ -44,27 +44,27 @@ def real_part(weights: Sequence) -> Polynomial:
 
 def square(weights: Sequence) -> Polynomial:
     """|z|^2 as a polynomial in t."""
-    waves, found = _waves(weights), {}
+    waves, product = _waves(weights), {}
     for m, x in waves.items():
         for n, y in waves.items():
-            found[m - n] = found.get(m - n, Fraction(0)) + x * y
-    return _cosines(found)
+            product[m - n] = product.get(m - n, Fraction(0)) + x * y
+    return _cosines(product)
 
 
 def _waves(weights: Sequence) -> dict[int, Fraction]:
     """z = sum_m a_m exp(i m theta)."""
-    found: dict[int, Fraction] = {}
+    amplitudes: dict[int, Fraction] = {}
     for k, w in enumerate(weights, start=-2):
-        found[k] = found.get(k, Fraction(0)) - w
-        found[k - 1] = found.get(k - 1, Fraction(0)) + w
-    return found
+        amplitudes[k] = amplitudes.get(k, Fraction(0)) - w
+        amplitudes[k - 1] = amplitudes.get(k - 1, Fraction(0)) + w
+    return amplitudes
 
 
 def _cosines(waves: dict[int, Fraction]) -> Polynomial:
     """sum_m a_m cos(m theta), cos theta = 1 - 2 t, by T_m+1 = 2 (1 - 2 t) T_m - T_m-1."""
     cosine = Polynomial([1, -2])
-    before, now, found = cosine, Polynomial([1]), Polynomial([])
+    before, now, total = cosine, Polynomial([1]), Polynomial([])
     for m in range(max(abs(m) for m in waves) + 1):
-        found = found + now * (waves.get(m, Fraction(0)) + (waves.get(-m, Fraction(0)) if m else 0))
+        total = total + now * (waves.get(m, Fraction(0)) + (waves.get(-m, Fraction(0)) if m else 0))
         before, now = now, 2 * cosine * now - before
-    return found
+    return total
