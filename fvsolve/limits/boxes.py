@@ -1,8 +1,9 @@
-"""Whether a polynomial in two variables is nowhere negative in a box, proved in whole numbers. Knows no method.
+"""Sign of a polynomial in two variables on a box, proved in integers.
 
-In Bernstein's basis a polynomial lies between its least and its greatest coefficient, and those at the corners are
-its values there; halving the box draws the coefficients towards the values (Lane and Riesenfeld 1981). Coefficients
-are whole multiples of 2^-BITS of the largest one, rounded down, so that what is proved of them holds of the polynomial.
+In Bernstein's basis a polynomial lies between its least and its greatest coefficient. Coefficients at the corners are
+values of the polynomial; bisection of the box moves the coefficients towards the values (Lane and Riesenfeld 1981).
+Coefficients are integer multiples of 2^-BITS of the largest coefficient, rounded down, so that a proof of their sign
+holds for the polynomial.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from math import comb
 import numpy as np
 
 BITS = 400
-MOST_BOXES = 400  # after that many the question is left open
+MOST_BOXES = 400  # number of boxes after which the sign is left undecided
 
 Matrix = Sequence[Sequence[int]]  # g[m][i] of x^m y^i
 
@@ -55,9 +56,9 @@ def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, 
 
 
 def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
-    """Coefficients on low..high x 0..1, rounded down; positive factors are left out."""
+    """Bernstein coefficients on low..high x 0..1, up to a positive factor, rounded down."""
     a = np.array([[Fraction(entry) for entry in row] for row in g], dtype=object)
-    for k in range(a.shape[0] - 1):  # x = low + s: Horner's scheme, again and again
+    for k in range(a.shape[0] - 1):  # x = low + s, by repeated Horner schemes
         for m in range(a.shape[0] - 2, k - 1, -1):
             a[m] = a[m] + low * a[m + 1]
     width, power = high - low, Fraction(1)
@@ -72,7 +73,7 @@ def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
 
 
 def _to_bernstein(a: np.ndarray) -> np.ndarray:
-    """From powers to Bernstein's basis along the first axis: b_j = sum_i C(j, i) / C(n, i) a_i."""
+    """Convert from powers to Bernstein's basis along the first axis: b_j = sum_i C(j, i) / C(n, i) a_i."""
     n = a.shape[0] - 1
     return np.array([sum(Fraction(comb(j, i), comb(n, i)) * a[i] for i in range(j + 1)) for j in range(n + 1)])
 
@@ -88,7 +89,7 @@ def _halves(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bends(b: np.ndarray) -> int:
-    """How far the coefficients are from a straight line along the first axis, over the whole degree."""
+    """Deviation of the coefficients from a straight line along the first axis, times the square of the degree."""
     if b.shape[0] < 3:
         return 0
     return max(abs(difference) for difference in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2

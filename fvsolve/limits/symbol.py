@@ -1,4 +1,4 @@
-"""What a linear scheme makes of a wave on a uniform periodic grid, exactly. Knows face weights; knows no method.
+"""Symbol of a linear scheme: rate of a wave on a uniform periodic grid, in exact arithmetic.
 
 u_t + a u_x = 0 in cells of width dx: du_j/dt = -(a / dx) (F_j - F_j-1), F_j = sum_k w_k u_j+k-2. A wave
 u_j = exp(i j theta) grows by du/dt = (a / dx) z(theta) u. With t = sin^2(theta / 2) both Re z and |z|^2 are
@@ -20,7 +20,7 @@ WEIGHTS: dict[str, Weights] = {name: one.weights for name, one in LINEAR.items()
 
 
 def weights_of(scheme: str) -> Weights:
-    """Weights of cells u-2 .. u+2 in the value at the face after u; raises FvsolveError for a scheme that has none."""
+    """Weights of cells u-2 .. u+2 in the value at the face after u; raises FvsolveError for a nonlinear scheme."""
     if scheme in WEIGHTS:
         return WEIGHTS[scheme]
     linear = ", ".join(WEIGHTS)
@@ -32,7 +32,7 @@ def weights_of(scheme: str) -> Weights:
 
 
 def symbol(weights: Sequence, theta) -> np.ndarray:
-    """z(theta) in floating point, theta a phase a cell [rad] or an array of them."""
+    """z(theta) in floating point; theta : phase per cell [rad], a number or an array."""
     theta = np.asarray(theta, dtype=float)
     return sum(float(a) * np.exp(1j * m * theta) for m, a in _waves(weights).items())
 
