@@ -76,7 +76,7 @@ class Halves:
             return
         before, now = loop.before[self.which], loop.now[self.which]
         t = loop.t - h
-        middle = self.stepped(loop, t, loop.before, 0.5 * h, fresh=True)
+        middle = self.stepped(loop, t, loop.before, 0.5 * h, first=True)
         half_steps = self.stepped(loop, t + 0.5 * h, middle, 0.5 * h)
         if not np.all(np.isfinite(half_steps)):  # the half steps cannot be computed
             return

@@ -166,7 +166,7 @@ def test_a_run_says_when_and_in_what_newton_failed_and_keeps_everything_up_to_th
     result = fvsolve.run(case, out=tmp_path / "run")
     assert not result.ok
     assert result.reason.startswith("stopped: Newton did not converge at t = 0.100223 s, however short the step")
-    assert "worst in pot.mass; look for a jump" in result.reason
+    assert "worst in pot.mass; check the parts there for jumps" in result.reason
     assert result.summary["newton_failures"] > 10
     kept = fvsolve.open_run(tmp_path / "run")
     assert kept.reason == result.reason and kept.t == pytest.approx(0.005 * np.arange(21))
