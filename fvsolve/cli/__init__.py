@@ -10,8 +10,7 @@ from fvsolve.errors import FvsolveError, visible
 
 __all__ = ["main"]
 
-# Modules that add commands to the application. A module of a single command has the name of the command, except
-# `failure_map` (command `map`), `optimise`, `precompile` and `scenarios`.
+# Modules that add commands to the application. A module of a single command usually has the name of the command.
 COMMANDS = (
     "commands",
     "chart",
