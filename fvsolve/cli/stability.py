@@ -122,8 +122,11 @@ def say(result, folder: Path, files: list[str]) -> None:
     rows = result.rows
     console, first_row = terminal.console(), rows[0]
     cells = first_row.rate > 0.0
-    terminal.line(console, f"{result.case} at {first_row.when}: {first_row.states} states; a step fails if "
-                         f"a deviation grows by {first_row.threshold:g} (energy norm) within {first_row.steps} steps")  # fmt: skip
+    terminal.line(
+        console,
+        f"{result.case} at {first_row.when}: {first_row.states} states; a step fails if a deviation grows by "
+        f"{first_row.threshold:g} (energy norm) within {first_row.steps} steps",
+    )
     if cells:
         terminal.line(console, f"Courant number: step times {first_row.rate:.6g} 1/s; bounds as Courant numbers")
     terminal.sheet(Sheet(shown(cells), [line for row in rows for line in lines(row)]), console)

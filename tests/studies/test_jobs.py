@@ -92,6 +92,6 @@ def test_commands_take_jobs(line, fvs, tmp_path):
     code, out, _ = fvs(*words, "--jobs", "2", "--out", tmp_path / "two")
     assert code == 0 and len(json.loads(out)["studies"][0]["rows"]) == 2
     code, _, err = fvs("stability", "--jobs", "2")
-    assert code == 2 and "--jobs: nothing to say without a case" in err
+    assert code == 2 and "--jobs: needs a case" in err
     code, _, err = fvs("chart", tmp_path / "line.toml", "--models", "--jobs", "2")
-    assert code == 2 and "--jobs: not with --models" in err
+    assert code == 2 and "--jobs: not valid with --models" in err

@@ -207,7 +207,7 @@ def test_the_command_prints_the_rows_and_fails_where_one_does(fvs, tmp_path):
     code, out, _ = fvs("sweep", "two-tanks", "--set", "numerics.rtol=1e-4,2", "--out", tmp_path)
     assert code == 1 and "refused: numerics.rtol" in out
     code, _, err = fvs("sweep", "two-tanks", "--set", "numerics.rtol", "--out", tmp_path)
-    assert code == 2 and "wanted KEY=a,b,c" in err
+    assert code == 2 and "expected KEY=a,b,c" in err
 
 
 def bare(rows) -> list[dict]:
