@@ -108,8 +108,8 @@ def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
     ("change", "told"),
     [
         (("[protections.none]", "[protections.none.links.tap]\nopening = 0.5"),
-         "links.tap.opening is set here and links.tap.opening by protections.none"),
-        (("[protections.none]", "[protections.none]\n'links.tap' = {}"), "links.tap.opening is set here and links.tap"),
+         "links.tap.opening is set here, and links.tap.opening in protections.none"),
+        (("[protections.none]", "[protections.none]\n'links.tap' = {}"), "links.tap.opening is set here, and links.tap"),
         (("[events.slow]", "[events.slow]\n'links.tpa.area' = 2"), 'no link named "tpa"; did you mean "tap"?'),
         (("at = 450.0", "at = 550.0"), "is not within: main runs from 0 m to 500 m"),
         (('case = "main.toml"', 'case = "mian.toml"'), "there is no such file"),
@@ -117,7 +117,7 @@ def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
         (("[events.slow]", "[event.slow]"), 'unknown key; did you mean "events"?'),
         (('title = "Two taps"', "title = 3"), "3 is not text"),
         (("[protections.none]", "[protections]\nnone = 3\n[protections.x]"), "3 is no table"),
-        (("[events.slow]", "[nodes.slow]"), "is a case, no study"),
+        (("[events.slow]", "[nodes.slow]"), "is a case, not a study"),
         (("[events.slow]", "[events.slow"), "line 8: TOML"),
     ],
 )  # fmt: skip
