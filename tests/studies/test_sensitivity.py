@@ -113,7 +113,10 @@ def test_what_cannot_be_asked_is_named(line):
         ({"vary": bounds}, "no outcome; wanted one such as"),
         ({"vary": {}, "outcome": "max(gate.pressure)"}, "nothing varies"),
         ({"vary": bounds, "outcome": "max(gate.pressure)", "samples": 1}, "samples = 1; wanted 2 or more"),
-        ({"vary": {"nodes.gate.position": [0.0, 1.0]}, "outcome": "max(gate.pressure)"}, "is no quantity"),
+        (
+            {"vary": {"nodes.gate.position": [0.0, 1.0]}, "outcome": "max(gate.pressure)"},
+            "is not a continuous quantity",
+        ),
         ({"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "outcome": "max(gate.pressure)"}, "no key moves it"),
         ({"vary": bounds, "outcome": "t [s]"}, 'no outcome "t .s."'),
     ):
