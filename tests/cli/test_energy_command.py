@@ -212,7 +212,7 @@ def test_without_a_case_auto_is_said_to_be_several_methods(told):
 def test_a_case_without_ports_says_that_it_has_none(told, tanks):
     code, _, err = told(tanks, "--port", "a")
     assert code == 2
-    assert err.strip().endswith("wanted a reservoir, an inflow or a junction, and this case has none")
+    assert err.strip().endswith("Expected a reservoir, an inflow or a junction; the case has no such node")
 
 
 PLACES = {
