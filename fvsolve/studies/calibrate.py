@@ -114,7 +114,7 @@ def calibrate(
         raise FvsolveError("no measured series to fit to. Expected a [compare] with a series in the case")
     bounds = ranges(loaded, free)
     points = sampled(loaded, free, f"sobol:{FIRST * len(bounds)}", seed)
-    return Fitting(loaded, bounds, points, progress or (lambda done, total, what: None)).found(jobs, dask)
+    return Fitting(loaded, bounds, points, progress or (lambda done, total, text: None)).found(jobs, dask)
 
 
 class Fitting:

@@ -40,26 +40,26 @@ class Errands:
         """True if all runs are computed in this process, one after another."""
         return self.bench.alone
 
-    def ahead(self, errands: Sequence[Errand]) -> Iterator[int]:
+    def ahead(self, requests: Sequence[Errand]) -> Iterator[int]:
         """Compute runs ahead of their request; yields the index of each finished run.
 
         The first, cheapest run comes first, then runs from the end, where the most expensive are. With a single
         process nothing is computed ahead; each run is computed when requested.
         """
-        if self.alone or not errands:
+        if self.alone or not requests:
             return
-        order = [0, *range(len(errands) - 1, 0, -1)]
-        for position, answer in self.bench.do([errands[k] for k in order]):
-            self.found[repr(errands[order[position]])] = answer
+        order = [0, *range(len(requests) - 1, 0, -1)]
+        for position, answer in self.bench.do([requests[k] for k in order]):
+            self.found[repr(requests[order[position]])] = answer
             yield order[position]
 
-    def __call__(self, case: Case, errand: Errand) -> Any:
+    def __call__(self, case: Case, request: Errand) -> Any:
         """Result of a run, computed now unless it was computed ahead; `case` is the case with the stages applied."""
-        answer = self.found.pop(repr(errand), None)
+        answer = self.found.pop(repr(request), None)
         if answer is None:
-            return errand.how(case, errand.keys)
+            return request.how(case, request.keys)
         if isinstance(answer, Outcome) and not answer.refused and answer.model is None:
-            return replace(answer, model=prepared(case, errand.keys))
+            return replace(answer, model=prepared(case, request.keys))
         return answer
 
     def __enter__(self) -> Errands:
@@ -76,19 +76,19 @@ class Runner:
         self.sent = Sent(source)
         self.staged: dict[str, Case] = {}
 
-    def __call__(self, errand: Errand) -> Any:
-        name = repr(errand.stages)
+    def __call__(self, request: Errand) -> Any:
+        name = repr(request.stages)
         if name not in self.staged:
-            first_stage, *later = errand.stages or ({},)
+            first_stage, *later = request.stages or ({},)
             case = load(self.sent.source, first_stage)
             for stage in later:
                 case = load(case, stage)
             self.staged[name] = case
-        return errand.how(self.staged[name], errand.keys)
+        return request.how(self.staged[name], request.keys)
 
-    def lost(self, errand: Errand) -> Any:
+    def lost(self, request: Errand) -> Any:
         """Raise RunError: a study cannot continue without the run."""
-        keys = ", ".join(f"{key} = {value}" for key, value in errand.keys.items())
+        keys = ", ".join(f"{key} = {value}" for key, value in request.keys.items())
         raise RunError(f"the process that made the run with {keys} was killed repeatedly. Is there enough memory?")
 
     def __getstate__(self) -> dict[str, Any]:

@@ -120,7 +120,7 @@ def ratio_of_signals(signals: Sequence[Signal]) -> float:
     if len(signals) < 3:
         return SLOW
     t = signals[-1][0]
-    coarse, middle, fine = (np.interp(t, *one) for one in signals)
+    coarse, middle, fine = (np.interp(t, *signal) for signal in signals)
     before = float(np.mean(np.abs(middle - coarse)))
     return float(np.mean(np.abs(fine - middle))) / before if before > 0.0 else SLOW
 

@@ -22,7 +22,7 @@ EXACT = "delay lines are exact here, at any step and stretch: rows are exact to 
 
 def lines(case) -> list[str]:
     """Names of pipes that are delay lines. With `fixed_choices` in the case, no pipe is left to `auto`."""
-    return [name for name, one in followed(case).items() if one.line == "delay"]
+    return [name for name, pipe in followed(case).items() if pipe.line == "delay"]
 
 
 def slowest(case) -> str:
@@ -64,10 +64,10 @@ def as_lines(chosen: dict[str, str]) -> dict[str, str]:
     return {f"links.{name}.line": line for name, line in chosen.items()}
 
 
-def averages(slate, t: float, out: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Delay line -> sum and difference of both waves [kg/s], averaged over its cells of output."""
     sums = {}
-    for k, (r, l) in slate.along(t, out, POINTS).items():  # noqa: E741
+    for k, (r, l) in run_data.along(t, out, POINTS).items():  # noqa: E741
         r, l = r.reshape(-1, POINTS) @ WEIGHTS, l.reshape(-1, POINTS) @ WEIGHTS  # noqa: E741
-        sums[slate.model.pipes[k].name] = r + l, r - l
+        sums[run_data.model.pipes[k].name] = r + l, r - l
     return sums

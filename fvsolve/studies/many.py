@@ -40,8 +40,8 @@ class Hands(Protocol):
 
 def many(work: Work, tasks: Sequence, jobs: int = 1, dask: str | None = None) -> Iterator[tuple[int, Any]]:
     """Compute tasks with a `TaskPool`; yields (index, answer) of each task when it is finished."""
-    with Bench(work, jobs, dask) as bench:
-        yield from bench.do(tasks)
+    with Bench(work, jobs, dask) as pool:
+        yield from pool.do(tasks)
 
 
 class Bench:
@@ -87,7 +87,7 @@ def opened(work: Work, jobs: int, dask: str | None) -> Hands:
     return Crew(work, jobs)
 
 
-def handed(work: Work, tasks: Sequence, hands: Hands, first: int) -> Iterator[tuple[int, Any]]:
+def handed(work: Work, tasks: Sequence, workers: Hands, first: int) -> Iterator[tuple[int, Any]]:
     """Distribute the tasks from index `first` on to workers; yields (index, answer).
 
     If a process crashes, its chunk is split in two halves and repeated, so that only tasks that crash are lost.
@@ -97,13 +97,13 @@ def handed(work: Work, tasks: Sequence, hands: Hands, first: int) -> Iterator[tu
     crashes: dict[int, int] = {}
     size, next_chunk = 1, 0  # start with single tasks: computing times of tasks may differ by orders of magnitude
     while waiting or retry or in_work:
-        while (waiting or retry) and len(in_work) < hands.room:
-            fair_share = -(-len(waiting) // hands.room)  # limits chunks near the end, so that no worker is idle
+        while (waiting or retry) and len(in_work) < workers.room:
+            fair_share = -(-len(waiting) // workers.room)  # limits chunks near the end, so that no worker is idle
             numbers_given = retry.popleft() if retry else [waiting.popleft() for _ in range(min(size, fair_share))]
             in_work[next_chunk] = numbers_given
-            hands.give(next_chunk, [tasks[k] for k in numbers_given])
+            workers.give(next_chunk, [tasks[k] for k in numbers_given])
             next_chunk += 1
-        chunk, answers, seconds = hands.take()
+        chunk, answers, seconds = workers.take()
         numbers = in_work.pop(chunk)
         if answers is not None:
             size = sized(len(numbers), seconds, size)

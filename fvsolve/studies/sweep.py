@@ -185,7 +185,7 @@ class Sweeping:
     """State of a sweep."""
 
     def __init__(self, source, raw: dict, base: dict, runs: list[dict], cache: Points, progress) -> None:
-        self.runs, self.kept, self.told = runs, cache, progress or (lambda done, total, what: None)
+        self.runs, self.kept, self.told = runs, cache, progress or (lambda done, total, text: None)
         self.source, self.base = source, base
         self.found: dict[int, dict] = {}
         self.digests: dict[str, str] = {}  # name of a file -> hash of its content

@@ -93,7 +93,7 @@ def once(case, keys: Mapping) -> Outcome:
 def truth(
     case, finest: Mapping | None = None, *, opinions: int | None = None, judged: bool = False, way: str = "both",
     stiff: bool = False, exact: bool = True, lines: bool = False, run: Callable = once,
-    tell: Callable[[str], None] = lambda what: None, errands: Errands | None = None, stages: tuple[dict, ...] = (),
+    tell: Callable[[str], None] = lambda text: None, errands: Errands | None = None, stages: tuple[dict, ...] = (),
 ) -> Truth:  # fmt: skip
     """Find the most accurate reference for runs of a case with the keys `finest` or coarser ones.
 

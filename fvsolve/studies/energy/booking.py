@@ -30,7 +30,7 @@ class Booked(Loop):
         """Start the summation; on_step() is called after every accepted step."""
         self.accounts, self.on_step = accounts, on_step
         self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # ledger lines, then the Newton residual
-        self.supplied, self.rates, self.lost = (accounts.of(what) for what in ("supplied", "rate", "dissipated"))
+        self.supplied, self.rates, self.lost = (accounts.of(kind) for kind in ("supplied", "rate", "dissipated"))
         self.longest = float(self.orders[slots.STEP_MAX])
         self.dydt, self.beside = np.zeros(self.model.y_size), self.model.new_out()
         self.orders[slots.LEAPS] = 0.0  # fused steps store no stages
