@@ -135,7 +135,9 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
     values = slope(w[:-1], w[1:]) if callable(slope) else slope
     bounds = _each("the slope", values, (len(w) - 1,), float)
     if not np.all(np.isfinite(bounds) & (bounds >= 0.0)):
-        raise FvsolveError(f"the slope is not bounded on Re s = {shift:g} 1/s. If poles lie on it, use a greater shift")
+        raise FvsolveError(
+            f"the slope is not bounded on Re s = {shift:g} 1/s. If poles lie on it, use a shift to their right"
+        )
     return bounds
 
 
