@@ -291,5 +291,5 @@ def test_more_threads_than_rows_are_named():
 
 
 def test_check_says_what_can_be_shared_out(fvs):
-    assert "threads: up to 50 share out 50 rows of tank" in fvs("check", "dam-break")[1]
-    assert "threads: one; plain: its mesh is no full rectangle" in fvs("check", "flooding")[1]
+    assert "threads: up to 50 share 50 rows of tank" in fvs("check", "dam-break")[1]
+    assert "threads: 1; plain: its mesh is no full rectangle" in fvs("check", "flooding")[1]

@@ -178,12 +178,12 @@ def test_ctrl_c_during_a_rung_ends_the_ladder(tmp_path):
         main()"""
     command = [sys.executable, "-c", script, "chart", "line.toml", "--models"]
     left = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
-    assert left.returncode == 130 and "none of them is kept" in left.stderr and "Traceback" not in left.stderr
+    assert left.returncode == 130 and "their results are lost" in left.stderr and "Traceback" not in left.stderr
 
 
 def test_what_means_nothing_to_the_ladder_is_refused_by_name(fvs):
     code, _, err = fvs("chart", "gradual-closure", "--models", "--scheme", "weno5", "--step", "1e-3")
-    assert code == 2 and err.startswith("--scheme, --step: not with --models")
+    assert code == 2 and err.startswith("--scheme, --step: not valid with --models")
 
 
 def test_the_quickest_change_is_the_range_over_the_steepest_slope():
