@@ -1,0 +1,174 @@
+"""Proof that a change of names changed no result: shipped cases of two commits, compared to the bit.
+
+    python benchmarks/compare_commits.py OLD NEW [--map names.tsv] [--cases a,b] [--quick]
+
+Both commits are extracted to a temporary folder; uncommitted changes are not seen. Each commit runs its own cases, in a
+process of its own with an empty cache of compiled code. Of each case are compared (dump_cases.py):
+
+- the right-hand side in full (`dydt` and all that it writes beside), by a time and a state and by what a state
+  remembers, and all probes: at the start, at a quarter of the run and at its end as `advance` gives them, again at the
+  start, and halfway between start and end;
+- the files of the run: history, envelope, routes, fields and lines of all frames, the summary, the resolved case;
+  cases in `dump_cases.ENDS` end earlier than they are shipped.
+
+Not compared are times of the clock, costs, versions and hashes in the summary, the checkpoint, and pictures. Texts for
+people (titles, notices, reasons after their first word) are compared by number and kind, not by their words.
+
+A line of the map is KIND, OLD and NEW name with tabs between (compare_dumps.py). Kind `public` renames words of keys,
+columns and texts: `extremes.least` is `least` below `extremes`. Other kinds (`module`, `name`, `member`, `column`,
+`arg`) are names of Python, by which dump_cases.py finds functions of either commit.
+
+Prints a line for each case. Exit status: 0 if all are equal, 1 if any differs, 2 if they cannot be compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import os
+import pickle
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+from pathlib import Path
+
+from compare_dumps import Dump, Names, compare, count
+
+HERE = Path(__file__).resolve().parent
+PARTS = ("fvsolve", "cases")  # folders of a commit that are extracted
+TINY = "accumulator"  # the case of --quick
+SHOWN = 3  # differences of a case that are printed
+
+
+class Side:
+    """One commit: its files, and the process that dumps its cases."""
+
+    def __init__(self, commit: str, folder: Path, written: Path, fresh: bool) -> None:
+        self.commit, self.folder, self.tree = commit, folder, folder / "tree"
+        extract(commit, self.tree)
+        cache = {"FVSOLVE_CACHE": str(folder / "cache")} if fresh else {}
+        known = {key: value for key, value in os.environ.items() if key != "FVSOLVE_PARTS"}
+        known |= {"PYTHONPATH": str(self.tree), "MPLBACKEND": "Agg", "OPENBLAS_NUM_THREADS": "1"} | cache
+        self.command = [sys.executable, "-P", str(HERE / "dump_cases.py"), str(self.tree), str(written)]
+        self.known, self.process, self.seconds = known, None, 0.0
+
+    @property
+    def cases(self) -> dict[str, Path]:
+        """Name -> file of its shipped cases."""
+        return {path.stem: path for path in sorted((self.tree / "cases").glob("*.toml"))}
+
+    def dump(self, name: str) -> Dump | str:
+        """The dump of a case, or how its process ended."""
+        begun, out = time.perf_counter(), self.folder / "dump"
+        if self.process is None:
+            self.process = subprocess.Popen(
+                self.command, env=self.known, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                stderr=open(self.folder / "errors", "w", encoding="utf-8"),
+            )  # fmt: skip
+        try:
+            print(self.cases[name], out, sep="\t", file=self.process.stdin, flush=True)
+            answer = self.process.stdout.readline()
+        except BrokenPipeError:
+            answer = ""
+        self.seconds = time.perf_counter() - begun
+        if answer:
+            return pickle.loads(out.read_bytes())
+        code, self.process = self.process.wait(), None
+        last = (self.folder / "errors").read_text(encoding="utf-8", errors="replace").strip().splitlines()[-1:]
+        return f"the process of {self.commit} ended with {code}: {' '.join(last)}"
+
+    def close(self) -> None:
+        """End the process."""
+        if self.process is not None:
+            self.process.stdin.close()
+            self.process.wait()
+
+
+def extract(commit: str, tree: Path) -> None:
+    """The package and the cases of a commit."""
+    packed = subprocess.run(["git", "archive", commit, *PARTS], cwd=HERE.parent, capture_output=True, check=True)
+    with tarfile.open(fileobj=io.BytesIO(packed.stdout)) as archive:
+        archive.extractall(tree, filter="data")
+
+
+def revision(name: str) -> str:
+    """Short hash of a commit; ValueError for an unknown one."""
+    command = ["git", "rev-parse", "--verify", "--quiet", "--short", f"{name}^{{commit}}"]
+    found = subprocess.run(command, cwd=HERE.parent, capture_output=True, text=True)
+    if found.returncode:
+        raise ValueError(f"{name}: unknown commit")
+    return found.stdout.strip()
+
+
+def pairs(old: Side, new: Side, names: Names, asked: list[str]) -> list[tuple[str | None, str | None]]:
+    """Names of each case on both sides, None where a side has none; ValueError for unknown ones that are asked for."""
+    unknown = [name for name in asked if name not in old.cases]
+    if unknown:
+        raise ValueError(f"{old.commit} has no case {', '.join(unknown)}; expected some of {', '.join(old.cases)}")
+    found = []
+    for name in asked or old.cases:
+        found.append((name, next((one for (one,) in names.places((name,)) if one in new.cases), None)))
+    left = set(new.cases) - {other for _, other in found}
+    return found + ([] if asked else [(None, name) for name in sorted(left)])
+
+
+def compared(old: Side, new: Side, names: Names, name: str | None, other: str | None) -> tuple[bool, str]:
+    """True if a case is equal on both sides; the line that says so."""
+    for side, missing in ((old, name is None), (new, other is None)):
+        if missing:
+            return False, f"{name or other}: differs: {side.commit} has no such case"
+    dumps = [old.dump(name), new.dump(other)]
+    said = f"{name}" if name == other else f"{name} ({other})"
+    ended = [one for one in dumps if isinstance(one, str)]
+    if ended:
+        return False, f"{said}: differs: {'; '.join(ended)}"
+    found, took = compare(*dumps, names), f"{old.seconds:.1f} s and {new.seconds:.1f} s"
+    if not found:
+        fault = f", both {dumps[0]['fault',]}" if ("fault",) in dumps[0] else ""
+        return True, f"{said}: equal{fault}, {count(dumps[0])} values in {len(dumps[0])} places, {took}"
+    places = f"differs in {len(found)} of {len(dumps[0])} places, {took}: "
+    return False, f"{said}: {places}{'; '.join(map(str, found[:SHOWN]))}"
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("old", nargs="?", default="HEAD", help="commit (default HEAD)")
+    parser.add_argument("new", nargs="?", default="HEAD", help="commit (default HEAD)")
+    parser.add_argument("--map", type=Path, help="file of renamed words: KIND, OLD and NEW name with tabs between")
+    parser.add_argument("--cases", default="", help="names of cases of OLD with commas between (default all)")
+    parser.add_argument("--quick", action="store_true", help=f"cases as named (default {TINY}), the user's own cache")
+    given, begun = parser.parse_args(), time.perf_counter()
+    asked = [name for name in given.cases.split(",") if name] or ([TINY] if given.quick else [])
+    sides: list[Side] = []
+    with tempfile.TemporaryDirectory(prefix="fvsolve-compare-") as folder:
+        try:
+            lines = given.map.read_text(encoding="utf-8").splitlines() if given.map else []
+            names, written = Names(lines), Path(folder) / "names.tsv"
+            written.write_text("\n".join(lines), encoding="utf-8")
+            for commit, label in ((given.old, "old"), (given.new, "new")):
+                (Path(folder) / label).mkdir()
+                sides.append(Side(revision(commit), Path(folder) / label, written, not given.quick))
+            cases = pairs(*sides, names, asked)
+        except (ValueError, OSError) as error:
+            print(error, file=sys.stderr)
+            return 2
+        print(f"{sides[0].commit} and {sides[1].commit}, {len(cases)} cases", flush=True)
+        equal = 0
+        try:
+            for name, other in cases:
+                same, line = compared(*sides, names, name, other)
+                equal += same
+                print(line, flush=True)
+        finally:
+            for side in sides:
+                side.close()
+    if unused := names.unused():
+        print(f"public names of the map that no case has: {', '.join(unused)}")
+    print(f"{equal} of {len(cases)} cases are equal; {time.perf_counter() - begun:.0f} s")
+    return 0 if equal == len(cases) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
