@@ -59,7 +59,7 @@ class EnergyForm:
         return bool(np.all(np.abs(self.forth @ (a @ self.idle)) <= CLOSED * most))
 
     def fitting(self, a: Any) -> EnergyForm:
-        """This form if A is `preserves_idle`, else the `full_norm`."""
+        """This form if A maps idle motions to idle motions, else the full norm."""
         return self if self.closed(a) else self.completed()
 
     def completed(self) -> EnergyForm:
