@@ -134,9 +134,7 @@ def _scale(atol, rtol: float, n: int) -> np.ndarray:
     """Reference size of the deviations of each state, added to the size of the state."""
     atol = _numbers("atol", atol)
     if atol.shape not in ((), (n,)) or not np.all(np.isfinite(atol) & (atol > 0)):
-        raise FvsolveError(
-            f"atol is not valid. Expected a positive number, or {n} of them, one for each state"
-        )
+        raise FvsolveError(f"atol is not valid. Expected a positive number, or {n} of them, one for each state")
     return np.broadcast_to(atol / rtol, n).copy()
 
 
