@@ -11,7 +11,7 @@ JUMP = 1e-6  # fraction of an event function, and of a given step; smaller chang
 def arm(g, armed):
     """Set the flag of every event function at or below zero, where the rhs is in its switched state.
 
-    Only accepted states set flags, so no step meets a switch of the rhs, not even in stages beyond an event.
+    Only accepted states set flags, so the rhs does not switch within a step, not even in stages beyond an event.
     """
     for i in range(g.size):
         armed[i] = 1.0 if g[i] <= 0.0 else 0.0
