@@ -363,4 +363,4 @@ def test_the_table_is_parquet_too_and_every_extreme_has_a_chart(line, fvs, tmp_p
     assert fvs(*again, "--outcome", "final(valve.flow)")[0] == 0
     assert [path.name for path in (tmp_path / "o" / "charts").iterdir()] == ["final-valve.flow.png"]
     code, _, err = fvs(*again, "--outcome", "max(x)")
-    assert code == 2 and 'no outcome "max(x)"; there are' in err
+    assert code == 2 and 'no outcome "max(x)". Outcomes are' in err
