@@ -72,7 +72,8 @@ def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
     frames = [name for name, node in nodes.items() if node.kind == "frame"]
     while waiting:
         ready = {name: body for name, body in waiting.items()
-                 if hangs_on(body)[0] not in waiting and placed(nodes, body) and hangs_on(body)[0] in (WORLD, *result, *frames)}  # fmt: skip
+                 if hangs_on(body)[0] not in waiting and placed(nodes, body)
+                 and hangs_on(body)[0] in (WORLD, *result, *frames)}  # fmt: skip
         if not ready:
             return result
         result |= ready
