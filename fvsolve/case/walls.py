@@ -202,7 +202,7 @@ def faults_between(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) -
     first = next(iter(axes), None)
     for patch, (axis, _) in axes.items():
         if axis != axes[first][0]:
-            text = f"moves along {'xy'[axis]} and {first} along {'xy'[1 - axis]}; expected one axis for all walls of a basin"
+            text = f"moves along {'xy'[axis]} and {first} along {'xy'[1 - axis]}; expected the same axis for all walls"
             yield (patch,), text
     for patch in basin.patches:
         if patch in walls or patch not in mesh.patches[:-1]:
