@@ -212,8 +212,10 @@ def at_least_one(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tup
 
 
 def misfits(
-    error: ValidationError, keys: list[str], synonyms: dict[str, str] = {}
-) -> list[tuple[tuple[Any, ...], str]]:  # noqa: B006
+    error: ValidationError,
+    keys: list[str],
+    synonyms: dict[str, str] = {},  # noqa: B006
+) -> list[tuple[tuple[Any, ...], str]]:
     """Faults of a pydantic error, with their key paths; synonyms : keys of other programs -> equivalent here."""
     result = []
     for entry in error.errors(include_url=False):
