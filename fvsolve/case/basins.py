@@ -114,7 +114,7 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
         if not re.fullmatch(r"[\w-]+", name):
             yield key, f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
         if line.basin in nodes and pool is None:
-            continue  # at fault itself
+            continue  # the basin itself is faulty
         if not isinstance(pool, Pool):
             pools = [basin for basin, kind in nodes.items() if kind is None or isinstance(kind, Pool)]
             near = did_you_mean(line.basin, pools) or f"; basins are {listing(pools) or 'none'}"

@@ -212,7 +212,7 @@ def misfits(nodes: dict[str, Any], named: Any) -> Found:
     for name, body in bodies.items():
         on, point = hangs_on(body)
         keys = ("nodes", name, "joint", "on")
-        if on == WORLD or (on not in nodes and on in named):  # at fault itself
+        if on == WORLD or (on not in nodes and on in named):  # the carrier itself is faulty
             continue
         if on not in own:
             state = f"is a {nodes[on].kind}" if on in nodes else "is not a node"

@@ -338,7 +338,7 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Fo
     for (group, name), part in wet.items():
         derived = getattr(part, "head", None) is not None or getattr(part, "on", None) is not None
         if stated and name not in stated and not derived and not lends:
-            yield (group, name), f"elevation is missing: {listing(stated)} state it; expected at all places or at none"
+            yield (group, name), f"elevation is missing, but stated for {listing(stated)}; expected for all or for none"
     heights_of = {name: node.elevation for name, node in nodes.items()}
     heights_of |= {f"{name}.{place}": link.elevation for name, link in links.items() for place in chambers_of(link)}
     for name, link in links.items():

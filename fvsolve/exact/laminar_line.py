@@ -145,7 +145,7 @@ class LineDeviation:
         return p, m
 
     def _arrived(self, d, after):
-        """(pressure, flow) of a unit jump after a distance d, at a time `after` its front, by a fixed Talbot contour."""
+        """(pressure, flow) of a unit jump at a distance d and a time `after` its front, by a fixed Talbot contour."""
         here = after > 0.0
         p, m = np.zeros(d.shape), np.zeros(d.shape)
         if not here.any():

@@ -209,7 +209,7 @@ class Rays:
         return result
 
     def kinks(self, pipe: str, t: float) -> np.ndarray:
-        """Places of kinks in a pipe at time t [m]: rays from kinks of schedules, or from a start without equilibrium."""
+        """Places of kinks in a pipe at time t [m]: rays from kinks of schedules, or from an unbalanced start."""
         places, length = [np.zeros(0)], self.pipes[pipe].length
         for group, times in self._acting().items():
             for end in (0, 1):

@@ -44,10 +44,10 @@ FAULTS = {
     "courant of text": (piped(method="gauss-4", courant="fast"), "numerics.courant"),
     "courant without cells": (
         cellless(method="gauss-4", courant=20.0),
-        "no pipe, so no cell to cross",
+        "needs cells, and the case has no pipe or basin",
     ),
-    "auto by courant": (piped(method="auto", courant=0.9), 'method "auto" goes by the error of its steps; give rtol'),
-    "auto by step": (piped(method="auto", step=1e-3), 'method "auto" goes by the error of its steps; give rtol'),
+    "auto by courant": (piped(method="auto", courant=0.9), 'method "auto" controls the error of its steps; give rtol'),
+    "auto by step": (piped(method="auto", step=1e-3), 'method "auto" controls the error of its steps; give rtol'),
     "two settings": (piped(method="radau-iia-5", rtol=1e-6, courant=2.0), "courant and rtol are given; keep one"),
     "no such algebra": (piped(method="gauss-4", linear_algebra="bandid"), 'did you mean "banded"?'),
 }
@@ -82,7 +82,7 @@ INTEGRATE = {
     "negative": (dict(method="radau-iia-5", rtol=-1e-6), "rtol = -1e-06 is not a positive number"),
     "infinite": (dict(method="radau-iia-5", step=float("inf")), "step = inf is not a positive number"),
     "text": (dict(rtol="1e-6"), "rtol = '1e-6' is not a positive number"),
-    "auto by steps": (dict(method="auto", step=0.1), 'method "auto" goes by the error of its steps'),
+    "auto by steps": (dict(method="auto", step=0.1), 'method "auto" controls the error of its steps'),
     "negative atol": (dict(atol=-1.0), "atol must be a positive number, or 1 of them"),
     "atol of another length": (dict(atol=[1e-6, 1e-6]), "atol must be a positive number, or 1 of them"),
 }
