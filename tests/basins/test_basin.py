@@ -222,7 +222,7 @@ FAULTS = {
     "cells": ({"cells": [4.5, 3]}, "no pair of numbers of cells"),
     "physics": ({"pressure": "1 bar"}, 'means nothing to physics "free-surface"; it goes with liquid'),
     "needs": ({"physics": "liquid"}, "thickness is missing"),
-    "start": ({"start": {"pressure": "1 bar"}}, 'start.pressure: means nothing to physics "free-surface"'),
+    "start": ({"start": {"pressure": "1 bar"}}, 'start.pressure: does not apply to physics "free-surface"'),
     "formula": ({"bed": "0.1*z"}, "z is unknown"),
     "number": ({"bed": "sqrt(x - 1)"}, "is not a number at x = 0.25 m"),
     "holes": ({"holes": [[0.1, 0.0, 1.0, 1.0]]}, "holes.0.: x0 = 0.1 m is on no grid line"),

@@ -278,11 +278,14 @@ def test_links_that_cannot_be_are_refused_by_name(text):
 def test_what_a_joint_holds_and_energy_are_refused_where_a_link_joins_a_basin_that_rides(link):
     case = changed(twins({"kind": "fixed"}, COLUMN), {"b": {"at": [2, 0, 0]} if link["type"] == "valve" else {}}, {})
     case["links"]["duct"] = changed({"nodes": {}, "links": {"duct": case["links"]["duct"]}}, {}, link)["links"]["duct"]
-    reaction = "the reaction of the flow through a.gap is not modelled"
-    with pytest.raises(FvsolveError, match=f"not booked; links.duct: {reaction} yet"):
+    with pytest.raises(
+        FvsolveError, match="not booked; links.duct: the reaction of the flow through a.gap is not modelled yet"
+    ):
         energy(case)
     case["output"]["probes"] = ["hull.joint_fx"]
-    with pytest.raises(CaseError, match=f"{reaction} .* a probe asks what joints hold"):
+    with pytest.raises(
+        CaseError, match="the reaction of the flow through a.gap is not modelled .* a probe asks what joints hold"
+    ):
         fv.build(fv.load(case))
 
 

@@ -193,7 +193,7 @@ def carrying(velocity, mesh=None, **more) -> dict:
 @pytest.mark.parametrize("key", ["u", "level"])
 def test_what_is_carried_starts_from_no_flow_of_its_own(key):
     case = carrying({"stream": "sin(pi*x)*sin(pi*y)"}, size=[1.0, 1.0], cells=[4, 4], start={key: 1.0})
-    with pytest.raises(CaseError, match=f'start.{key}: means nothing to physics "transport"'):
+    with pytest.raises(CaseError, match=f'start.{key}: does not apply to physics "transport"'):
         fvsolve.load(case)
 
 

@@ -209,8 +209,9 @@ def test_what_goes_on_after_the_end_is_noted_and_nothing_is_sized_by_it(fvs, tmp
     assert note.text == "nodes.gate.demand: continues to 30.1 s, after the end of the run at 4 s"
     assert not fvsolve.run(case, set=late).verdicts[0].ok and fvsolve.run(case, set=late).verdicts[0].margin > 0.0
     status, text, _ = fvs("run", "scene.toml", "--no-pictures", "--set", "nodes.gate.demand.duration=30")
-    assert status == 1
-    assert "OPEN, as nodes.gate.demand: continues to 30.1 s, after the end of the run at 4 s: top" in text
+    assert (
+        status == 1 and "OPEN, as nodes.gate.demand: continues to 30.1 s, after the end of the run at 4 s: top" in text
+    )
     held = {"nodes.gate.demand": {"time": [0.0, 30.0], "value": [flow, flow]}}  # goes on, but changes nothing
     assert [one for one in fvsolve.run(case, set=held).warnings if one.kind == "end"] == []
     status, text, _ = fvs("size", "scene.toml", "--vary", "nodes.gate.demand.duration=0.1 s,30 s", "--goal", "least")

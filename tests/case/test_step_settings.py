@@ -35,9 +35,15 @@ FAULTS = {
         'method "gauss-4" estimates no error; use ',
     ),
     "no estimate by default": (cellless(method="gauss-4"), 'numerics.method: method "gauss-4" estimates no error; use'),
-    "rtol below rounding": (piped(method="radau-iia-5", rtol=1e-14), "numerics.rtol: 1e-14 is below rounding; wanted"),
+    "rtol below rounding": (
+        piped(method="radau-iia-5", rtol=1e-14),
+        "numerics.rtol: 1e-14 is below rounding; expected",
+    ),
     "rtol of no kind": (piped(method="radau-iia-5", rtol="small"), "numerics.rtol"),
-    "step that moves nothing": (piped(method="gauss-4", step=1e-17), "numerics.step: 1e-17 s would not move the time"),
+    "step that moves nothing": (
+        piped(method="gauss-4", step=1e-17),
+        "numerics.step: 1e-17 s is below the rounding of the time",
+    ),
     "step of no time": (piped(method="gauss-4", step="1 m"), "numerics.step"),
     "step of zero": (piped(method="gauss-4", step=0.0), "numerics.step"),
     "courant of zero": (piped(method="gauss-4", courant=0.0), "numerics.courant"),
@@ -82,7 +88,7 @@ INTEGRATE = {
     "negative": (dict(method="radau-iia-5", rtol=-1e-6), "rtol = -1e-06 is not a positive number"),
     "infinite": (dict(method="radau-iia-5", step=float("inf")), "step = inf is not a positive number"),
     "text": (dict(rtol="1e-6"), "rtol = '1e-6' is not a positive number"),
-    "auto by steps": (dict(method="auto", step=0.1), 'method "auto" controls the error of its steps'),
+    "auto by steps": (dict(method="auto", step=0.1), 'method "auto" goes by the error of its steps'),
     "negative atol": (dict(atol=-1.0), "atol must be a positive number, or 1 of them"),
     "atol of another length": (dict(atol=[1e-6, 1e-6]), "atol must be a positive number, or 1 of them"),
 }

@@ -205,7 +205,7 @@ def test_a_precharge_above_the_line_is_kept_until_the_line_exceeds_it(law):
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        ({"gas_volume": None}, "no gas; wanted one of precharge, gas_volume"),
+        ({"gas_volume": None}, "no gas; expected one of precharge, gas_volume"),
         ({"precharge": 1e5}, "precharge and gas_volume are given; keep one"),
         ({"gas_volume": 0.2}, "0.2 m3 is more than its volume of 0.1 m3"),
         ({"gas_volume": 0.0}, "out of range"),

@@ -128,7 +128,13 @@ BAD = {
     ),
     "all at once": (
         {"axis": [0, 0, 0], "angle": "m", "matrix": 2 * [[2, 0, 0]] + [[0, 0, 1]], "yaw": 0, "zyz": [0, 1, 0], "x": 1},
-        {"axis": "has zero length", "angle": "no number", "matrix": "from the identity by 7", "zyz": "57.3 deg away", "x": "unknown key"},
+        {
+            "axis": "has zero length",
+            "angle": "no number",
+            "matrix": "from the identity by 7",
+            "zyz": "57.3 deg away",
+            "x": "unknown key",
+        },
     ),
 }  # fmt: skip
 
