@@ -278,10 +278,10 @@ FAULTS = {
     "impedance": (
         {"level": 1.0, "patches": {"out": {"side": "east", "impedance": 1.0}}},
         {},
-        "means nothing to physics",
+        "does not apply to physics",
     ),
     "scalar": ({"level": 1.0, "scalars": {"dye": 1.0}}, {}, "no scalar named"),
-    "start": ({"level": 1.0, "start": {"pressure": 1.0}}, {}, "means nothing to physics"),
+    "start": ({"level": 1.0, "start": {"pressure": 1.0}}, {}, "does not apply to physics"),
 }
 
 

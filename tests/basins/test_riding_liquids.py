@@ -370,14 +370,14 @@ def test_energy_and_joints_are_refused_by_name_where_a_side_is_open():
 # faults ----------
 
 FAULTS = {
-    "rides by": ({}, {"sloshing": "frozen"}),
-    "goes? by|rides by .cells. alone": ({}, {"sloshing": "modes"}),
-    "one of both": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
-    "would have to feel what leaves": (
+    "on a body has only": ({}, {"sloshing": "frozen"}),
+    "goes? by|on a body has only .cells.": ({}, {"sloshing": "modes"}),
+    "a basin on a body cannot have moving walls": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
+    "and the reaction to outflow": (
         {"joint": {"kind": "prismatic", "axis": [1, 0, 0]}},
         {"patches": {"gap": {"side": "east", "impedance": 0.0}}},
     ),
-    "say where with at": ({}, {"elevation": 1.0}),
+    "give its place with at": ({}, {"elevation": 1.0}),
 }
 
 

@@ -147,9 +147,9 @@ def test_velocities_that_cannot_be_had_are_refused_with_what_is_wanted(velocity,
     "text, words",
     [
         (None, "No such file"),
-        ("", "is empty; wanted a header"),
+        ("", "is empty; expected a header"),
         ("x,y,u\n0,0,1\n", "line 1: its header is x, y, u; wanted x, y, u, v or x, y, psi"),
-        ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "b" is no number in column "psi"'),
+        ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "b" is not a number in column "psi"'),
         ("x,y,psi\n0,0,1\n1,0,2\n", "2 points; wanted at least three"),
         ("x,y,psi\n0,0,1\n1,0,2\n2,0,3\n", "lie on one line"),
         ("x,y,psi\n0,0,1\n1,0,2\n0,1,3\n", "do not reach around 9 of 20 places of the mesh, the first"),
@@ -192,7 +192,7 @@ def carrying(velocity, mesh=None, **more) -> dict:
 @pytest.mark.parametrize("key", ["u", "level"])
 def test_what_is_carried_starts_from_no_flow_of_its_own(key):
     case = carrying({"stream": "sin(pi*x)*sin(pi*y)"}, size=[1.0, 1.0], cells=[4, 4], start={key: 1.0})
-    with pytest.raises(CaseError, match=f'start.{key}: means nothing to physics "transport"'):
+    with pytest.raises(CaseError, match=f'start.{key}: does not apply to physics "transport"'):
         fvsolve.load(case)
 
 

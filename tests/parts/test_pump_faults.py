@@ -21,19 +21,19 @@ def faults(more=None, **keys) -> str:
 
 
 FOUND = [
-    ({}, "wanted one of curve, power, suter"),
+    ({}, "expected one of curve, power, suter"),
     ({"curve": ONE, "power": 1e4}, "curve and power are given; keep one"),
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 55.0]}}, "curve.head[1]: 55.0 comes after 50.0; the head must fall"),
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0, 50.0]}}, "the head must fall as the flow rises"),
     ({"curve": {"flow": [0.0, 0.1, 0.1], "head": [50.0, 40.0, 30.0]}}, "flows out of order: 0.1 comes after 0.1"),
     ({"curve": {"flow": [0.0], "head": [50.0]}}, "one point must have a flow and a head above 0"),
-    ({"curve": {"flow": [], "head": []}}, "is no list; wanted a list of values"),
+    ({"curve": {"flow": [], "head": []}}, "is not a list; expected a list of values"),
     ({"curve": {"flow": [0.0, 0.1], "head": [50.0]}}, "1 values for 2 flows"),
     ({"curve": {"coefficients": [50.0]}}, "fall to 0 at some flow"),
     ({"curve": {"coefficients": [50.0, 100.0, -5000.0]}}, "the head rises at a flow of 0 m3/s"),
     ({"curve": ONE, "trip": 1.0}, "trip: wants rated_speed"),
     ({"curve": ONE, "inertia": 2.0}, 'inertia: wants rated_speed, for example "1480 rpm"'),
-    ({"curve": ONE, "inertia": -2.0, "rated_speed": 150.0}, "inertia: -2.0 is out of range; wanted a value above 0"),
+    ({"curve": ONE, "inertia": -2.0, "rated_speed": 150.0}, "inertia: -2.0 is out of range; expected a value above 0"),
     ({"curve": ONE, "inertia": "2 kg", "rated_speed": 150.0}, "is a mass; wanted a moment of inertia"),
     ({"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": -1.0}, "-1 s lies before the start at 0 s"),
     ({"curve": ONE, "speed": -1.0}, "speed: -1.0 is out of range"),
@@ -68,7 +68,7 @@ def test_faults_of_torques():
     held = {"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": step(0.5, 0.0, 1.0)["time"][1]}
     assert "is held by its motor until it trips" in faults(motor, **held)
     wet = {"motor": {"type": "torque", "to": "out", "torque": 1.0}}
-    assert "a hydraulic place, and this port of a torque a rotational or spatial one" in faults(wet, curve=ONE)
+    assert "a hydraulic place, and this port of a torque needs a rotational or spatial place" in faults(wet, curve=ONE)
 
 
 def rounded(by: float) -> dict:

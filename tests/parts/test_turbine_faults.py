@@ -48,7 +48,7 @@ FOUND = [
     (half(opening=1.2), "hill_chart[0].opening: 1.2 is out of range"),
     (half(efficiency=None), "hill_chart[0]: wanted efficiency or unit_torque"),
     (half(unit_torque=[1, 2, 3]), "hill_chart[0].unit_torque: efficiency and unit_torque are given; keep one"),
-    (half(efficiency=[0.7, 85, 0.6]), "hill_chart[0].efficiency[1]: 85 is out of range; wanted a value between"),
+    (half(efficiency=[0.7, 85, 0.6]), "hill_chart[0].efficiency[1]: 85 is out of range; expected a value between"),
     (half(efficiency=[0.7, 0.8]), "3 of unit_speed, 3 of unit_flow, 2 of efficiency; wanted as many of each"),
     (half(unit_speed=[40], unit_flow=[0.5], efficiency=[0.7]), "hill_chart[0]: has one point; wanted two at least"),
     (half(unit_speed=[60, 40, 90]), "hill_chart[0]: turns back at point 2, (40, 0.5); a curve may fold in unit_speed"),

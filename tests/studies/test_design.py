@@ -111,7 +111,7 @@ def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
         (("[protections.none]", "[protections.none]\n'links.tap' = {}"),
          "links.tap.opening is set here, and links.tap"),
         (("[events.slow]", "[events.slow]\n'links.tpa.area' = 2"), 'no link named "tpa"; did you mean "tap"?'),
-        (("at = 450.0", "at = 550.0"), "is not within: main runs from 0 m to 500 m"),
+        (("at = 450.0", "at = 550.0"), "is outside: main runs from 0 m to 500 m"),
         (('case = "main.toml"', 'case = "mian.toml"'), "there is no such file"),
         (('case = "main.toml"', ""), "case is missing"),
         (("[events.slow]", "[event.slow]"), 'unknown key; did you mean "events"?'),
