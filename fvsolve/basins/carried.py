@@ -35,7 +35,7 @@ def cell_value(tables, basin, q, y, i):
 
 @njit
 def patch_values(t, y, dydt, out, handle):
-    """Compute the value of every scalar at every patch: the mean of its outflow, or the mean by area if all cells are dry."""
+    """Compute the value of every scalar at every patch: the mean of its outflow, or by area if all cells are dry."""
     tables = open_tables(handle)
     nodes, value = tables.nodes.size, tables.layout[0]["value"]
     for k in range(tables.patches.size):

@@ -373,10 +373,12 @@ class BasinRows:
             return key, f"ssp-rk3 with courant = {COURANT:g} or less keeps the bounds", None, None
         diffusing = [name for name in self.scalars if self.case.scalars[name].diffusivity > 0.0]
         if diffusing and not self.is_grid:
-            text = (
-                "diffuses across faces that are not normal to the lines between centres; a rectangle keeps the bounds"
+            return (
+                None,
+                f"{listing(diffusing)} diffuses on a mesh with oblique faces; a rectangle keeps them",
+                None,
+                None,
             )
-            return None, f"{listing(diffusing)} {text}", None, None
         if self.gathers > ROUNDING * row["fastest"]:
             reason = (
                 f"the velocity has a divergence of up to {self.gathers:.3g} 1/s, which concentrates or dilutes scalars"

@@ -91,7 +91,7 @@ def lifted(tables, wall):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Subtract from the rate of storage the part due to changing areas: in less space the same mass has a higher density."""
+    """Correct the rate of storage for changing areas: in less space the same mass has a higher density."""
     tables = open_tables(handle)
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):

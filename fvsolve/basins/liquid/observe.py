@@ -26,7 +26,7 @@ def observe_liquid(t, y, out, handle, values):
 
 @njit
 def read(tables, probe, y):
-    """Weighted sums of density deviations (under law log of pressure over its slope at rest), and of velocities [m/s]."""
+    """Weighted sums of density deviations (under law log c0^2-scaled pressure), and of velocities [m/s]."""
     basin, law, total, u, v = tables.basins[probe["index"]], tables.settings[0]["law"], 0.0, 0.0, 0.0
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):

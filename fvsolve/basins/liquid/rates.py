@@ -73,8 +73,8 @@ def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, r
             form(sums, False, basin["y"] + q * basin["n"], nx, formed_ahead, ahead, 0, nx)
         formed_ahead = ahead
         grid.row_rates(
-            basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, begin, stop, row, block_stop, kx, ky,
-            reflect, side_kinds, r, mx, my, through, work, rate_r, rate_x, rate_y, None,
+            basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, begin, stop, row, block_stop, kx,
+            ky, reflect, side_kinds, r, mx, my, through, work, rate_r, rate_x, rate_y, None,
         )  # fmt: skip
         for q in range(3):
             if sums[MODE] == LOOK:

@@ -76,7 +76,7 @@ class Flowing(Value):
             of = "number" if way == "stream" else "velocity"
             keys = {key: Shaped(of).read(keys.get(key, 0.0), setting) for key in known}
         elif way == "expression":
-            own = {key: value for key, value in keys.items() if key in PARAMETERS}
+            own = {key: entry for key, entry in keys.items() if key in PARAMETERS}
             keys |= read_keys(own, {key: (PARAMETERS[key], None) for key in own}, setting)
         elif way == "file":
             stated["file"] = File("").read(keys["file"], setting)
