@@ -24,7 +24,9 @@ BAD_RECTANGLES = {
     "holes[0]: y1 = 2 m is on no grid line; nearest y: 1 m": dict(holes=[(0, 0, 0.5, 2)]),
     "holes: they leave 2 pieces that share no face": dict(holes=[(0.25, 0, 0.5, 1)]),
     "holes: they leave no cell": dict(holes=[(0, 0, 1, 1)]),
-    'patches.a: unknown side "wets"; expected west, east, south, north; did you mean "west"?': dict(patches={"a": "wets"}),
+    'patches.a: unknown side "wets"; expected west, east, south, north; did you mean "west"?': dict(
+        patches={"a": "wets"}
+    ),
     "patches.a: 0.2 to 0.5 m does not consist of whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
         patches={"a": ("west", 0.2, 0.5)}
     ),
@@ -188,5 +190,6 @@ def test_a_cell_that_names_no_point(tmp_path):
         "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 double\n0 0 0 1 0 0 0 1 0\n"
         "CELLS 1 4\n3 0 1 7\nCELL_TYPES 1\n5\n"
     )
-    with pytest.raises(MeshError, match="cells: number 0 refers to a point that the file does not contain; it contains 3"):
+    words = "cells: number 0 refers to a point that the file does not contain; it contains 3"
+    with pytest.raises(MeshError, match=words):
         read(tmp_path / "lost.vtk")
