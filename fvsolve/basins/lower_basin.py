@@ -147,7 +147,7 @@ class BasinRows:
         return []
 
     def watches(self, y: np.ndarray) -> list[Any]:
-        """Checks during a run from deviations y, see `lower_watch.Watch`."""
+        """Checks during a run from deviations y, see `lower_watch.ErrorWatch`."""
         return []
 
     # ----------------------------------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 """Advection of values over a grid, of second or first order.
 
-With the flow F through a face [m2/s], the value q at the face and the cell's own value c, the rate of a cell is kx ky
+F is the flow through a face [m2/s], q the value at the face, and c the cell's own value. The rate of a cell is kx ky
 times the sum of F (q - c) over the inflows, minus c times the divergence of F. So the rate of a uniform value is the
 value times the divergence, to the bit. The slope of an upwind cell uses the differences across the face and across the
 face behind the cell.

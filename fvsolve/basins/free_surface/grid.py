@@ -2,7 +2,7 @@
 
 h_t + (q_x)_x + (q_y)_y = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed). Depth h, surface e = h + bed and
 velocities are reconstructed; both sides of a face use the higher bed (hydrostatic reconstruction, Audusse et al. 2004).
-The pressure of a cell on its faces and the force of its bed are combined in g h (rise of e), so a lake at rest stays at
+The pressure of a cell on its faces and the force of its bed are combined in g h (rise of e). So a lake at rest stays at
 rest to the bit, with dry islands too. The flux is that of Harten, Lax and van Leer with the contact wave (HLLC, Toro
 2001): tangential momentum is carried with the mass. The bounds of wave speeds are those of the cells on either side,
 which bound limited values too, so that no depth falls below zero.

@@ -38,9 +38,8 @@ SHORES = 6.0  # and to sixths of cells under fifth order with a shore
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
     """Mean depth of water over cells with a uniform bed at its mean, from `samples` of both : float64[n] [m].
 
-    The mean of max(level - bed, 0). If the water is cut off in the cell by a bank and has a uniform level, it gets that
-    level over the mean bed instead, because so it stays at rest. This correction decreases as the level follows the
-    bed.
+    The mean of max(level - bed, 0). Water of uniform level that a bank cuts off in the cell gets that level over the
+    mean bed instead, because so it stays at rest. This correction decreases as the level follows the bed.
     """
     deep = level - bed
     wet = deep > ROUNDING * (np.abs(level) + np.abs(bed))

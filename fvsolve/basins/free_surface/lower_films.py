@@ -20,7 +20,7 @@ def too_slow(basin, y: np.ndarray) -> tuple[float, float, float]:
     """(1 - speed over the correct speed, depth, fall of the bed between cells [m]) of the deepest film at deviations y.
 
     Both sides of a face use the higher bed. So the force on a film of depth h above a fall d > h is g h^2 / 2 instead
-    of g h d, and its speed is sqrt(h / (2 d)) of the correct one (Delestre et al. 2012, arXiv 1206.4986).
+    of g h d. Its speed is sqrt(h / (2 d)) of the correct one (Delestre et al. 2012, arXiv 1206.4986).
     """
     mesh, depth = basin.mesh, basin.depth_of(y)
     left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
