@@ -190,6 +190,7 @@ def test_a_cell_that_names_no_point(tmp_path):
         "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 double\n0 0 0 1 0 0 0 1 0\n"
         "CELLS 1 4\n3 0 1 7\nCELL_TYPES 1\n5\n"
     )
-    words = "cells: number 0 refers to a point that the file does not contain; it contains 3"
-    with pytest.raises(MeshError, match=words):
+    with pytest.raises(
+        MeshError, match="cells: number 0 refers to a point that the file does not contain; it contains 3"
+    ):
         read(tmp_path / "lost.vtk")
