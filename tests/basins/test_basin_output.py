@@ -439,7 +439,7 @@ def test_what_a_mesh_leaves_unsaid_is_noted(tmp_path):
     path = write(tmp_path / "mm.msh", 1e7 * np.array(points), cells)
     model = fvsolve.build(fvsolve.load(liquid([], mesh={"file": str(path)})))
     assert any("basin block: the mesh is" in note.text and 'unit = "mm"' in note.text for note in model.warnings)
-    assert any("the file names no group of lines" in note.text for note in model.warnings)
+    assert any("the file contains no named group of lines" in note.text for note in model.warnings)
 
 
 def test_a_summary_counts_the_cells_of_basins():
@@ -495,8 +495,8 @@ def test_a_line_has_scalars_and_a_velocity_by_name_its_parameters(tmp_path):
     "velocity, said",
     [
         ({"expression": "swirl", "speed": "fast"}, 'nodes.sheet.velocity.speed: "fast" is no number with a unit'),
-        ({"expression": "shear", "rate": 1, "y1": 0}, 'velocity "shear" has no y1; it takes rate, u, y0'),
-        ({"stream": "y", "u": 1}, "nodes.sheet.velocity: has stream, u; wanted { u, v } or { stream }"),
+        ({"expression": "shear", "rate": 1, "y1": 0}, 'velocity "shear" has no parameter y1; expected rate, u, y0'),
+        ({"stream": "y", "u": 1}, "nodes.sheet.velocity: has stream, u; expected { u, v } or { stream }"),
         (
             {"expression": "rotation", "centre": [0], "angular_velocity": 1},
             "nodes.sheet.velocity.centre: [0] has 1 values",

@@ -274,7 +274,7 @@ FAULTS = {
         "given by velocity",
     ),
     "expression": ({"physics": "transport", "velocity": {"expression": "swril"}}, {}, 'did you mean "swirl"'),
-    "ways": ({"physics": "transport", "velocity": {"u": 1.0, "stream": "x"}}, {}, "wanted"),
+    "ways": ({"physics": "transport", "velocity": {"u": 1.0, "stream": "x"}}, {}, "expected"),
     "impedance": (
         {"level": 1.0, "patches": {"out": {"side": "east", "impedance": 1.0}}},
         {},
