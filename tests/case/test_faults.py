@@ -310,7 +310,7 @@ BAD = {
     ),
     "wall of a word": (
         swap('wave_speed = "1219.2 m/s"', 'wall = "soft"'),
-        'links.main.wall: "soft" is no wall; wanted "stiff"',
+        'links.main.wall: "soft" is not a wall; expected "stiff"',
     ),
     "gauge modulus": (swap('"2.2 GPa"', '"2.2 barg"'), 'fluid.bulk_modulus: "2.2 barg" is a gauge pressure'),
     "position": (add("nodes.gate", "position = [1]"), "nodes.gate.position: [1] has 1 values; wanted 2"),
