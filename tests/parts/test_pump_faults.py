@@ -104,7 +104,7 @@ WATERS = {"sump": lake(0.0), "out": junction(), "top": lake(20.0)}
 def test_a_pump_drawn_backwards_is_asked_about_and_one_that_lifts_is_not():
     assert notes(WATERS, "sump", "out", curve=ONE) == []
     ((key, text),) = notes(WATERS, "out", "sump", curve=ONE)
-    assert key == "from" and "the lowest water there is" in text and "drawn backwards?" in text
+    assert key == "from" and "the lowest water level" in text and "check its direction" in text
     down = {"sump": lake(60.0), "out": junction(), "top": lake(20.0)}
     ((key, text),) = notes(down, "sump", "out", curve={"flow": [0.02], "head": [10.0]})
     assert key == "from" and "m lower" in text
@@ -115,25 +115,25 @@ def test_a_pump_drawn_backwards_is_asked_about_and_one_that_lifts_is_not():
 @pytest.mark.parametrize("flow, unit", [(20.0, "l/s"), (2000.0, "m3/h"), (20000.0, "l/min")])
 def test_a_rated_flow_too_quick_for_the_pipes_beside_it_is_asked_about(flow, unit):
     said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
-    assert [key for key, _ in said] == ["curve"] and f'was "{flow:.4g} {unit}" meant?' in said[0][1]
+    assert [key for key, _ in said] == ["curve"] and f'did you mean "{flow:.4g} {unit}"?' in said[0][1]
     assert notes(WATERS, "sump", "out", curve={"flow": [1.0], "head": [50.0]}) == []
 
 
 @pytest.mark.parametrize("flow, asked", [("0.03 l/s", True), ("0.1 m3/h", True), ("2 l/s", False)])
 def test_a_rated_flow_that_hardly_moves_in_the_pipes_beside_it_is_asked_about(flow, asked):
     said = notes(WATERS, "sump", "out", curve={"flow": [flow], "head": [50.0]})
-    assert [key for key, _ in said] == ["curve"] * asked and all("another unit meant?" in text for _, text in said)
+    assert [key for key, _ in said] == ["curve"] * asked and all("mean another unit?" in text for _, text in said)
 
 
 @pytest.mark.parametrize(
     ("keys", "says"),
     [
         ({"inertia": 1.5e4}, '"15000 kg cm2"'),  # 1.5 kg m2, which power and speed let expect to a factor of 2
-        ({"inertia": 0.0015}, "1.84 kg m2 is usual of 6.538e+04 W at 1480 rpm"),
+        ({"inertia": 0.0015}, "1.84 kg m2 is usual for 6.538e+04 W at 1480 rpm"),
         ({"inertia": 1.5}, None),
         ({"inertia": 15.0}, None),  # a flywheel
         ({"shaft_power": {"flow": [0.1], "power": [65]}}, '"65 kW"'),
-        ({"shaft_power": {"flow": [0.1], "power": ["65 MW"]}}, "shaft_power says 6.5e+07 W"),
+        ({"shaft_power": {"flow": [0.1], "power": ["65 MW"]}}, "shaft_power is 6.5e+07 W"),
         ({"shaft_power": {"flow": [0.1], "power": ["65 kW"]}}, None),
     ],
 )

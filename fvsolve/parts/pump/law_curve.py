@@ -70,7 +70,7 @@ def leaves(floats, at, speed, flow):
 
 @njit
 def joined_value(floats, join, correction_at, speed, flow):
-    """`suter_value` of a joined table with its correction; `correction_at` : index of the correction, then the table."""
+    """`suter_value` of a joined table with its correction; `correction_at` : index of correction, then table."""
     value, slope = suter_value(floats, correction_at + 1, int(floats[join + VALUES]), speed, flow)
     angle, edge, fade, steep = atan2(flow, speed), floats[join + EDGE], 0.0, 0.0
     if edge <= angle < 0.5 * pi:
