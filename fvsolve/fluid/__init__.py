@@ -1,4 +1,4 @@
-"""Fluid properties at one state. The only door to CoolProp; knows no part."""
+"""Fluid properties at one state."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Fluid:
     """A fluid at its reference state.
 
     temperature [K], pressure [Pa] absolute, density [kg/m3], bulk_modulus = rho a^2 at constant entropy [Pa],
-    viscosity, dynamic [Pa s] (None where nobody knows it), vapor_pressure [Pa] (0 where there is none).
+    viscosity, dynamic [Pa s] (None where unknown), vapor_pressure [Pa] (0 without vapour pressure).
     """
 
     name: str
@@ -45,7 +45,7 @@ class Fluid:
         return math.sqrt(self.bulk_modulus / self.density)
 
     def plain(self) -> dict[str, Any]:
-        """As JSON says it: the liquid at its reference state, SI, and where its numbers are from."""
+        """Data for JSON: the liquid at its reference state, SI, and the source of its numbers."""
         keys = ("name", "density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure", "source")
         return {key: getattr(self, key) for key in keys}
 
@@ -66,9 +66,9 @@ def properties(
 ) -> Fluid:
     """Properties of a CoolProp fluid, an oil, "INCOMP::..." or "user" at temperature [K] and pressure [Pa].
 
-    Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] stand in place of
-    those; "user" has nothing else. `air_fraction` and the rest of Air are for the law "mixture",
-    which without any is "log".     Raises FluidError with the key that is to blame.
+    Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] replace
+    those of the fluid; "user" has no others. `air_fraction` and the rest of Air are for the law "mixture",
+    which without any is "log". Raises FluidError with the key at fault.
     """
     given = dict(density=density, bulk_modulus=bulk_modulus, viscosity=viscosity, vapor_pressure=vapor_pressure)
     given = {key: float(value) for key, value in given.items() if value is not None}
