@@ -44,9 +44,9 @@ def half(**keys) -> tuple:
 STILL = {"opening": 0, "unit_speed": [70], "unit_flow": [0], "unit_torque": [-30]}
 FOUND = [
     (half(opening=None), "hill_chart[0]: opening is missing"),
-    (half(opening=1.0), "hill_chart[1].opening: 1 is that of curve 1 already; one curve each"),
+    (half(opening=1.0), "hill_chart[1].opening: 1 is already the opening of curve 1"),
     (half(opening=1.2), "hill_chart[0].opening: 1.2 is out of range"),
-    (half(efficiency=None), "hill_chart[0]: wanted efficiency or unit_torque"),
+    (half(efficiency=None), "hill_chart[0]: efficiency or unit_torque is missing"),
     (half(unit_torque=[1, 2, 3]), "hill_chart[0].unit_torque: efficiency and unit_torque are given; keep one"),
     (half(efficiency=[0.7, 85, 0.6]), "hill_chart[0].efficiency[1]: 85 is out of range; wanted a value between"),
     (half(efficiency=[0.7, 0.8]), "3 of unit_speed, 3 of unit_flow, 2 of efficiency; expected equal numbers"),
@@ -65,10 +65,10 @@ FOUND = [
     ((HALF, {**STILL, "unit_torque": [3]}), "3 drives the runner behind shut vanes; expected 0 or less"),
     ((HALF, {**HALF, "opening": 0}), "vanes at opening 0 are shut; expected no curve, or a single point"),
     ((STILL,), "hill_chart: has no curve of an opening above 0"),
-    ([], "is no list of curves"),
-    ([3], "hill_chart[0]: 3 is no table"),
+    ([], "is not a list of curves"),
+    ([3], "hill_chart[0]: 3 is not a table"),
     ({"file": "nowhere.csv"}, "there is no such file"),
-    ({"file": "a.csv", "of": 1}, "hill_chart.of: unknown key; beside file there is none"),
+    ({"file": "a.csv", "of": 1}, "hill_chart.of: unknown key; expected only file"),
 ]  # fmt: skip
 
 
@@ -95,7 +95,7 @@ def torque_on(keys) -> str:
 
 
 @pytest.mark.parametrize("header, message", [
-    ("opening,unit_speed,unit_flow", "wanted a column efficiency or unit_torque, and it has neither"),
+    ("opening,unit_speed,unit_flow", "expected a column efficiency or unit_torque; the file has neither"),
     ("opening,unit_speed [rad/s],unit_flow,efficiency", 'unit_speed in rpm m^(1/2)'),
     ("opening,n11,unit_flow,efficiency", 'has no column "unit_speed"'),
     ("opening,unit_speed,unit_flow,efficiency", "chart.csv, opening 0.5: efficiency: 85.0 is out of range"),
