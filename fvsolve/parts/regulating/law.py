@@ -2,7 +2,7 @@
 
 dx/dt = error / (band T), 0 <= x <= 1, M |M| = G x^2 dP. armed[event] : shut against reverse flow;
 armed[event + 2] : fully open; armed[event + 4] : on its seat. These flags change on accepted states only. If it is the
-only outlet of a rigid column, it controls the flow of the column near its seat (armed[event + 6]).
+only valve at a rigid column, it controls the flow of the column near its seat (armed[event + 6]).
 """
 
 from math import sqrt

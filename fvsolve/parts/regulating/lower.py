@@ -155,8 +155,8 @@ class Regulator(Device, kind=""):
     def refuse(self, start, k: int) -> None:
         """Report a fault: no opening keeps the sensed quantity at its set value."""
         name = start.draft.valve_names[k]
-        start.draft.fault(f"links.{name}.{self.key}", "no steady state: what is drawn beyond it hangs on it alone, "
-                          'and leaves it nothing to set; change the demand, or use initial = "rest"')  # fmt: skip
+        start.draft.fault(f"links.{name}.{self.key}", "no steady state: the valve alone supplies a given demand, "
+                          'so it cannot set its quantity; change the demand, or use initial = "rest"')  # fmt: skip
 
 
 class PressureReducingRows(Regulator, kind="pressure-reducing"):
