@@ -76,16 +76,16 @@ def properties(
     _check_numbers(given | state, law)
     name = oil_name(name) or name
     LAWS[law].check(name, given)
-    found = _found(name, law, **state)
-    boiling = max(found["vapor_pressure"], given.get("vapor_pressure", 0.0))
+    values = _found(name, law, **state)
+    boiling = max(values["vapor_pressure"], given.get("vapor_pressure", 0.0))
     if state["pressure"] <= boiling:
         raise FluidError("pressure", _not_liquid(name, boiling, **state))
     mixed = dict(air_fraction=air_fraction, gas_exponent=gas_exponent)
     mixed |= dict(saturation_pressure=saturation_pressure, cavitation=cavitation)
     air = LAWS[law].air({key: value for key, value in mixed.items() if value is not None})
     if given and name != "user":
-        found = found | {"source": f"{found['source']}; {', '.join(given)} given"}
-    fluid = Fluid(name=name, law=law, air=air, **(found | state | given))
+        values = values | {"source": f"{values['source']}; {', '.join(given)} given"}
+    fluid = Fluid(name=name, law=law, air=air, **(values | state | given))
     for key in ("density", "bulk_modulus"):
         if getattr(fluid, key) is None:
             raise FluidError(key, _missing(name, key))

@@ -24,11 +24,11 @@ def cached(name: str, temperature: float, pressure: float, law: str) -> dict[str
     key = json.dumps([FORMAT, coolprop(), name, temperature, pressure, law])
     stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
     path = cache_folder() / "fluids" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
-    found = _read(path, key)
-    if found is None:
-        found = ask(name, temperature, pressure, law) | {"source": f"CoolProp {coolprop()}"}
-        _write(path, key, found)
-    return found
+    properties = _read(path, key)
+    if properties is None:
+        properties = ask(name, temperature, pressure, law) | {"source": f"CoolProp {coolprop()}"}
+        _write(path, key, properties)
+    return properties
 
 
 @functools.cache
@@ -45,16 +45,18 @@ def _read(path: Path, key: str) -> dict[str, Any] | None:
         digest, body = path.read_text(encoding="utf-8").split("\n", 1)
         if digest != hashlib.sha256(body.encode()).hexdigest():
             return None
-        held, found = json.loads(body)
-        found["table"] = found["table"] and FluidTable(**found["table"])
-        return found if held == key else None
+        stored_key, properties = json.loads(body)
+        properties["table"] = properties["table"] and FluidTable(**properties["table"])
+        return properties if stored_key == key else None
     except (OSError, ValueError, TypeError, KeyError):
         return None
 
 
-def _write(path: Path, key: str, found: dict[str, Any]) -> None:
+def _write(path: Path, key: str, properties: dict[str, Any]) -> None:
     """Write a cache file atomically; ignore a folder that cannot be written."""
-    body = json.dumps([key, found], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item))
+    body = json.dumps(
+        [key, properties], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item)
+    )
     text = hashlib.sha256(body.encode()).hexdigest() + "\n" + body
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

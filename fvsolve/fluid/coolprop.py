@@ -29,18 +29,18 @@ def _ask_pure(name: str, temperature: float, pressure: float, law: str) -> dict[
     state = _pure_state(name)
     _check_range(state, name, temperature, pressure)
     vapor_pressure = _vapor_pressure(state, temperature)
-    found = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=vapor_pressure, table=None)
+    values = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=vapor_pressure, table=None)
     if pressure <= vapor_pressure:
-        return found
+        return values
     try:
         state.update(CoolProp.PT_INPUTS, pressure, temperature)
     except ValueError as error:
         raise FluidError("pressure", f"{name} is two-phase there, or unknown (CoolProp: {error})") from None
-    found |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
-    found["viscosity"] = known(state.viscosity)
+    values |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
+    values["viscosity"] = known(state.viscosity)
     if LAWS[law].tabulated:
-        found["table"] = isentrope(state, name, vapor_pressure)
-    return found
+        values["table"] = isentrope(state, name, vapor_pressure)
+    return values
 
 
 def _pure_state(name: str) -> Any:
@@ -121,9 +121,9 @@ def _ask_incompressible(name: str, temperature: float, pressure: float) -> dict[
         raise FluidError(_blame(reason), f"{name}: {reason}") from None
     viscosity = known(lambda: PropsSI("V", "T", temperature, "P", pressure, name))
     vapor_pressure = known(lambda: PropsSI("P", "T", temperature, "Q", 0, name))
-    found = dict(density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None)
+    values = dict(density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None)
     # CoolProp returns exactly 1 Pa s, exp(0), for fluids without viscosity data, such as LiBr.
-    return found | dict(viscosity=None if viscosity == 1.0 else viscosity)
+    return values | dict(viscosity=None if viscosity == 1.0 else viscosity)
 
 
 def _blame(reason: str) -> str:

@@ -98,16 +98,16 @@ def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: fl
 
 def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0) -> Any:
     """SI value or array in `unit`; an absolute pressure in a gauge unit counts from `ambient` [Pa]."""
-    found = find(unit, dimension)
-    if found.gauge and dimension == "pressure":
+    target = find(unit, dimension)
+    if target.gauge and dimension == "pressure":
         value_si = value_si - ambient
-    return found.number(value_si)
+    return target.number(value_si)
 
 
 def span(unit: str) -> str:
     """Unit of differences of values in a unit: "bar" of "barg" and of "bara"."""
-    found = UNITS.get(unit)
-    return unit[:-1] if found is not None and (found.gauge or found.absolute) else unit
+    entry = UNITS.get(unit)
+    return unit[:-1] if entry is not None and (entry.gauge or entry.absolute) else unit
 
 
 def likely(given: Any, dimension: str, least: float, greatest: float) -> str:

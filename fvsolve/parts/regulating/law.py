@@ -121,6 +121,6 @@ def events(t, y, out, tables, device, g):
 
 
 @njit
-def value(t, y, out, tables, device, which):
+def value(t, y, out, tables, device, quantity):
     """Opening, 0 to 1."""
     return min(max(regulator_opening(y, tables, device), 0.0), 1.0)

@@ -64,10 +64,10 @@ class Regulator(Device, kind=""):
         least = float(np.min(part.set_pressure.value))
         head = (least - case.ambient_pressure) / weight + (case.elevation(place) or 0.0)
         if head > best:
-            told = case.amount
-            what = (f"{told(least, 'pressure', 6)} at {place} is a head of {told(head, 'head')}, above every source: "
-                    f"{source} has {told(best, 'head')}")  # fmt: skip
-            draft.fault(f"links.{name}.set_pressure", f"{what}; the valve would never {self.verb}; set it lower")
+            amount = case.amount
+            text = (f"{amount(least, 'pressure', 6)} at {place} is a head of {amount(head, 'head')}, above every "
+                    f"source: {source} has {amount(best, 'head')}")  # fmt: skip
+            draft.fault(f"links.{name}.set_pressure", f"{text}; the valve would never {self.verb}; set it lower")
 
     def inputs(self, model, name, part):
         schedule = int(self.row_of(model, name)["schedule"])

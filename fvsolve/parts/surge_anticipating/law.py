@@ -99,6 +99,6 @@ def follow(g, flags, stage, later, left):
 
 
 @njit
-def value(t, y, out, tables, device, which):
+def value(t, y, out, tables, device, quantity):
     """Opening, 0 to 1."""
     return min(max(y[device["y"]], 0.0), 1.0)

@@ -111,21 +111,21 @@ def power(t, y, dydt, out, tables, device):
 
 
 @njit
-def value(t, y, out, tables, device, which):
+def value(t, y, out, tables, device, quantity):
     """Head [m], speed [rad/s], torque [N m], power at the shaft [W] or opening, by number."""
     st, k = tables.settings[0], device["valve"]
     opening, omega, q, _ = point(out, tables, device)
-    if which == 0:
+    if quantity == 0:
         if opening > 0.0:
             return chart_head(tables.floats, tables.valves[k]["data"], opening, omega, q)[0]
         rho, drop = head_drop(tables, out, k)
         return drop / (rho * st["gravity"])
-    if which == 1:
+    if quantity == 1:
         return omega
-    if which == 4:
+    if quantity == 4:
         return opening
     torque = torque_now(out, tables, device)
-    return torque if which == 2 else torque * omega
+    return torque if quantity == 2 else torque * omega
 
 
 @njit
