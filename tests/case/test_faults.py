@@ -238,15 +238,15 @@ BAD = {
     ),
     "Kv with an area": (
         swap("discharge_coefficient = 0.6", "Kv = 1"),
-        "links.valve.area: Kv says it all; leave area out",
+        "links.valve.area: Kv already gives the size; leave area out",
     ),
     "no size": (
         swap('area = "0.001768 m2"\n', ""),
-        "links.valve: discharge_coefficient wants area or diameter",
+        "links.valve: discharge_coefficient needs area or diameter",
     ),
     "no size at all": (
         swap('area = "0.001768 m2"\ndischarge_coefficient = 0.6\n', ""),
-        "line 32: links.valve: no size; wanted area, diameter, Kv or Cv",
+        "line 32: links.valve: size is missing; expected area, diameter, Kv or Cv",
     ),
     "wall and wave speed": (
         add("links.main", 'wall = "stiff"'),
@@ -310,7 +310,7 @@ BAD = {
     ),
     "wall of a word": (
         swap('wave_speed = "1219.2 m/s"', 'wall = "soft"'),
-        'links.main.wall: "soft" is no wall; wanted "stiff"',
+        'links.main.wall: "soft" is not a wall; expected "stiff"',
     ),
     "gauge modulus": (swap('"2.2 GPa"', '"2.2 barg"'), 'fluid.bulk_modulus: "2.2 barg" is a gauge pressure'),
     "position": (add("nodes.gate", "position = [1]"), "nodes.gate.position: [1] has 1 values; expected 2"),
@@ -386,7 +386,7 @@ BAD = {
     ),
     "area table not from the bottom": (
         tank("area = 1", "area = { level = [1, 2], area = [1, 1] }"),
-        "nodes.t.area.level: levels count from the bottom",
+        "nodes.t.area.level: levels are measured from the bottom",
     ),
     "area zero": (
         tank("area = 1", "area = { level = [0, 1], area = [1, 0] }"),
@@ -499,7 +499,7 @@ BAD = {
     ),
     "characteristic that ends early": (
         add("links.valve", "characteristic = { opening = [0, 0.9], flow_area = [0, 1] }"),
-        "characteristic.opening: openings must lead from 0 to 1",
+        "characteristic.opening: openings must begin at 0 and end at 1",
     ),
     # numerics
     "no end": (swap('end = "10 s"\n', ""), "line 40: numerics: end is missing"),
