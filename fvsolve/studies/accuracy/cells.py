@@ -100,7 +100,7 @@ def loads(case, cells_by_key: Counts) -> bool:
 def greatest_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
     """Number of cells that the fastest wave crosses per second [1/s].
 
-    Basins count with their own measure of the rate, at the start. Delay lines count with cells per travel time of the slowest line.
+    Basins count with their own rate, at the start. Delay lines count with cells per travel time of the slowest line.
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
              for name, pipe in in_cells(case).items()]  # fmt: skip
