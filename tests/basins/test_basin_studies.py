@@ -109,7 +109,7 @@ def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
     meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]))
     basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0}
     case = fvsolve.load(scene({"pool": basin}, {}, 1.0, PLANE))
-    with pytest.raises(FvsolveError, match="the mesh of pool is a file, which nothing refines"):
+    with pytest.raises(FvsolveError, match="the mesh of pool is a file, which cannot be refined"):
         plan(case, "both")
 
 

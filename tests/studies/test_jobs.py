@@ -79,7 +79,9 @@ def test_workers_of_dask_find_the_same(line, cluster, study, asked):
 
 
 def test_what_has_no_name_to_be_sent_by_is_refused(line):
-    with pytest.raises(FvsolveError, match="initial, source and exact are functions of this process; wanted jobs = 1"):
+    with pytest.raises(
+        FvsolveError, match="initial, source and exact are functions of this process. Expected jobs = 1"
+    ):
         order(line, jobs=2, initial=lambda pipe, x: (x, x))
     with pytest.raises(FvsolveError, match="jobs = 0 is out of range. Expected 1 or more"):
         order(line, jobs=0)
