@@ -23,7 +23,6 @@ Prints a line for each case. Exit status: 0 if all are equal, 1 if any differs, 
 
 from __future__ import annotations
 
-import argparse
 import io
 import os
 import pickle
@@ -34,6 +33,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import measure
 from compare_dumps import Dump, Names, compare, count
 
 HERE = Path(__file__).resolve().parent
@@ -51,7 +51,8 @@ class Side:
         cache = {"FVSOLVE_CACHE": str(folder / "cache")} if fresh else {}
         known = {key: value for key, value in os.environ.items() if key != "FVSOLVE_PARTS"}
         known |= {"PYTHONPATH": str(self.tree), "MPLBACKEND": "Agg", "OPENBLAS_NUM_THREADS": "1"} | cache
-        self.command = [sys.executable, "-P", str(HERE / "dump_cases.py"), str(self.tree), str(written)]
+        start = f"import sys; sys.path.append({str(HERE)!r}); import dump_cases; dump_cases.main()"
+        self.command = [sys.executable, "-P", "-c", start, str(self.tree), str(written)]
         self.known, self.process, self.seconds = known, None, 0.0
 
     @property
@@ -133,13 +134,15 @@ def compared(old: Side, new: Side, names: Names, name: str | None, other: str | 
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = measure.parser(__doc__)
     parser.add_argument("old", nargs="?", default="HEAD", help="commit (default HEAD)")
     parser.add_argument("new", nargs="?", default="HEAD", help="commit (default HEAD)")
     parser.add_argument("--map", type=Path, help="file of renamed words: KIND, OLD and NEW name with tabs between")
     parser.add_argument("--cases", default="", help="names of cases of OLD with commas between (default all)")
-    parser.add_argument("--quick", action="store_true", help=f"cases as named (default {TINY}), the user's own cache")
     given, begun = parser.parse_args(), time.perf_counter()
+    if given.quick and not (HERE.parent / ".git").exists():
+        print(f"the repository of git is not there: {measure.SKIPPED}")
+        return 0
     asked = [name for name in given.cases.split(",") if name] or ([TINY] if given.quick else [])
     sides: list[Side] = []
     with tempfile.TemporaryDirectory(prefix="fvsolve-compare-") as folder:

@@ -186,7 +186,3 @@ def main() -> None:
         file, out = line.rstrip("\n").split("\t")
         Path(out).write_bytes(pickle.dumps(dump(Path(file), names, fvsolve)))
         print("written", file=answers, flush=True)
-
-
-if __name__ == "__main__":
-    main()
