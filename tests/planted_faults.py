@@ -69,7 +69,11 @@ FAULTS = [
     Fault("units/__init__.py", "value_si - ambient", "value_si + ambient"),
     Fault("case/sloshing.py", "return 0.25 * np.pi * a * a if", "return 0.2525 * np.pi * a * a if"),
     Fault("fluid/oils.py", "(hot - cold)) - 0.7)", "(hot - cold)) - 0.707)"),
-    Fault("studies/peaks.py", "v[at - 1] - 2.0 * v[at] + v[at + 1]", "v[at - 1] + 2.0 * v[at] + v[at + 1]"),
+    Fault(
+        "studies/peaks.py",
+        "v[position - 1] - 2.0 * v[position] + v[position + 1]",
+        "v[position - 1] + 2.0 * v[position] + v[position + 1]",
+    ),
     Fault(
         "studies/energy/booking.py",
         "change[self.supplied].sum() - change[self.rates].sum()",
@@ -111,11 +115,11 @@ FAULTS = [
         "rho * (n * p * compressibility * (total - volume) - volume)",
     ),
     Fault("parts/tank/lower.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
-    Fault("parts/pump/law_curve.py", "rest = drop + weight * head", "rest = drop + 1.01 * weight * head"),
+    Fault("parts/pump/law_curve.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
     Fault("run/comparison.py", "compare.t + compare.shift", "compare.t - compare.shift"),
     Fault("epanet/words.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
     Fault("solve/summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),
-    Fault("exact/laminar_line.py", "self.length - found if self.reversed", "found if self.reversed"),
+    Fault("exact/laminar_line.py", "self.length - places if self.reversed", "places if self.reversed"),
 ]
 
 

@@ -1,1 +1,1 @@
-"""Basins: what all physics share, and a folder for each; loaded and compiled by scenes that have one alone."""
+"""Basins: common parts and a folder for each physics, loaded and compiled only for models that contain a basin."""

@@ -1,11 +1,12 @@
-"""Scalars carried over a grid of rectangles by given flows. Knows amounts and depths; not what makes the flows.
+"""Advection of scalars over a grid of rectangles by given flows.
 
 s_t + div(F c) = 0 for amounts s = depth c per area. Rates of a uniform c are c times the divergence of F, to the bit.
-In flows without divergence, Euler steps up to these Courant numbers (with the rate of `grid_fastest`) keep every value
-between those around it: upwind 1, muscl 1/2 and beside an inlet 1/3, with minmod 2/3 and 1/2. Up to 1/2 weno5 keeps all
-between `least` and `most`; upwind5 promises nothing. SSP methods do as Euler within their coefficient.
+In flows without divergence, Euler steps keep every value within the range of its neighbours up to these Courant numbers
+(with the rate of `grid_fastest`): upwind 1; muscl 1/2, next to an inlet 1/3; muscl with minmod 2/3, next to an inlet
+1/2. Up to 1/2, weno5 keeps all values between `least` and `most`; upwind5 has no bounds. SSP methods keep the same
+bounds up to their coefficient times these numbers.
 
-The ring of a grid is its boundary faces, west (ny), east (ny), south (nx), north (nx).
+The boundary faces of a grid are ordered west (ny), east (ny), south (nx), north (nx).
 """
 
 from fvsolve.basins.bounds import bound, bound_work
@@ -15,7 +16,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.records import MUSCL, UPWIND, WENO5
 
 INFINITE = float("inf")
-THIN = 1e-6  # depth below which values fade [m]
+THIN = 1e-6  # depth below which values fade to zero [m]
 BOUND = 0.5  # Courant number up to which weno5 keeps its bounds
 
 
@@ -28,14 +29,14 @@ def put_values(s, depth, c):
 
 @njit
 def near_values(nx, ny, begin, stop, s, depth, c):
-    """Values of cells of rows `begin` to `stop` and of three beside them."""
+    """Values of cells of rows `begin` to `stop`, and of three rows on either side."""
     a, z = nx * max(begin - 3, 0), nx * min(stop + 3, ny)
     put_values(s[a:z], depth[a:z], c[a:z])
 
 
 @njit
 def grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work):
-    """The greatest rate |u| kx + |v| ky of a grid [1/s], u and v from the greater flows on either side of a cell.
+    """Greatest rate |u| kx + |v| ky of a grid [1/s], with the greater flow of two opposite faces of a cell.
 
     work : float64[nx]
     """
@@ -56,22 +57,23 @@ def grid_fastest(nx, ny, kx, ky, flow_x, flow_y, depth, work):
 
 
 def advection_work(scheme, nx, ny):
-    """Floats that rates of a scheme are worked out in."""
+    """Length of the work array of a scheme."""
     if scheme == UPWIND or scheme == MUSCL:
         return nx * ny + second_order_work(nx, ny)
-    both = max(grid_excesses_work(nx, ny), bound_work(nx, ny), second_order_work(nx, ny))
-    return nx * ny + (nx + 1) * ny + nx * (ny + 1) + both
+    most = max(grid_excesses_work(nx, ny), bound_work(nx, ny), second_order_work(nx, ny))
+    return nx * ny + (nx + 1) * ny + nx * (ny + 1) + most
 
 
 @njit
 def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x, flow_y, depth, outside, s, work, rate):
-    """Rates of the amounts `s` that factor times the flows carry, by muscl or, any other scheme, by upwind.
+    """Rates of the amounts `s` in factor times the flows, by muscl or, for any other scheme, by upwind.
 
-    They are those of rows `begin` to `stop`, for which two rows beside these are looked at too.
+    The rates are those of rows `begin` to `stop`; two rows on either side are read too.
     kx : float64[nx], ky : float64[ny]  1 / widths and heights [1/m]; factor : on all flows, of either sign
-    flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  through the faces, row by row, per depth [m2/s] or,
-    with depths, whole [m3/s]
-    depth : float64[nx ny], empty where s is the value; outside : float64[ring]  values that come in with the flow
+    flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx]  flows through the faces, row by row, per depth [m2/s]
+    or,
+    with depths, total [m3/s]
+    depth : float64[nx ny], empty if s is the value; outside : float64[ring]  values of inflow at boundary faces
     work : float64[advection_work(scheme, nx, ny)]; s, rate : float64[nx ny]
     """
     c, rest, first = s, work[nx * ny :], scheme if scheme == MUSCL else UPWIND
@@ -87,10 +89,10 @@ def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x,
 def add_fifth_order(
     scheme, nx, ny, kx, ky, factor, flow_x, flow_y, depth, outside, least, most, fastest, s, work, rate
 ):
-    """Add to rates by upwind what those by upwind5 or weno5 have beyond them.
+    """Add to rates by upwind the difference of those by upwind5 or weno5.
 
-    scheme : LINEAR, which is upwind5, or WENO5; least, most : bounds that weno5 keeps, infinite for none
-    fastest : what `grid_fastest` says of the flows [1/s]; the others as of `grid_advection`
+    scheme : LINEAR for upwind5, or WENO5; least, most : bounds that weno5 keeps, infinite for none
+    fastest : rate of `grid_fastest` for the flows [1/s]; other arguments as for `grid_advection`
     """
     c, rest, mx, my = s, work[nx * ny :], (nx + 1) * ny, nx * (ny + 1)
     if depth.size > 0:

@@ -1,12 +1,13 @@
-"""Scalars carried by given flows through the faces of any mesh, and diffusing. Knows not what makes the flows.
+"""Advection and diffusion of scalars by given flows through the faces of any mesh.
 
 s_t + div(F c) = div(D depth grad c) for amounts s = depth c per area. Rates of a uniform c are c times the divergence
-of F, to the bit. Euler steps up to one over the rate that is returned keep all values between two bounds: a side
-differs from its cell by no more than this does from the nearer bound, so what leaves is at most twice as far from a
-bound as the cell. Up to two thirds of that `minmod` keeps them between those around. Other limiters have second order
-on any mesh. Diffusion goes from cell to cell, and what the line between their centres leans away from the normal by the
-mean of their gradients: second order, bounds not kept where cells lean. Nothing diffuses through walls and where the
-flow leaves; where it enters, the value outside holds at the face.
+of F, to the bit. Euler steps up to the reciprocal of the returned rate keep all values between two bounds: a value at a
+side differs from that of its cell by no more than the distance to the nearer bound. So the outflow is at most twice as
+far from a bound as the cell. Up to two thirds of that step, `minmod` keeps values within the range of the neighbours.
+Other limiters have second order on any mesh. Diffusion uses the difference of two cells along the line between their
+centres. Where this line is not normal to the face, the mean of both gradients gives the rest: second order, without
+bounds on such cells. There is no diffusion through walls and where the flow leaves; where it enters, the value outside
+holds at the face.
 """
 
 import numpy as np
@@ -36,10 +37,10 @@ from fvsolve.basins.faces import (
 from fvsolve.jit import njit
 from fvsolve.kernels.records import UPWIND
 
-THIN = 1e-6  # depth below which values fade [m]
+THIN = 1e-6  # depth below which values fade to zero [m]
 
-# rows of BLOCK in the scratch of a block: four for `put_sides`, of which value and depth beyond, gradients beyond; then
-# value beyond the side, outward flow, rate, divergence, sum for the step
+# Rows of BLOCK in the scratch of a block: four for `limited_sides`, also used for value, depth and gradients beyond;
+# then value beyond the side, outward flow, rate, divergence, sum for the step.
 _DEPTH, _GX, _GY, _VALUE, _FLOW, _RATE, _DIVERGENCE, _GONE, _TOP, _FREE = (k * BLOCK for k in range(1, 11))
 _REACH, _WX, _WY, _GAP, _LX, _LY = REACH * BLOCK, WX * BLOCK, WY * BLOCK, GAP * BLOCK, LEAN_X * BLOCK, LEAN_Y * BLOCK
 ROWS = 11
@@ -47,7 +48,7 @@ ROWS = 11
 
 @njit
 def put_values(s, depth, c, d):
-    """Values c = s / depth of a block of cells, and their depths, 1 where none are given."""
+    """Values c = s / depth of a block of cells, and their depths, 1 where `depth` is empty."""
     if depth.size == 0:
         for i in range(s.size):
             c[i], d[i] = s[i], 1.0
@@ -58,7 +59,7 @@ def put_values(s, depth, c, d):
 
 @njit
 def put_gradients(j, floats, integers, values, shown, edges, w, gx, gy):
-    """Gradients by least squares of block j."""
+    """Gradients of block j by least squares."""
     slots, at, places = integers[0], j % integers[4] * BLOCK, integers[HEAD:].view(np.int32)
     c, gx, gy = values[at:], gx[at:], gy[at:]
     for i in range(BLOCK):
@@ -84,17 +85,17 @@ def gather_flows(faces, factor, flow, out):
 
 
 @njit
-def put_room(c, least, most, room):
-    """How far sides of a block of cells may differ from these: to the nearer bound."""
+def put_room(c, least, most, allowed):
+    """Greatest allowed deviation of sides from a block of cells: the distance to the nearer bound."""
     for i in range(BLOCK):
-        room[i] = max(min(c[i] - least, most - c[i]), 0.0)
+        allowed[i] = max(min(c[i] - least, most - c[i]), 0.0)
 
 
 @njit
 def carry(count, c, d, cl, far, w):
-    """Take from the rates of a block of cells what flows out through one side of each, beyond that of a uniform c.
+    """Subtract from the rates of a block of cells the outflow through one side, beyond that of a uniform c.
 
-    count : what counts as rate over what leaves
+    count : factor of the outflow in the rate that limits the step
     """
     for i in range(BLOCK):
         q = far[SHARE * BLOCK + i] * w[_FLOW + i]
@@ -105,18 +106,18 @@ def carry(count, c, d, cl, far, w):
 
 @njit
 def diffuse(diffusivity, c, d, gx, gy, geo, far, w):
-    """Add to the rates of a block of cells what diffuses in through one side of each."""
+    """Add to the rates of a block of cells the diffusive inflow through one side of each."""
     for i in range(BLOCK):
         a, b = d[i], w[_DEPTH + i]
         k = diffusivity * geo[_REACH + i] * (2.0 * a * b / (a + b + TINY))
-        lean = far[_LX + i] * (gx[i] + w[_GX + i]) + far[_LY + i] * (gy[i] + w[_GY + i])
-        w[_RATE + i] += k * (far[_GAP + i] * (w[i] - c[i]) + 0.5 * lean)
+        oblique = far[_LX + i] * (gx[i] + w[_GX + i]) + far[_LY + i] * (gy[i] + w[_GY + i])
+        w[_RATE + i] += k * (far[_GAP + i] * (w[i] - c[i]) + 0.5 * oblique)
         w[_GONE + i] += k * far[_GAP + i] / max(a, THIN)
 
 
 @njit
 def clear(w):
-    """No rates and no sums yet."""
+    """Set rates and sums to zero."""
     for i in range(BLOCK):
         w[_RATE + i], w[_DIVERGENCE + i], w[_GONE + i] = 0.0, 0.0, 0.0
 
@@ -131,7 +132,7 @@ def put_rates(c, w, rate):
 
 
 def work_size(integers):
-    """Floats that `advection_rates` works in."""
+    """Length of the work array of `advection_rates`."""
     return 8 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
 
 
@@ -139,18 +140,19 @@ def work_size(integers):
 def advection_rates(
     scheme, wide_by, diffusivity, factor, floats, integers, flow, depth, outside, least, most, s, work, rate
 ):
-    """Rates of the amounts `s`; returns one over the step that keeps bounds, which diffusion shortens [1/s].
+    """Rates of the amounts `s`; returns the reciprocal of the step that keeps bounds, which diffusion shortens [1/s].
 
-    That is the greatest share of a cell that leaves it, by `muscl` twice that.
+    That is the greatest fraction of a cell that leaves it per time, for `muscl` twice that.
 
-    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
+    scheme : UPWIND or MUSCL; wide_by : allowed excess of values at sides over the range of neighbours, 1 for none
     diffusivity : [m2/s], 0 for none; factor : on all flows
-    flow : float64[f]  through faces, left to right [m2/s], with depth [m3/s]; depth : float64[n], empty where s is the
-    value; outside : float64[b]  values that come in with the flow; least, most : bounds, infinite for none
+    flow : float64[f]  through faces, left to right [m2/s], with depth [m3/s]; depth : float64[n], empty if s is the
+    value
+    outside : float64[b]  values of inflow; least, most : bounds, infinite for none
     work : float64[work_size(integers)]
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
-    count, limited, spreads = blocks(integers), scheme != UPWIND, diffusivity > 0.0
+    count, limited, diffuses = blocks(integers), scheme != UPWIND, diffusivity > 0.0
     m = count * slots * BLOCK
     at, to = HEAD + INDICES * m // 2, MEASURES * m + 2 * b + f
     need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
@@ -164,14 +166,19 @@ def advection_rates(
     for i in range(BLOCK):
         w[_TOP + i] = 0.0
     twice = 2.0 if limited else 1.0
-    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
+    cells_done, sides_done, wall, edge = (
+        0,
+        0,
+        0,
+        0,
+    )  # blocks with computed cells and sides; boundary sides done in both loops
     for j in range(count):
-        while sided < need[j]:
-            while known < need[sided]:
-                i, k, o = known * BLOCK, min((known + 1) * BLOCK, n), (known % ring) * BLOCK
+        while sides_done < need[j]:
+            while cells_done < need[sides_done]:
+                i, k, o = cells_done * BLOCK, min((cells_done + 1) * BLOCK, n), (cells_done % ring) * BLOCK
                 put_values(s[i:k], depth[i:k], c[o:], d[o:])
-                known += 1
-            k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
+                cells_done += 1
+            k, wall = wall, edges_before(edges, wall, 4 * (sides_done + 1) * BLOCK)
             here, bounds, ends = edges[k:wall], shown[k:], shown[b + k :]
             for q in range(k, wall):
                 value, face = c[place(edges[q], ring)], f - b + number[q]
@@ -179,11 +186,11 @@ def advection_rates(
                 shown[q] = outside[number[q]] if enters else value
                 shown[b + q] = 2.0 * shown[q] - value if depth.size == 0 else value
             if limited:
-                put_room(c[sided % ring * BLOCK :], least, most, free)
-                put_sides(sided, floats, integers, c, wide_by, free, bounds, here, w, cs)
-            if spreads:
-                put_gradients(sided, floats, integers, c, ends, here, w, gx, gy)
-            sided += 1
+                put_room(c[sides_done % ring * BLOCK :], least, most, free)
+                put_sides(sides_done, floats, integers, c, wide_by, free, bounds, here, w, cs)
+            if diffuses:
+                put_gradients(sides_done, floats, integers, c, ends, here, w, gx, gy)
+            sides_done += 1
         clear(w)
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
         for k in range(slots):
@@ -196,7 +203,7 @@ def advection_rates(
             for q in range(i, edge):
                 w[_VALUE + edges[q] % BLOCK] = outside[number[q]]
             carry(twice, c[o:], d[o:], cs[own:], far, w)
-            if spreads:
+            if diffuses:
                 gather(c, where, w)
                 gather(d, where, w[_DEPTH:])
                 gather(gx, where, w[_GX:])
@@ -205,7 +212,7 @@ def advection_rates(
                     w[edges[q] % BLOCK] = shown[b + q]
                 diffuse(diffusivity, c[o:], d[o:], gx[o:], gy[o:], geo, far, w)
         put_rates(c[o:], w, rate[first:last])
-    quickest = 0.0
+    max_rate = 0.0
     for i in range(BLOCK):
-        quickest = max(quickest, w[_TOP + i])
-    return quickest
+        max_rate = max(max_rate, w[_TOP + i])
+    return max_rate

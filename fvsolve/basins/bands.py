@@ -1,23 +1,23 @@
-"""Bands of basins: rows that one thread steps, and what passes the boundary, to which all add. Knows the tables."""
+"""Bands of basins: the rows that one thread steps, and flows through the boundary, to which all bands contribute."""
 
 from fvsolve.basins.patches import book_open
 from fvsolve.jit import njit
 from fvsolve.kernels import joint
 from fvsolve.kernels.handle import open_tables
 
-REACH = 5  # rows beyond a band that rates look at: three, and as many as a side of a liquid is closed by
+REACH = 5  # rows beyond a band that its rates read: three, or the five of the boundary closure of a liquid
 
 
 @njit(forceinline=True)
 def cells_of(tables, b):
-    """(first, one beyond the last) of the cells of a basin that are stepped here."""
+    """(first, last + 1) of the cells of a basin in the band of this thread."""
     wide = max(tables.basins[b]["nx"], 1)
     return wide * tables.bands[2 * b], wide * tables.bands[2 * b + 1]
 
 
 @njit(forceinline=True)
 def cells_near(tables, b):
-    """The same with the rows beside them that rates look at."""
+    """(first, last + 1) of the cells of the band and of the rows next to it that its rates read."""
     basin = tables.basins[b]
     begin, stop = max(tables.bands[2 * b] - REACH, 0), min(tables.bands[2 * b + 1] + REACH, basin["ny"])
     return (basin["nx"] * begin, basin["nx"] * stop) if basin["nx"] > 0 else (0, basin["n"])
@@ -25,7 +25,7 @@ def cells_near(tables, b):
 
 @njit
 def book_together(t, y, dydt, out, handle):
-    """Book what passes the open boundaries of all basins once more, now that rates of all bands are there."""
+    """Compute the flows through open boundaries of all basins again, after all bands have computed their fluxes."""
     tables = open_tables(handle)
     joint.fetch(tables.joint, joint.OF_FLOWS, tables.work)
     for b in range(tables.basins.size):

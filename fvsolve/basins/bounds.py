@@ -1,21 +1,21 @@
-"""Excess fluxes cut so that a step of Euler keeps values within bounds (Zalesak 1979). Knows cells and faces of a grid.
+"""Flux-corrected transport: excess fluxes limited so that an Euler step keeps values within bounds (Zalesak 1979).
 
-What upwind leaves is within the bounds; of what excesses would add, each cell takes no more than there is room for.
+The result of upwind is within the bounds. Each cell accepts excess fluxes only up to its distance from the bounds.
 """
 
 from fvsolve.jit import inner, njit
 
 
 @njit
-def share(room, need):
-    """The share of a need that there is room for, at most all of it."""
-    room = room if room > 0.0 else 0.0
-    return room / need if need > room else 1.0
+def share(available, need):
+    """Fraction of a need that is available, at most 1."""
+    available = available if available > 0.0 else 0.0
+    return available / need if need > available else 1.0
 
 
 @njit
 def rise(a, b, c, d):
-    """The sum of those that are positive."""
+    """Sum of the positive values of four."""
     a, b = a if a > 0.0 else 0.0, b if b > 0.0 else 0.0
     c, d = c if c > 0.0 else 0.0, d if d > 0.0 else 0.0
     return (a + b) + (c + d)
@@ -23,7 +23,7 @@ def rise(a, b, c, d):
 
 @inner
 def row_shares(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, rate, aw, ae, south, north, up, down):
-    """Shares of the rises and falls of a row of cells, by what comes in through its faces, that a step has room for."""
+    """Fractions of the rises and falls of a row of cells, by flows through its faces, that keep the bounds."""
     for i in range(s.size):
         scale = step * (factor * (kx[i] * ky))
         then = s[i] + step * rate[i]
@@ -35,7 +35,10 @@ def row_shares(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, rate
 
 @inner
 def cut(factor, up, down, up_then, down_then, excess):
-    """Cut the excesses between cells and those that come then to the share that both of a face allow."""
+    """Multiply excesses by the fraction that both cells of a face allow.
+
+    The arrays *_then are those of the next cells.
+    """
     for i in range(excess.size):
         forth = down[i] if down[i] < up_then[i] else up_then[i]
         back = up[i] if up[i] < down_then[i] else down_then[i]
@@ -43,20 +46,21 @@ def cut(factor, up, down, up_then, down_then, excess):
 
 
 def bound_work(nx, ny):
-    """Floats that `bound` works in."""
+    """Length of the work array of `limit_excesses`."""
     return 2 * (nx + 2) * (ny + 2)
 
 
 @njit
 def bound(nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, step, s, rate, ax, ay, work):
-    """Cut the excesses ax, ay so that s + step times the rates with them lies between least and most times the depth.
+    """Limit the excesses ax, ay: s + step times the corrected rates lies between least and most times the depth.
 
-    rate : float64[n]  of upwind; work : float64[bound_work(nx, ny)]
+    rate : float64[n]  rates by upwind
+    work : float64[limit_excesses_work(nx, ny)]
     """
     wide = nx + 2
     up, down = work[: wide * (ny + 2)], work[wide * (ny + 2) : 2 * wide * (ny + 2)]
     for i in range(up.size):
-        up[i], down[i] = 1.0, 1.0  # as stays beyond the boundary
+        up[i], down[i] = 1.0, 1.0  # beyond the boundary this remains
     for j in range(ny):
         a, z, w, to = j * nx, (j + 1) * nx, j * (nx + 1), (j + 1) * wide + 1
         row_shares(

@@ -1,4 +1,4 @@
-"""Scalars in basins as rooms of a scene: what patches have of them, and rates of their amounts. Knows the tables.
+"""Scalars in basins: values at patches and beyond the boundary, sources and decay of their amounts.
 
 Amounts are per area, s = depth c; a basin with a given velocity has depth 1.
 """
@@ -16,12 +16,12 @@ from fvsolve.kernels.mixing import lose
 from fvsolve.kernels.records import CELL_SCALAR
 from fvsolve.kernels.schedules import schedule_value
 
-LEAST = 1e-12  # what a dry cell counts by in the value at a patch [m]
+LEAST = 1e-12  # weight of a dry cell in the value at a patch [m]
 
 
 @njit
 def depth_at(tables, basin, y, i):
-    """Depth of a cell that an amount is spread over."""
+    """Depth of a cell over which an amount is distributed, 1 without depth."""
     if basin["deep"] == 0:
         return 1.0
     return max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
@@ -35,7 +35,7 @@ def cell_value(tables, basin, q, y, i):
 
 @njit
 def patch_values(t, y, dydt, out, handle):
-    """Value of every scalar at every patch: the mean of what leaves the cells behind it, or of dry ones by area."""
+    """Compute the value of every scalar at every patch: the mean of its outflow, or by area if all cells are dry."""
     tables = open_tables(handle)
     nodes, value = tables.nodes.size, tables.layout[0]["value"]
     for k in range(tables.patches.size):
@@ -43,18 +43,18 @@ def patch_values(t, y, dydt, out, handle):
         basin = tables.basins[patch["basin"]]
         seen = seen_of(basin, tables.seen, y)
         for q in range(tables.scalars.size):
-            deep, total, held = basin["deep"] == 1, 0.0, 0.0
+            deep, total, amount = basin["deep"] == 1, 0.0, 0.0
             for m in range(patch["count"]):
                 i = tables.integers[patch["first"] + m]
                 part = tables.plane[basin["area"] + i]
                 part *= max(weight(tables.plane, basin, True, i, seen), LEAST) if deep else 1.0
-                total, held = total + part, held + part * cell_value(tables, basin, q, seen, i)
-            out[value + q * nodes + patch["node"]] = held / total
+                total, amount = total + part, amount + part * cell_value(tables, basin, q, seen, i)
+            out[value + q * nodes + patch["node"]] = amount / total
 
 
 @njit
 def observe_values(t, y, out, handle, values):
-    """values[k] of every probe of a scalar at a point of a basin."""
+    """Write values[k] of every probe of a scalar at a point of a basin."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
@@ -67,7 +67,7 @@ def observe_values(t, y, out, handle, values):
 
 @njit
 def put_outside(t, tables, patch, basin, q):
-    """Fill the values of a scalar beyond the faces of a patch, its initial one where nothing is said."""
+    """Write the value of a scalar beyond the faces of a patch, its schedule's or its initial one."""
     schedule = tables.integers[patch["values"] + q]
     value = tables.scalars[q]["initial"]
     if schedule >= 0:
@@ -79,7 +79,7 @@ def put_outside(t, tables, patch, basin, q):
 
 @njit
 def made_ready(t, tables, b, y):
-    """Depths and values beyond the boundary of a basin, for its scalars."""
+    """Compute depths and values beyond the boundary of a basin, for its scalars."""
     plane, basin, patches = tables.plane, tables.basins[b], tables.patches
     n, o, at, seen = basin["n"], basin["y"], basin["plan"], seen_of(basin, tables.seen, y)
     if basin["deep"] == 1:
@@ -94,19 +94,19 @@ def made_ready(t, tables, b, y):
 
 @njit
 def turned(t, basin):
-    """The factor on the flows of a basin, which may turn back and forth."""
+    """Factor on the flows of a basin whose given velocity is periodic, cos(pi t / period)."""
     return cos(pi * t / basin["period"]) if basin["period"] > 0.0 else 1.0
 
 
 @njit
 def deep(basin):
-    """Number of depths that were made ready: none where it is 1."""
+    """Number of depths that `prepare_scalars` computes; 0 where the depth is 1."""
     return basin["n"] if basin["deep"] == 1 else 0
 
 
 @njit
 def settle_amounts(t, y, dydt, out, handle):
-    """Add what decays and comes through patches to rates of amounts; book it, and what passes the boundary."""
+    """Add decay and inflow through patches to rates of amounts; record them, and the flow through the boundary."""
     tables = open_tables(handle)
     work = tables.work
     for b in range(tables.basins.size if dydt.size > 0 else 0):
@@ -124,15 +124,21 @@ def settle_amounts(t, y, dydt, out, handle):
 
 @njit
 def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
-    """Add to rates what decays and what links bring; book these, and what passes the boundary."""
+    """Add decay and the inflow of links to the rates of a scalar; record them, and the flow through the boundary."""
     scalar, patches, n = tables.scalars[q], tables.patches, basin["n"]
     if basin["through"] >= 0:
         book_boundary(tables, b, basin, q, factor, per, rate, outside, out)
     if scalar["decay"] > 0.0:
         area = tables.plane[basin["area"] : basin["area"] + n]
         for i in range(n):
-            high = depth[i] if depth.size > 0 else 1.0
-            lose(out, tables, q, basin["lost"] + i, per * scalar["decay"] * area[i] * (s[i] - high * scalar["ambient"]))
+            cell_depth = depth[i] if depth.size > 0 else 1.0
+            lose(
+                out,
+                tables,
+                q,
+                basin["lost"] + i,
+                per * scalar["decay"] * area[i] * (s[i] - cell_depth * scalar["ambient"]),
+            )
         add_decay(scalar["decay"], scalar["ambient"], depth, s, rate)
     for p in range(0 if is_given(basin) else patches.size):
         if patches[p]["basin"] == b and patches[p]["open"] == 0:
@@ -141,43 +147,49 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
 
 @njit
 def book_boundary(tables, b, basin, q, factor, per, rate, outside, out):
-    """What a given velocity brings in is booked to its patches; what it takes out, all else that cells gain, to one."""
+    """Record the inflow of a scalar through each open patch.
+
+    The patch with most outflow gets the remaining gain of all cells.
+    """
     plane, patches, nodes = tables.plane, tables.patches, tables.nodes.size
     flows = plane if is_given(basin) else tables.work
-    lies, gained = tables.layout[0]["gain"] + q * nodes, 0.0
+    first, total = tables.layout[0]["gain"] + q * nodes, 0.0
     for i in range(basin["n"]):
-        gained += plane[basin["area"] + i] * rate[i]
-    last, most = -1, -1.0
+        total += plane[basin["area"] + i] * rate[i]
+    largest, largest_outflow = -1, -1.0
     for p in range(patches.size):
         if patches[p]["basin"] != b or patches[p]["open"] == 0:
             continue
-        into, away = 0.0, 0.0
+        inflow, outflow = 0.0, 0.0
         for m in range(patches[p]["faces"]):
             k = tables.integers[patches[p]["ring"] + m]
             flow = factor * flows[basin["through"] + k]
-            into += max(flow, 0.0) * outside[k]
-            away -= min(flow, 0.0)
-        out[lies + patches[p]["node"]] = per * into
-        gained -= into
-        if away > most:
-            last, most = patches[p]["node"], away
-    out[lies + last] += per * gained
+            inflow += max(flow, 0.0) * outside[k]
+            outflow -= min(flow, 0.0)
+        out[first + patches[p]["node"]] = per * inflow
+        total -= inflow
+        if outflow > largest_outflow:
+            largest, largest_outflow = patches[p]["node"], outflow
+    out[first + largest] += per * total
 
 
 @njit
 def bring(tables, patch, basin, q, y, rate, out):
-    """What the network brings through a patch into the cells behind it; each gives of its own where water leaves."""
+    """Distribute the inflow of a scalar through a patch over its cells.
+
+    Where water leaves, each cell loses its own value.
+    """
     layout, nodes, rho = tables.layout[0], tables.nodes.size, tables.settings[0]["rho"]
     node = patch["node"]
-    made_up = out[layout["gain"] + q * nodes + node]
+    supplied = out[layout["gain"] + q * nodes + node]
     flow = min(out[layout["net"] + node] + out[layout["supply"] + node], 0.0) / (rho * counted(tables, patch, True, y))
-    brought, plane = (out[layout["brought"] + q * nodes + node] + made_up) / rho, tables.plane
+    inflow, plane = (out[layout["brought"] + q * nodes + node] + supplied) / rho, tables.plane
     for m in range(patch["count"] if flow < 0.0 else 0):
         i = tables.integers[patch["first"] + m]
-        gone = flow * weight(plane, basin, True, i, y) * cell_value(tables, basin, q, y, i)
-        rate[i] += gone
-        brought -= plane[basin["area"] + i] * gone
-    brought /= counted(tables, patch, False, y)
+        loss = flow * weight(plane, basin, True, i, y) * cell_value(tables, basin, q, y, i)
+        rate[i] += loss
+        inflow -= plane[basin["area"] + i] * loss
+    inflow /= counted(tables, patch, False, y)
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
-        rate[i] += brought * weight(plane, basin, False, i, y)
+        rate[i] += inflow * weight(plane, basin, False, i, y)

@@ -1,4 +1,4 @@
-"""Scalars in basins on meshes of any cells as a room of a scene. Knows the tables; the rest is as in `carried`."""
+"""Rates of scalars in basins on meshes of any cells; other terms are those of `basin_scalars`."""
 
 from fvsolve.basins.advection_faces import advection_rates
 from fvsolve.basins.behind import is_given
@@ -11,7 +11,7 @@ from fvsolve.kernels.records import RATE
 
 @njit
 def carry_on_meshes(t, y, dydt, out, handle):
-    """Rates of all amounts, carried and spread."""
+    """Rates of all amounts by advection and diffusion."""
     tables = open_tables(handle)
     plane, work, scalars, integers = tables.plane, tables.work, tables.scalars, tables.integers
     for b in range(tables.basins.size if dydt.size > 0 else 0):
@@ -31,5 +31,7 @@ def carry_on_meshes(t, y, dydt, out, handle):
                 flow, depth, work[ring : ring + basin["outer"]], scalars[q]["least"], scalars[q]["greatest"],
                 seen[o : o + n], work[basin["toil"] + n :], dydt[o : o + n],
             )  # fmt: skip
-            still = (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]  # which will be at full speed
-            out[RATE] = max(out[RATE], quickest + still + scalars[q]["decay"])
+            full_rate = (
+                (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]
+            )  # a periodic velocity returns to full speed
+            out[RATE] = max(out[RATE], quickest + full_rate + scalars[q]["decay"])

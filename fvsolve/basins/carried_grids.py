@@ -1,4 +1,4 @@
-"""Scalars in basins on grids as a room of a scene. Knows the tables; the rest is as in `carried`."""
+"""Rates of scalars in basins on grids; other terms are those of `basin_scalars`."""
 
 from fvsolve.basins.advection import add_fifth_order, grid_advection, grid_fastest
 from fvsolve.basins.behind import is_given
@@ -14,13 +14,13 @@ from fvsolve.kernels.sums import BOTH, CELLS, LOOK, MODE, OFF, asked, form, form
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """Whether scalars of a basin are carried over a grid."""
+    """True if the basin is a grid with scalars."""
     return basin["carried"] >= 0 and basin["nx"] > 0
 
 
 @njit(forceinline=True)
 def parts(tables, basin):
-    """1 / widths and heights of a grid, flows along and across, depths that were made ready, and room to work in."""
+    """1 / widths and heights of a grid, flows along x and y, depths from `prepare_scalars`, and a work array."""
     plane, work = tables.plane, tables.work
     flows = plane if is_given(basin) else work
     nx, ny, k, f, toil = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["toil"]
@@ -43,7 +43,7 @@ def carry_on_grids(t, y, dydt, out, handle):
         begin, stop = tables.bands[2 * b], tables.bands[2 * b + 1]
         kx, ky, flow_x, flow_y, depth, work = parts(tables, basin)
         seen = seen_of(basin, tables.seen, y)
-        quick = basin["unsplit"] * basin["fastest"]  # at full speed: while it turns back it gets quicker in a step
+        quick = basin["unsplit"] * basin["fastest"]  # at full speed: a periodic velocity may grow within a step
         for q in range(tables.scalars.size):
             out[RATE] = max(out[RATE], quick + tables.scalars[q]["decay"])
             n, ring = basin["n"], basin["outside"] + q * basin["outer"]
@@ -64,29 +64,29 @@ def carry_on_grids(t, y, dydt, out, handle):
 
 @njit
 def by_blocks(sums, at, scheme, limiter, begin, stop, kx, ky, factor, flow_x, flow_y, outside, y, work, rate):
-    """`grid_advection` of values themselves, block by block, and the stages that are asked for formed beside them."""
-    nx, ny, n, known, done = kx.size, ky.size, rate.size, begin, begin
+    """Rates by `grid_advection` at depth 1, block by block, with the requested stages formed in the same pass."""
+    nx, ny, n, formed_ahead, formed_end = kx.size, ky.size, rate.size, begin, begin
     rows = max(sums[CELLS] // nx, 1)
     for row in range(begin, stop, rows):
-        until = min(row + rows, stop)
-        ahead = min(until + 2, stop)
+        block_stop = min(row + rows, stop)
+        ahead = min(block_stop + 2, stop)
         if sums[MODE] != LOOK:
-            form(sums, False, at, nx, known, ahead, 0, nx)
-        known = ahead
+            form(sums, False, at, nx, formed_ahead, ahead, 0, nx)
+        formed_ahead = ahead
         second_order_rates(
-            scheme if scheme == MUSCL else UPWIND, limiter, nx, ny, row, until, stop, row == begin, kx, ky, factor,
+            scheme if scheme == MUSCL else UPWIND, limiter, nx, ny, row, block_stop, stop, row == begin, kx, ky, factor,
             flow_x, flow_y, outside, y[at : at + n], work[n:], rate,
         )  # fmt: skip
         if sums[MODE] == LOOK:
-            look(sums, y, at, nx, row, until, 0, nx)
-        elif sums[MODE] == BOTH:  # the last of these rows is looked at by the next one's rates
-            form(sums, True, at, nx, done, until if until == stop else until - 1, 0, nx)
-            done = until - 1
+            look(sums, y, at, nx, row, block_stop, 0, nx)
+        elif sums[MODE] == BOTH:  # rates of the next row read the last of these rows
+            form(sums, True, at, nx, formed_end, block_stop if block_stop == stop else block_stop - 1, 0, nx)
+            formed_end = block_stop - 1
 
 
 @njit
 def add_on_grids(t, y, dydt, out, handle):
-    """Add to the rates of all amounts what upwind5 has more, or weno5, which keeps the bounds of what there can be."""
+    """Add the excess of upwind5 or weno5 over upwind to the rates of all amounts; weno5 keeps the bounds."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
@@ -109,7 +109,7 @@ def add_on_grids(t, y, dydt, out, handle):
 
 @njit
 def spread_on_grids(t, y, dydt, out, handle):
-    """Add to the rates of all amounts what spreads."""
+    """Add diffusion to the rates of all amounts."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
@@ -119,12 +119,12 @@ def spread_on_grids(t, y, dydt, out, handle):
         begin, stop = tables.bands[2 * b], tables.bands[2 * b + 1]
         seen = seen_of(basin, tables.seen, y)
         for q in range(tables.scalars.size):
-            n, ring, spreads = basin["n"], basin["outside"] + q * basin["outer"], tables.scalars[q]["diffusivity"]
+            n, ring, diffusivity = basin["n"], basin["outside"] + q * basin["outer"], tables.scalars[q]["diffusivity"]
             at = basin["carried"] + q * n
-            if spreads > 0.0:
-                quick = grid_diffusion(
-                    kx.size, ky.size, begin, stop, kx, ky, spreads, turned(t, basin), flow_x, flow_y, depth,
+            if diffusivity > 0.0:
+                diffusion_rate = grid_diffusion(
+                    kx.size, ky.size, begin, stop, kx, ky, diffusivity, turned(t, basin), flow_x, flow_y, depth,
                     tables.work[ring : ring + basin["outer"]], seen[at : at + n], work, dydt[at : at + n],
                 )  # fmt: skip
-                still = basin["unsplit"] * basin["fastest"] + tables.scalars[q]["decay"]
-                out[RATE] = max(out[RATE], still + quick)
+                other_rates = basin["unsplit"] * basin["fastest"] + tables.scalars[q]["decay"]
+                out[RATE] = max(out[RATE], other_rates + diffusion_rate)

@@ -1,4 +1,4 @@
-"""What scalars do beside being carried: spread and decay. Knows cells of a grid; adds to rates.
+"""Diffusion and decay of scalars on a grid, added to rates.
 
 s_t = div(D depth grad c) - decay (s - depth ambient), for amounts s = depth c per area.
 """
@@ -9,13 +9,13 @@ from fvsolve.jit import inner, njit
 
 @njit
 def between(a, b):
-    """Harmonic mean, of depths or of cells per length: none where there is nothing on one side."""
+    """Harmonic mean, of depths or of cells per length: 0 if both are 0."""
     return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0
 
 
 @inner
 def conduct(across, a, b, to):
-    """What a row of faces conducts: across times the depth between a and b, which are empty where it is 1."""
+    """Conductances of a row of faces: `across` times the depth between a and b, which are empty if the depth is 1."""
     if a.size == 0:
         for i in range(to.size):
             to[i] = across
@@ -26,7 +26,10 @@ def conduct(across, a, b, to):
 
 @inner
 def spread(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
-    """Add to the rates of a row; p : its values, with one beyond either end; top : greatest rate by column so far."""
+    """Add diffusion to the rates of a row. p : its values, with one beyond either end.
+
+    top : greatest rate by column so far
+    """
     w, e, ww, we = p, p[2:], wx, wx[1:]
     for i in range(rate.size):
         x = kx[i] * (we[i] * (e[i] - here[i]) - ww[i] * (here[i] - w[i]))
@@ -38,19 +41,17 @@ def spread(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
 
 
 def diffusion_work(nx, ny):
-    """Floats that `grid_diffusion` works in."""
+    """Length of the work array of `grid_diffusion`."""
     return nx * ny + 8 * nx + 3
 
 
 @njit
 def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flow_y, depth, outside, s, work, rate):
-    """Add the rates of diffusion [m2/s], and return the greatest rate 2 D (kx^2 + ky^2) of a cell [1/s].
+    """Add the rates of diffusion to rows `begin` to `stop`; return the greatest rate 2 D (kx^2 + ky^2) of a cell [1/s].
 
-    Of cells of rows `begin` to `stop`.
-
-    No flux at the boundary but where factor times a given flow comes in: there the value `outside` holds on the face.
-    (That of water, with depths, may hardly move there: a value held at one sign and not at the other would be a jump.)
-    Arguments as of `grid_advection`; work : float64[diffusion_work(nx, ny)]
+    There is no flux through the boundary, except where factor times a given flow enters: there the value on the face is
+    `outside`. (Flows of water, with depths, may be almost zero there: a value fixed for one sign only would jump.)
+    Arguments as for `grid_advection`; diffusivity in m2/s; work : float64[diffusion_work(nx, ny)]
     """
     c, rest = s, work[nx * ny :]
     if depth.size > 0:
@@ -59,9 +60,9 @@ def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flo
     p, wx, rest = rest[: nx + 2], rest[nx + 2 : 2 * nx + 3], rest[2 * nx + 3 :]
     rows, beyond, top = rest[: 2 * nx], rest[2 * nx : 4 * nx], rest[4 * nx : 5 * nx]
     below, above, most = beyond[:nx], beyond[nx:], 0.0
-    held = 2.0 * diffusivity if depth.size == 0 else 0.0
+    inflow_factor = 2.0 * diffusivity if depth.size == 0 else 0.0
     for i in range(nx):
-        below[i], rows[i] = outside[2 * ny + i], ky[0] * held if factor * flow_y[i] > 0.0 else 0.0
+        below[i], rows[i] = outside[2 * ny + i], ky[0] * inflow_factor if factor * flow_y[i] > 0.0 else 0.0
         above[i], top[i] = outside[2 * ny + nx + i], 0.0
     for j in range(max(begin - 1, 0), stop):
         a, z, f = j * nx, (j + 1) * nx, j * (nx + 1)
@@ -73,15 +74,15 @@ def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flo
         conduct(1.0, h, h[1:], inner_w)
         for i in range(nx - 1):
             inner_w[i] *= diffusivity * between(kx[i], kx[i + 1])
-        wx[0] = kx[0] * held if factor * flow_x[f] > 0.0 else 0.0
-        wx[nx] = kx[nx - 1] * held if factor * flow_x[f + nx] < 0.0 else 0.0
+        wx[0] = kx[0] * inflow_factor if factor * flow_x[f] > 0.0 else 0.0
+        wx[nx] = kx[nx - 1] * inflow_factor if factor * flow_x[f + nx] < 0.0 else 0.0
         ws, wn = rows[(j % 2) * nx :], rows[((j + 1) % 2) * nx : ((j + 1) % 2 + 1) * nx]
         south, north = c[a - nx : a] if j > 0 else below, c[z : z + nx] if j < ny - 1 else above
         if j < ny - 1:
             conduct(diffusivity * between(ky[j], ky[j + 1]), h, hn, wn)
         else:
             for i in range(nx):
-                wn[i] = ky[j] * held if factor * flow_y[z + i] < 0.0 else 0.0
+                wn[i] = ky[j] * inflow_factor if factor * flow_y[z + i] < 0.0 else 0.0
         if j >= begin:
             spread(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
     for i in range(nx):

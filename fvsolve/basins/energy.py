@@ -1,9 +1,9 @@
-"""Power of what comes into basins by patches, under the linear law. Knows the tables; adds nothing up over time.
+"""Power of flows into basins through patches, under the linear law.
 
-Rows of `power`, last of all, a basin: what comes in by patches at their potential, what is lost there (what enters has
-no speed, what leaves takes its own along and is not paid for it), friction, rate of storage, what its law takes of it
-besides where it rides on a body [W]; of `stored`: its
-change since the profile [J]. A physics fills what is not zero of its own, squares being those of a cell's mean.
+Rows of `power` of a basin [W], at the end: power of the inflow through patches at their potential; loss there (inflow
+has no speed, outflow takes its kinetic energy along unpaid); friction; rate of storage; on a body, power dissipated by
+the law. `stored` contains the change of energy since the profile [J]. A physics fills its own rows that are not zero;
+squares are those of cell means.
 """
 
 from fvsolve.jit import njit
@@ -14,7 +14,7 @@ from fvsolve.kernels.handle import open_tables
 
 @njit
 def row_of(tables, power, b):
-    """The first of the rows of `power` of basin b."""
+    """First row of `power` of basin b."""
     return basin_rows(tables, power) + OF_BASIN * b
 
 
@@ -26,7 +26,7 @@ def at_rest(st, basin):
 
 @njit
 def patch_power(t, y, dydt, out, handle, power):
-    """What comes in by the patches of all basins."""
+    """Set rows of basins to zero, and add the power of the inflow through all patches."""
     tables = open_tables(handle)
     rho, patches, layout = tables.settings[0]["rho"], tables.patches, tables.layout[0]
     for k in range(row_of(tables, power, 0), power.size):

@@ -1,21 +1,25 @@
-"""Sides of cells of any mesh: how their arrays lie, slopes by least squares, and their limiter. Knows no physics.
+"""Sides of cells of any mesh: layout of their arrays, least-squares gradients, and the limiter.
 
-A cell has `slots` sides, three or four. Cells stand in blocks of BLOCK, the last one filled up. Every cell gathers what
-lies beyond its sides and settles its own rates; both cells of a face find the same flux to the bit, so nothing is lost.
-What a cell has not (a triangle among quadrilaterals) is a side of no length to itself.
+A cell has `slots` sides, three or four. Cells are stored in blocks of BLOCK; the last block is padded. Every cell reads
+the values beyond its sides and computes its own rates. Both cells of a face compute the same flux to the bit, so the
+scheme is conservative. A missing side (a triangle among quadrilaterals) has length 0 and itself as neighbour.
 
-What is found of cells and their sides on the way lives in a ring of the last `ring` blocks, so that it stays in a near
+Temporary values of cells and their sides are stored in a ring of the last `ring` blocks, so that they stay in a near
 cache: cell i of block j at (j BLOCK + i) modulo ring BLOCK, its side k at ((4 j + k) BLOCK + i) modulo 4 ring BLOCK.
-Block j is settled once the sides of blocks before need[j] are known, and these once the cells before need[] of theirs.
-Loops run over BLOCK cells and a few arrays at constant distances, so that the compiler sees that they are apart.
+Rates of block j are computed once the sides of blocks before need[j] are known, and these once the cells before need[]
+of theirs. Loops run over BLOCK cells and a few arrays at constant distances, so that the compiler knows that they do
+not overlap.
 
 integers : int64[:]  slots, cells, faces, boundary faces, ring; by block, side and row of BLOCK, two int32 to an
-           int64: places of cell and side beyond (on the boundary its own); need[blocks]; of the boundary in order of
-           sides: side not taken modulo, number; by block and side: face (~f where its normal points inwards)
-floats : float64[:]  by block, side and row of BLOCK: outward normal, length / area, from centre to the side's middle,
-         weights of its difference in the gradient; of the boundary in order of sides: outward normal; of faces: length;
-         by block, side and row again: 1 / area, 1 / distance to the cell beyond along the normal, the normal less that
-         distance's direction
+           int64: places of the neighbour cell and of its side (on the boundary its own); need[blocks]; of the boundary
+           in order of sides: side not taken modulo, number; by block and side: face (~f where its normal points
+           inwards)
+floats : float64[:]  by block, side and row of BLOCK: outward normal, length / area, vector from the centre to the
+side's
+         middle, weights of its difference in the gradient; of the boundary in order of sides: outward normal; of faces:
+         length; by block, side and row again: 1 / area, 1 / distance to the next cell along the normal, the normal
+         minus
+         that distance's direction
 """
 
 import numpy as np
@@ -35,13 +39,13 @@ _WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEAS
 
 @njit
 def blocks(integers):
-    """How many blocks the cells fill."""
+    """Number of blocks of the cells."""
     return (integers[1] + BLOCK - 1) // BLOCK
 
 
 @njit
 def edges_before(edges, first, side):
-    """The first of the boundary's sides, from `first` on, that is not before `side`."""
+    """Index of the first boundary side, from `first` on, that is not before `side`."""
     while first < edges.size and edges[first] < side:
         first += 1
     return first
@@ -49,7 +53,7 @@ def edges_before(edges, first, side):
 
 @njit
 def place(side, ring):
-    """Where the ring has the cell of a side of the boundary."""
+    """Place in the ring of the cell of a boundary side."""
     return (side // (4 * BLOCK)) % ring * BLOCK + side % BLOCK
 
 
@@ -62,18 +66,18 @@ def gather(values, where, out):
 
 @njit
 def put_inward(edges, number, flux, length, through):
-    """What comes in through the boundary at its sides `edges`, all of one number of a block, from fluxes outward."""
+    """Inward flows through the boundary sides `edges`, all of the same side number of a block, from outward fluxes."""
     for q in range(edges.size):
         through[number[q]] = -flux[edges[q] % BLOCK] * length[number[q]]
 
 
 @njit
 def sides_of_three(p, wide, cap, beyond, geo, out):
-    """Limited values at three sides of a block of cells, from those beyond.
+    """Limited values at three sides of a block of cells, from the values beyond them.
 
-    Where cells around rise by `most` and fall by `least`, a side rises by no more than wide most, -2 wide least and
-    `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of the highest and of the lowest cell
-    around differs from it; where wide is 1 none leaves the values around.
+    If the neighbours differ from the cell by `least` to `most`, a side rises by no more than wide most, -2 wide least
+    and `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of a local extremum differs from
+    its cell. With wide = 1 all values at sides lie in the range of the neighbours.
     """
     back = 2.0 * wide
     for i in range(BLOCK):
@@ -93,7 +97,10 @@ def sides_of_three(p, wide, cap, beyond, geo, out):
 
 @njit
 def sides_of_four(p, wide, cap, beyond, geo, out):
-    """The same at four sides; opposite ones of a rectangle first, so that mirrored cells find mirrored sums."""
+    """Limited values at four sides.
+
+    Opposite sides of a rectangle are added first, so that mirror cells give mirror sums.
+    """
     back = 2.0 * wide
     for i in range(BLOCK):
         here = p[i]
@@ -123,7 +130,7 @@ def put_sides(j, floats, integers, values, wide, cap, shown, edges, scratch, sid
 
     values : float64[ring BLOCK]; wide, cap : see `sides_of_three`; scratch : float64[4 BLOCK]
     sides : float64[4 ring BLOCK]
-    shown : float64[:]  what the boundary shows at its sides `edges`, int64[:], of this block
+    shown : float64[:]  values beyond the boundary at its sides `edges`, int64[:], of this block
     """
     slots, ring, places = integers[0], integers[4], integers[HEAD:].view(np.int32)
     for k in range(slots):

@@ -1,40 +1,41 @@
-"""Fifth order over a grid, as what upwind rates lack of it. Knows rows of cells and faces; knows no depth.
+"""Fifth-order advection over a grid, as the difference from upwind rates.
 
-Linear (upwind5) or WENO-Z values (Borges et al. 2008), written in differences, so that what is uniform stays so. The
-mean of a product over a face is the product of means, and 1/12 and 1/180 of the products of the first and second
-Legendre coefficients along it. What passes a face beyond the upwind flux is an excess, that `bound` may cut.
+Values are linear (upwind5) or WENO-Z (Borges et al. 2008), written in differences, so that a uniform value stays
+uniform. The mean of a product over a face is the product of the means plus 1/12 and 1/180 of the products of the first
+and second Legendre coefficients along the face. The flux through a face minus the upwind flux is an excess, which
+`limit_excesses` may reduce.
 """
 
 from fvsolve.jit import inner, njit
 from fvsolve.kernels.records import WENO5
 
-SMALL = 1e-30  # against a division by zero between squares of differences
+SMALL = 1e-30  # prevents a division by zero between squares of differences
 GHOSTS = 3
-NARROW = 5  # cells below which values beyond a side are those of its last cells
+NARROW = 5  # with fewer cells, values beyond a side are those of its last cells
 
 
 @njit
 def beyond(known, o, a, b, c, d, e):
-    """Means of the two cells beyond a side, from the polynomial of degree 4 that fits those inside, a the nearest.
+    """Means of the two cells beyond a side, from the polynomial of degree 4 through the means of the cells inside.
 
-    Where it is known, o at the side takes the place of e.
+    a : the nearest cell; o : value at the side, used in place of e if `known`
     """
     p, q, r, s = a - b, b - c, c - d, d - e
     if known:
-        one = (60.0 * (o - a) - 29.0 * p + 14.0 * q - 3.0 * r) / 12.0
-        return a + one, a + (300.0 * (o - a) - 217.0 * p + 118.0 * q - 27.0 * r) / 12.0
+        nearest = (60.0 * (o - a) - 29.0 * p + 14.0 * q - 3.0 * r) / 12.0
+        return a + nearest, a + (300.0 * (o - a) - 217.0 * p + 118.0 * q - 27.0 * r) / 12.0
     return a + (4.0 * p - 6.0 * q + 4.0 * r - s), a + (14.0 * p - 26.0 * q + 19.0 * r - 5.0 * s)
 
 
 @njit
 def lean_linear(p, q, r, s):
-    """The value after a cell less its own, from the differences between it and two cells on either side."""
+    """Value at the face after a cell minus its own, from the differences between it and two cells on either side."""
     return (24.0 * r + 11.0 * q - 2.0 * p - 3.0 * s) / 60.0
 
 
 @njit
 def lean_weno(p, q, r, s):
-    """The same by WENO-Z, all weights over one divisor."""
+    """Value at the face after a cell minus its own by WENO-Z, with one common divisor of all weights."""
     b0 = 13.0 / 12.0 * (q - p) ** 2 + 0.25 * (3.0 * q - p) ** 2 + SMALL
     b1 = 13.0 / 12.0 * (r - q) ** 2 + 0.25 * (r + q) ** 2 + SMALL
     b2 = 13.0 / 12.0 * (s - r) ** 2 + 0.25 * (s - 3.0 * r) ** 2 + SMALL
@@ -45,28 +46,28 @@ def lean_weno(p, q, r, s):
 
 @njit
 def excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
-    """Values q at faces between c and d, and how much more than the upwind value's flow passes there."""
+    """Values q at faces between c and d, and the flux in excess of that of the upwind value."""
     if scheme == WENO5:
         for i in range(q.size):
             forward = factor * flow[i] > 0.0
             p, s = b[i] - a[i], g[i] - e[i]
             m, r, n = c[i] - b[i], d[i] - c[i], e[i] - d[i]
-            lean = lean_weno(p if forward else s, m if forward else n, r, n if forward else m)
-            q[i] = c[i] + lean if forward else d[i] - lean
-            excess[i] = flow[i] * (lean if forward else -lean)
+            difference = lean_weno(p if forward else s, m if forward else n, r, n if forward else m)
+            q[i] = c[i] + difference if forward else d[i] - difference
+            excess[i] = flow[i] * (difference if forward else -difference)
     else:
         for i in range(q.size):
             forward = factor * flow[i] > 0.0
             p, s = b[i] - a[i], g[i] - e[i]
             m, r, n = c[i] - b[i], d[i] - c[i], e[i] - d[i]
-            lean = lean_linear(p if forward else s, m if forward else n, r, n if forward else m)
-            q[i] = c[i] + lean if forward else d[i] - lean
-            excess[i] = flow[i] * (lean if forward else -lean)
+            difference = lean_linear(p if forward else s, m if forward else n, r, n if forward else m)
+            q[i] = c[i] + difference if forward else d[i] - difference
+            excess[i] = flow[i] * (difference if forward else -difference)
 
 
 @njit
 def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
-    """Values in v, float64[ny + 6, nx + 6] in one line, with what lies beyond the sides."""
+    """Copy values to v, float64[ny + 6, nx + 6] in one array, with ghost cells beyond the sides."""
     wide = nx + 2 * GHOSTS
     for j in range(ny):
         to, fx = v[(j + GHOSTS) * wide :], flow_x[j * (nx + 1) :]
@@ -87,7 +88,7 @@ def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
 
 @njit
 def ghosts(n, known, o, v, at, step):
-    """Both values of `beyond` for the cells v[at], v[at + step], ... inward."""
+    """Both values of `ghost_means` for the cells v[at], v[at + step], ... inward."""
     if n < NARROW:
         return (o, o) if known else (v[at], v[at])
     return beyond(known, o, v[at], v[at + step], v[at + 2 * step], v[at + 3 * step], v[at + 4 * step])
@@ -95,7 +96,7 @@ def ghosts(n, known, o, v, at, step):
 
 @inner
 def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
-    """Add what a mean of products has more than the product of means, from five faces in line along the side."""
+    """Add the mean of products minus the product of means, from five faces in line along the side."""
     for i in range(excess.size):
         f1 = (82.0 * (fd[i] - fb[i]) - 11.0 * (fe[i] - fa[i])) / 120.0
         q1 = (82.0 * (qd[i] - qb[i]) - 11.0 * (qe[i] - qa[i])) / 120.0
@@ -106,7 +107,7 @@ def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
 
 @njit
 def extend(v, wide, rows):
-    """Fill the two rows before and after rows 2 .. of v by extrapolation."""
+    """Extrapolate two rows before and after the rows of v, which start at row 2."""
     first, last = 2 * wide, (rows + 1) * wide
     for i in range(wide):
         v[wide + i], v[i] = ghosts(rows, False, 0.0, v, first + i, wide)
@@ -115,7 +116,7 @@ def extend(v, wide, rows):
 
 @njit
 def pad_line(v, n, to):
-    """Fill to, float64[n + 4], with v and two values beyond either end."""
+    """Copy v to the middle of to, float64[n + 4], and extrapolate two values beyond either end."""
     middle = to[2:]
     for i in range(n):
         middle[i] = v[i]
@@ -124,13 +125,13 @@ def pad_line(v, n, to):
 
 
 def grid_excesses_work(nx, ny):
-    """Floats that `grid_excesses` works in."""
+    """Length of the work array of `grid_excesses`."""
     return (nx + 6) * (ny + 6) + 2 * (nx + 1) * (ny + 4) + nx * (ny + 1) + 2 * (nx + 4)
 
 
 @njit
 def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, ay):
-    """What passes the faces beyond the flux of upwind, in ax as flow_x and ay as flow_y."""
+    """Fluxes through faces in excess of upwind, in ax ordered as flow_x and ay as flow_y."""
     wide, m = nx + 2 * GHOSTS, nx + 1
     mx, my = m * (ny + 4), nx * (ny + 1)
     v, rest = work[: wide * (ny + 6)], work[wide * (ny + 6) :]
@@ -156,9 +157,9 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
             side, turn = (outside[2 * ny :], 1.0) if j == 0 else (outside[2 * ny + nx :], -1.0)
             own = d if j == 0 else p[2 * wide :]
             for i in range(nx):
-                come = turn * factor * fy[i]
-                if come >= 0.0:
-                    qj[i], a[i] = side[i] if come > 0.0 else own[i], 0.0
+                inflow = turn * factor * fy[i]
+                if inflow >= 0.0:
+                    qj[i], a[i] = side[i] if inflow > 0.0 else own[i], 0.0
     extend(fx, m, ny)
     extend(qx, m, ny)
     for j in range(ny):
@@ -173,7 +174,7 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
 
 @njit
 def settle_excesses(nx, ny, kx, ky, factor, ax, ay, rate):
-    """Add to the rates of all cells what their faces' excesses bring."""
+    """Add the excesses of their faces to the rates of all cells."""
     for j in range(ny):
         k, to = ky[j], rate[j * nx : (j + 1) * nx]
         aw, ae, south, north = ax[j * (nx + 1) :], ax[j * (nx + 1) + 1 :], ay[j * nx :], ay[(j + 1) * nx :]

@@ -1,14 +1,15 @@
-"""Basins that ride on bodies: how their axes move, and where that lifts what is in them. Knows rows of tables; no flux.
+"""Accelerated frame of reference of a basin on a body, and the potential of its inertial and gravity forces.
 
-In axes of the basin, z along its normal, r = (x, y, 0) from its middle, which moves with acceleration a and turns at W
-(65): u_t + u.grad u + grad(p) / rho + grad(phi) = - 2 W_z x u - dW_z/dt x r, with G = R' ((0, 0, -g) - a) and
+In the axes of the basin, z is along its normal and r = (x, y, 0) is the distance from its middle. The middle has the
+acceleration a, and the axes rotate at W. The equation of motion is (65)
+u_t + u.grad u + grad(p) / rho + grad(phi) = - 2 W_z x u - dW_z/dt x r, with G = R' ((0, 0, -g) - a) and
 
     phi = - G_x x - G_y y - ((W_y^2 + W_z^2) x^2 - 2 W_x W_y x y + (W_x^2 + W_z^2) y^2) / 2
 
-Under a free surface, whose water weighs g_n = -G_z along the normal, phi / g_n stands where the bed stands: tilt,
-accelerations and centrifugal forces are a bed that moves. In a liquid phi joins the pressure that is reconstructed
-(`liquid.riding`). So what rests in the frame rests to round-off. Left out are what columns feel along z but at the
-origin, and vertical momentum: both of the order of angle times depth over wave length.
+The water below a free surface has the weight g_n = -G_z along the normal, and phi / g_n is added to the bed elevation:
+tilt, accelerations and centrifugal forces act like a moving bed. In a liquid, phi is added to the reconstructed
+pressure (`liquid_on_body`). So water at rest in the frame stays at rest to round-off. Neglected are accelerations along
+z away from the origin, and vertical momentum: both are of the order of angle times depth over wave length.
 """
 
 from fvsolve.jit import inner, njit
@@ -16,19 +17,23 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.mechanism.room import ATTITUDE, BIAS, SPIN, SPIN_BIAS, cross, row_of, turned
 from fvsolve.kernels.records import GN, NO_WEIGHT, STATUS, WHERE
 
-AT, TURN = 0, 3  # numbers of a frame: place of its origin and attitude, by rows, in axes of its body,
-GX, GY, _, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n, W and dW/dt in its own axes,
-SURFACE = 21  # offsets in `plane`: of surfaces as drawn, and of places of columns and rows, or of cells
-PLACES = 22
+# Places of the numbers of a frame in `plane`, from the offset basin["frame"].
+AT, TURN = 0, 3  # position of the origin and rotation matrix (by rows) in the axes of the body
+GX, GY, _, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n (GN of the kernels), W and dW/dt in the axes of the basin
+SURFACE = 21  # offset in `plane` of the undisturbed surface above the level at rest [m]: 0, or a bed above that level
+PLACES = 22  # offset in `plane` of the positions of columns and rows of a grid, or of cells
 DOWN = 23  # gravity alone, three numbers
-LEVEL = 26  # of the water at rest above its origin [m]
-PHI = 27  # of a liquid: offset in `work` of what is raised; behind PLACES those of lines follow, or of sides of cells
-FRAME = 28  # numbers
+LEVEL = 26  # level of the water at rest above the origin [m]
+PHI = 27  # liquid: offset in `work` of potentials; positions of grid lines or of sides of cells follow those at PLACES
+FRAME = 28  # number of numbers
 
 
 @njit
 def set_frames(t, y, dydt, out, handle):
-    """What all frames do now, and beds with them."""
+    """Compute the motion of all frames, and tilt the beds of basins with a free surface.
+
+    Sets the status NO_WEIGHT if a basin with a free surface has no weight along its normal.
+    """
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -42,14 +47,17 @@ def set_frames(t, y, dydt, out, handle):
 
 @njit
 def seen_along(out, row, plane, at, k, x, y, z):
-    """Part of a vector of the world along axis k of a frame whose attitude on its body stands at plane[at]."""
+    """Component of a vector of the world along axis k of a frame.
+
+    Its rotation matrix relative to its body is at plane[at].
+    """
     ax, ay, az = turned(out, row + ATTITUDE, plane[at + k : at + k + 7 : 3], 0)
     return ax * x + ay * y + az * z
 
 
 @njit
 def set_frame(tables, basin, out):
-    """G, W and dW/dt in axes of a basin, and gravity alone."""
+    """Compute G, W, dW/dt and gravity alone in the axes of a basin."""
     plane, at, row = tables.plane, basin["frame"], row_of(tables, basin["body"])
     rx, ry, rz = turned(out, row + ATTITUDE, plane[at : at + 3], 0)
     ex, ey, ez = cross(out, row + SPIN_BIAS, rx, ry, rz)
@@ -70,7 +78,10 @@ def set_frame(tables, basin, out):
 
 @njit(forceinline=True)
 def potential(plane, at, per):
-    """Numbers of per phi = x (fx + xx x + xy y) + y (fy + yy y), of the frame at plane[at]."""
+    """Coefficients (fx, fy, xx, xy, yy) of a potential for the frame at plane[at].
+
+    per phi = x (fx + xx x + xy y) + y (fy + yy y)
+    """
     wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
     fx, fy = -per * plane[at + GX], -per * plane[at + GY]
     return fx, fy, -0.5 * per * (wy * wy + wz * wz), per * wx * wy, -0.5 * per * (wx * wx + wz * wz)
@@ -78,7 +89,7 @@ def potential(plane, at, per):
 
 @njit
 def tilt_bed(plane, basin):
-    """Surfaces at rest, less the level, with phi."""
+    """Add phi / g_n to the bed elevation above the level at rest."""
     at, n = basin["frame"], basin["n"]
     to, drawn = basin["plan"] + n, int(plane[at + SURFACE])
     lift(plane, basin, 1.0 / plane[at + GN], plane[drawn : drawn + n], plane[to : to + n])
@@ -86,7 +97,7 @@ def tilt_bed(plane, basin):
 
 @njit
 def lift(plane, basin, per, values, lifted):
-    """Values of all cells with per phi."""
+    """Write the values of all cells plus per phi to `lifted`."""
     n, nx, at = basin["n"], basin["nx"], int(plane[basin["frame"] + PLACES])
     phi = potential(plane, basin["frame"], per)
     if nx == 0:
@@ -97,7 +108,10 @@ def lift(plane, basin, per, values, lifted):
 
 @njit
 def lift_points(phi, x, y, values, lifted):
-    """Values, or nothing where these are None, with what `potential` says of points."""
+    """Write values plus the potential at points to `lifted`; values None count as 0.
+
+    phi : coefficients of `potential`
+    """
     fx, fy, xx, xy, yy = phi
     for i in range(lifted.size):
         rise = x[i] * (fx + xx * x[i] + xy * y[i]) + y[i] * (fy + yy * y[i])
@@ -106,7 +120,7 @@ def lift_points(phi, x, y, values, lifted):
 
 @njit
 def lift_rows(phi, x, y, values, lifted):
-    """The same of a grid, its columns at x and its rows at y."""
+    """Write values plus the potential at the cells of a grid with columns at x and rows at y to `lifted`."""
     fx, fy, xx, xy, yy = phi
     for j in range(y.size):
         a, z = j * x.size, (j + 1) * x.size
@@ -115,16 +129,16 @@ def lift_rows(phi, x, y, values, lifted):
 
 
 @inner
-def lift_row(x, values, slope, xx, even, lifted):
-    """The same of a row."""
+def lift_row(x, values, slope, xx, constant, lifted):
+    """Write values plus the potential at a row of cells to `lifted`."""
     for i in range(lifted.size):
-        rise = x[i] * (slope + xx * x[i]) + even
+        rise = x[i] * (slope + xx * x[i]) + constant
         lifted[i] = rise if values is None else values[i] + rise
 
 
 @njit(forceinline=True)
 def place_of(plane, basin, i):
-    """Where the centre of cell i lies in axes of its basin [m]."""
+    """Centre of cell i in the axes of its basin [m]."""
     n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + PLACES])
     if nx == 0:
         return plane[places + i], plane[places + n + i]

@@ -1,11 +1,11 @@
-"""Energy of water that rides on bodies, as the world has it. Knows the tables; adds nothing up over time.
+"""Energy of the water in basins on bodies, in the inertial frame.
 
-Of columns as point masses on the bed, weight at mid depth: T = M V^2 / 2 + V . (W x S + Q) + W . I W / 2 + W_z H + sum
-of rho q^2 / (2 h), U = M g z - d . (S, lever), d gravity in axes of the basin, V velocity of its origin; M, S, I the
-moments of mass, Q and H momentum and its moment relative to the basin. A liquid has no lever, and what it stores in its
-own axes is that of `liquid.energy`. A body brings -(F . V + T . W) with the load that it feels; see `frames_load`. What
-is known of the origin's acceleration along the normal, a, weighs on the water and not on columns that rise: a d/dt (sum
-of dm h / 2) is taken from it by the law, and may be given back.
+Columns are point masses on the bed, at mid depth: T = M V^2 / 2 + V . (W x S + Q) + W . I W / 2 + W_z H + sum of rho
+q^2 / (2 h), U = M g z - d . (S, lever). d is gravity in axes of the basin, V the velocity of its origin. M, S, I are
+the moments of mass; Q and H are momentum and its moment relative to the basin. A liquid has no lever, and its stored
+energy in its own axes is that of `liquid_energy`. A body supplies the power -(F . V + T . W) with the load on it; see
+`frame_reaction`. The acceleration a of the origin along the normal changes the weight of the water, but does not act on
+columns that rise: so the law dissipates a d/dt (sum of dm h / 2), which may be negative.
 """
 
 from fvsolve.basins.energy import row_of as energy_row
@@ -40,7 +40,7 @@ def origin_moves(tables, basin, b, out):
 
 @njit
 def origin_gathers(tables, basin, b, out):
-    """Accelerations of a basin's origin and of its turning, solved ones, in its own axes."""
+    """Solved accelerations of a basin's origin and of its rotation, in its own axes."""
     row, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     x, y, z = arm_of(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
@@ -58,21 +58,24 @@ def origin_gathers(tables, basin, b, out):
 
 @njit
 def felt(tables, basin, b, out):
-    """Force and torque on the body as it moves: those with joints held, and what gives way along the normal."""
+    """Force and torque on the moving body: the load with locked joints and the inertial part along the normal."""
     ax, ay, az, wx, wy, wz = yielded(tables, basin, out)
     tank = tables.layout[0]["tank"] + TANK_OUT * b
     e, m = tank + EAST, tank + MOMENTS
     a, c, d = dot(out, e + 6, ax, ay, az), -dot(out, e + 3, wx, wy, wz), dot(out, e, wx, wy, wz)
-    push = out[m] * a + out[m + 1] * c + out[m + 2] * d
-    east = out[m + 2] * a + out[m + 4] * c + out[m + 5] * d
-    north = out[m + 1] * a + out[m + 3] * c + out[m + 4] * d
+    normal_force = out[m] * a + out[m + 1] * c + out[m + 2] * d
+    moment_x = out[m + 2] * a + out[m + 4] * c + out[m + 5] * d
+    moment_y = out[m + 1] * a + out[m + 3] * c + out[m + 4] * d
     f = tank + LOAD
-    return out[f], out[f + 1], out[f + 2] - push, out[f + 3] - east, out[f + 4] + north, out[f + 5]
+    return out[f], out[f + 1], out[f + 2] - normal_force, out[f + 3] - moment_x, out[f + 4] + moment_y, out[f + 5]
 
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """What bodies bring to the water in them, and its rate of storage."""
+    """Add the power supplied by bodies to the water in them.
+
+    Compute the rate of storage and the dissipation by the law.
+    """
     tables = open_tables(handle)
     plane = tables.plane
     for b in range(tables.basins.size):
@@ -104,21 +107,27 @@ def gained(tables, basin, b, y, dydt, out, vx, vy, vz):
     plane, n, o, at, per_area = tables.plane, basin["n"], basin["y"], basin["frame"], mass_per(tables, basin)
     m, wx, wy, wz = tables.layout[0]["tank"] + TANK_OUT * b, plane[at + WX], plane[at + WY], plane[at + WZ]
     ax, ay, az, bx, by, bz = origin_gathers(tables, basin, b, out)
-    qx = qy = turn = fx = fy = spin = inner = lever = high = 0.0
+    qx = qy = turn = fx = fy = spin = own_rate = lever = high = 0.0
     dx = dy = dxx = dxy = dyy = 0.0
     for i in range(n):
         x, z = place_of(plane, basin, i)
         per, depth = per_area * plane[basin["area"] + i], max(plane[basin["plan"] + i] + y[o + i], 0.0)
-        p, q, more = y[o + n + i], y[o + 2 * n + i], per * dydt[o + i]
+        p, q, mass_rate = y[o + n + i], y[o + 2 * n + i], per * dydt[o + i]
         dp, dq = dydt[o + n + i], dydt[o + 2 * n + i]
         qx, qy, turn = qx + per * p, qy + per * q, turn + per * (x * q - z * p)
         fx, fy, spin = fx + per * dp, fy + per * dq, spin + per * (x * dq - z * dp)
-        dx, dy, dxx, dxy, dyy = dx + more * x, dy + more * z, dxx + more * x * x, dxy + more * x * z, dyy + more * z * z
+        dx, dy, dxx, dxy, dyy = (
+            dx + mass_rate * x,
+            dy + mass_rate * z,
+            dxx + mass_rate * x * x,
+            dxy + mass_rate * x * z,
+            dyy + mass_rate * z * z,
+        )
         if basin["deep"] == 1:
             share, bed = per_flow(depth), ground(plane, basin, i)
             u, v = share * p, share * q
-            inner += per * (u * dp + v * dq) - 0.5 * more * (u * u + v * v)
-            lever, high = lever + per * depth * (bed + 0.5 * depth), high + more * (bed + depth)
+            own_rate += per * (u * dp + v * dq) - 0.5 * mass_rate * (u * u + v * v)
+            lever, high = lever + per * depth * (bed + 0.5 * depth), high + mass_rate * (bed + depth)
     mass, sx, sy, xx, xy, yy = out[m], out[m + 1], out[m + 2], out[m + 3], out[m + 4], out[m + 5]
     ax, ay, az = ax - (wy * vz - wz * vy), ay - (wz * vx - wx * vz), az - (wx * vy - wy * vx)  # of its parts
     px, py, pz = mass * vx + qx - wz * sy, mass * vy + qy + wz * sx, mass * vz + wx * sy - wy * sx
@@ -128,7 +137,7 @@ def gained(tables, basin, b, y, dydt, out, vx, vy, vz):
     )
     total += (yy * wx - xy * wy) * bx + (xx * wy - xy * wx) * by + (xx + yy) * wz * bz
     total += 0.5 * (dyy * wx * wx - 2.0 * dxy * wx * wy + dxx * wy * wy + (dxx + dyy) * wz * wz)
-    total += bz * turn + wz * spin + inner
+    total += bz * turn + wz * spin + own_rate
     gx, gy, gz = plane[at + DOWN], plane[at + DOWN + 1], plane[at + DOWN + 2]
     total -= mass * (gx * vx + gy * vy + gz * vz) + gx * dx + gy * dy + gz * high
     return total + (wy * gz - wz * gy) * sx + (wz * gx - wx * gz) * sy + (wx * gy - wy * gx) * lever
@@ -136,7 +145,7 @@ def gained(tables, basin, b, y, dydt, out, vx, vy, vz):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """T + U [J], in place of what water that stands still would hold; a liquid's own beside it."""
+    """Write T + U [J] in place of the energy of stationary water; for a liquid, add it to its own stored energy."""
     tables = open_tables(handle)
     plane = tables.plane
     for b in range(tables.basins.size):

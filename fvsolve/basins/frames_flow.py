@@ -1,11 +1,12 @@
-"""Forces on what rides on bodies that are no gradient, and what bodies feel of it. Knows rows of tables; knows no flux.
+"""Coriolis and Euler forces on the water in basins on bodies, and the coupling of water and body accelerations.
 
-Coriolis' and Euler's terms, see `frames`. Where forces move the body its acceleration is not known before that of what
-is in its basins. As Lagrange (70) has it for columns that are point masses which slide along the bed, weight at mid
-depth: what pushes them along the bed hangs on the state alone. So rates of flow are found first as if joints were held;
-water then loads the body by what its momentum lacks (`frames_load`), along the normal by its mass and moments beside
-those of bodies (`kernels.mechanism.tanks`); once accelerations are solved, flow feels them (`follow_bodies`). A liquid
-is such a layer without height. Momentum of the whole is kept to the method's order.
+For the forces see `basin_frames`. If forces move the body, its acceleration must be solved together with that of the
+water in its basins. Lagrange's equations (70) are those of columns that are point masses at mid depth and slide along
+the bed. The force along the bed depends on the state alone, so flow rates are first computed with locked joints. The
+water then loads the body by its missing momentum (`frame_reaction`). Along the normal it acts by its mass and moments,
+together with those of bodies (`kernels.mechanism.basin_inertia`). After the accelerations are solved, the flow rates
+are corrected for them (`correct_for_bodies`). A liquid is such a layer without height. The total momentum is conserved
+to the order of the method.
 """
 
 from fvsolve.basins.frames import AZ, WZ
@@ -20,7 +21,7 @@ from fvsolve.kernels.records import LAW_LINEAR, RATE
 
 @njit
 def turn_fluid(t, y, dydt, out, handle):
-    """Add Coriolis and Euler forces to rates of flow, and let bodies feel what is in their basins.
+    """Add Coriolis and Euler forces to rates of flow, and the loads of the contents of basins to their bodies.
 
     Under law linear the inertia of a liquid is that at rest.
     """
@@ -41,7 +42,7 @@ def turn_fluid(t, y, dydt, out, handle):
 
 @njit
 def follow_bodies(t, y, dydt, out, handle):
-    """Let flow feel what the accelerations of its body are beyond those with joints held."""
+    """Correct the rates of flow for the accelerations of the body beyond those with locked joints."""
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
@@ -49,7 +50,7 @@ def follow_bodies(t, y, dydt, out, handle):
             continue
         ax, ay, az, wx, wy, wz = yielded(tables, basin, out)
         e = tables.layout[0]["tank"] + TANK_OUT * b + EAST
-        east, north, turn = dot(out, e, ax, ay, az), dot(out, e + 3, ax, ay, az), dot(out, e + 6, wx, wy, wz)
-        if east == 0.0 and north == 0.0 and turn == 0.0:
+        x_part, y_part, turn = dot(out, e, ax, ay, az), dot(out, e + 3, ax, ay, az), dot(out, e + 6, wx, wy, wz)
+        if x_part == 0.0 and y_part == 0.0 and turn == 0.0:
             continue
-        push_flow(tables.plane, basin, y, dydt, basin["y"], 1.0, 0.0, -east, -north, turn)
+        push_flow(tables.plane, basin, y, dydt, basin["y"], 1.0, 0.0, -x_part, -y_part, turn)

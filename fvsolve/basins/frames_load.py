@@ -1,4 +1,4 @@
-"""What what rides on a body puts on it: force and torque with joints held, moments of mass. Knows rows of tables."""
+"""Force and torque that a fluid-filled basin exerts on its body with locked joints, and its mass moments."""
 
 from fvsolve.basins.frames import AT, AX, AY, AZ, DOWN, GN, GX, GY, LEVEL, PLACES, SURFACE, TURN, WX, WY, WZ
 from fvsolve.basins.frames_push import push_cells
@@ -22,29 +22,29 @@ from fvsolve.kernels.mechanism.tanks import ARM_OF, EAST, LOAD, MOMENTS, TANK_OU
 
 @njit
 def arm_of(tables, basin, out):
-    """Where the origin of a basin lies from that of its body, in axes of the world [m]."""
+    """Vector from the origin of the body to that of a basin, in axes of the world [m]."""
     at = basin["frame"] + AT
     return turned(out, row_of(tables, basin["body"]) + ATTITUDE, tables.plane[at : at + 3], 0)
 
 
 @njit(forceinline=True)
 def mass_per(tables, basin):
-    """Mass per area over what cells hold: depth [kg/m3], or density of a liquid [m]."""
+    """Mass per area over the stored quantity of cells: per depth [kg/m3], or per density of a liquid [m]."""
     return tables.settings[0]["rho"] if basin["deep"] == 1 else basin["thickness"]
 
 
 @njit(fastmath={"reassoc"})
 def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, dy):
-    """Of cells of one y: mass, its rate (1, x, xx), flow along x and y (1, x), rates of flow, weight times height.
+    """Sums over a row: mass, its rate (1, x, xx), flow along x and y (1, x), rates of flow, mass times height.
 
-    The order of sums is left to the compiler, which makes whole vectors of them.
+    The compiler may reorder these sums, so that it can use vector instructions.
     """
     r0 = r1 = r2 = d0 = d1 = d2 = p0 = v0 = v1 = p1 = f0 = f1 = g0 = 0.0
     for i in range(h.size):
         depth, per = max(rest[i] + h[i], 0.0), per_area * area[i]
-        mass, more, v, dv = per * depth, per * dh[i], per * qy[i], per * dy[i]
+        mass, mass_rate, v, dv = per * depth, per * dh[i], per * qy[i], per * dy[i]
         r0, r1, r2 = r0 + mass, r1 + mass * x[i], r2 + mass * x[i] * x[i]
-        d0, d1, d2 = d0 + more, d1 + more * x[i], d2 + more * x[i] * x[i]
+        d0, d1, d2 = d0 + mass_rate, d1 + mass_rate * x[i], d2 + mass_rate * x[i] * x[i]
         p0, v0, v1 = p0 + per * qx[i], v0 + v, v1 + v * x[i]
         p1, f0, f1 = p1 + per * dx[i], f0 + dv, f1 + dv * x[i]
         if deep:
@@ -54,10 +54,12 @@ def row_sums(deep, per_area, level, x, area, rest, surface, h, qx, qy, dh, dx, d
 
 @njit
 def moments(tables, basin, y, rates, first, own, twice, euler):
-    """Sums over cells, in axes of the basin: moments 1, x, y, xx, xy, yy of mass [kg ..] and of its weight along the
-    normal; of the rate of mass x, y, xx, xy, yy; momentum along x and y and its moment about z, and rates of these.
+    """Sums over cells, in axes of the basin.
 
-    On grids these rates first get, row by row, what `frames_flow.turn_fluid` adds to others at once.
+    Returns the moments 1, x, y, xx, xy, yy of mass [kg ..], the sum of mass times height along the normal, the moments
+    x, y, xx, xy, yy of the rate of mass, momentum along x and y and its moment about z, and the rates of these three.
+
+    On grids, the terms that `frame_forces.add_frame_forces` adds to other basins at once are added here, row by row.
     """
     plane, n, o, per_area = tables.plane, basin["n"], basin["y"], mass_per(tables, basin)
     m = sx = sy = xx = xy = yy = lever = 0.0
@@ -86,7 +88,10 @@ def moments(tables, basin, y, rates, first, own, twice, euler):
 
 @njit
 def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
-    """Force and torque of what is in a basin on its body with joints held, and its moments along the normal."""
+    """Add the force and torque of the contents of a basin on its body with locked joints.
+
+    Store its moments and axes.
+    """
     m, sx, sy, xx, xy, yy, lever, dx, dy, dxx, dxy, dyy, qx, qy, turn, fx, fy, spin = moments(
         tables, basin, y, rates, first, own, twice, euler
     )
@@ -119,13 +124,13 @@ def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
 
 @njit(forceinline=True)
 def beyond(out, i, j):
-    """The vector at i less that at j."""
+    """Vector at i minus the vector at j."""
     return out[i] - out[j], out[i + 1] - out[j + 1], out[i + 2] - out[j + 2]
 
 
 @njit
 def yielded(tables, basin, out):
-    """Accelerations of a basin's origin and of its turning beyond those with joints held, in axes of the world."""
+    """Accelerations of a basin's origin and of its rotation minus those with locked joints, in axes of the world."""
     row = row_of(tables, basin["body"])
     rx, ry, rz = arm_of(tables, basin, out)
     wx, wy, wz = beyond(out, row + TURNING, row + SPIN_BIAS)

@@ -1,4 +1,4 @@
-"""What pushes the flow of what rides on bodies beside the fluxes, see `frames`. Knows rows of cells; knows no body."""
+"""Momentum terms of the accelerated frame of a basin on a body (see `basin_frames`), added to rates of flow."""
 
 from fvsolve.basins.frames import PLACES
 from fvsolve.jit import inner, njit
@@ -6,9 +6,12 @@ from fvsolve.jit import inner, njit
 
 @njit
 def push_flow(plane, basin, y, rates, first, own, twice, east, north, turn):
-    """Add to rates of flow 2 W q and depth times a push that is even but for `turn` times the place.
+    """Add 2 W q and depth times an acceleration to rates of flow.
 
-    Depth is what is held per area, `own` the share of its deviation that counts.
+    The acceleration is uniform plus `turn` times the position.
+
+    Depth is the stored quantity per area (density for a liquid). own : 1 to include its deviation, 0 for its value at
+    rest
     """
     n, o, p, places = basin["n"], basin["y"], basin["plan"], int(plane[basin["frame"] + PLACES])
     for row in range(basin["ny"]):
@@ -21,7 +24,7 @@ def push_flow(plane, basin, y, rates, first, own, twice, east, north, turn):
 
 @njit
 def push_cells(plane, basin, y, rates, first, row, own, twice, east, north, turn):
-    """The same of a row of cells of a grid."""
+    """Add the terms of `accelerate_flow` to a row of cells of a grid."""
     n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + PLACES])
     at, level = row * nx, plane[places + nx + row]
     a, p, to = basin["y"] + at, basin["plan"] + at, first + n + at
@@ -34,7 +37,7 @@ def push_cells(plane, basin, y, rates, first, row, own, twice, east, north, turn
 
 @inner
 def push_row(x, rest, dh, qx, qy, own, twice, east, north, turn, rate_x, rate_y):
-    """`push_flow` of a row of cells of a grid."""
+    """Add the terms of `accelerate_flow` to the arrays of a row of cells."""
     for i in range(rate_x.size):
         depth = max(rest[i] + own * dh[i], 0.0)
         rate_x[i] += twice * qy[i] + depth * east

@@ -1,4 +1,4 @@
-"""Basins lowered to rows of tables, loaded by scenes that have one. Knows where a physics lies; knows none."""
+"""Rows of tables for basins; loaded for models that contain a basin."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.kernels import records as rec
 
 
 def lower_basins(draft) -> None:
-    """Fill the tables of basins and their patches, and states for their cells."""
+    """Fill the tables of basins and their patches, and add states for their cells."""
     case = draft.case
     draft.basins = [lowered_by(case.nodes[name].own)(case, name) for name in case.meshes]
     draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
@@ -28,21 +28,21 @@ def lower_basins(draft) -> None:
 
 
 def lowered_by(physics: type) -> type:
-    """The class by which a physics lowers its basins: of the module `lower` beside what declares it."""
+    """Class that fills the rows of a physics: from the module `lower` next to its declaration."""
     home = physics.__module__.rpartition(".")[0]
     import_module(f"{home}.lower")
     return import_module("fvsolve.basins.lower_basin").BasinRows.physics[home]
 
 
 def at_start(basins: list, size: int, attitudes: dict[str, np.ndarray] | None = None) -> np.ndarray:
-    """States at the start: no deviation from the profile but where basins start from one.
+    """States at the start: deviations from the profile, zero unless a basin states a start.
 
-    attitudes : of bodies by name, in place of those of the start
+    attitudes : of bodies by name, instead of those at the start
     """
-    found = np.zeros(size)
+    states = np.zeros(size)
     for basin in basins:
         on = basin.part.on if attitudes else None
-        basin.own(found)[:] = basin.start() if on is None else basin.start(attitudes[on])
+        basin.own(states)[:] = basin.start() if on is None else basin.start(attitudes[on])
         if basin.scalars:
-            basin.start_scalars(found)
-    return found
+            basin.start_scalars(states)
+    return states

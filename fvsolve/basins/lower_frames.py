@@ -1,4 +1,4 @@
-"""Basins that ride on bodies, as rows of tables. Knows names; knows no law."""
+"""Rows of tables for basins on bodies."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from fvsolve.case.riding_patches import level_over
 
 
 def lower_frame(draft, basin, row) -> None:
-    """Reserve what is known of its axes, and keep the surface as drawn.
+    """Reserve the numbers of the frame of a basin, and store the undisturbed surface.
 
-    The axes that kernels follow have their origin in the middle: what columns feel along the normal is taken there, and
-    the mirrors of walls know no Euler force beyond it, so that this errs least, and alike wherever a corner is drawn.
+    The axes of the kernels have their origin in the middle of the basin. Accelerations along the normal are taken
+    there, and the mirror cells at walls neglect the Euler force beyond it. So the error is least, and independent of
+    the corner in which the drawing has its origin.
     """
     part, grid, middle = basin.part, basin.mesh.grid, basin.mesh.centroid
     places = [*(basin.mesh.centre - middle).T]
     if basin.is_grid:
-        lines = [one - at for one, at in zip((grid.x, grid.y), middle, strict=True)]
-        places = [0.5 * (one[1:] + one[:-1]) for one in lines]
+        lines = [line - at for line, at in zip((grid.x, grid.y), middle, strict=True)]
+        places = [0.5 * (line[1:] + line[:-1]) for line in lines]
     numbers = np.zeros(FRAME)
     numbers[:3] = np.array(part.place) + part.turn[:, :2] @ middle
     numbers[3:12] = part.turn.ravel()
@@ -29,50 +30,50 @@ def lower_frame(draft, basin, row) -> None:
         numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
     else:
         sides = lines if basin.is_grid else places_of_sides(basin) - middle[:, None]
-        many = sides[0].size * grid.ny + grid.nx * sides[1].size if basin.is_grid else sides[0].size
-        numbers[PHI], places = draft.to_work(basin.n + many), [*places, *sides]
+        face_count = sides[0].size * grid.ny + grid.nx * sides[1].size if basin.is_grid else sides[0].size
+        numbers[PHI], places = draft.to_work(basin.n + face_count), [*places, *sides]
     numbers[PLACES] = draft.to_plane(np.concatenate(places))
     row["body"], row["frame"] = draft.body_names.index(part.on), draft.to_plane(numbers)
-    joints = asked_of_joints(draft.case)
-    row["heavy"] = any(joints) or any(free_joints(part.on, draft.case.nodes))
-    held = set(carriers(part.on, draft.case.nodes))
-    for k, body in joints:
-        if basin.opening is not None and body in held:
-            text = f"{body} carries {basin.name}, and its joint's force lacks what passes {basin.name}.{basin.opening}"
-            draft.fault(f"output.probes[{k}]", f"{text} yet; wanted none of these, or a wall there")
+    joint_probes = asked_of_joints(draft.case)
+    row["heavy"] = any(joint_probes) or any(free_joints(part.on, draft.case.nodes))
+    chain = set(carriers(part.on, draft.case.nodes))
+    for k, body in joint_probes:
+        if basin.opening is not None and body in chain:
+            text = f"{body} carries {basin.name}: the joint load omits the flow through {basin.name}.{basin.opening}"
+            draft.fault(f"output.probes[{k}]", f"{text}. Expected no probe of a joint load, or a wall at that patch")
 
 
 def asked_of_joints(case) -> list[tuple[int, str]]:
-    """(number, body) of probes of what a joint holds."""
-    asked = enumerate(case.probes)
-    return [(k, one.name) for k, one in asked if one.part == "nodes" and one.quantity.startswith("joint_")]
+    """(number, body) of the probes of joint loads."""
+    probes = enumerate(case.probes)
+    return [(k, probe.name) for k, probe in probes if probe.part == "nodes" and probe.quantity.startswith("joint_")]
 
 
 def places_of_sides(basin) -> np.ndarray:
-    """Middles of sides of cells in the order of `basins.faces`, alike from both cells : float64[2, sides]."""
+    """Middles of sides of cells in the order of `cell_sides`, equal for both cells of a face : float64[2, sides]."""
     count = int(blocks(basin.integers) * basin.integers[0] * BLOCK)
     face = basin.integers[-count:]
     return basin.mesh.middle[np.where(face >= 0, face, ~face)].T
 
 
 def place_in_frame(draft, basin, patch: str) -> list[float]:
-    """Where a patch is in the axes that kernels follow, over the level at rest [m], and its profile's weight [J/kg]."""
+    """Position of a patch in the axes of the kernels, z from the level at rest [m], and g depth at rest [J/kg]."""
     place, part = draft.case.places[f"{basin.name}.{patch}"], basin.part
     own = part.turn.T @ (np.array(place.at) - np.array(part.place))
     return [*(own[:2] - basin.mesh.centroid).tolist(), float(own[2]) - part.level, draft.case.gravity * place.depth]
 
 
 def potential_at_start(basin) -> np.ndarray:
-    """What gravity lifts cells by above their basin's middle, as its body stands at the start [J/kg]."""
+    """Gravity potential of cells above the middle of their basin, in the attitude of its body at the start [J/kg]."""
     pose, gravity = basin.case.poses[basin.part.on], basin.case.gravity
     up = (pose.attitude @ basin.part.turn).T @ np.array([0.0, 0.0, gravity])
     return (basin.mesh.centre - basin.mesh.centroid) @ up[:2]
 
 
 def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
-    """Depth of water that is level in the world though its basin is not, of the volume that it has at rest [m].
+    """Depth of water with a surface level in the world, in a tilted basin, with the volume it has at rest [m].
 
-    attitude : R of its body, that of the start if left out
+    attitude : rotation matrix of its body, that of the start if omitted
     """
     part, turn = basin.part, basin.case.poses[basin.part.on].attitude if attitude is None else attitude
     down = (turn @ part.turn).T @ np.array([0.0, 0.0, -1.0])
@@ -84,7 +85,7 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
 
 
 def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarray]:
-    """Origin float64[3] [m] and axes float64[3, 3], one a column, of a basin on a body, in the world."""
+    """Origin float64[3] [m] and axes float64[3, 3], by columns, of a basin on a body, in the world."""
     from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE
     from fvsolve.kernels.records import BODY_OUT
 

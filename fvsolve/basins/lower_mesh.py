@@ -1,7 +1,4 @@
-"""A mesh lowered to the flat arrays that loops over the sides of cells run on. Knows geometry; knows no physics.
-
-The layout is that of `fvsolve.basins.faces`, where the words are explained.
-"""
+"""Flat arrays of a mesh for loops over the sides of cells, in the layout of `fvsolve.basins.cell_sides`."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
-    """(float64[:] floats, int64[:] integers): geometry, and who lies beyond; cells and faces keep their numbers."""
+    """(float64[:] floats, int64[:] integers): geometry and neighbours; cells and faces keep their numbers."""
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
     slots, face, own, side = _sides(mesh)
     block, lane, count = own // faces.BLOCK, own % faces.BLOCK, -(-n // faces.BLOCK)
@@ -29,7 +26,7 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     indices = np.zeros((faces.INDICES, count * slots * faces.BLOCK), np.int64)
     k, i = np.divmod(np.arange(indices.shape[1]), faces.BLOCK)
     j, k = np.divmod(k, slots)
-    indices[faces.CELL] = (j % ring) * faces.BLOCK + i  # of sides that a cell has not: itself
+    indices[faces.CELL] = (j % ring) * faces.BLOCK + i  # missing side of a cell: the cell itself
     indices[faces.SIDE] = (4 * (j % ring) + k) * faces.BLOCK + i
     indices[:, at] = indices[:, at[other]]
     face_of = np.full(indices.shape[1], ~0)
@@ -46,10 +43,10 @@ def lower_mesh(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(floats), np.concatenate(integers).astype(np.int64)
 
 
-def lower_ends(mesh: Mesh, goes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(int64[blocks], int64[:]) of `moving_meshes`: blocks in which or beside which corners move, and ends of sides.
+def lower_ends(mesh: Mesh, moves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(int64[blocks], int64[:]) of `moving_meshes`: blocks with moving corners in or next to them, and ends of sides.
 
-    goes : bool[p]  whether a corner moves
+    moves : bool[p]  True if a corner moves
     """
     n, inner = len(mesh.area), mesh.inner
     slots, face, own, side = _sides(mesh)
@@ -61,17 +58,17 @@ def lower_ends(mesh: Mesh, goes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         np.maximum(np.where(left, mesh.right[number], mesh.left[number]), -1),
     ]  # fmt: skip
     corners = np.where(mesh.cells < 0, mesh.cells[:, :1], mesh.cells)
-    moved = goes[corners].any(axis=1)
-    beside = moved.copy()
-    np.logical_or.at(beside, mesh.left[:inner], moved[mesh.right[:inner]])
-    np.logical_or.at(beside, mesh.right[:inner], moved[mesh.left[:inner]])
-    stirs = np.bincount(np.arange(n) // faces.BLOCK, beside, count) > 0.0
+    has_moving_corner = moves[corners].any(axis=1)
+    is_affected = has_moving_corner.copy()
+    np.logical_or.at(is_affected, mesh.left[:inner], has_moving_corner[mesh.right[:inner]])
+    np.logical_or.at(is_affected, mesh.right[:inner], has_moving_corner[mesh.left[:inner]])
+    moving_blocks = np.bincount(np.arange(n) // faces.BLOCK, is_affected, count) > 0.0
     pairs = [table.ravel().astype(np.int32).view(np.int64) for table in (corners, _by_block(ends))]
-    return stirs.astype(np.int64), np.concatenate(pairs)
+    return moving_blocks.astype(np.int64), np.concatenate(pairs)
 
 
 def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
-    """(sides a cell has at most, and of each side its face, its cell and its number there)."""
+    """(greatest number of sides of a cell, and of each side its face, its cell and its number there)."""
     n, f, inner = len(mesh.area), len(mesh.left), mesh.inner
     slots = 4 if (mesh.cells[:, 3] >= 0).any() else 3
     face = np.concatenate([np.arange(f), ~np.arange(inner)])  # ~f where the cell is on the right of it
@@ -84,18 +81,18 @@ def _sides(mesh: Mesh) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _by_block(table: np.ndarray) -> np.ndarray:
-    """Rows over slots as they lie in memory."""
+    """Rows over slots in the order of memory."""
     return table.reshape(len(table), -1, faces.BLOCK).swapaxes(0, 1).ravel()
 
 
 def _turn(mesh: Mesh, face: np.ndarray) -> np.ndarray:
-    """Direction of a side seen from its cell, west first: sides of cells of a grid stand west, south, east, north."""
+    """Direction of a side from its cell, so that the sides of a rectangle are in order west, south, east, north."""
     normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[np.where(face >= 0, face, ~face)]
     return np.round(np.arctan2(-normal[:, 1], -normal[:, 0]), 9) % round(2.0 * np.pi, 9)
 
 
 def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int) -> np.ndarray:
-    """float64[MEASURES, sides]: what `faces` tells of every side."""
+    """float64[MEASURES + DISTANCES, sides]: measures of every side, see `cell_sides`."""
     number = np.where(face >= 0, face, ~face)
     normal = np.where(face[:, None] >= 0, 1.0, -1.0) * mesh.normal[number]
     to_side = mesh.middle[number] - mesh.centre[own]
@@ -108,6 +105,6 @@ def _measures(mesh: Mesh, face: np.ndarray, own: np.ndarray, n: int) -> np.ndarr
     scale = weight / (xx * yy - xy * xy)
     slope = scale * (yy * across[:, 0] - xy * across[:, 1]), scale * (xx * across[:, 1] - xy * across[:, 0])
     gap = 1.0 / np.sum(across * normal, axis=1)
-    lean = normal - across * gap[:, None]
+    offset = normal - across * gap[:, None]
     share = 1.0 / mesh.area[own]
-    return np.stack([*normal.T, mesh.length[number] * share, *to_side.T, *slope, share, gap, *lean.T])
+    return np.stack([*normal.T, mesh.length[number] * share, *to_side.T, *slope, share, gap, *offset.T])

@@ -1,4 +1,4 @@
-"""Of which pieces basins consist that all physics share (`kernels.phases`). Knows names; knows no physics."""
+"""Terms of the right-hand side and probes common to basins of all physics (`kernels.rhs_assembly`)."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from fvsolve.kernels.phases import MIXED, Pieces
 
 HOME = "fvsolve.basins"
 ALL = Pieces(home=HOME, observe="observe: observe_flows", power="energy: patch_power")
-DENSE = Pieces(home=HOME, observe="observe: observe_dense_flows")  # under all laws but linear
+DENSE = Pieces(home=HOME, observe="observe: observe_dense_flows")  # all laws but linear
 MARKED = Pieces(home=HOME, record="patches: record_patches")
 WALLS = Pieces(
     home=HOME, see="walls: see", prepare="walls: drive_lines", enter="walls: push_bodies", swell="walls: swell",
     observe="walls: observe_walls", power="walls: wall_power",
 )  # fmt: skip
 SIDES = Pieces(home=HOME, see="moving_meshes: see_meshes", prepare="moving_meshes: drive_sides")
-FRAMES = Pieces(home=HOME, prepare="frames: set_frames")  # before what patches say
+FRAMES = Pieces(home=HOME, prepare="frames: set_frames")  # before patches
 TURNING = Pieces(
     home=HOME, enter="frames_flow: turn_fluid", follow="frames_flow: follow_bodies",
     power="frames_energy: add_power", stored="frames_energy: add_stored",
@@ -26,26 +26,26 @@ FIFTH = Pieces(home=HOME, carry="carried_grids: add_on_grids")
 SPREAD = Pieces(home=HOME, carry="carried_grids: spread_on_grids")
 MESHES = Pieces(home=HOME, carry="carried_faces: carry_on_meshes")
 SETTLED = Pieces(home=HOME, carry="carried: settle_amounts")
-CARRIED = (VALUES, MIXED, GRIDS, FIFTH, SPREAD, MESHES, SETTLED)  # in order, which those of a phase run in
+CARRIED = (VALUES, MIXED, GRIDS, FIFTH, SPREAD, MESHES, SETTLED)  # in the order in which they run within a phase
 
 
 def of_basins(basins: list, valves: bool) -> tuple[Pieces, ...]:
-    """What runs in basins beside scalars; valves : whether there are any in the network."""
+    """Terms of basins without scalars. valves : True if there are valves in the network"""
     shared = [ALL] if basins and basins[0].case.law.linear else [ALL, DENSE] if basins else []
     shared += [FRAMES] if any(basin.part.on is not None for basin in basins) else []
     moving = [WALLS] if any(basin.moves for basin in basins) else []
     moving += [SIDES] if any(basin.moves and not basin.is_grid for basin in basins) else []
-    return tuple(dict.fromkeys([*shared, *(one for basin in basins for one in basin.pieces(valves)), *moving]))
+    return tuple(dict.fromkeys([*shared, *(terms for basin in basins for terms in basin.pieces(valves)), *moving]))
 
 
 def of_scalars(basins: list) -> tuple[Pieces, ...]:
-    """What carries scalars there; each piece knows which basins are its own."""
-    wanted = {piece for basin in basins for piece in carrying(basin)}
-    return tuple(one for one in CARRIED if one in wanted)
+    """Terms of scalars in basins; each term selects its basins itself."""
+    needed = {piece for basin in basins for piece in carrying(basin)}
+    return tuple(terms for terms in CARRIED if terms in needed)
 
 
 def carrying(basin) -> Iterator[Pieces]:
-    """Of what one basin needs to carry its scalars, if any."""
+    """Terms of the scalars of a basin, if it has scalars."""
     if not basin.scalars:
         return
     yield from (VALUES, SETTLED)

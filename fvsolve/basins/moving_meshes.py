@@ -1,13 +1,14 @@
-"""Meshes of any cells between walls that move: their sides as they are. Knows corners; knows no physics.
+"""Meshes of any cells between moving walls: measures of their sides at the present positions of corners.
 
-Corners go along one axis, so areas and length times normal of sides are linear in travels, whatever the cells are, and
-a side sweeps its length times the mean speed of its two corners: what is even stays so (`walls`). What `faces` reads of
-cells and sides is found anew for each state, where anything moves.
+Corners move along one axis. So areas, and lengths times normals of sides, are linear in travels for cells of any shape.
+A side sweeps its length times the mean speed of its two corners, so a uniform state stays uniform (`moving_walls`). The
+measures of `cell_sides` are computed again for each state, in blocks where anything moves.
 
-places : float64[:]  of corners x, y and the one of these that moves as drawn; of cells x and y of centres; room
-ends : int64[:]  how many blocks, and of each whether anything moves there; four corners of cells, two int32 to an
-       int64, a triangle's first one again; by block, side and row of BLOCK as such pairs: corners where the side begins
-       and ends (both the same where there is none), cell beyond, -1 for none
+places : float64[:]  x and y of corners, and their undeformed coordinate along the axis of motion; x and y of centres of
+         cells; scratch
+ends : int64[:]  number of blocks, and for each 1 if anything moves there; four corners of cells, two int32 to an int64,
+       a triangle's first corner again; by block, side and row of BLOCK as such pairs: corners where the side begins and
+       ends (equal for a missing side), cell beyond, -1 for none
 """
 
 from math import sqrt
@@ -39,8 +40,8 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import RATE
 
 START, STOP, BEYOND, ENDS = range(4)
-# rows of BLOCK in the room of a block: sums over sides, 1 / area, centre; of one side its ends, the centre beyond, 1
-# where there is a cell, length
+# Rows of BLOCK in the scratch of a block: sums over sides, 1 / area, centre; of the current side its ends, the centre
+# beyond, 1 where there is a cell, length.
 _XX, _XY, _YY, _SHARE, _CX, _CY, _XA, _YA, _XB, _YB, _OX, _OY, _INSIDE, _LONG = (k * BLOCK for k in range(14))
 ROOM = 14 * BLOCK
 _NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in (NX, NY, REACH, DX, DY, WX, WY))
@@ -48,13 +49,13 @@ _NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in (NX, NY, REACH, DX, D
 
 @njit(forceinline=True)
 def on_moving_mesh(basin):
-    """Whether it is a mesh of any cells between walls that move."""
+    """True if the basin is a mesh of any cells between moving walls."""
     return basin["walls"] > 0 and basin["nx"] == 0
 
 
 @njit(forceinline=True)
 def places_of(plane, basin):
-    """(x, y, the one that moves as drawn) of corners, (x, y) of centres of cells, and room."""
+    """(x, y, undeformed coordinate along the axis of motion) of corners, (x, y) of centres of cells, and scratch."""
     at, p, n = basin["places"], basin["corners"], basin["n"]
     x, y, drawn = plane[at : at + p], plane[at + p : at + 2 * p], plane[at + 2 * p : at + 3 * p]
     at += 3 * p
@@ -63,7 +64,7 @@ def places_of(plane, basin):
 
 @njit(forceinline=True)
 def ends_of(integers, basin):
-    """(which blocks move, corners of cells, ends of sides)."""
+    """(flags of moving blocks, corners of cells, ends of sides)."""
     ends = integers[basin["ends"] :]
     count = ends[0]
     return ends[1 : 1 + count], ends[1 + count :].view(np.int32), ends[1 + count + 2 * basin["n"] :].view(np.int32)
@@ -71,7 +72,7 @@ def ends_of(integers, basin):
 
 @njit
 def see_meshes(t, y, seen, out, handle):
-    """Corners, centres, sides and patches of meshes as they are at y."""
+    """Compute corners, centres, sides and patches of meshes at y."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
@@ -84,7 +85,7 @@ def see_meshes(t, y, seen, out, handle):
 
 @njit
 def move_corners(tables, basin, y):
-    """Corners where walls take them."""
+    """Move corners with the walls."""
     plane, walls = tables.plane, tables.walls
     x, north, drawn, _, _, _ = places_of(plane, basin)
     along = north if basin["turn"] == 1 else x
@@ -102,120 +103,127 @@ def put_centres(first, last, corners, x, y, cx, cy):
         own = corners[4 * i : 4 * i + 4]
         a, b, c, d = own[0], own[1], own[2], own[3]
         ax, ay, bx, by, dx, dy = x[c] - x[a], y[c] - y[a], x[b] - x[a], y[b] - y[a], x[d] - x[a], y[d] - y[a]
-        one, other = bx * ay - by * ax, ax * dy - ay * dx  # twice the areas on both sides of a diagonal
-        lean = (one - other) / (6.0 * (one + other))
-        x_one, x_other, y_one, y_other = x[a] + x[c], x[b] + x[d], y[a] + y[c], y[b] + y[d]
-        cx[i] = 0.25 * (x_one + x_other) - (x_other - x_one) / 12.0 - lean * (x[d] - x[b])
-        cy[i] = 0.25 * (y_one + y_other) - (y_other - y_one) / 12.0 - lean * (y[d] - y[b])
+        area_1, area_2 = bx * ay - by * ax, ax * dy - ay * dx  # twice the areas on both sides of a diagonal
+        offset = (area_1 - area_2) / (6.0 * (area_1 + area_2))
+        x_1, x_2, y_1, y_2 = x[a] + x[c], x[b] + x[d], y[a] + y[c], y[b] + y[d]
+        cx[i] = 0.25 * (x_1 + x_2) - (x_2 - x_1) / 12.0 - offset * (x[d] - x[b])
+        cy[i] = 0.25 * (y_1 + y_2) - (y_2 - y_1) / 12.0 - offset * (y[d] - y[b])
 
 
 @njit
-def gather_cells(area, cx, cy, room):
-    """1 / areas and centres of a block of cells; sums over their sides begin."""
+def gather_cells(area, cx, cy, scratch):
+    """Read 1 / areas and centres of a block of cells; set the sums over their sides to zero."""
     for i in range(BLOCK):
-        room[i], room[_XY + i], room[_YY + i], room[_SHARE + i] = 0.0, 0.0, 0.0, 0.0
+        scratch[i], scratch[_XY + i], scratch[_YY + i], scratch[_SHARE + i] = 0.0, 0.0, 0.0, 0.0
     for i in range(area.size):
-        room[_SHARE + i], room[_CX + i], room[_CY + i] = 1.0 / area[i], cx[i], cy[i]
+        scratch[_SHARE + i], scratch[_CX + i], scratch[_CY + i] = 1.0 / area[i], cx[i], cy[i]
 
 
 @njit
-def gather_ends(start, stop, beyond, x, y, cx, cy, room):
-    """Where a side of each cell of a block begins and ends, the centre beyond, and whether there is a cell there."""
+def gather_ends(start, stop, beyond, x, y, cx, cy, scratch):
+    """Read the ends of a side of each cell of a block, the centre beyond, and whether there is a cell."""
     for i in range(BLOCK):
         a, b, other = start[i], stop[i], max(beyond[i], 0)
-        room[_XA + i], room[_YA + i], room[_XB + i], room[_YB + i] = x[a], y[a], x[b], y[b]
-        room[_OX + i], room[_OY + i], room[_INSIDE + i] = cx[other], cy[other], 1.0 if beyond[i] >= 0 else 0.0
+        scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i] = x[a], y[a], x[b], y[b]
+        scratch[_OX + i], scratch[_OY + i], scratch[_INSIDE + i] = cx[other], cy[other], 1.0 if beyond[i] >= 0 else 0.0
 
 
 @njit
-def put_side(room, geo):
-    """Measures of one side of each cell of a block, and sums over sides of what a plane is fitted to."""
+def put_side(scratch, geo):
+    """Measures of one side of each cell of a block, and sums over sides for the least-squares gradient."""
     for i in range(BLOCK):
         xa, ya, xb, yb, cx, cy = (
-            room[_XA + i], room[_YA + i], room[_XB + i], room[_YB + i], room[_CX + i], room[_CY + i]
+            scratch[_XA + i], scratch[_YA + i], scratch[_XB + i], scratch[_YB + i], scratch[_CX + i], scratch[_CY + i]
         )  # fmt: skip
         dx, dy = xb - xa, yb - ya
-        long = sqrt(dx * dx + dy * dy)
-        there = long > 0.0  # else a side that the cell has not
-        per = 1.0 / (long + TINY)
-        nx, ny = per * dy if there else 1.0, 0.0 - per * dx
-        to_x, to_y = 0.5 * (xa + xb) - cx if there else 0.0, 0.5 * (ya + yb) - cy if there else 0.0
-        back = 2.0 * (to_x * nx + to_y * ny)  # to the mirror image
-        inside = room[_INSIDE + i] > 0.0
-        ax, ay = room[_OX + i] - cx if inside else back * nx, room[_OY + i] - cy if inside else back * ny
-        weight = 1.0 / (ax * ax + ay * ay) if there else 0.0
-        room[_LONG + i] = long
-        geo[_NX + i], geo[_NY + i], geo[_REACH + i] = nx, ny, long * room[_SHARE + i]
+        length = sqrt(dx * dx + dy * dy)
+        exists = length > 0.0  # else a missing side of the cell
+        per = 1.0 / (length + TINY)
+        nx, ny = per * dy if exists else 1.0, 0.0 - per * dx
+        to_x, to_y = 0.5 * (xa + xb) - cx if exists else 0.0, 0.5 * (ya + yb) - cy if exists else 0.0
+        mirror_distance = 2.0 * (to_x * nx + to_y * ny)  # to the mirror image
+        inside = scratch[_INSIDE + i] > 0.0
+        ax, ay = (
+            scratch[_OX + i] - cx if inside else mirror_distance * nx,
+            scratch[_OY + i] - cy if inside else mirror_distance * ny,
+        )
+        weight = 1.0 / (ax * ax + ay * ay) if exists else 0.0
+        scratch[_LONG + i] = length
+        geo[_NX + i], geo[_NY + i], geo[_REACH + i] = nx, ny, length * scratch[_SHARE + i]
         geo[_DX + i], geo[_DY + i] = to_x, to_y
         geo[_WX + i], geo[_WY + i] = weight * ax, weight * ay
-        room[i] += weight * ax * ax
-        room[_XY + i] += weight * ax * ay
-        room[_YY + i] += weight * ay * ay
+        scratch[i] += weight * ax * ax
+        scratch[_XY + i] += weight * ax * ay
+        scratch[_YY + i] += weight * ay * ay
 
 
 @njit
-def put_distance(room, geo, far):
-    """What scalars that are carried or spread want of the same side."""
+def put_distance(scratch, geo, far):
+    """Measures of a side of each cell that diffusion and flows of scalars need: 1 / area, 1 / distance, obliqueness."""
     for i in range(BLOCK):
         nx, ny = geo[_NX + i], geo[_NY + i]
-        back = 2.0 * (geo[_DX + i] * nx + geo[_DY + i] * ny)
-        inside, there = room[_INSIDE + i] > 0.0, room[_LONG + i] > 0.0
-        ax = room[_OX + i] - room[_CX + i] if inside else back * nx
-        ay = room[_OY + i] - room[_CY + i] if inside else back * ny
-        gap = 1.0 / (ax * nx + ay * ny) if there else 0.0
-        far[SHARE * BLOCK + i], far[GAP * BLOCK + i] = room[_SHARE + i] if there else 0.0, gap
-        far[LEAN_X * BLOCK + i] = nx - ax * gap if there else 0.0
-        far[LEAN_Y * BLOCK + i] = ny - ay * gap if there else 0.0
+        mirror_distance = 2.0 * (geo[_DX + i] * nx + geo[_DY + i] * ny)
+        inside, exists = scratch[_INSIDE + i] > 0.0, scratch[_LONG + i] > 0.0
+        ax = scratch[_OX + i] - scratch[_CX + i] if inside else mirror_distance * nx
+        ay = scratch[_OY + i] - scratch[_CY + i] if inside else mirror_distance * ny
+        gap = 1.0 / (ax * nx + ay * ny) if exists else 0.0
+        far[SHARE * BLOCK + i], far[GAP * BLOCK + i] = scratch[_SHARE + i] if exists else 0.0, gap
+        far[LEAN_X * BLOCK + i] = nx - ax * gap if exists else 0.0
+        far[LEAN_Y * BLOCK + i] = ny - ay * gap if exists else 0.0
 
 
 @njit
-def invert(room):
-    """The matrix that makes gradients of sums over sides."""
+def invert(scratch):
+    """Inverse of the least-squares matrix, which gives gradients from sums over sides."""
     for i in range(BLOCK):
-        xx, xy, yy = room[i], room[_XY + i], room[_YY + i]
+        xx, xy, yy = scratch[i], scratch[_XY + i], scratch[_YY + i]
         scale = 1.0 / max(xx * yy - xy * xy, TINY)
-        room[i], room[_XY + i], room[_YY + i] = scale * yy, scale * xy, scale * xx
+        scratch[i], scratch[_XY + i], scratch[_YY + i] = scale * yy, scale * xy, scale * xx
 
 
 @njit
-def weigh_side(room, geo):
+def weigh_side(scratch, geo):
     """Weights of a side's difference in the gradient."""
     for i in range(BLOCK):
-        wx, wy, cross = geo[_WX + i], geo[_WY + i], room[_XY + i]
-        geo[_WX + i], geo[_WY + i] = room[i] * wx - cross * wy, room[_YY + i] * wy - cross * wx
+        wx, wy, cross = geo[_WX + i], geo[_WY + i], scratch[_XY + i]
+        geo[_WX + i], geo[_WY + i] = scratch[i] * wx - cross * wy, scratch[_YY + i] * wy - cross * wx
 
 
 @njit
 def move_sides(tables, basin):
-    """All that `faces` reads of sides, where anything moves."""
+    """Compute all measures of `cell_sides`, in blocks where anything moves."""
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
-    x, y, _, cx, cy, room = places_of(tables.plane, basin)
+    x, y, _, cx, cy, scratch = places_of(tables.plane, basin)
     area = tables.plane[basin["area"] :]
-    stirs, corners, ends = ends_of(tables.integers, basin)
+    moving_blocks, corners, ends = ends_of(tables.integers, basin)
     slots, n, f, b = integers[0], integers[1], integers[2], integers[3]
-    m = stirs.size * slots * BLOCK
-    lies = HEAD + INDICES * m // 2 + stirs.size
-    edges, number, face = integers[lies : lies + b], integers[lies + b : lies + 2 * b], integers[lies + 2 * b :]
+    m = moving_blocks.size * slots * BLOCK
+    offset = HEAD + INDICES * m // 2 + moving_blocks.size
+    edges, number, face = (
+        integers[offset : offset + b],
+        integers[offset + b : offset + 2 * b],
+        integers[offset + 2 * b :],
+    )
     lengths, distances = floats[MEASURES * m + 2 * b :], floats[MEASURES * m + 2 * b + f :]
-    for j in range(stirs.size):
-        if stirs[j] == 1:
+    for j in range(moving_blocks.size):
+        if moving_blocks[j] == 1:
             put_centres(j * BLOCK, min((j + 1) * BLOCK, n), corners, x, y, cx, cy)
-    for j in range(stirs.size):
-        if stirs[j] == 0:
+    for j in range(moving_blocks.size):
+        if moving_blocks[j] == 0:
             continue
         first, last = j * BLOCK, min((j + 1) * BLOCK, n)
-        gather_cells(area[first:last], cx[first:last], cy[first:last], room)
+        gather_cells(area[first:last], cx[first:last], cy[first:last], scratch)
         for slot in range(j * slots, (j + 1) * slots):
             own, geo = ends[slot * ENDS * BLOCK :], floats[slot * MEASURES * BLOCK :]
-            gather_ends(own, own[STOP * BLOCK :], own[BEYOND * BLOCK :], x, y, cx, cy, room)
-            put_side(room, geo)
+            gather_ends(own, own[STOP * BLOCK :], own[BEYOND * BLOCK :], x, y, cx, cy, scratch)
+            put_side(scratch, geo)
             if basin["carried"] >= 0:
-                put_distance(room, geo, distances[slot * DISTANCES * BLOCK :])
+                put_distance(scratch, geo, distances[slot * DISTANCES * BLOCK :])
             if basin["flows"] >= 0:
-                put_lengths(face[slot * BLOCK :], room[_LONG:], lengths)
-        invert(room)
+                put_lengths(face[slot * BLOCK :], scratch[_LONG:], lengths)
+        invert(scratch)
         for slot in range(j * slots, (j + 1) * slots):
-            weigh_side(room, floats[slot * MEASURES * BLOCK :])
+            weigh_side(scratch, floats[slot * MEASURES * BLOCK :])
     for q in range(b):
         side = edges[q] // BLOCK
         geo = floats[(side // 4 * slots + side % 4) * MEASURES * BLOCK + edges[q] % BLOCK :]
@@ -224,16 +232,16 @@ def move_sides(tables, basin):
 
 
 @njit
-def put_lengths(face, long, lengths):
-    """Lengths of faces, from the cells that have them on their left."""
+def put_lengths(face, side_lengths, lengths):
+    """Lengths of faces, from the cells on their left."""
     for i in range(BLOCK):
         if face[i] >= 0:
-            lengths[face[i]] = long[i]
+            lengths[face[i]] = side_lengths[i]
 
 
 @njit
 def size_patch(tables, basin, patch):
-    """Sizes of a patch: lengths of its faces, areas of the cells behind."""
+    """Sizes of a patch: lengths of its faces, area of its cells."""
     plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
     links = integers[basin["links"] :]
     at = basin["mesh"] + MEASURES * blocks(links) * links[0] * BLOCK + 2 * links[3] + links[2] - links[3]
@@ -249,7 +257,7 @@ def size_patch(tables, basin, patch):
 
 @njit
 def drive_sides(t, y, dydt, out, handle):
-    """Speeds of all sides along their normals; steps follow these too."""
+    """Compute the speeds of all sides along their normals; the speeds limit the step."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
@@ -258,12 +266,15 @@ def drive_sides(t, y, dydt, out, handle):
 
 @njit
 def put_speeds(tables, basin):
-    """Fill them from those of corners; returns the greatest share of a cell that a side sweeps [1/s]."""
+    """Compute the speeds of sides from those of corners.
+
+    Return the greatest fraction of a cell swept by a side [1/s].
+    """
     plane, slots, most = tables.plane, tables.integers[basin["links"]], 0.0
     v, across = plane[basin["lines"] :], _NY if basin["turn"] == 1 else _NX
-    stirs, _, ends = ends_of(tables.integers, basin)
-    for slot in range(stirs.size * slots):
-        if stirs[slot // slots] == 0:
+    moving_blocks, _, ends = ends_of(tables.integers, basin)
+    for slot in range(moving_blocks.size * slots):
+        if moving_blocks[slot // slots] == 0:
             continue
         start, stop = ends[slot * ENDS * BLOCK :], ends[(slot * ENDS + STOP) * BLOCK :]
         geo = plane[basin["mesh"] + slot * MEASURES * BLOCK :]
@@ -276,8 +287,8 @@ def put_speeds(tables, basin):
 
 @njit(forceinline=True)
 def moves_of(tables, basin):
-    """Speeds of sides, room for what they find: thrust on faces of the boundary, what else a law books; and wide."""
+    """Speeds of sides, array for pressures and energy losses on boundary faces, and stretching `wide` of cells."""
     sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
-    many = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
-    plane, found = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]
-    return plane[sides : sides + many], found, plane[rows : rows + basin["n"]]
+    count = 4 * BLOCK * blocks(tables.integers[basin["links"] :])
+    plane, thrust_array = tables.plane, tables.work[thrust : thrust + 2 * basin["outer"]]
+    return plane[sides : sides + count], thrust_array, plane[rows : rows + basin["n"]]

@@ -1,6 +1,6 @@
-"""What probes read off all basins: flows through patches. Knows the tables; changes no state.
+"""Probes common to all basins: flows through patches, and velocities.
 
-Each physics reads its own cells, by the number of a field that stands as `side` in a probe of kind CELL_FIELD.
+Each physics reads its own cells. The number of a field is `side` in a probe of kind CELL_FIELD.
 """
 
 from math import sqrt
@@ -10,18 +10,18 @@ from fvsolve.kernels.density import density
 from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import PATCH_FLOW
 
-U, V, SPEED, OWN = range(4)  # fields of velocities; from OWN on each physics has its own
+U, V, SPEED, OWN = range(4)  # fields of velocities; numbers from OWN on are fields of the physics
 
 
 @njit
 def of_velocity(field, u, v):
-    """What such a field is of a velocity."""
+    """Value of a velocity field: u, v or speed."""
     return u if field == U else v if field == V else sqrt(u * u + v * v)
 
 
 @njit
 def observe_flows(t, y, out, handle, values):
-    """values[k] of the probes of flows through patches [m3/s]."""
+    """Write values[k] of the probes of flows through patches [m3/s]."""
     tables = open_tables(handle)
     probes = tables.probes
     for k in range(probes.size):
@@ -31,7 +31,7 @@ def observe_flows(t, y, out, handle, values):
 
 @njit
 def observe_dense_flows(t, y, out, handle, values):
-    """The same at the density of the place, under all laws but linear."""
+    """Write the flows through patches [m3/s] with the density at the patch, under all laws but linear."""
     tables = open_tables(handle)
     st, probes, at = tables.settings[0], tables.probes, tables.layout[0]["pressure"]
     for k in range(probes.size):
@@ -43,6 +43,6 @@ def observe_dense_flows(t, y, out, handle, values):
 
 @njit
 def patch_flow(tables, probe, out):
-    """Mass that flows into a basin through a patch [kg/s]."""
+    """Mass flow into a basin through a patch [kg/s]."""
     layout, i = tables.layout[0], probe["index"]
     return out[layout["net"] + i] + out[layout["supply"] + i]

@@ -1,4 +1,4 @@
-"""Patches of basins: what passes an open boundary, and what gives way where a link joins. Knows the tables."""
+"""Patches of basins: flow through an open boundary, and momentum of the flow of links."""
 
 from fvsolve.basins.behind import through_patch
 from fvsolve.jit import njit
@@ -8,19 +8,19 @@ from fvsolve.kernels.records import GN
 
 @njit(forceinline=True)
 def weight_of(st, plane, basin):
-    """Gravity along the normal of a basin [m/s2], which on a body is what it feels there; see `basins.frames`."""
+    """Gravity along the normal of a basin [m/s2], on a body that of its accelerated frame; see `basin_frames`."""
     return st["gravity"] if basin["frame"] < 0 else plane[basin["frame"] + GN]
 
 
 @njit(forceinline=True)
 def wanted(basin, dydt):
-    """Whether its rates are asked for, or what they say of flows through open patches."""
+    """True if the rates of a basin are needed, or the flows through its open patches, which follow from them."""
     return dydt.size > 0 or basin["through"] >= 0 or basin["frame"] >= 0
 
 
 @njit
 def book_open(tables, b, per, out):
-    """Book what passes the open boundary of a basin, to each patch its own."""
+    """Write the flows through the open boundary of a basin, patch by patch, as supplies of the nodes of patches."""
     patches = tables.patches
     for k in range(patches.size):
         if patches[k]["basin"] == b and patches[k]["open"] == 1:
@@ -29,31 +29,31 @@ def book_open(tables, b, per, out):
 
 @njit
 def record_patches(t, y, out, handle, values):
-    """Mark where a link asked for more than there was; what passes an open boundary is booked, and no mark."""
+    """Record the first time at which a link takes more water than the basin contains; open patches are excluded."""
     tables = open_tables(handle)
     patches, marks, nodes = tables.patches, tables.marks, tables.nodes.size
     for k in range(patches.size):
         at = tables.pipes.size + nodes + patches[k]["node"]
-        made_up = patches[k]["open"] == 0 and out[tables.layout[0]["supply"] + patches[k]["node"]] > 0.0
-        if made_up and marks[at] != marks[at]:
+        is_short = patches[k]["open"] == 0 and out[tables.layout[0]["supply"] + patches[k]["node"]] > 0.0
+        if is_short and marks[at] != marks[at]:
             marks[at] = t
 
 
 @njit
 def give_way(plane, patch, m, push, dydt, x, y):
-    """Add to the momentum of the cell behind face m of a patch what a wall would not have let pass.
+    """Add to the momentum of the cell at face m of a patch the part that a wall would not transmit.
 
-    A wall stops what runs into it, p + Z u_n; where v passes the pressure on it is p + Z (u_n - v).
+    A wall stops the flow, so the pressure on it is p + Z u_n. With a flow at v through the face it is p + Z (u_n - v).
     push : Z v, v positive outward
     """
-    at, many = patch["normals"], patch["faces"]
-    share = push * plane[at + 2 * many + m]
+    at, count = patch["normals"], patch["faces"]
+    share = push * plane[at + 2 * count + m]
     dydt[x] += share * plane[at + m]
-    dydt[y] += share * plane[at + many + m]
+    dydt[y] += share * plane[at + count + m]
 
 
 @njit
 def put_inward(turn, k, flux, inward):
-    """Flows through a row of faces; turn : 1 or -1 for fluxes inward or outward, k : 1 / lengths of faces."""
+    """Inward flows through a row of faces. turn : 1 or -1 for fluxes inward or outward; k : 1 / lengths of faces"""
     for i in range(inward.size):
         inward[i] = turn * flux[i] / k[i]

@@ -1,8 +1,9 @@
-"""Values carried over a grid, to second order or first. Knows rows of cells and faces; knows no depth.
+"""Advection of values over a grid, of second or first order.
 
-With the flow F through a face [m2/s], its value q and the cell's own value c, a cell's rate is kx ky times the sum of
-F (q - c) that comes in, less c times the divergence of F: what is uniform changes by its value times the divergence,
-to the bit. An upwind cell's slope comes from the difference across the face and the one behind it.
+F is the flow through a face [m2/s], q the value at the face, and c the cell's own value. The rate of a cell is kx ky
+times the sum of F (q - c) over the inflows, minus c times the divergence of F. So the rate of a uniform value is the
+value times the divergence, to the bit. The slope of an upwind cell uses the differences across the face and across the
+face behind the cell.
 """
 
 from fvsolve.jit import inner, njit
@@ -12,21 +13,21 @@ from fvsolve.kernels.records import UPWIND
 
 @njit
 def value(limiter, forward, b, c, d, e):
-    """The value between cells c and d, from c where the flow is forward; b and e lie beyond them."""
+    """Value at the face between cells c and d, from c if the flow is forward; b and e are the cells next to them."""
     half = 0.5 * slope(limiter, c - b if forward else e - d, d - c)
     return c + half if forward else d - half
 
 
 @inner
 def along_limited(limiter, factor, flow, b, c, d, e, q):
-    """Values q at faces between c and d by a limiter."""
+    """Values q at faces between c and d with a limiter."""
     for i in range(q.size):
         q[i] = value(limiter, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
 
 
 @njit
 def settled(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
-    """The rate of a cell from flows and values of its four faces."""
+    """Rate of a cell from flows and values at its four faces."""
     x = fw * (qw - own) - fe * (qe - own)
     y = fs * (qs - own) - fn * (qn - own)
     return scale * ((x + y) - own * ((fe - fw) + (fn - fs)))
@@ -34,10 +35,10 @@ def settled(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
 
 @inner
 def along(scheme, limiter, factor, flow, b, c, d, e, q):
-    """Values q at faces between c and d, from the side that factor times flow comes from."""
+    """Values q at faces between c and d, from the upwind side of factor times flow."""
     if scheme == UPWIND:
         for i in range(q.size):
-            low, high = c[i], d[i]  # read before it is known which: a choice, not a branch
+            low, high = c[i], d[i]  # read both first, so that the choice compiles without a branch
             q[i] = low if factor * flow[i] > 0.0 else high
     else:
         by_limiter(along_limited, limiter, factor, flow, b, c, d, e, q)
@@ -45,7 +46,7 @@ def along(scheme, limiter, factor, flow, b, c, d, e, q):
 
 @njit
 def one_value(scheme, limiter, forward, b, c, d, e):
-    """The value at one face."""
+    """Value at a single face."""
     if scheme == UPWIND:
         return c if forward else d
     half = 0.5 * limited(limiter, c - b if forward else e - d, d - c)
@@ -54,9 +55,9 @@ def one_value(scheme, limiter, forward, b, c, d, e):
 
 @inner
 def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
-    """Values q at the nx + 1 faces of a row of cells, the first of c; west and east are values outside.
+    """Values q at the nx + 1 faces of a row of cells c; west and east are values outside.
 
-    The loop runs on into the next row, where there is one, so that it is whole vectors.
+    The loop continues into the next row, where there is one, so that it fills whole vectors.
     """
     if nx > 3:
         along(scheme, limiter, factor, flow[2:], c, c[1:], c[2:], c[3:], q[2 : min(c.size, nx + 3) - 1])
@@ -73,7 +74,7 @@ def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
 
 @inner
 def across_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
-    """`across` by a limiter."""
+    """`north_values_and_rates` with a limiter."""
     fe, qe = fx[1:], qx[1:]
     for i in range(rate.size):
         q = value(limiter, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
@@ -83,7 +84,7 @@ def across_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, 
 
 @inner
 def across(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
-    """Values qn at the northern faces of a row of cells c, and its rates; ky : its own."""
+    """Values qn at the northern faces of a row of cells c, and rates of the row. ky : 1 / height of the row"""
     if scheme == UPWIND:
         fe, qe = fx[1:], qx[1:]
         for i in range(rate.size):
@@ -96,7 +97,7 @@ def across(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, 
 
 
 def second_order_work(nx, ny):
-    """Floats that `second_order_rates` works in."""
+    """Length of the work array of `second_order_rates`."""
     return 7 * nx + 4
 
 
@@ -104,9 +105,10 @@ def second_order_work(nx, ny):
 def second_order_rates(
     scheme, limiter, nx, ny, begin, until, stop, fresh, kx, ky, factor, flow_x, flow_y, outside, c, work, rate
 ):  # fmt: skip
-    """Rates of cells of values c by upwind or muscl, of rows `begin` to `until`; arguments as of `grid_advection`.
+    """Rates of rows `begin` to `until` for cell values c, by upwind or muscl; arguments as for `grid_advection`.
 
-    fresh : whether it does not go on where it has ended last, at `begin`; then `stop` is where it ends at last
+    fresh : False if the last call ended at `begin` with the same work; then its results are reused
+    stop : end of the last call
     """
     below, above, north = work[:nx], work[nx : 2 * nx], work[2 * nx : 3 * nx]
     rows, rest = work[3 * nx : 5 * nx], work[5 * nx :]
@@ -115,8 +117,8 @@ def second_order_rates(
         rows[i] = outside[2 * ny + i] if factor * flow_y[i] > 0.0 else c[i]
         north[i] = outside[2 * ny + nx + i] if factor * flow_y[last + nx + i] < 0.0 else c[last + i]
         below[i], above[i] = 2.0 * rows[i] - c[i], 2.0 * north[i] - c[last + i]
-    first = max(begin - 1, 0) if fresh else begin  # whose own rate may be wrong, but for values at its northern faces
-    for j in range(first - 1 if fresh else begin, until):  # values along a row are had a row ahead
+    first = max(begin - 1, 0) if fresh else begin  # only for values at its northern faces; its rate may be wrong
+    for j in range(first - 1 if fresh else begin, until):  # values along a row are computed one row ahead
         if j < stop - 1:
             k = j + 1
             fx, qx = flow_x[k * (nx + 1) :], rest[(k % 2) * (nx + 2) :]

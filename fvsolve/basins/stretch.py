@@ -1,7 +1,9 @@
-"""Cells that are stretched as lines move: what they contain, and what they hold per area. Knows vectors; knows no law.
+"""Cells that stretch as lines move: conversion between contents and values per area.
 
-Contents count as deviations over areas as drawn, (A U - A0 U0) / A0, see `walls`; all columns of a grid stretch alike,
-or all rows. wide : areas over those as drawn; narrow : 1 / wide
+Contents are deviations over undeformed areas, (A U - A0 U0) / A0, see `moving_walls`; all columns of a grid stretch
+alike, or all rows.
+
+wide : areas over undeformed areas; narrow : 1 / wide
 """
 
 from fvsolve.jit import njit
@@ -9,7 +11,7 @@ from fvsolve.jit import njit
 
 @njit(forceinline=True)
 def seen_of(basin, seen, y):
-    """Deviations of what cells hold per area: `seen` of the tables where walls move, for y then has contents."""
+    """Deviations of values per area: `seen` of the tables where walls move, because y then contains contents."""
     if basin["walls"] > 0:
         return seen
     return y
@@ -17,7 +19,7 @@ def seen_of(basin, seen, y):
 
 @njit(forceinline=True)
 def row_across(basin, i):
-    """In which of the rows that stretch cell i lies."""
+    """Index of the stretching row or column of cell i; on a mesh i itself."""
     if basin["nx"] == 0:
         return i
     return i // basin["nx"] if basin["turn"] == 1 else i % basin["nx"]
@@ -25,20 +27,20 @@ def row_across(basin, i):
 
 @njit(forceinline=True)
 def stretched(plane, basin, i):
-    """Area of cell i over that as drawn."""
+    """Area of cell i over its undeformed area."""
     return plane[basin["stretch"] + row_across(basin, i)] if basin["walls"] > 0 else 1.0
 
 
 @njit
 def fill(value, values):
-    """All the same."""
+    """Set all values to `value`."""
     for i in range(values.size):
         values[i] = value
 
 
 @njit
 def multiply(values, factors, products):
-    """products = values * factors, which must be another array, or the loop is no whole vectors."""
+    """products = values * factors. products must be another array, or the loop is not vectorised."""
     for i in range(products.size):
         products[i] = values[i] * factors[i]
 
@@ -72,19 +74,22 @@ def see_densities(rest, wide, narrow, content, seen):
 
 
 @njit
-def swell(wide, one, other, third):
-    """Three rates of cells become those of what these contain."""
-    widen(wide, one)
-    widen(wide, other)
+def swell(wide, first, second, third):
+    """Convert three rates per area to rates of contents."""
+    widen(wide, first)
+    widen(wide, second)
     widen(wide, third)
 
 
 @njit
-def swell_row(columns, wide, first, j, one, other, third):
-    """The same of row j of a grid, from column `first` on; columns : whether these stretch, and not the rows."""
+def swell_row(columns, wide, first, j, rate_1, rate_2, rate_3):
+    """Convert three rates of row j of a grid from column `first` on.
+
+    columns : True if columns stretch, False if rows do
+    """
     if columns:
-        swell(wide[first:], one, other, third)
+        swell(wide[first:], rate_1, rate_2, rate_3)
     else:
-        scale(wide[j], one)
-        scale(wide[j], other)
-        scale(wide[j], third)
+        scale(wide[j], rate_1)
+        scale(wide[j], rate_2)
+        scale(wide[j], rate_3)

@@ -1,10 +1,11 @@
-"""Walls of basins that move, and the lines that go with them. Knows rows of tables; knows no physics.
+"""Moving walls of basins, and the grid lines that move with them.
 
-d/dt of what a cell contains is the sum of F - w U over its faces, w their speeds (Reynolds' transport theorem, 71 to
-73). So the states are contents over areas as drawn, (A U - A0 U0) / A0, and where walls stand are states as well: areas
-are then linear in states, a sum that every Runge-Kutta method keeps, and what is even stays so to round-off. All walls
-of a basin move along one axis. What other pieces see in place of the contents are deviations U - U0, and in `plane`
-lines and areas as they are. Corners of other meshes are what lines are to grids (`moving_meshes` has the rest of them).
+The rate of the content of a cell is the sum of F - w U over its faces, with their speeds w (Reynolds' transport
+theorem, 71 to 73). So the states are contents over undeformed areas, (A U - A0 U0) / A0, and positions of walls are
+states too. Areas are then linear in the states; every Runge-Kutta method keeps this relation, and a uniform state stays
+uniform to round-off. All walls of a basin move along the same axis. Other functions read deviations U - U0 (`seen`)
+instead of contents, and present lines and areas in `plane`. On other meshes, corners take the place of grid lines (see
+`moving_meshes`).
 """
 
 from math import sqrt
@@ -20,26 +21,29 @@ from fvsolve.kernels.mechanism.room import row_of as row_of_body
 from fvsolve.kernels.records import NO_DRAG, NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
 from fvsolve.kernels.schedules import schedule_slopes
 
-FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # what probes read, in the order of `parts.basin.part.MovingWall`
-ROOM = 1e-3  # share of its drawn width that a cell keeps at least
-BESIDE = 8  # speeds of lines that loops over whole vectors look at beyond the last
+FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # quantities of probes, in the order of `parts.basin.part.MovingWall`
+ROOM = 1e-3  # least width of a cell over its undeformed width; below it the run stops
+BESIDE = 8  # additional speeds of lines that vector loops read beyond the last line
 
 
 @njit(forceinline=True)
 def across(basin):
-    """How many rows of cells stretch, and how many lines move; of a mesh cells and corners."""
+    """Number of rows or columns of cells that stretch, and number of moving lines.
+
+    On a mesh, numbers of cells and corners.
+    """
     if basin["nx"] == 0:
         return basin["n"], basin["corners"]
-    many = basin["ny"] if basin["turn"] == 1 else basin["nx"]
-    return many, many + 1
+    count = basin["ny"] if basin["turn"] == 1 else basin["nx"]
+    return count, count + 1
 
 
 @njit
 def see(t, y, seen, out, handle):
-    """Lines and areas of basins as they are at y, and in `seen` of the tables the state as all others see it.
+    """Compute lines and areas of basins at y, and the state as deviations, into `seen` of the tables.
 
-    Where no `seen` is given kernels come next that take contents themselves: of these cells then those that patches and
-    walls look at, unless more do.
+    An empty argument `seen` means that kernels of rates follow. For cells whose kernel reads contents, only the
+    deviations next to patches and walls are then computed, unless scalars or friction need all.
     """
     tables, done = open_tables(handle), 0
     for b in range(tables.basins.size):
@@ -59,7 +63,7 @@ def see(t, y, seen, out, handle):
 
 @njit(forceinline=True)
 def takes_contents(basin):
-    """Whether the kernel of its rates does: that of water on grids, row by row."""
+    """True if the kernel of its rates reads contents: water on grids, row by row."""
     return basin["deep"] == 1 and basin["nx"] > 0
 
 
@@ -72,40 +76,40 @@ def copy(source, target):
 
 @njit
 def stretch_cells(tables, basin, y):
-    """By how much columns, rows or cells are stretched with walls where they are, and 1 over that."""
+    """Compute the stretching of columns, rows or cells at the present positions of walls, and its reciprocal."""
     plane, walls, at = tables.plane, tables.walls, basin["stretch"]
-    many, lines = across(basin)
-    wide, narrow = plane[at : at + many], plane[at + many : at + 2 * many]
+    count, lines = across(basin)
+    wide, narrow = plane[at : at + count], plane[at + count : at + 2 * count]
     fill(1.0, wide)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         weights, travel = plane[walls[k]["weights"] + lines :], y[walls[k]["y"]]
-        for i in range(many):
+        for i in range(count):
             wide[i] += weights[i] * travel
-    for i in range(many):
+    for i in range(count):
         narrow[i] = 1.0 / wide[i]
     if basin["nx"] > 0:
         spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
-        multiply(plane[at + 2 * many :], narrow, plane[spacing : spacing + many])  # 1 / widths as drawn
+        multiply(plane[at + 2 * count :], narrow, plane[spacing : spacing + count])  # 1 / widths as drawn
 
 
 @njit
 def factors_of(tables, basin, j):
-    """(wide, narrow) of the cells of row j of a grid, or of all of a mesh."""
-    plane, nx, at, (many, _) = tables.plane, basin["nx"], basin["stretch"], across(basin)
+    """(wide, narrow) of the cells of row j of a grid, or of all cells of a mesh."""
+    plane, nx, at, (count, _) = tables.plane, basin["nx"], basin["stretch"], across(basin)
     if nx == 0 or basin["turn"] == 0:
-        return plane[at : at + many], plane[at + many : at + 2 * many]
-    row = at + 3 * many
+        return plane[at : at + count], plane[at + count : at + 2 * count]
+    row = at + 3 * count
     fill(plane[at + j], plane[row : row + nx])
-    fill(plane[at + many + j], plane[row + nx : row + 2 * nx])
+    fill(plane[at + count + j], plane[row + nx : row + 2 * nx])
     return plane[row : row + nx], plane[row + nx : row + 2 * nx]
 
 
 @njit
 def see_rows(tables, basin, y):
-    """Areas, and U - U0 of all cells: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
+    """Compute areas, and U - U0 of all cells: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
     plane, seen, n, first = tables.plane, tables.seen, basin["n"], basin["y"]
     rows, size = (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, n)
-    many = tables.scalars.size if basin["carried"] >= 0 else 0
+    scalar_count = tables.scalars.size if basin["carried"] >= 0 else 0
     for j in range(rows):
         a, z, (wide, narrow) = j * size, (j + 1) * size, factors_of(tables, basin, j)
         multiply(plane[basin["drawn"] + a :], wide, plane[basin["area"] + a : basin["area"] + z])
@@ -113,14 +117,14 @@ def see_rows(tables, basin, y):
             see_depths(plane[basin["plan"] + a :], wide, narrow, y[first + a :], seen[first + a : first + z])
         else:
             see_densities(basin["density"], wide, narrow, y[first + a :], seen[first + a : first + z])
-        for q in range(1, 3 + many):
+        for q in range(1, 3 + scalar_count):
             at = first + q * n if q < 3 else basin["carried"] + (q - 3) * n
             multiply(y[at + a :], narrow, seen[at + a : at + z])
 
 
 @njit
 def see_near(tables, b, y):
-    """The same of the cells of water behind patches, walls among them."""
+    """Compute areas and U - U0 of the cells of water next to patches, moving walls included."""
     plane, seen, basin, patches = tables.plane, tables.seen, tables.basins[b], tables.patches
     n, first = basin["n"], basin["y"]
     for p in range(patches.size):
@@ -134,7 +138,7 @@ def see_near(tables, b, y):
 
 @njit
 def stretch_patches(tables, b):
-    """Sizes of the patches of a grid."""
+    """Compute the sizes of the patches of a grid."""
     for p in range(tables.patches.size):
         if tables.patches[p]["basin"] == b:
             stretch_patch(tables, tables.basins[b], tables.patches[p])
@@ -142,26 +146,26 @@ def stretch_patches(tables, b):
 
 @njit
 def stretch_patch(tables, basin, patch):
-    """Sizes of a patch that rides on a side along which lines move, or stands before cells that stretch.
+    """Compute the sizes of a patch on a side along which lines move, or next to cells that stretch.
 
-    Rates of what cells contain go with lengths over areas as drawn.
+    Rates of contents are proportional to lengths over undeformed areas.
     """
     plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
     for m in range(patch["count"]):
         area += plane[basin["area"] + integers[patch["first"] + m]]
-    at, many = patch["normals"], patch["faces"]
-    for m in range(many):
-        i = integers[patch["ring"] + many + m]
-        rides = abs(plane[at + (1 if basin["turn"] == 1 else 0) * many + m]) < 0.5
-        per_area = plane[at + 3 * many + m] * (stretched(plane, basin, i) if rides else 1.0)
-        plane[at + 2 * many + m] = per_area
+    at, count = patch["normals"], patch["faces"]
+    for m in range(count):
+        i = integers[patch["ring"] + count + m]
+        is_normal = abs(plane[at + (1 if basin["turn"] == 1 else 0) * count + m]) < 0.5
+        per_area = plane[at + 3 * count + m] * (stretched(plane, basin, i) if is_normal else 1.0)
+        plane[at + 2 * count + m] = per_area
         length += per_area * plane[basin["drawn"] + i]
     plane[patch["sizes"]], plane[patch["sizes"] + 1] = area, length
 
 
 @njit
 def speed_of(t, tables, wall, y):
-    """Speed of a wall along its axis [m/s]."""
+    """Speed of a wall along its axis [m/s], that of its mass, its body or its schedule."""
     if wall["mass"] >= 0:
         return motion(tables.masses[wall["mass"]], y)[1]
     if wall["body"] >= 0:
@@ -174,14 +178,17 @@ def speed_of(t, tables, wall, y):
 
 @njit
 def drive_lines(t, y, dydt, out, handle):
-    """Speeds of all lines; steps follow these too."""
+    """Compute the speeds of all lines and the rates of the travels of walls; the speeds limit the step.
+
+    Sets the status NO_ROOM if a cell is narrower than ROOM times its undeformed width.
+    """
     tables = open_tables(handle)
     plane, walls = tables.plane, tables.walls
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["walls"] == 0:
             continue
-        at, (many, lines) = basin["lines"], across(basin)
+        at, (count, lines) = basin["lines"], across(basin)
         for i in range(lines):
             plane[at + i] = 0.0
         for k in range(basin["wall"], basin["wall"] + basin["walls"]):
@@ -191,40 +198,43 @@ def drive_lines(t, y, dydt, out, handle):
             if dydt.size > 0:
                 dydt[walls[k]["y"]] = speed
         spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
-        for i in range(many):
+        for i in range(count):
             if not plane[basin["stretch"] + i] > ROOM:
                 out[STATUS], out[WHERE] = NO_ROOM, nearest(tables, basin, i)
-        for i in range(many if basin["nx"] > 0 else 0):
+        for i in range(count if basin["nx"] > 0 else 0):
             most = max(most, max(abs(plane[at + i]), abs(plane[at + i + 1])) * plane[spacing + i])
         out[RATE] = max(out[RATE], most)
 
 
 @njit
 def nearest(tables, basin, i):
-    """The place that is the wall with which column, row or cell i goes most."""
-    found, most, (_, lines) = basin["wall"], -1.0, across(basin)
+    """Node of the wall that changes the width of column, row or cell i most per travel."""
+    index, most, (_, lines) = basin["wall"], -1.0, across(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         per = abs(tables.plane[tables.walls[k]["weights"] + lines + i])
         if per > most:
-            found, most = k, per
-    return tables.walls[found]["node"]
+            index, most = k, per
+    return tables.walls[index]["node"]
 
 
 @njit(forceinline=True)
 def moves_of(tables, basin):
-    """Speeds of lines along x and along y, room for what they find on the boundary; wide and narrow."""
-    plane, at, rows, (many, lines) = tables.plane, basin["lines"], basin["stretch"], across(basin)
-    speeds, none = plane[at : at + lines + BESIDE], plane[:0]
+    """Speeds of lines along x and along y, arrays for pressures on the boundary, stretching `wide` and its reciprocal.
+
+    Speeds along the axis without motion are empty.
+    """
+    plane, at, rows, (count, lines) = tables.plane, basin["lines"], basin["stretch"], across(basin)
+    speeds, no_speeds = plane[at : at + lines + BESIDE], plane[:0]
     thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * basin["outer"]]
-    wide, narrow = plane[rows : rows + many], plane[rows + many : rows + 2 * many]
+    wide, narrow = plane[rows : rows + count], plane[rows + count : rows + 2 * count]
     if basin["turn"] == 1:
-        return none, speeds, thrust, wide, narrow
-    return speeds, none, thrust, wide, narrow
+        return no_speeds, speeds, thrust, wide, narrow
+    return speeds, no_speeds, thrust, wide, narrow
 
 
 @njit
 def impedance(tables, basin, i, y):
-    """Force per speed of one metre of wall beside cell i that sends out waves [N s/m2]."""
+    """Radiation impedance of one metre of wall next to cell i, force per speed [N s/m2]."""
     st = tables.settings[0]
     if basin["deep"] == 0:
         return basin["density"] * basin["speed"] * basin["thickness"]
@@ -234,14 +244,18 @@ def impedance(tables, basin, i, y):
 
 @njit
 def press(out, tables, wall, force):
-    """Add a force on a wall, outward, to those of its body, through that body's origin."""
-    row, along, push = row_of_body(tables, wall["body"]), tables.basins[wall["basin"]]["turn"], wall["outward"] * force
-    out[row + FORCE + along] += push
+    """Add an outward force on a wall to the forces on its body, through that body's origin."""
+    row, along, force_along = (
+        row_of_body(tables, wall["body"]),
+        tables.basins[wall["basin"]]["turn"],
+        wall["outward"] * force,
+    )
+    out[row + FORCE + along] += force_along
 
 
 @njit
 def press_at_rest(t, y, dydt, out, handle):
-    """What the profile puts on walls, to the bodies that they go with."""
+    """Add the forces at rest on walls to the forces on their bodies."""
     tables = open_tables(handle)
     for k in range(tables.walls.size):
         if tables.walls[k]["body"] >= 0:
@@ -250,7 +264,7 @@ def press_at_rest(t, y, dydt, out, handle):
 
 @njit
 def push_bodies(t, y, dydt, out, handle):
-    """Forces on walls, outward, less those of the profile; bodies feel them, as steps do."""
+    """Compute the outward forces on walls minus those at rest; add them to masses and bodies, and limit the step."""
     tables = open_tables(handle)
     layout, walls, masses, st = tables.layout[0], tables.walls, tables.masses, tables.settings[0]
     seen = tables.seen
@@ -279,7 +293,10 @@ def push_bodies(t, y, dydt, out, handle):
 
 @njit
 def swell(t, y, dydt, out, handle):
-    """Rates of what cells contain of scalars, from those of what they hold per area; others are made so as found."""
+    """Convert rates of amounts of scalars per area to rates of contents.
+
+    Other rates are computed as rates of contents.
+    """
     tables = open_tables(handle)
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
@@ -295,7 +312,7 @@ def swell(t, y, dydt, out, handle):
 
 @njit
 def observe_walls(t, y, out, handle, values):
-    """Forces of walls on the water, inward, the power that they bring, and how far they have moved."""
+    """Probe values of walls: inward force on the water [N], power supplied to it [W], travel [m]."""
     tables = open_tables(handle)
     for p in range(tables.probes.size):
         probe = tables.probes[p]
@@ -313,7 +330,7 @@ def observe_walls(t, y, out, handle, values):
 
 @njit(forceinline=True)
 def brought(t, tables, k, y, out):
-    """Power that wall k brings to what it stands in [W]."""
+    """Power that wall k supplies to its basin [W]."""
     wall = tables.walls[k]
     force = wall["rest"] + out[tables.layout[0]["wall"] + k]
     return -force * wall["outward"] * speed_of(t, tables, wall, y)
@@ -321,18 +338,21 @@ def brought(t, tables, k, y, out):
 
 @njit
 def wall_power(t, y, dydt, out, handle, power):
-    """Rows of walls, before those of basins: what they bring to these, and what the law of these loses beside them."""
+    """Rows of `power` of walls, before those of basins: power supplied, and power dissipated by the law."""
     tables = open_tables(handle)
     for k in range(tables.walls.size):
-        work, lost = brought(t, tables, k, y, out), lost_beside(tables, tables.walls[k])
+        work, dissipated = brought(t, tables, k, y, out), lost_beside(tables, tables.walls[k])
         first = wall_rows(tables, power) + OF_WALL * k
-        power[first], power[first + 1] = work, lost
-        power[row_of(tables, power, tables.walls[k]["basin"])] += work - lost
+        power[first], power[first + 1] = work, dissipated
+        power[row_of(tables, power, tables.walls[k]["basin"])] += work - dissipated
 
 
 @njit
 def lost_beside(tables, wall):
-    """What law linear loses beside a wall, whose density and momentum do not ride along [W]; see `liquid.faces`."""
+    """Power dissipated by law linear at a wall, whose motion does not carry density and momentum along [W].
+
+    See `liquid_mesh`.
+    """
     basin, total = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):
         at = basin["thrust"] + basin["outer"] + tables.integers[wall["faces"] + m]
@@ -342,7 +362,7 @@ def lost_beside(tables, wall):
 
 @njit
 def widening(t, tables, basin, y, i):
-    """Rate of the area of cell i over that as drawn [1/s]."""
+    """Rate of the area of cell i over its undeformed area [1/s]."""
     total, (_, lines) = 0.0, across(basin)
     for k in range(basin["wall"], basin["wall"] + basin["walls"]):
         wall = tables.walls[k]

@@ -1,4 +1,4 @@
-"""What a TOML file may say. Knows keys, units and cross-checks; computes no flow."""
+"""Case files: keys, units and checks between parts."""
 
 from fvsolve.case.case import Case
 from fvsolve.case.claims import Compare, Expect

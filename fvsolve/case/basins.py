@@ -1,4 +1,4 @@
-"""Meshes of basins, and what must hold between these, their patches and the rest of a case. Knows no network."""
+"""Meshes of basins, and checks of basins against the rest of a case."""
 
 from __future__ import annotations
 
@@ -34,28 +34,28 @@ Found = Iterator[tuple[tuple, str]]
 
 @dataclass(frozen=True)
 class Pool:
-    """A basin as probes see it: its fields, name -> dimension, and its mesh."""
+    """Basin as seen by probes: name -> dimension of its fields, and its mesh."""
 
     fields: dict[str, str]
     mesh: Mesh
     kind: ClassVar[str] = "basin"
     quantities: ClassVar[dict[str, str]] = {}
 
-    def point(self, what: str, place: str | None) -> tuple[float, float]:
-        """The point inside that a text such as "3.5,1.2" means [m]; ValueError where it means none."""
+    def point(self, label: str, place: str | None) -> tuple[float, float]:
+        """Point [m] that a text such as "3.5,1.2" gives. Raises ValueError."""
         middle = ",".join(f"{value:.4g}" for value in self.mesh.centre[len(self.mesh.centre) // 2])
         if place is None:
-            raise ValueError(f'a basin is read at points: say where, for example "{what}@{middle}"')
+            raise ValueError(f'a probe of a basin needs a point, for example "{label}@{middle}"')
         try:
-            x, y = (float(one) for one in place.split(","))
+            x, y = (float(part) for part in place.split(","))
         except ValueError:
-            raise ValueError(f'"@{place}" is no point x,y [m]; wanted for example "@{middle}"') from None
+            raise ValueError(f'"@{place}" is not a point x,y [m]; expected for example "@{middle}"') from None
         return self.inside(x, y)
 
     def inside(self, x: float, y: float) -> tuple[float, float]:
-        """The same point; ValueError where it lies outside or in a hole."""
+        """Return the point if it lies inside the mesh. Raises ValueError if it lies outside or in a hole."""
         if not (math.isfinite(x) and math.isfinite(y)):
-            raise ValueError(f"{x:g}, {y:g} is no point")
+            raise ValueError(f"{x:g}, {y:g} is not a point")
         if self.points.cell(x, y) < 0:
             near = ",".join(f"{value:.6g}" for value in self.points.nearest(x, y))
             raise ValueError(f"{x:g},{y:g} m lies outside the mesh or in a hole; the nearest point inside is {near}")
@@ -63,57 +63,60 @@ class Pool:
 
     @cached_property
     def points(self) -> MeshPoints:
-        """Finds points of the mesh."""
+        """Locator of points in the mesh."""
         from fvsolve.mesh.points import MeshPoints
 
         return MeshPoints(self.mesh)
 
 
 def lumped_fields(basin: Basin) -> dict[str, str]:
-    """What can be read at points of water without cells: its depth where it swings."""
+    """Fields that probes can read in water without cells: the depth, if the water sloshes in modes."""
     return {"depth": basin.own.fields["depth"]} if basin.sloshing == "modes" and basin.own.sloshes else {}
 
 
 def mesh_of(basin: Basin, setting: Setting) -> Mesh:
-    """The mesh of a basin; Misfit with all that is wrong with it."""
+    """Mesh of a basin. Raises Misfit with all faults of the mesh."""
     from fvsolve.mesh import read, rectangle
 
     try:
         if basin.mesh is None:
-            many = math.prod(basin.cells or ())
-            if many * BASIN_CELL > free_memory():
-                said = f"{many:.3g} cells take about {size(many * BASIN_CELL)} of memory"
-                raise Misfit([(("cells",), f"{said}, and {size(free_memory())} are free; wanted fewer")])
-            sides = {name: (one.side, *one.span) if one.span else one.side for name, one in basin.patches.items()}
+            count = math.prod(basin.cells or ())
+            if count * BASIN_CELL > free_memory():
+                text = f"{count:.3g} cells take about {size(count * BASIN_CELL)} of memory"
+                raise Misfit([(("cells",), f"{text}, and {size(free_memory())} are free; expected fewer")])
+            sides = {name: (item.side, *item.span) if item.span else item.side for name, item in basin.patches.items()}
             grading = basin.grading or (1.0, 1.0)
             return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())
         return read(setting.files[basin.mesh.file], basin.mesh.unit)
     except MeshError as error:
-        if basin.mesh is not None:  # what is wrong lies in its file, and is no key of the case
-            name, places = Path(basin.mesh.file).name, [one.place == "unit" for one in error.faults]
-            raise Misfit([(("mesh", "unit"), one.message) if key else (("mesh",), f"{name}: {one}")
-                          for key, one in zip(places, error.faults, strict=True)]) from None  # fmt: skip
+        if basin.mesh is not None:  # the faults are in the mesh file, not in keys of the case
+            name, places = Path(basin.mesh.file).name, [item.place == "unit" for item in error.faults]
+            raise Misfit([(("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
+                          for key, item in zip(places, error.faults, strict=True)]) from None  # fmt: skip
         raise Misfit([(keys(fault.place), fault.message) for fault in error.faults]) from None
 
 
 def keys(place: str) -> tuple:
-    """What a fault's place says, as keys: "patches.east", "holes[0]"."""
-    found = [int(one) if one.isdigit() else one for one in re.split(r"[.\[\]]", place) if one]
-    return tuple(found) if found and found[0] in Basin.keys() else ()
+    """Key path of the place of a mesh fault: "patches.east", "holes[0]"; empty if it is not a key of a basin."""
+    path = [int(word) if word.isdigit() else word for word in re.split(r"[.\[\]]", place) if word]
+    return tuple(path) if path and path[0] in Basin.keys() else ()
 
 
 def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
-    """Faults of lines across basins; `nodes` are kinds, or what of a basin can be read."""
+    """Faults of output lines across basins.
+
+    nodes : name -> kind of the node, or the `Pool` of a basin
+    """
     for name, line in output.lines.items():
         pool, key = nodes.get(line.basin), ("output", "lines", name)
         if len(name) > LONGEST_NAME:
-            yield key, f"has {len(name)} letters; wanted {LONGEST_NAME} at most"
+            yield key, f"has {len(name)} letters; expected at most {LONGEST_NAME}"
         if not re.fullmatch(r"[\w-]+", name):
-            yield key, f"{show(name)} is no name; a name has letters, digits, _ and -"
+            yield key, f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
         if line.basin in nodes and pool is None:
-            continue  # at fault itself
+            continue  # the basin itself is faulty
         if not isinstance(pool, Pool):
-            pools = [one for one, kind in nodes.items() if kind is None or isinstance(kind, Pool)]
+            pools = [basin for basin, kind in nodes.items() if kind is None or isinstance(kind, Pool)]
             near = did_you_mean(line.basin, pools) or f"; basins are {listing(pools) or 'none'}"
             yield (*key, "basin"), f"no basin named {show(line.basin)}{near}"
             continue
@@ -123,92 +126,100 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
             except ValueError as error:
                 yield (*key, end), str(error)
         if line.from_ == line.to:
-            yield (*key, "to"), "is where the line starts; wanted another point"
+            yield (*key, "to"), "is also the start of the line; expected another point"
     if output.lines and output.fields == 0:
-        yield ("output", "lines"), "are written at every frame, and fields is 0; wanted fields = 1 or more"
+        yield ("output", "lines"), "are written with every frame, but fields is 0; expected fields = 1 or more"
 
 
 def patch_names(mesh: Mesh) -> tuple[str, ...]:
-    """Patches that a file may name; the last one is all that has no name."""
+    """Names of patches that a file may use; the last patch of the mesh holds all faces without a name."""
     return mesh.patches[:-1]
 
 
 def behind(mesh: Mesh, patch: str) -> np.ndarray:
-    """Numbers of the cells behind a patch : int64[count]."""
+    """Indices of the cells next to a patch : int64[count]."""
     return np.unique(mesh.left[mesh.patch(patch)])
 
 
 def place_kind(basin: Basin, patch: str) -> type[Place]:
-    """What a patch is as a place."""
+    """Class of a patch as a place: `MovingWall` or `Place`."""
     stated = basin.patches.get(patch)
     return MovingWall if stated is not None and stated.moves else Place
 
 
 def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, Place]:
-    """Patches as places, at rest; pose : of the body that it rides on, without which none says what it is under."""
-    found = {}
+    """Patches as places, with the water at rest.
+
+    pose : pose of the body that carries the basin; without it, elevation and depth are those of an upright basin
+    """
+    result = {}
     for patch in patch_names(mesh):
         rest = basin.own.rest(basin, lambda shape: means(samples(shape, mesh)), behind(mesh, patch), mesh.area)
         if basin.on is not None:
             rest = on_body(basin, mesh, patch, rest, pose)
         kind = place_kind(basin, patch)
-        found[f"{name}.{patch}"] = kind.model_construct(position=None, basin=name, patch=patch, **rest)
-    return found
+        result[f"{name}.{patch}"] = kind.model_construct(position=None, basin=name, patch=patch, **rest)
+    return result
 
 
 def riding_places(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, Place]:
-    """Patches of basins that ride, where they are on bodies; none of a basin whose formulas are at fault."""
-    found: dict[str, Place] = {}
+    """Patches of basins on bodies as places; basins with faulty formulas are left out."""
+    result: dict[str, Place] = {}
     for name, mesh in meshes.items():
         if nodes[name].on is not None:
             with suppress(ValueError):
-                found |= places(name, nodes[name], mesh)
-    return found
+                result |= places(name, nodes[name], mesh)
+    return result
 
 
-def _patches(basin: Basin, known: tuple[str, ...], wanted: str) -> str:
-    """What patches there are, or how a file comes to have some."""
+def _patches(basin: Basin, known: tuple[str, ...], name: str) -> str:
+    """List the patches of a mesh, or explain how to name them in a mesh file."""
     if known or basin.mesh is None:
         return f"patches are {listing(known) or 'none'}"
-    name = Path(basin.mesh.file).name
-    return f"{name} names no groups of lines; Gmsh does by Physical Curve({show(wanted)}) = {{1, 2}};"
+    file = Path(basin.mesh.file).name
+    return f"{file} names no groups of lines; Gmsh does by Physical Curve({show(name)}) = {{1, 2}};"
 
 
 def misfits(
     nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any, times: tuple, all_nodes: Any
 ) -> Found:
-    """Faults of patches, and of what basins do not go with; times : of start and end [s].
+    """Faults of basins: density law, patches, moving walls, formulas.
 
-    all_nodes : names of all, also of those at fault themselves
+    times : start and end [s]; all_nodes : names of all nodes, also of faulty ones
     """
-    found = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
+    pools = {name: node for name, node in nodes.items() if isinstance(node, Basin)}
     joined = {place for link in links.values() for place in link.ports.values()}
-    for name, basin in found.items():
+    for name, basin in pools.items():
         key = ("nodes", name)
         own = basin.own
         if fluid is not None and not own.goes(fluid.law):
-            wanted = named(lambda law, own=own: own.goes(law.name))
-            yield ("fluid", "law"), f"{show(fluid.law)} does not go with {own.described}; wanted {wanted}"
+            laws = named(lambda law, own=own: own.goes(law.name))
+            yield ("fluid", "law"), f"{show(fluid.law)} does not apply to {own.described}; expected {laws}"
         yield from riding.misfits(name, basin, nodes, all_nodes)
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
         yield from walls.misfits(name, basin, meshes[name], nodes, joined, times, all_nodes)
-        for patch, one in basin.patches.items():
+        for patch, options in basin.patches.items():
             if patch not in known:
                 yield (*key, "patches", patch), f"the mesh has no such patch; {_patches(basin, known, patch)}"
             elif f"{name}.{patch}" in joined and not own.joined:
-                yield (*key, "patches", patch), "a link joins here, but what flows is given by velocity"
-            elif f"{name}.{patch}" in joined and (one.boundary or one.impedance) is not None:
-                what = "boundary" if one.boundary else "impedance"
-                yield (*key, "patches", patch, what), "a link joins here, and the patch is its boundary; leave it out"
-            if one.impedance is not None and not own.echoes:
-                yield (*key, "patches", patch, "impedance"), f"means nothing to physics {show(basin.physics)}"
+                yield (*key, "patches", patch), "a link joins here, but the flow is given by velocity"
+            elif f"{name}.{patch}" in joined and (options.boundary or options.impedance) is not None:
+                key_name = "boundary" if options.boundary else "impedance"
+                yield (
+                    (*key, "patches", patch, key_name),
+                    "a link joins here and is the boundary of the patch; leave this key out",
+                )
+            if options.impedance is not None and not own.echoes:
+                yield (*key, "patches", patch, "impedance"), f"does not apply to physics {show(basin.physics)}"
         shapes = [*own.shapes(basin, meshes[name])]
         if basin.start is not None:
-            shapes += [(("start", what), getattr(basin.start, what), None) for what in StartOfFields.model_fields]
+            shapes += [
+                (("start", key_name), getattr(basin.start, key_name), None) for key_name in StartOfFields.model_fields
+            ]
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
-                yield (*key, "start", other), f"means nothing to physics {show(basin.physics)}"
+                yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}"
         shapes += [(("scalars", scalar), shape, None) for scalar, shape in basin.scalars.items()]
         for below, shape, points in shapes:
             try:

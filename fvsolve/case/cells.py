@@ -1,4 +1,4 @@
-"""What formulas are in the cells of a mesh. Knows points; knows no basin."""
+"""Samples and means of formulas in the cells of a mesh."""
 
 from __future__ import annotations
 
@@ -12,17 +12,20 @@ from fvsolve.parts.formula import Formula
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
 
-# Three Gauss points along either side of a rectangle, of sqrt(3 / 5) of half of it: centre, corners, sides.
+# Three Gauss points in each direction of a rectangle, at 0 and +-sqrt(3 / 5) of its half: centre, corners, sides.
 GAUSS = (0, 0), (-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, -1), (0, 1)
 
 
 def is_grid(mesh: Mesh) -> bool:
-    """Whether cells are all of a rectangle."""
+    """True if the cells fill a rectangular grid."""
     return mesh.grid is not None and len(mesh.cells) == mesh.grid.nx * mesh.grid.ny
 
 
 def samples(shape: Formula | None, mesh: Mesh) -> np.ndarray:
-    """A formula in cells, centres first: on grids at nine Gauss points, elsewhere there alone : float64[points, n]."""
+    """Values of a formula in the cells : float64[points, n].
+
+    On grids there are nine Gauss points a cell, the centre first; on other meshes only the centre.
+    """
     x, y = np.ascontiguousarray(mesh.centre.T)
     if not is_grid(mesh):
         places = np.array([x]), np.array([y])
@@ -32,14 +35,17 @@ def samples(shape: Formula | None, mesh: Mesh) -> np.ndarray:
         places = x + to[:, 0] * wide, y + to[:, 1] * high
     if shape is None:
         return np.zeros(places[0].shape)
-    return shape.at(*(one.ravel() for one in places)).reshape(places[0].shape)
+    return shape.at(*(coordinate.ravel() for coordinate in places)).reshape(places[0].shape)
 
 
-def means(found: np.ndarray) -> np.ndarray:
-    """Means over cells of `samples`, in sums that mirrored and turned cells share; what is even stays so to the bit."""
-    if len(found) == 1:
-        return found[0]
-    corners = (found[1] + found[2]) + (found[3] + found[4])
-    sides = (found[5] + found[6]) + (found[7] + found[8])
-    mean = (25.0 * corners + (40.0 * sides + 64.0 * found[0])) / 324.0
-    return np.where(np.ptp(found, axis=0) > 0.0, mean, found[0])
+def means(values: np.ndarray) -> np.ndarray:
+    """Means over cells of `samples` : float64[n]. Constant samples keep their value to the bit.
+
+    The order of the sums keeps the result the same on mirrored and rotated cells.
+    """
+    if len(values) == 1:
+        return values[0]
+    corners = (values[1] + values[2]) + (values[3] + values[4])
+    sides = (values[5] + values[6]) + (values[7] + values[8])
+    mean = (25.0 * corners + (40.0 * sides + 64.0 * values[0])) / 324.0
+    return np.where(np.ptp(values, axis=0) > 0.0, mean, values[0])

@@ -1,4 +1,4 @@
-"""What moving a key of a case asks of its model: tables, another start, another model. Knows no model."""
+"""Effect of a changed key on the model: new tables, a new start, or a new model."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ CLASSES = (VALUE, PROFILE, SHAPE)
 
 
 def changes(case: Case, key: str) -> str:
-    """What moving the number or word under a key, such as "links.gate.area", asks: "value", "profile" or "shape".
+    """Effect of changing the value under a key such as "links.gate.area": "value", "profile" or "shape".
 
     value : other numbers in the tables of the model; state, flows and pressures at the start are the same to the bit
     profile : another start too, in tables of the same sizes, names and whole numbers
     shape : another model
-    Between numbers that mean the same: no demand and no loss are none of their kind. Raises FvsolveError where the case
-    has no such key.
+    This holds between values of the same meaning: zero demand or zero loss may be a special case. Raises FvsolveError
+    for an unknown key.
     """
     keys = dotted(key)
     own = classed(case, keys)
@@ -44,36 +44,38 @@ def changes(case: Case, key: str) -> str:
 
 
 def classed(case: Case, keys: tuple[Any, ...]) -> str:
-    """The class of a key as this case has it."""
-    found, links = declared(case.raw, keys).changes, [link_said(case.raw, name) for name in case.raw.get("links", {})]
+    """Class of a key in this case."""
+    result, links = declared(case.raw, keys).changes, [link_said(case.raw, name) for name in case.raw.get("links", {})]
     if keys[0] == "links" and keys[2:3] == ("length",) and keys[1] in pieces_of(case.raw):
-        return SHAPE  # its pieces by chainage get other cells
-    if found == COUNTED:
-        found = SHAPE if any(one["type"] == "pipe" and "cells" not in one for one in links) else PROFILE
-    unsteady = any(one.get("friction", {}).get("model") == "unsteady" for one in links)
-    if found == VALUE and case.settles and keys[0] in ("nodes", "links"):
-        found = PROFILE  # it may be what balances
-    return SHAPE if found == PROFILE and unsteady else found  # its terms are chosen by the start
+        return SHAPE  # its pieces between chainages get other cells
+    if result == COUNTED:
+        result = SHAPE if any(link["type"] == "pipe" and "cells" not in link for link in links) else PROFILE
+    unsteady = any(link.get("friction", {}).get("model") == "unsteady" for link in links)
+    if result == VALUE and case.settles and keys[0] in ("nodes", "links"):
+        result = PROFILE  # it may change the equilibrium
+    return SHAPE if result == PROFILE and unsteady else result  # the start chooses the terms of unsteady friction
 
 
 def declared(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
-    """What a key may be, as its part declares it; of a key below one that says all, what that one may be."""
-    found: Value | None = Keys(known(raw))
+    """Declaration of a key by its part; for a key inside a value without keys, the declaration of that value."""
+    result: Value | None = Keys(known(raw))
     keys = own_keys(raw, keys)
     for key in (*keys[:2], *keys[4:]) if keys[2:3] == ("pieces",) else keys:
-        outer = found
+        outer = result
         try:
-            found = outer.below(key)
+            result = outer.below(key)
         except KeyError:
-            raise FvsolveError(f"no key {show('.'.join(keys))}; wanted one of the case, such as numerics.end") from None
-        if found is None:
+            raise FvsolveError(
+                f"no key {show('.'.join(keys))}; expected a key of the case, such as numerics.end"
+            ) from None
+        if result is None:
             return outer
-    return found
+    return result
 
 
 @dataclass(frozen=True)
 class Keys(Value):
-    """A table of keys with a value each."""
+    """Table of keys with a value declaration each."""
 
     values: dict[str, Value]
 
@@ -82,20 +84,20 @@ class Keys(Value):
 
 
 def known(raw: dict[str, Any]) -> dict[str, Value]:
-    """What each key of a case may be; where parts have names of their own, those of this one."""
+    """Declaration of each key of a case, with the names of its parts."""
     signals = Keys(dict.fromkeys(raw.get("signals", {}), Scheduled("number")))
-    found = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": signals}
-    found |= {name: Inside(model) for name, model in TABLES.items()}
+    result = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": signals}
+    result |= {name: Inside(model) for name, model in TABLES.items()}
     for group, kinds in KINDS.items():
         parts = raw.get(group, {}).items()
-        found[group] = Keys({name: Keys({"type": Value(), **kinds[one["type"]].values()}) for name, one in parts})
-    found["defaults"] = Keys({kind: Keys(defaults.values(kind)) for kind in defaults.KINDS})
+        result[group] = Keys({name: Keys({"type": Value(), **kinds[entry["type"]].values()}) for name, entry in parts})
+    result["defaults"] = Keys({kind: Keys(defaults.values(kind)) for kind in defaults.KINDS})
     for group, name, _ in placed(raw):
         where = {"on": Text(), "at": Quantity("length", changes=SHAPE)}
-        found[group] = Keys({**found[group].values, name: Keys({**found[group].values[name].values, **where})})
-    said = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
-    said |= {"routes": Route.values(), "limits": values_of(limit_keys("pressure", "pressure"))}
-    return found | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(one))) for group, one in said.items()}
+        result[group] = Keys({**result[group].values, name: Keys({**result[group].values[name].values, **where})})
+    named = {"expect": values_of(expect_keys("number")), "compare": values_of(COMPARE_KEYS), "scalars": Scalar.values()}
+    named |= {"routes": Route.values(), "limits": values_of(limit_keys("pressure", "pressure"))}
+    return result | {group: Keys(dict.fromkeys(raw.get(group, {}), Keys(entry))) for group, entry in named.items()}
 
 
 def values_of(keys: dict[str, tuple[Value, Any]]) -> dict[str, Value]:
@@ -103,9 +105,9 @@ def values_of(keys: dict[str, tuple[Value, Any]]) -> dict[str, Value]:
 
 
 def followers(table: Any, signal: str, keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
-    """Keys of all that a signal drives."""
+    """Key paths of everything that a signal drives."""
     if isinstance(table, dict):
         if table.get("signal") == signal and keys[:1] != ("signals",):
             yield keys
-        for key, one in table.items():
-            yield from followers(one, signal, (*keys, key))
+        for key, inner in table.items():
+            yield from followers(inner, signal, (*keys, key))

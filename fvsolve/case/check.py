@@ -1,4 +1,4 @@
-"""What must hold between the parts of a case. Knows the network; each part has checked itself."""
+"""Checks between the parts of a case; each part has checked itself."""
 
 from __future__ import annotations
 
@@ -23,58 +23,58 @@ Found = Iterator[tuple[tuple, str]]
 
 
 def network(table: dict[str, Any]) -> Found:
-    """Faults of the incidence list, from names alone: unknown places, loose nodes, islands, nothing fixed."""
+    """Faults of the incidence list, from names alone: unknown places, loose nodes, islands, no fixed pressure."""
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
     gone = [name for name in (*nodes, *links) if lost(name, nodes, links)]
     places = _places(nodes, links, gone)
     ends: dict[str, list[str]] = {}
-    unjoined = 0  # ports that join no place that is known
+    unjoined = 0  # ports that join no known place
     for name, link in links.items():
-        found, fits = _ports(_dict(link)), True
-        for keys, place, domain in found:
+        ports, fits = _ports(_dict(link)), True
+        for keys, place, domain in ports:
             if isinstance(place, str) and place not in places:
                 yield ("links", name, *keys), _unknown_place(place, places, nodes, links)
             elif isinstance(place, str) and None not in (domain, places[place]) and not _fits(places[place], domain):
                 fits = False
                 yield ("links", name, *keys), _unlike_place(place, domain, places, nodes, _dict(link))
-        sorts = {places.get(place): (keys, place) for keys, place, _ in found if isinstance(place, str)}
+        sorts = {places.get(place): (keys, place) for keys, place, _ in ports if isinstance(place, str)}
         if fits and {"translational", "spatial"} <= set(sorts):
             keys, place = sorts["translational"]
-            text = f"{show(place)} is a place on the axis of masses, {show(sorts['spatial'][1])} one in space"
-            yield ("links", name, *keys), f"{text}; wanted both of one kind, of a frame one of its points"
-        joined = [place for _, place, _ in found if isinstance(place, str)]
-        for k, (keys, place, _) in enumerate(found):
-            if isinstance(place, str) and place in [other for _, other, _ in found[:k]]:
+            text = f"{show(place)} is a place on the axis of masses, {show(sorts['spatial'][1])} a place in space"
+            yield ("links", name, *keys), f"{text}; expected two places of the same kind (of a frame, a point of it)"
+        joined = [place for _, place, _ in ports if isinstance(place, str)]
+        for k, (keys, place, _) in enumerate(ports):
+            if isinstance(place, str) and place in [other for _, other, _ in ports[:k]]:
                 yield ("links", name, *keys), f"joins {show(place)} to itself"
-        unjoined += len(found) - len({*joined} & places.keys())
+        unjoined += len(ports) - len({*joined} & places.keys())
         ends[name] = [place for place in [*joined, *_owned(name, link)] if place in places]
     for group in ("nodes", "links"):
         kinds = [_dict(node).get("type") for node in nodes.values()]
         alone = "body" in kinds or any(own_places(name, node) is not None for name, node in nodes.items())
         if table.get(group) == {} and not alone:
-            yield (group,), "is empty; wanted two places and a link between them at least"
+            yield (group,), "is empty; expected at least two places and a link between them"
     tied = {name: _tied(name, node, places) for name, node in nodes.items()}
     hanging = _hanging(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
     loose = [name for name, node in nodes.items() if name not in gone and own_places(name, node) is None
              and not touched & {name, *points_of(name, node)}]  # fmt: skip
-    if len(loose) > unjoined:  # else they may be what ports at fault should join
+    if len(loose) > unjoined:  # otherwise faulty ports may be meant to join them
         yield from ((("nodes", name), "no link touches it") for name in loose)
     if unjoined or gone:
-        return  # what hangs together is not known
+        return  # the connections are not known
     own = {name: [name, *ties] if name in places else ties for name, ties in tied.items() if ties}
     own |= {f"{name}.": [name, *points] for name, node in nodes.items() if (points := points_of(name, node))}
     own |= {f"{k}..": group for k, group in enumerate(hanging)}
     islands = _islands(own | {f"links.{name}": places for name, places in ends.items()})
     if len(islands) > 1:
         sizes = " | ".join(listing(island, 6) for island in islands)
-        yield ("links",), f"disconnected network of {len(islands)} pieces: {sizes}; write a case for each"
+        yield ("links",), f"disconnected network of {len(islands)} parts: {sizes}; write a case for each"
     for island in islands:
         wet = [name for name in island if places[name] in ("hydraulic", None)]
         kinds = [_kind("nodes", nodes[name]) if name in nodes else Chamber for name in wet]
         if kinds and all(kind is not None and not kind.fixes_pressure for kind in kinds):
             where = "" if len(islands) == 1 else f" of {listing(island, 6)}"
-            yield ("nodes",), f"nothing fixes the pressure{where}; wanted a reservoir, tank or chamber"
+            yield ("nodes",), f"nothing fixes the pressure{where}; expected a reservoir, tank or chamber"
     yield from _rigid_junctions(nodes, links, ends)
 
 
@@ -89,13 +89,13 @@ def parts(
     meshes: dict[str, Any],
     lumped: dict[str, Any],
 ) -> Found:
-    """Faults of elevations, and what each part finds wrong beside the others."""
+    """Faults of elevations, of bodies, and of each part in the context of the others."""
     poses = bodies.poses(nodes, start)
     named = nodes if raw is None else _dict(raw.table.get("nodes"))
     high = {name: node for name, node in nodes.items() if riding_networks.has_height(node, poses)}
-    said = {} if raw is None else _dict(raw.table.get("links"))
+    raw_links = {} if raw is None else _dict(raw.table.get("links"))
     lends = any("profile" in _dict(link) or kind_name(link, "links") is None or not {*_ends(link)} <= named.keys()
-                for name, link in said.items() if name not in links or "profile" in _dict(link))  # fmt: skip
+                for name, link in raw_links.items() if name not in links or "profile" in _dict(link))  # fmt: skip
     yield from _elevations({name: riding_networks.standing(node, poses) for name, node in high.items()}, links, lends)
 
     def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Found:
@@ -112,8 +112,8 @@ def parts(
         yield from sloshing.weightless(nodes, gravity)
         yield from riding.overturned(nodes, poses)
     around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
-    for group, found in (("links", links), ("nodes", nodes)):
-        for name, part in found.items():
+    for group, members in (("links", links), ("nodes", nodes)):
+        for name, part in members.items():
             for keys, text in part.faults(name, around):
                 yield keys[1:] if keys[:1] == (ROOT,) else (group, name, *keys), text
 
@@ -122,9 +122,9 @@ RIDES = ("on", "at", "attitude")  # keys of places on bodies
 
 
 def in_space(part: Any) -> bool:
-    """Whether a part has a place in space, or rides: of a case without any there is nothing to be wrong in space."""
-    said = vars(part)
-    return "points" in said or bool(said.get("route")) or any(said.get(key) is not None for key in RIDES)
+    """True if a part has a place in space or on a body; a case without such parts has no faults in space."""
+    values = vars(part)
+    return "points" in values or bool(values.get("route")) or any(values.get(key) is not None for key in RIDES)
 
 
 def numerics(numerics: Numerics, has_cells: bool) -> Found:
@@ -134,14 +134,17 @@ def numerics(numerics: Numerics, has_cells: bool) -> Found:
     method = METHODS.get(numerics.method)
     if numerics.courant is not None and not has_cells:
         or_rtol = " or rtol" if method is None or method.adaptive else ""
-        yield ("numerics", "courant"), f"no pipe, so no cell to cross; give step{or_rtol}"
+        yield ("numerics", "courant"), f"needs cells, and the case has no pipe or basin; give step{or_rtol}"
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if numerics.step is not None and not numerics.step > least:
-        yield ("numerics", "step"), f"{numerics.step:g} s would not move the time; wanted more than {least:.2g} s"
+        yield (
+            ("numerics", "step"),
+            f"{numerics.step:g} s is below the rounding of the time; expected more than {least:.2g} s",
+        )
     if numerics.rtol is not None and numerics.rtol < LEAST_TOLERANCE:
-        yield ("numerics", "rtol"), f"{numerics.rtol:g} is below rounding; wanted {LEAST_TOLERANCE:g} or more"
+        yield ("numerics", "rtol"), f"{numerics.rtol:g} is below rounding; expected {LEAST_TOLERANCE:g} or more"
     if numerics.method == AUTO and not numerics.courant is numerics.step is None:
-        yield ("numerics", "method"), 'method "auto" goes by the error of its steps; give rtol, not courant or step'
+        yield ("numerics", "method"), 'method "auto" controls the error of its steps; give rtol, not courant or step'
     by_error = numerics.rtol is not None or (not has_cells and numerics.courant is numerics.step is None)
     if by_error and method is not None and not method.adaptive:
         able = " or ".join(dict.fromkeys(show(other.name) for other in METHODS.values() if other.adaptive))
@@ -150,15 +153,15 @@ def numerics(numerics: Numerics, has_cells: bool) -> Found:
 
 
 def follows_cavities(fluid: FluidSpec | None, has_cells: bool) -> bool:
-    """Whether cavities are followed in pipes; fluid : None where it is at fault."""
+    """True if cavities are solved in pipes; fluid : None if it is faulty."""
     return has_cells and fluid is not None and bool(fluid.cavitation)
 
 
 def cavities(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) -> Found:
-    """Faults of schemes that cannot follow the edge of a cavity."""
+    """Faults of schemes that cannot resolve the edge of a cavity."""
     if follows_cavities(fluid, has_cells) and numerics.scheme not in (None, *CAVITY_SCHEMES):
         able = " or ".join(map(show, CAVITY_SCHEMES))
-        yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; wanted {able}"
+        yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; expected {able}"
 
 
 def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:
@@ -178,83 +181,83 @@ def _kind(group: str, part: Any) -> Any:
 
 
 def _owned(name: str, link: Any) -> dict[str, str]:
-    """Places that a link owns, as others name them -> domain."""
+    """Full name -> domain of the places that a link owns."""
     kind = _kind("links", link)
     return {f"{name}.{place}": domain for place, domain in kind.owns.items()} if kind else {}
 
 
 def own_places(name: str, node: Any) -> list[str] | None:
-    """Places in a node's stead, as others name them; None where it is a place itself."""
+    """Full names of the places that replace a node; None if the node is a place itself."""
     kind = _kind("nodes", node)
     own = kind.own_places(_dict(node)) if kind else None
-    return None if own is None else [f"{name}.{one}" for one in own]
+    return None if own is None else [f"{name}.{place}" for place in own]
 
 
 def kind_name(part: Any, group: str = "nodes") -> str | None:
-    """The type of a part of the file; None where it is at fault."""
+    """Type of a raw part; None if it is unknown."""
     kind = _kind(group, part)
     return None if kind is None else kind.kind
 
 
 def has_mesh(node: Any) -> bool:
-    """Whether a node of a file is a basin whose patches are those of a mesh in a file of its own."""
+    """True if a raw node is a basin with its mesh in a file."""
     return _dict(node).get("type") == "basin" and "mesh" in node
 
 
 def named_of(name: str, links: dict[str, Any]) -> list[str]:
-    """Places of a part that links of the file name."""
+    """Places of a part that raw links name."""
     places = [place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)]
     return [place.partition(".")[2] for place in places if place.startswith(f"{name}.")]
 
 
 def _ends(link: Any) -> list[str]:
-    """Places that a link of the file goes from and to, those that are names."""
+    """Names in the from and to of a raw link."""
     return [str(_dict(link).get(key)) for key in ("from", "to")]
 
 
 def _tied(name: str, node: Any, places: dict[str, Any]) -> list[str]:
-    """Places that hang together by a node alone: those in its stead, and the bodies that it goes with."""
+    """Places that a node joins without a link: its own places, and the bodies that carry it."""
     own, kind = own_places(name, node) or [], _kind("nodes", node)
     return own + [body for body in (kind.bodies(_dict(node)) if kind else ()) if body in places]
 
 
 def points_of(name: str, node: Any) -> list[str]:
-    """Points of a node, as others name them."""
+    """Full names of the points of a raw node."""
     kind = _kind("nodes", node)
-    return [f"{name}.{one}" for one in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
+    return [f"{name}.{point}" for point in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
 
 
 def _hanging(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
-    """Of every body what it is joined to, and of every frame with points the world."""
-    found = []
+    """Pairs of each body and its carrier, and of each frame with points and the world."""
+    pairs = []
     for name, node in nodes.items():
         kind, on = _dict(node).get("type"), _dict(_dict(node).get("joint")).get("on")
         if kind == "body":
-            found.append([name, on] if isinstance(on, str) and on in places else [name, WORLD])
+            pairs.append([name, on] if isinstance(on, str) and on in places else [name, WORLD])
         elif kind == "frame" and points_of(name, node):
-            found.append([points_of(name, node)[0], WORLD])
-    return found
+            pairs.append([points_of(name, node)[0], WORLD])
+    return pairs
 
 
-def _fits(domain: str, wanted: str) -> bool:
-    """Whether a place of a domain suits a port that takes one of some."""
-    return domain in wanted.split(" or ")
+def _fits(domain: str, domains: str) -> bool:
+    """True if the domain of a place suits a port; `domains` lists those of the port, joined by " or "."""
+    return domain in domains.split(" or ")
 
 
 def _places(nodes: dict[str, Any], links: dict[str, Any], gone: list[str]) -> dict[str, str | None]:
-    """Every place -> its domain, None where its type is at fault; gone : parts whose places cannot be told."""
-    found: dict[str, str | None] = {}
+    """Domain of every place, None if its type is faulty; gone : parts whose places are unknown."""
+    result: dict[str, str | None] = {}
     for name, node in nodes.items():
         kind, own = _kind("nodes", node), own_places(name, node)
-        found |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
-        found |= dict.fromkeys(points_of(name, node), "spatial")
-    found |= {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
+        result |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
+        result |= dict.fromkeys(points_of(name, node), "spatial")
+    result |= {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
     named = [f"{name}.{place}" for name in gone for place in named_of(name, links)]
-    return dict.fromkeys(named, None) | found
+    return dict.fromkeys(named, None) | result
 
 
 def lost(name: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
-    """Whether places of a part cannot be told, as it is at fault itself."""
+    """True if the places of a part are unknown because the part is faulty."""
     for group, parts in (("nodes", nodes), ("links", links)):
         if name in parts and _kind(group, parts[name]) is None:
             return True
@@ -263,13 +266,13 @@ def lost(name: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
 
 
 def _ports(link: dict[str, Any]) -> list[tuple[tuple, Any, str | None]]:
-    """(keys, place as the file says it, domain it must have) of every port of a link that is stated."""
+    """(keys, raw place, required domain) of every stated port of a link."""
     kind = _kind("links", link)
     if kind is None:
         return [((key,), link.get(key), None) for key in ("from", "to")]
     given, below = (_dict(link.get("ports")), ("ports",)) if "ports" in kind.keys() else (link, ())
-    wanted = [port for port in kind.joins if port in given or port not in kind.may_lack]
-    return [((*below, port), given.get(port), kind.joins[port]) for port in wanted]
+    ports = [port for port in kind.joins if port in given or port not in kind.may_lack]
+    return [((*below, port), given.get(port), kind.joins[port]) for port in ports]
 
 
 def _unknown_place(place: str, places: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any]) -> str:
@@ -289,14 +292,16 @@ def chambers_of(link: Any) -> list[str]:
 def _unlike_place(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
     owned = "shaft" if places[place] == "rotational" else "chamber"
     owned = "point" if places[place] == "spatial" else owned
-    what = f"is a {nodes[place]['type']}" if place in nodes else f"is a {owned}"
+    state = f"is a {nodes[place]['type']}" if place in nodes else f"is a {owned}"
     alike = [name for name, other in places.items() if _fits(other or "", domain)]
     has = f"; {domain} places are {listing(alike)}" if alike else ""
-    return f"{show(place)} {what}, a {places[place]} place, and this port of a {link['type']} a {domain} one{has}"
+    return (
+        f"{show(place)} {state}, a {places[place]} place, and this port of a {link['type']} needs a {domain} place{has}"
+    )
 
 
 def _islands(ends: dict[str, list[str]]) -> list[list[str]]:
-    """Nodes that hang together by links, in order of appearance."""
+    """Groups of nodes connected by links, in order of appearance."""
     root: dict[str, str] = {}
 
     def find(name: str) -> str:
@@ -321,8 +326,8 @@ def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[st
             touching.setdefault(place, set()).add(str(_dict(links[link]).get("type")))
     for name, node in nodes.items():
         if _dict(node).get("type") in ("junction", "inflow") and touching.get(name) == {"rigid-column"}:
-            fixed = ", as above its required_pressure it takes the same at any" if "required_pressure" in node else ""
-            message = f"only rigid columns meet here, so nothing sets its pressure{fixed}; give it a chamber volume"
+            fixed = ", since its demand is constant above its required_pressure" if "required_pressure" in node else ""
+            message = f"only rigid columns join here, so nothing sets its pressure{fixed}; use a chamber with a volume"
             yield ("nodes", name), message
 
 
@@ -331,9 +336,9 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Fo
     wet |= {("links", name): link for name, link in links.items() if chambers_of(link)}
     stated = dict.fromkeys(name for (_, name), part in wet.items() if part.elevation is not None)
     for (group, name), part in wet.items():
-        elsewhere = getattr(part, "head", None) is not None or getattr(part, "on", None) is not None
-        if stated and name not in stated and not elsewhere and not lends:
-            yield (group, name), f"elevation is missing: {listing(stated)} state one, so all must, or none"
+        derived = getattr(part, "head", None) is not None or getattr(part, "on", None) is not None
+        if stated and name not in stated and not derived and not lends:
+            yield (group, name), f"elevation is missing, but stated for {listing(stated)}; expected for all or for none"
     heights_of = {name: node.elevation for name, node in nodes.items()}
     heights_of |= {f"{name}.{place}": link.elevation for name, link in links.items() for place in chambers_of(link)}
     for name, link in links.items():
@@ -345,7 +350,7 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Fo
             climb = abs(heights[1] - heights[0])
             yield (
                 ("links", name, "length"),
-                f"{length:g} m is too short: its ends lie {climb:g} m apart in height",
+                f"{length:g} m is too short: its ends differ by {climb:g} m in elevation",
             )
 
 
@@ -360,7 +365,7 @@ def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Found:
 
 
 def _said(keys: tuple, index: int, raw: Raw) -> tuple[Any, tuple]:
-    """What the file says of one value of a schedule, and where."""
+    """Value that the file has for an entry of a schedule, and its key path."""
     given = raw.get(keys)
     if isinstance(given, dict) and "signal" in given:
         keys = ("signals", given["signal"])

@@ -1,4 +1,4 @@
-"""What a case claims and is laid beside: `[expect]`, `[compare]`. Knows their wording; knows no result."""
+"""Claims and measured series of a case: `[expect]`, `[compare]`."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ _BARE = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
 @dataclass(frozen=True)
 class Expect:
-    """A claim: a function (max, min, mean, final, at) of a probe, or the greatest or least of a whole part or route, is
-    `value` [SI], within tolerance."""
+    """Claim: a function of a probe (max, min, mean, final, at), or an extreme of a part or route, equals `value`.
+
+    value : expected value [SI], within rtol, atol
+    """
 
     text: str
     function: str
@@ -39,13 +41,13 @@ class Expect:
     atol: float
 
     def table(self) -> dict[str, Any]:
-        """What the file would say."""
+        """Keys of the claim as in a file."""
         return {"value": self.value, "rtol": self.rtol, "atol": self.atol}
 
 
 @dataclass(frozen=True, eq=False)
 class Compare:
-    """A measured series laid over a probe: columns by header, shift to be added to its times [s].
+    """Measured series for comparison with a probe: columns by header, shift to be added to its times [s].
 
     t, v : float64[n]  times as measured, without shift [s], and values [SI, pressures absolute]
     """
@@ -60,52 +62,52 @@ class Compare:
     v: np.ndarray = field(repr=False)
 
     def table(self) -> dict[str, Any]:
-        """What the file would say."""
+        """Keys of the series as in a file."""
         return {"file": self.file, "time": self.time, "value": self.value, "shift": self.shift}
 
 
 def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: Setting) -> Expect | None:
-    """One line of `[expect]`; None where the part of its probe is at fault itself. Raises Misfit."""
+    """Read one entry of `[expect]`; None if the part of its probe is faulty. Raises ValueFault."""
     faults, named = [], (None, None, None, None)
     try:
         named = read_claim(claim, kinds, routes, setting)
     except ValueError as error:
         faults.append(((), str(error)))
     function, probe, extent, time = named
-    read = probe or extent
-    keys = expect_keys("number" if read is None else read.dimension)
-    if read is None:
+    target = probe or extent
+    keys = expect_keys("number" if target is None else target.dimension)
+    if target is None:
         keys |= {"value": (Anything(), NEEDED), "atol": (Anything(), 0.0)}
     try:
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table; wanted one such as {{ value = 1.0, rtol = 1e-2 }}")
+            raise ValueError(f"{show(given)} is not a table; expected for example {{ value = 1.0, rtol = 1e-2 }}")
         if "rtol" not in given and "atol" not in given:
-            faults.append(((), "no tolerance; wanted rtol, atol or both"))
-        found = read_keys(given, keys, setting)
+            faults.append(((), "tolerance is missing; expected rtol, atol or both"))
+        values = read_keys(given, keys, setting)
     except ValueError as error:
         raise Misfit(faults + getattr(error, "faults", [((), str(error))])) from None
     if faults:
         raise Misfit(faults)
-    return None if read is None else Expect(claim, function, probe, extent, time, **found)
+    return None if target is None else Expect(claim, function, probe, extent, time, **values)
 
 
 def read_claim(
     claim: str, kinds: Kinds, routes: Mapping[str, Any], setting: Setting
 ) -> tuple[str, Probe | None, Extent | None, float | None]:
-    """(function, probe, extent, time [s]) that a claim names; neither where the part is at fault itself."""
+    """Return (function, probe, extent, time [s]) of a claim; probe and extent are None if the part is faulty."""
     match = _CLAIM.fullmatch(claim)
     if match is None or match[1] not in FUNCTIONS:
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
-        wanted = "max, min, mean or final(PROBE), at(PROBE, TIME), or greatest or least(PART.QUANTITY)"
-        raise ValueError(f"no such claim; wanted {wanted}{hint}")
+        forms = "max, min, mean or final(PROBE), at(PROBE, TIME), or greatest or least(PART.QUANTITY)"
+        raise ValueError(f"is not a claim; expected {forms}{hint}")
     function, probe_text = match.groups()
     when = None
-    if function == "at":  # the last comma: a point in a basin has one of its own
+    if function == "at":  # split at the last comma: a point in a basin contains a comma
         probe_text, comma, when = map(str.strip, probe_text.rpartition(","))
         if not comma:
-            raise ValueError("wanted at(PROBE, TIME)")
+            raise ValueError("the time is missing; expected at(PROBE, TIME)")
     elif "," in probe_text and "@" not in probe_text:
-        raise ValueError(f"wanted {function}(PROBE)")
+        raise ValueError(f"only at() has a time; expected {function}(PROBE)")
     time = None
     if when is not None:
         given_time = float(when) if _BARE.fullmatch(when) else when.strip("\"'")
@@ -113,13 +115,13 @@ def read_claim(
     if function in WHOLE and "@" not in probe_text:
         on, dot, quantity = probe_text.rpartition(".")
         if not dot:
-            raise ValueError(f"wanted {function}(PART.QUANTITY)")
+            raise ValueError(f"the quantity is missing; expected {function}(PART.QUANTITY)")
         return function, None, read_extent(on, quantity, kinds, routes), time
     return function, read_probe(probe_text, kinds), None, time
 
 
 def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:
-    """Keys of a claim on a probe of that dimension; a pressure's tolerance is a difference, never gauge."""
+    """Keys of a claim on a probe of that dimension; the tolerance of a pressure is a difference, never gauge."""
     difference = "modulus" if dimension.endswith("pressure") else dimension
     return {
         "value": (Quantity(dimension, changes=VALUE), NEEDED),
@@ -129,23 +131,23 @@ def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:
 
 
 COMPARE_KEYS = {
-    "file": (Text("a CSV file with a header, relative to the case", VALUE), NEEDED),
-    "time": (Text("header of the times, the first column if left out", VALUE), None),
-    "value": (Text("header of the values, the second column if left out", VALUE), None),
-    "shift": (Quantity("time", about="added to its times [s]", changes=VALUE), 0.0),
+    "file": (Text("CSV file with a header; path relative to the case file", VALUE), NEEDED),
+    "time": (Text("header of the column of times; the first column if left out", VALUE), None),
+    "value": (Text("header of the column of values; the second column if left out", VALUE), None),
+    "shift": (Quantity("time", about="time shift, added to the times of the file [s]", changes=VALUE), 0.0),
 }
 
 
 def read_compare(probe: Probe | None, given: Any, setting: Setting) -> Compare | None:
-    """One line of `[compare]`; None where its probe is at fault. Raises ValueError."""
+    """Read one entry of `[compare]`; None if its probe is faulty. Raises ValueError."""
     if not isinstance(given, dict):
-        raise ValueError(f'{show(given)} is no table; wanted one such as {{ file = "rig.csv" }}')
-    found = read_keys(given, COMPARE_KEYS, setting)
+        raise ValueError(f'{show(given)} is not a table; expected for example {{ file = "rig.csv" }}')
+    values = read_keys(given, COMPARE_KEYS, setting)
     try:
-        path = find_file(found["file"], setting)
+        path = find_file(values["file"], setting)
         if probe is None:
             return None
-        t, v, *headers = read_columns(path, found["time"], found["value"], probe.dimension, setting)
+        t, v, *headers = read_columns(path, values["time"], values["value"], probe.dimension, setting)
     except ValueError as error:
         raise Misfit([(("file",), str(error))]) from None
-    return Compare(probe, copy_name(path, setting), path, *headers, found["shift"], t, v)
+    return Compare(probe, copy_name(path, setting), path, *headers, values["shift"], t, v)

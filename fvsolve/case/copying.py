@@ -1,4 +1,4 @@
-"""A shipped case and all that it uses, copied beside each other. Knows files."""
+"""Copies a shipped case with all files that it uses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 
 
 def copy(name: str, to: Path) -> list[Path]:
-    """Copy a shipped case to `to` and the files it uses beside it; FvsolveError rather than overwrite one."""
+    """Copy a shipped case to `to` and its files beside it. Raises FvsolveError before overwriting a file."""
     if name not in names():
         raise FvsolveError(f"no shipped case {name}{did_you_mean(name, names())}; cases are {listing(names())}")
     if to.is_dir():
@@ -20,13 +20,13 @@ def copy(name: str, to: Path) -> list[Path]:
     source = folder() / f"{name}.toml"
     pairs = [(source, to)]
     pairs += [(Path(path), to.parent / Path(path).absolute().relative_to(folder())) for path in load(source).files]
-    described = to.parent / SCHEMA
+    schema = to.parent / SCHEMA
     pairs = pairs[:1] + [pair for pair in pairs[1:] if not (pair[1].is_file() and cmp(*pair, shallow=False))]
     for _, target in pairs:
         if target.exists():
-            raise FvsolveError(f"{target} exists; state another file: fvsolve new {name} FILE")
-    if (folder() / SCHEMA).is_file() and not described.exists():
-        pairs.append((folder() / SCHEMA, described))
+            raise FvsolveError(f"{target} exists; give another file: fvsolve new {name} FILE")
+    if (folder() / SCHEMA).is_file() and not schema.exists():
+        pairs.append((folder() / SCHEMA, schema))
     for path, target in pairs:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(path, target)

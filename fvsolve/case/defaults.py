@@ -1,4 +1,4 @@
-"""`[defaults.pipe]`: what pipes are that do not say it. Knows which keys stand for others; reads no value."""
+"""`[defaults.pipe]`: keys of pipes that do not state them."""
 
 from __future__ import annotations
 
@@ -11,51 +11,53 @@ from fvsolve.parts.table import at_most_one
 from fvsolve.parts.value import Setting, Value
 from fvsolve.units import show
 
-KINDS = {"pipe": Pipe}  # of links that may have defaults
-OWN = ("from", "to")  # keys that no two parts share
-TOGETHER = ("wall", "friction")  # tables that other keys may complete: read with their part alone
+KINDS = {"pipe": Pipe}  # types of links that may have defaults
+OWN = ("from", "to")  # keys that each part must state itself
+TOGETHER = ("wall", "friction")  # tables that other keys may complete: checked only with their part
 
 
 def values(kind: str) -> dict[str, Value]:
-    """Keys that the defaults of a kind may have."""
+    """Keys that the defaults of a type may have."""
     return {key: value for key, value in KINDS[kind].values().items() if key not in OWN}
 
 
 def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
-    """What a case says of all parts of a kind; nothing where that is no table."""
-    found = table.get("defaults")
-    found = found.get(kind) if isinstance(found, dict) and isinstance(kind, str) and kind in KINDS else None
-    return found if isinstance(found, dict) else {}
+    """Raw defaults of a type of part; empty if they are not a table."""
+    result = table.get("defaults")
+    result = result.get(kind) if isinstance(result, dict) and isinstance(kind, str) and kind in KINDS else None
+    return result if isinstance(result, dict) else {}
 
 
 def filled(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """A part's table with the defaults of its kind: its own keys win, and so do their alternatives."""
-    found = defaults_of(table, given.get("type"))
-    if not found:
+    """Table of a part, completed by the defaults of its type. Its own keys, and alternatives to them, come first."""
+    general = defaults_of(table, given.get("type"))
+    if not general:
         return given
-    known = KINDS[given["type"]].keys()  # others are faults of the defaults alone
-    stated = {key for group in KINDS[given["type"]].alternatives if any(one in given for one in group) for key in group}
-    return {**{key: value for key, value in found.items() if key in known and key not in stated}, **given}
+    known = KINDS[given["type"]].keys()  # unknown keys are reported once, as faults of the defaults
+    stated = {
+        key for group in KINDS[given["type"]].alternatives if any(word in given for word in group) for key in group
+    }
+    return {**{key: value for key, value in general.items() if key in known and key not in stated}, **given}
 
 
 def link_said(table: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """What a case says of a link, its defaults among it; of a piece of a cut pipe what is said of the whole."""
+    """Raw table of a link with its defaults; for a piece of a cut pipe, that of the pipe."""
     return filled(table, table["links"][whole(table, name)])
 
 
 def whole(table: Mapping[str, Any], name: str) -> str:
-    """The link of a file that a link came from: itself, or a pipe that is cut."""
+    """Name in the file of a link: its own, or that of the pipe it is a piece of."""
     return name if name in table.get("links", ()) else name.rpartition("-")[0]
 
 
 def spread(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The same table without defaults, every link as it is with them."""
-    links = {name: filled(table, one) if isinstance(one, dict) else one for name, one in table["links"].items()}
+    """Copy a table with the defaults filled into every link and the table `defaults` removed."""
+    links = {name: filled(table, link) if isinstance(link, dict) else link for name, link in table["links"].items()}
     return {**{key: value for key, value in table.items() if key != "defaults"}, "links": links}
 
 
 def place(table: Mapping[str, Any], keys: tuple) -> tuple:
-    """Where the key of a part stands: among its own, or the defaults."""
+    """Key path at which the key of a part is stated: in the part, or in the defaults."""
     if len(keys) < 3 or keys[0] != "links":
         return keys
     links = table.get("links")
@@ -66,16 +68,19 @@ def place(table: Mapping[str, Any], keys: tuple) -> tuple:
 
 
 def misfits(table: Mapping[str, Any], setting: Setting) -> Iterator[tuple[tuple, str]]:
-    """Faults of the tables themselves, and of values that no part may ever take."""
+    """Faults of the tables of defaults, and of values that are invalid for every part."""
     given = table.get("defaults", {})
     if not isinstance(given, dict):
-        yield ("defaults",), f"{show(given)} is no table; wanted [defaults.pipe]"
+        yield ("defaults",), f"{show(given)} is not a table; expected [defaults.pipe]"
         return
     for kind, keys in given.items():
         if kind not in KINDS:
-            yield ("defaults", kind), f"no defaults of {show(kind)}{did_you_mean(kind, KINDS)}; wanted those of pipe"
+            yield (
+                ("defaults", kind),
+                f"defaults of {show(kind)} are unknown{did_you_mean(kind, KINDS)}; expected defaults of pipe",
+            )
         elif not isinstance(keys, dict):
-            yield ("defaults", kind), f"{show(keys)} is no table; wanted keys of a {kind}"
+            yield ("defaults", kind), f"{show(keys)} is not a table; expected keys of a {kind}"
         else:
             yield from ((("defaults", kind, *below), text) for below, text in _of_keys(kind, keys, setting))
 
@@ -89,10 +94,10 @@ def _of_keys(kind: str, given: dict[str, Any], setting: Setting) -> Iterator[tup
             if key not in TOGETHER:
                 yield from _of_value(key, known[key], value, setting)
         elif key in (*OWN, "type"):
-            yield (key,), f"is each {kind}'s own"
+            yield (key,), f"cannot be a default; each {kind} states its own"
         else:
             hint = KINDS[kind].meant.get(key)
-            near = f"; say {hint}" if hint else did_you_mean(key, known) or f"; keys are {listing(list(known))}"
+            near = f"; use {hint}" if hint else did_you_mean(key, known) or f"; keys are {listing(list(known))}"
             yield (key,), f"unknown key{near}"
 
 

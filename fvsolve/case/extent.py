@@ -1,4 +1,4 @@
-"""Parts and a quantity whose extremes over all steps are kept. Knows how they are named; knows no values."""
+"""Parts and a quantity whose extremes over all steps are recorded."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OF_PRESSURE = {"pressure": "pressure", "gauge_pressure": "gauge_pressure", "head
 
 @dataclass(frozen=True)
 class Extent:
-    """All of `parts`, pairs of group and name, along pipes every cell, end and point of a profile; `quantity` there."""
+    """Quantity of all `parts` (pairs of group and name); on pipes in every cell, at both ends and profile points."""
 
     on: tuple[str, ...]  # as the file names them
     parts: tuple[tuple[str, str], ...]
@@ -26,7 +26,7 @@ class Extent:
     dimension: str
 
     def probes(self, links: Mapping[str, Any]) -> Iterator[Probe]:
-        """What is to be watched for it beside the pressures of cells."""
+        """Probes to follow for the extremes, in addition to the pressures of cells."""
         pressed = self.quantity in OF_PRESSURE
         quantity, dimension = ("pressure", "pressure") if pressed else (self.quantity, self.dimension)
         for group, name in self.parts:
@@ -40,12 +40,12 @@ class Extent:
 
 
 def along(pipe: str, quantity: str, share: float, dimension: str) -> Probe:
-    """A place of a pipe that is watched."""
+    """Probe at a fraction of the length of a pipe, read along a straight line between cells."""
     return Probe(f"links.{pipe}.{quantity}@{share!r}", "links", pipe, quantity, share, dimension, straight=True)
 
 
 def of_profiles(links: Mapping[str, Any]) -> Iterator[Probe]:
-    """Pressures at both ends and at every point of pipes with a profile."""
+    """Pressure probes at both ends and at every point of pipes with a profile."""
     for name, link in links.items():
         if getattr(link, "profile", None) is not None:
             inner = link.profile.distance[1:-1] / link.length
@@ -54,25 +54,27 @@ def of_profiles(links: Mapping[str, Any]) -> Iterator[Probe]:
 
 
 def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> Extent | None:
-    """The extent of names; None where one of them is at fault itself.
+    """Read the extent of names; None if one of the parts is faulty.
 
-    Raises ValueError for names that are none, Misfit (below the key `quantity`) where they have none such.
+    Raises ValueError for unknown names, ValueFault (below the key `quantity`) if a part lacks the quantity.
     """
     names = [given] if isinstance(given, str) else given
-    if not isinstance(names, (list, tuple)) or not names or not all(isinstance(one, str) for one in names):
-        raise ValueError(f'{show(given)} names nothing; wanted a part, a route, "pipes" or "nodes", or a list of such')
+    if not isinstance(names, (list, tuple)) or not names or not all(isinstance(word, str) for word in names):
+        raise ValueError(
+            f'{show(given)} is not a name; expected a part, a route, "pipes" or "nodes", or a list of names'
+        )
     parts: dict[tuple[str, str], None] = {}
     problems, known = [], True
-    for one in names:
+    for word in names:
         try:
-            found = parts_of(one, quantity, kinds, routes)
+            members = parts_of(word, quantity, kinds, routes)
         except Misfit:
             raise
         except ValueError as error:
             problems.append(str(error))
         else:
-            known = known and found is not None
-            parts |= dict.fromkeys(found or ())
+            known = known and members is not None
+            parts |= dict.fromkeys(members or ())
     if problems:
         raise ValueError("; ".join(problems))
     dimensions, lacking = set(), []
@@ -85,56 +87,61 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
     if lacking:
         group, name, known = lacking[0]
         more = f", and {len(lacking) - 1} more" if len(lacking) > 1 else ""
-        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "it has none"
-        text = f"{name}{more} without {show(quantity)}: a {kinds[group][name].kind}; {has}"
+        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "it has no quantities"
+        text = f"{name}{more} has no {show(quantity)}: it is a {kinds[group][name].kind}; {has}"
         raise Misfit([(("quantity",), text)])
     if not known:
         return None
     return Extent(tuple(names), tuple(parts), quantity, dimensions.pop())
 
 
-def parts_of(one: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> list[tuple[str, str]] | None:
-    """Parts that a name stands for; None where it is at fault itself. Raises ValueError where it is none."""
-    group, dot, rest = one.partition(".")
+def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) -> list[tuple[str, str]] | None:
+    """Pairs (group, name) of the parts that a name stands for; None if a part is faulty. Raises ValueError."""
+    group, dot, rest = name.partition(".")
     if dot and group in ("nodes", "links") and rest in kinds[group]:
         return None if kinds[group][rest] is None else [(group, rest)]
-    groups = [group for group in ("nodes", "links") if one in kinds[group]]
+    groups = [group for group in ("nodes", "links") if name in kinds[group]]
     if len(groups) > 1:
-        raise ValueError(f"a node and a link are named {show(one)}; write nodes.{one} or links.{one}")
+        raise ValueError(f"a node and a link are named {show(name)}; write nodes.{name} or links.{name}")
     if groups:
-        return None if kinds[groups[0]][one] is None else [(groups[0], one)]
-    if one in routes:
+        return None if kinds[groups[0]][name] is None else [(groups[0], name)]
+    if name in routes:
         if quantity not in (known := quantities_of(Pipe)):
             has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
-            raise Misfit([(("quantity",), f"{one} without {show(quantity)}: a route; {has}")])
-        return None if routes[one] is None else [("links", pipe) for pipe in routes[one].pipes]
-    if of_uncut(one, kinds) or (one in ALL and None in kinds[ALL[one]].values()):
+            raise Misfit([(("quantity",), f"{name} has no {show(quantity)}: it is a route; {has}")])
+        return None if routes[name] is None else [("links", pipe) for pipe in routes[name].pipes]
+    if of_uncut(name, kinds) or (name in ALL and None in kinds[ALL[name]].values()):
         return None
-    if one in ALL:
-        wanted = (lambda kind: kind is Pipe) if one == "pipes" else (lambda kind: judged(kind, quantity))
-        found = [(ALL[one], name) for name, kind in kinds[ALL[one]].items() if kind is not None and wanted(kind)]
-        if not found:
-            if one == "pipes":
-                raise ValueError(f"{show(one)}: the case has no pipe")
+    if name in ALL:
+        included = (lambda kind: kind is Pipe) if name == "pipes" else (lambda kind: judged(kind, quantity))
+        matches = [(ALL[name], part) for part, kind in kinds[ALL[name]].items() if kind is not None and included(kind)]
+        if not matches:
+            if name == "pipes":
+                raise ValueError(f"{show(name)}: the case has no pipe")
             raise Misfit([(("quantity",), f"no node has {show(quantity)}")])
-        return found
+        return matches
     known = [*kinds["nodes"], *kinds["links"], *routes, *ALL]
-    raise ValueError(f"no part or route named {show(one)}{did_you_mean(one, known) or f'; there are {listing(known)}'}")
+    raise ValueError(
+        f"no part or route named {show(name)}{did_you_mean(name, known) or f'; there are {listing(known)}'}"
+    )
 
 
 def judged(kind: Any, quantity: str) -> bool:
-    """Whether a kind of node is among "nodes": a reservoir's pressure is given, perhaps at no elevation of its own."""
+    """True if a kind of node counts among "nodes" for a quantity.
+
+    The pressure of a reservoir is given, perhaps without an elevation: it does not count.
+    """
     return quantity in quantities_of(kind) and not (kind is Reservoir and quantity in OF_PRESSURE)
 
 
 def quantities_of(kind: Any) -> dict[str, str]:
-    """Quantities of a kind of part that can be watched -> dimension."""
-    found = {**getattr(kind, "quantities", {}), **getattr(kind, "along", {})}
-    return found | ({"pressure_head": "head"} if "pressure" in found else {})
+    """Quantities of a kind of part that can be recorded -> dimension."""
+    result = {**getattr(kind, "quantities", {}), **getattr(kind, "along", {})}
+    return result | ({"pressure_head": "head"} if "pressure" in result else {})
 
 
 def only_dimension(quantity: str) -> str | None:
-    """The dimension of a quantity, whatever has it; None where none has, or not all the same."""
+    """Dimension of a quantity over all kinds of parts; None if no kind has it, or if kinds differ."""
     kinds = [kind for group in KINDS.values() for kind in group.values()]
-    found = {quantities_of(kind).get(quantity) for kind in kinds} - {None}
-    return found.pop() if len(found) == 1 else None
+    dimensions = {quantities_of(kind).get(quantity) for kind in kinds} - {None}
+    return dimensions.pop() if len(dimensions) == 1 else None

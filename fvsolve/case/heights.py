@@ -1,4 +1,4 @@
-"""Elevations and positions that nodes take from the profiles of pipes. Knows parts; knows no file."""
+"""Elevations and positions of nodes, inherited from the profiles of pipes."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from typing import Any
 
 
 def lent(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, Any]:
-    """Nodes, those without an elevation or a position at which a profile begins or ends at that of the first that does.
+    """Fill in missing elevations and positions of nodes from the first pipe profile that begins or ends there.
 
-    Positions are those of profiles by x, y and z.
+    The position is that of the profile point, if the profile has x and y.
     """
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     for link in links.values():
         profile = getattr(link, "profile", None)
         if profile is None:
             continue
         for name, end in ((link.from_, 0), (link.to, -1)):
-            node = found.get(name, nodes.get(name))
+            node = result.get(name, nodes.get(name))
             if node is None or getattr(node, "on", None) is not None:
                 continue
             given = {"elevation": float(profile.elevation[end])}
             given |= {} if profile.plan is None else {"position": tuple(profile.plan[end].tolist())}
-            lacks = {key: one for key, one in given.items() if getattr(node, key, one) is None}
-            if lacks:
-                found[name] = node.model_copy(update=lacks)
-    return {name: found.get(name, node) for name, node in nodes.items()} if found else nodes
+            missing = {key: value for key, value in given.items() if getattr(node, key, value) is None}
+            if missing:
+                result[name] = node.model_copy(update=missing)
+    return {name: result.get(name, node) for name, node in nodes.items()} if result else nodes

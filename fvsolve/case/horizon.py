@@ -1,4 +1,4 @@
-"""What a case schedules beyond the end of its run, and which the run does not see. Knows parts and schedules."""
+"""Notices of schedules and trips after the end of the run."""
 
 from __future__ import annotations
 
@@ -10,24 +10,27 @@ import numpy as np
 from fvsolve.errors import Notice
 from fvsolve.parts.schedule import Schedule
 
-MOST = 20  # entries of what somebody drew; longer ones are records, of which a run may take a part
+MOST = 20  # entries of a hand-written schedule; longer schedules are records, of which a run may use a part
 
 
 def notices(case: Any) -> list[Notice]:
-    """One notice for every schedule that goes on changing, and every trip that comes, after the run."""
-    end, found = case.numerics.end, []
+    """Notices of every schedule that still changes, and of every trip, after the end of the run."""
+    end, result = case.numerics.end, []
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
             for key, time in later(part, end):
                 place = f"{group}.{name}"
-                late, last = (case.amount(one, "time", 6) for one in (time, end))
-                text = f"{place}.{key}: goes on to {late}, after the end of the run at {last}"
-                found.append(Notice("end", place, text, key, time, end))
-    return found
+                late, last = (case.amount(t, "time", 6) for t in (time, end))
+                text = f"{place}.{key}: continues to {late}, after the end of the run at {last}"
+                result.append(Notice("end", place, text, key, time, end))
+    return result
 
 
 def later(part: Any, end: float) -> Iterator[tuple[str, float]]:
-    """(key, time [s]) of what a part does after a time; of a wave, which has no end, of its first period."""
+    """Yield (key, time [s]) of schedules and trips of a part that continue after `end`.
+
+    A wave has no end: its first period counts.
+    """
     for name, info in type(part).model_fields.items():
         value = getattr(part, name)
         if isinstance(value, Schedule) and value.wave:

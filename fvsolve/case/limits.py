@@ -1,4 +1,4 @@
-"""Limits that a design has to hold: `[limits.NAME]`. Knows their wording; knows no result."""
+"""Design limits of a case: `[limits.NAME]`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ BOUNDS = ("least", "greatest", "share_of_class")
 
 
 class Bound(Value):
-    """A number with the unit of the limit's quantity, or a pressure by name."""
+    """Number in the unit of the limited quantity, or a pressure by name ("vacuum", "vapor")."""
 
     changes = VALUE
 
@@ -31,7 +31,7 @@ class Bound(Value):
         if isinstance(given, str) and given.casefold() in NAMED:
             if self.named:
                 return NAMED[given.casefold()]
-            raise ValueError(f"{show(given)} is a pressure; wanted a {self.item.dimension}")
+            raise ValueError(f"{show(given)} is a pressure; expected a {self.item.dimension}")
         try:
             return self.item.read(given, setting)
         except ValueError as error:
@@ -43,7 +43,7 @@ class Bound(Value):
 
 
 class On(Value):
-    """Names of parts or routes, read when these are known."""
+    """Names of parts or routes; resolved later, when the parts are known."""
 
     changes = VALUE
 
@@ -56,10 +56,10 @@ class On(Value):
 
 @dataclass(frozen=True)
 class DesignLimit:
-    """What a quantity may be at least and at most, everywhere on its extent and after every step [SI].
+    """Lower and upper bound of a quantity on an extent, checked after every step [SI].
 
     least, greatest : a number, "vacuum" (ambient pressure) or "vapor" (vapour pressure)
-    share_of_class : greatest gauge pressure over what the class of each pipe allows
+    share_of_class : greatest gauge pressure over the allowable pressure of the class of each pipe [-]
     """
 
     name: str
@@ -69,10 +69,10 @@ class DesignLimit:
     share_of_class: float | None
 
     def table(self) -> dict[str, Any]:
-        """What the file would say."""
+        """Keys of the limit as in a file."""
         on = self.extent.on[0] if len(self.extent.on) == 1 else list(self.extent.on)
-        said = {"on": on, "quantity": self.extent.quantity}
-        return said | {key: one for key in BOUNDS if (one := getattr(self, key)) is not None}
+        result = {"on": on, "quantity": self.extent.quantity}
+        return result | {key: bound for key in BOUNDS if (bound := getattr(self, key)) is not None}
 
 
 def limit_keys(quantity: str, dimension: str) -> dict[str, tuple[Value, Any]]:
@@ -90,21 +90,23 @@ def limit_keys(quantity: str, dimension: str) -> dict[str, tuple[Value, Any]]:
 def read_limit(
     name: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], links: Mapping[str, Any], setting: Setting
 ) -> DesignLimit | None:
-    """One table of `[limits]`; None where what it is on is at fault itself. Raises ValueError, Misfit."""
+    """Read one table of `[limits]`; None if its parts are faulty. Raises ValueError, ValueFault."""
     if not isinstance(given, dict):
-        raise ValueError(f'{show(given)} is no table; wanted one such as {{ on = "pipes", greatest = "16 barg" }}')
-    asked = given.get("quantity", "gauge_pressure" if "share_of_class" in given else "pressure")
+        raise ValueError(f'{show(given)} is not a table; expected for example {{ on = "pipes", greatest = "16 barg" }}')
+    quantity = given.get("quantity", "gauge_pressure" if "share_of_class" in given else "pressure")
     faults, extent = [], None
-    if not isinstance(asked, str):
-        faults.append((("quantity",), f"{show(asked)} is no text"))
+    if not isinstance(quantity, str):
+        faults.append((("quantity",), f"{show(quantity)} is not text"))
     elif "on" in given:
         try:
-            extent = read_extent(given["on"], asked, kinds, routes)
+            extent = read_extent(given["on"], quantity, kinds, routes)
         except ValueError as error:
             key = "quantity" if isinstance(error, Misfit) and "quantity" in given else "on"
             faults.append(((key,), str(error)))
-    dimension = extent.dimension if extent is not None else only_dimension(asked) if isinstance(asked, str) else None
-    keys = limit_keys(asked if isinstance(asked, str) else "", dimension or "number")
+    dimension = (
+        extent.dimension if extent is not None else only_dimension(quantity) if isinstance(quantity, str) else None
+    )
+    keys = limit_keys(quantity if isinstance(quantity, str) else "", dimension or "number")
     if dimension is None:
         keys |= dict.fromkeys(("least", "greatest"), (Anything(), None))
     bounds = dict.fromkeys(BOUNDS)
@@ -116,7 +118,7 @@ def read_limit(
         with suppress(KeyError, ValueError):
             bounds[key] = keys[key][0].read(given[key], setting)
     if not any(key in given for key in BOUNDS):
-        faults.append(((), f"nothing is limited; wanted one of {', '.join(BOUNDS)}"))
+        faults.append(((), f"bound is missing; expected one of {', '.join(BOUNDS)}"))
     if bounds["greatest"] is not None and bounds["share_of_class"] is not None:
         faults.append((("share_of_class",), "greatest and share_of_class are given; keep one"))
     least, greatest = bounds["least"], bounds["greatest"]
@@ -130,21 +132,21 @@ def read_limit(
 
 
 def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Iterator[tuple[tuple, str]]:
-    """What a limit asks that the fluid and gravity of its case do not tell."""
+    """Faults of a limit that depend on the fluid and gravity of its case."""
     if limit is None:
         return
     if gravity == 0.0 and limit.extent.quantity in ("head", "pressure_head"):
         yield (
             ("quantity",),
-            f"nothing weighs where gravity is 0, so there is no {limit.extent.quantity}; wanted pressure",
+            f"{limit.extent.quantity} does not exist where gravity is 0; expected pressure",
         )
     for key in ("least", "greatest"):
         if getattr(limit, key) == VAPOR and fluid is not None and not fluid.vapor_pressure:
-            yield (key,), 'the fluid has no vapour pressure; wanted vapor_pressure above 0 under [fluid], or "vacuum"'
+            yield (key,), 'the fluid has no vapour pressure; expected vapor_pressure above 0 under [fluid], or "vacuum"'
 
 
 def unclassed(extent: Extent, links: Mapping[str, Any]):
-    """Faults of a share of class on what has none."""
+    """Faults of `share_of_class` on quantities or parts without a pressure class."""
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
         yield ("share_of_class",), f"a class limits pressure, not {extent.quantity}; leave quantity out"
         return
@@ -152,4 +154,4 @@ def unclassed(extent: Extent, links: Mapping[str, Any]):
     parts = [name for group, name in extent.parts if group != "links" or name in bare]
     if parts:
         more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
-        yield ("share_of_class",), f"{parts[0]}{more} without a class; give it class or allowable_pressure"
+        yield ("share_of_class",), f"{parts[0]}{more} has no pressure class; give it class or allowable_pressure"

@@ -1,4 +1,4 @@
-"""Where a key stands in a TOML text. Knows the shape of TOML; judges nothing (tomllib does)."""
+"""Line numbers of the keys of a TOML text; tomllib checks the syntax."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ _SPACE = re.compile(r"[ \t]*")
 
 
 def key_lines(text: str) -> dict[Path, int]:
-    """The line (from 1) of every key path of a valid TOML text; list items count by index."""
+    """Line number (from 1) of every key path of a valid TOML text; items of lists count by index."""
     scan = _Scan(text)
     try:
         scan.document()
-    except (IndexError, RecursionError):  # the lines found so far must do
+    except (IndexError, RecursionError):  # return the lines collected so far
         pass
     return scan.lines
 
 
 class _Scan:
+    """Scanner of a TOML text: records the line of each key path."""
+
     def __init__(self, text: str):
         self.text = text
         self.at = 0
@@ -95,6 +97,7 @@ class _Scan:
             self.skip(_BARE)
 
     def inside(self, close: str, path: Path) -> None:
+        """Read the items of an inline table or list up to its closing bracket."""
         self.at += 1
         number = 0
         while True:

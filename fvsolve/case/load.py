@@ -1,4 +1,4 @@
-"""From a TOML file or dict to a case. Knows the order of reading; what fits where is known by the parts."""
+"""Read a case from a TOML file or dict."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ SCHEMA = 1
 GROUPS = {
     "fluid": "the fluid",
     "nodes": "places",
-    "links": "what lies between them",
-    "numerics": "how it is solved",
+    "links": "parts between the places",
+    "numerics": "settings of the solver",
 }
 ALONE = ("basin", "body")  # nodes that need no link
-NAMING = ("nodes", "links", "signals", "scalars", "routes", "defaults")  # tables that others name things of
+NAMING = ("nodes", "links", "signals", "scalars", "routes", "defaults")  # tables with names that other tables refer to
 OF_STUDIES = {"events", "protections"}
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
@@ -71,10 +71,10 @@ TOP = {
 
 @door(set=TABLE)
 def load(source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, Any] | None = None) -> Case:
-    """The case of a TOML file, the name of a shipped one, a dict shaped like a file, or a case, `set` overriding keys.
+    """Read the case of a TOML file, a shipped case by name, a dict shaped like a file, or a case; `set` overrides keys.
 
-    Numbers come out in SI, pressures absolute [Pa]. Raises CaseError with every fault: line, key path, what
-    was found, what was wanted and the nearest valid name.
+    Numbers come out in SI, pressures absolute [Pa]. Raises CaseError with every fault: line, key path, the value found,
+    the expected value and the nearest valid name.
     """
     if isinstance(source, Raw):
         return _Reader(replace(source, table=read_raw(source.table).table, overridden=[]), set or {}).case()
@@ -87,20 +87,20 @@ def load(source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, 
 
 
 def named(source: Any) -> Any:
-    """A source; where it is text that names no file but a shipped case, that case's file."""
+    """Path of a shipped case if the source is its name and no such file exists; otherwise the source."""
     if isinstance(source, str) and not Path(source).is_file() and source in shipped.names():
         return shipped.find(source)
     return source
 
 
 def crossing(links: Mapping[str, Any], meshes: Mapping[str, Any], fluid: Any) -> float:
-    """Time in which the quickest wave crosses a cell, in basins at 1 m/s [s]; inf without cells."""
+    """Shortest travel time of a wave through a cell [s], in basins at 1 m/s; inf without cells."""
     times = [link.length / link.cells / wave_speed(link, fluid) for link in links.values() if isinstance(link, Pipe)]
     return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
 
 
 def _alternatives() -> list[tuple[str, ...]]:
-    """Keys of which a table has one at most, over all tables."""
+    """Groups of keys of which a table may have at most one, over all tables."""
     return _alternatives_of((Numerics, Friction, *KINDS["nodes"].values(), *KINDS["links"].values()))
 
 
@@ -110,42 +110,42 @@ def _alternatives_of(models: tuple) -> list[tuple[str, ...]]:
 
 
 class _Reader:
-    """One reading of one case: gathers faults on the way, in the order of dependence."""
+    """Reader of one case: collects faults, in the order in which tables depend on each other."""
 
     def __init__(self, raw: Raw, settings: Mapping[str, Any], before: Case | None = None):
         self.raw, self.before = raw, before
         settings = placing.settings(raw.table, settings)
-        self.refused: list[Fault] = override(raw, settings, _alternatives())  # settings that cannot be made
+        self.refused: list[Fault] = override(raw, settings, _alternatives())  # settings that cannot be applied
         self.faults = self.refused[:]
         self.setting = Setting(folder=raw.folder)
-        self.read: dict[tuple, tuple[Any, Any]] = {}  # place -> (what stands there, what it was read as)
-        self.origin: dict[tuple, tuple] = {}  # (group, name) of what a cut pipe came to -> of what the file has
-        self.pieces: dict[str, list[str]] = {}  # of cut pipes
+        self.read: dict[tuple, tuple[Any, Any]] = {}  # key path -> (raw value, value as read)
+        self.origin: dict[tuple, tuple] = {}  # key path of a piece of a cut pipe -> key path in the file
+        self.pieces: dict[str, list[str]] = {}  # cut pipe -> names of its pieces
         self.said = raw.table  # before pipes are cut
-        self.lost: set[tuple[str, str]] = set()  # (group, name) of what cannot be read, as what it hangs on is at fault
-        self.uncut: dict[str, Pipe] = {}  # pipes that cannot be cut, as what is placed on them is at fault
-        self.joined = True  # whether it is known what joins what
-        self.lumped: dict[str, Any] = {}  # meshes of basins whose water is but masses on a body
+        self.lost: set[tuple[str, str]] = set()  # (group, name) that depend on faulty parts
+        self.uncut: dict[str, Pipe] = {}  # pipes not cut, since parts placed on them are faulty
+        self.joined = True  # True while the connections are known
+        self.lumped: dict[str, Any] = {}  # meshes of basins whose water is lumped masses on a body
 
     def case(self) -> Case:
-        if (made := moved(self)) is not None:
-            return made
+        if (case := moved(self)) is not None:
+            return case
         self.faults, self.setting, self.read = self.refused[:], Setting(folder=self.raw.folder), {}
         top = self.top()
         if self.before is not None and self.before.ambient_pressure != self.setting.ambient:
-            self.before = None  # all that is gauge is other
+            self.before = None  # all gauge pressures change
         if self.before is not None and self.before.raw.get("defaults") is not self.said.get("defaults"):
-            self.before = None  # every pipe may be other
+            self.before = None  # every pipe may change
         fluid, properties = self.kept(("fluid",), self.raw.table.get("fluid"), self.fluid)
         numerics = self.table("numerics", Numerics)
         self.setting.signals = self.group("signals")
         self.add(defaults.misfits(self.raw.table, self.setting))
         tables = [self.raw.table.get(name, {}) for name in NAMING]
         tables += tables[-1].values() if isinstance(tables[-1], dict) else []  # of defaults
-        if not all(isinstance(one, dict) for one in tables):
+        if not all(isinstance(table, dict) for table in tables):
             for name in NAMING[:-1]:
                 self.group(name)
-            self.stop()  # what is named there is not known
+            self.stop()  # the names are not known
         whole = self.raw.table
         self.cut(properties, numerics)
         carried = self.scalars()
@@ -155,22 +155,22 @@ class _Reader:
         self.unused_signals()
         kinds = {group: self.kinds(group) for group in parts} | {"scalars": carried}
         has_cells = Pipe in kinds["links"].values() or Basin in kinds["nodes"].values()
-        has_cells = has_cells or None in (*kinds["links"].values(), *kinds["nodes"].values())  # it may be one
+        has_cells = has_cells or None in (*kinds["links"].values(), *kinds["nodes"].values())  # faulty ones
         kinds["uncut"] = dict.fromkeys(self.uncounted() if self.faults else ())
         kinds["nodes"] |= {f"{name}.{place}": Chamber for name, kind in kinds["links"].items() if kind
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         for name, node in parts["nodes"].items():
             if isinstance(node, Body):
                 kinds["nodes"][name] = bodies.Riding(node)
-        for name, node in self.group("nodes").items():  # of those at fault too
+        for name, node in self.group("nodes").items():  # faulty nodes included
             kinds["nodes"] |= dict.fromkeys(check.points_of(name, node), BodyPoint)
         for name, kind in [*kinds["nodes"].items()]:
             if name in self.lumped and not parts["nodes"][name].own.sloshes:
-                kinds["nodes"][name] = None  # at fault itself
+                kinds["nodes"][name] = None  # faulty
             elif name in self.lumped:
                 kinds["nodes"][name] = basins.Pool(basins.lumped_fields(parts["nodes"][name]), self.lumped[name])
             elif kind is Basin and name not in meshes:
-                kinds["nodes"][name] = None  # at fault itself
+                kinds["nodes"][name] = None  # faulty
             if name in meshes:
                 pool = parts["nodes"][name]
                 own = dict.fromkeys(carried, "number") if pool.own.carries else {}
@@ -207,7 +207,7 @@ class _Reader:
             self.add(self.sizes(numerics, output, links, meshes, properties))
         named = self.table("exact", ExactSpec) if "exact" in self.raw.table else None
         self.stop()
-        made = Case(
+        case = Case(
             name=self.raw.name,
             path=self.raw.path,
             ambient_pressure=self.setting.ambient,
@@ -232,34 +232,34 @@ class _Reader:
             read=self.read,
             **top,
         )
-        return made if named is None else self.exact(made)
+        return case if named is None else self.exact(case)
 
     def sizes(self, numerics, output, links, meshes, properties) -> Iterator[tuple[tuple, str]]:
-        """Faults of counts, and of steps that would not move the time."""
+        """Faults of sizes, and of steps below the rounding of the time."""
         yield from size.misfits(numerics, output, links, meshes)
         yield from size.standstill(numerics, crossing(links, meshes, properties))
 
-    def exact(self, made: Case) -> Case:
-        """The case, if what it names under [exact] holds; settings that leave it no exact solution take that out."""
-        found = list(exact.misfits(made))
+    def exact(self, case: Case) -> Case:
+        """Check the case against its exact solution; settings that invalidate the solution remove it."""
+        faults = list(exact.misfits(case))
         settings = {keys[0] for keys in self.raw.overridden}
-        if found and settings and "exact" not in settings:
-            return replace(made, exact=None)
-        self.add(found)
+        if faults and settings and "exact" not in settings:
+            return replace(case, exact=None)
+        self.add(faults)
         self.stop()
-        return made
+        return case
 
     def cut(self, properties: Any, numerics: Numerics | None) -> None:
-        """Cut pipes at what is placed on them by chainage."""
+        """Cut pipes at the chainages of the parts placed on them."""
         table = placing.bent(self.raw.table)
         tables = (table.get("nodes"), table.get("links"), table.get("routes", {}))
-        if not all(isinstance(one, dict) for one in tables) or not placing.placed(table):
+        if not all(isinstance(item, dict) for item in tables) or not placing.placed(table):
             return
         for group, name, part in placing.placed(table):
             self.kind(group, name, part)
         self.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
-                       for name, one in table["links"].items() if placing.is_pipe(one)
-                       for k in range(len(one["bends"]) if isinstance(one.get("bends"), list) else 0)}  # fmt: skip
+                       for name, item in table["links"].items() if placing.is_pipe(item)
+                       for k in range(len(item["bends"]) if isinstance(item.get("bends"), list) else 0)}  # fmt: skip
         odd = list(placing.faults(table))
         self.add(odd)
         astray = {keys[:2] for keys, _ in odd}
@@ -267,35 +267,35 @@ class _Reader:
         for name, given in table["links"].items():
             if placing.is_pipe(given) and ("links", name) not in astray:
                 try:
-                    pipes[name] = self.part(Pipe, {key: one for key, one in given.items() if key != "pieces"})
+                    pipes[name] = self.part(Pipe, {key: item for key, item in given.items() if key != "pieces"})
                 except ValueError as error:
                     self.misfit(("links", name), error)
         if None in (properties, numerics):
             counts = {name: pipe.cells or 1 for name, pipe in pipes.items()}
         else:
             counts = default_cells(pipes, properties, numerics.cell_time)
-        made = placing.cut(table, pipes, counts, astray, self.fault)
-        self.raw, self.pieces = replace(self.raw, table=made.table), made.pieces
-        self.lost, self.uncut, self.joined = made.lost, made.wholes, made.known
-        self.origin |= made.origin
+        result = placing.cut(table, pipes, counts, astray, self.fault)
+        self.raw, self.pieces = replace(self.raw, table=result.table), result.pieces
+        self.lost, self.uncut, self.joined = result.lost, result.wholes, result.known
+        self.origin |= result.origin
 
     def kept(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
-        """What a place was read as in the case before, if the very same stands there; else what `make` reads.
+        """Value read at a key path in the case before, if its raw value is the same object; else the result of `make`.
 
-        Kept for the next is what is without faults and needs no file and no signal, which may change by themselves.
+        Values without faults that use no file and no signal are cached for the next reading.
         """
         before = None if self.before is None else self.before.read.get(place)
         if before is not None and before[0] is given:
             self.read[place] = before
             return before[1]
-        known = self.setting.asked, len(self.faults)
-        made = make()
-        if known == (self.setting.asked, len(self.faults)):
-            self.read[place] = given, made
-        return made
+        state = self.setting.asked, len(self.faults)
+        value = make()
+        if state == (self.setting.asked, len(self.faults)):
+            self.read[place] = given, value
+        return value
 
     def stop(self) -> None:
-        """Raise what was found so far."""
+        """Raise the faults collected so far."""
         if self.faults:
             raise CaseError(dict.fromkeys(self.faults), self.raw.file)
 
@@ -305,15 +305,15 @@ class _Reader:
         own = (*self.origin.get(keys[:2], keys[:2]), *keys[2:])
         keys = defaults.place(self.said, own)
         place = text.path(keys)
-        if keys != own and any(one.place == place for one in self.faults):
-            return  # a default that no part may have
+        if keys != own and any(fault.place == place for fault in self.faults):
+            return  # a faulty default, already reported for another part
         if self.raw.is_override(keys):
             self.faults.append(Fault(place, message, override=True))
         else:
             self.faults.append(Fault(place, message, self.raw.line(keys)))
 
-    def add(self, found: Iterable[tuple[tuple, str]]) -> None:
-        for keys, message in found:
+    def add(self, faults: Iterable[tuple[tuple, str]]) -> None:
+        for keys, message in faults:
             self.fault(keys, message)
 
     def misfit(self, keys: tuple, error: ValueError) -> None:
@@ -325,11 +325,11 @@ class _Reader:
             self.fault(keys, str(error))
 
     def group(self, name: str) -> dict[str, Any]:
-        found = self.raw.table.get(name, {})
-        if not isinstance(found, dict):
-            self.fault((name,), f"{show(found)} is no table")
+        table = self.raw.table.get(name, {})
+        if not isinstance(table, dict):
+            self.fault((name,), f"{show(table)} is not a table")
             return {}
-        return found
+        return table
 
     def table(self, name: str, model: Any) -> Any:
         if name not in self.raw.table:
@@ -345,19 +345,19 @@ class _Reader:
             return None
 
     def in_order(self, name: str, model: Any) -> Any:
-        """What the keys of a table say that have no fault, for what hangs on them; all may be left out."""
-        found = {}
+        """Model with the valid keys of a table only; all of them may be missing."""
+        values = {}
         for key, value in model.values().items():
             with suppress(KeyError, TypeError, ValueError):
-                found[key] = value.read(self.raw.table[name][key], self.setting)
-        return model.model_construct(**found)
+                values[key] = value.read(self.raw.table[name][key], self.setting)
+        return model.model_construct(**values)
 
     def timed(self) -> Numerics | None:
-        """The keys of `[numerics]` that are in order, if start and end are among them."""
-        said = self.raw.table.get("numerics")
-        asked = self.in_order("numerics", Numerics) if isinstance(said, dict) else None
-        times = {key for key in ("start", "end") if asked is not None and key in said}
-        return asked if "end" in times and times <= asked.model_fields_set else None
+        """Valid keys of `[numerics]`, if start and end are among them, else None."""
+        given = self.raw.table.get("numerics")
+        valid = self.in_order("numerics", Numerics) if isinstance(given, dict) else None
+        times = {key for key in ("start", "end") if valid is not None and key in given}
+        return valid if "end" in times and times <= valid.model_fields_set else None
 
     def top(self) -> dict[str, Any]:
         if OF_STUDIES & self.raw.table.keys() and not {"nodes", "links"} & self.raw.table.keys():
@@ -370,129 +370,129 @@ class _Reader:
         try:
             ambient, gauge = units.parse(given, "pressure")
             if gauge:
-                raise ValueError(f'{show(given)} is a gauge pressure; wanted an absolute one, for example "1 atm"')
+                raise ValueError(f'{show(given)} is a gauge pressure; expected an absolute one, for example "1 atm"')
             if ambient <= 0:
-                raise ValueError(f'{show(given)} is absolute, a vacuum; wanted for example "1 atm"')
+                raise ValueError(f'{show(given)} is absolute and not above 0; expected for example "1 atm"')
             self.setting.ambient = ambient
         except ValueError as error:
             self.fault(("ambient_pressure",), str(error))
-        found = {key: default for key, (_, default) in TOP.items()}
+        values = {key: default for key, (_, default) in TOP.items()}
         for key, value in TOP.items():
             try:
                 if key in self.raw.table:
-                    found |= read_keys({key: self.raw.table[key]}, {key: value}, self.setting)
+                    values |= read_keys({key: self.raw.table[key]}, {key: value}, self.setting)
             except ValueError as error:
                 self.misfit((), error)
-        return found
+        return values
 
     def fluid(self) -> tuple[FluidSpec | None, Any]:
         spec = self.table("fluid", FluidSpec)
         if spec is None:
             return None, None
-        asked = {key: getattr(spec, key) for key in FluidSpec.model_fields}
+        stated = {key: getattr(spec, key) for key in FluidSpec.model_fields}
         try:
             if isinstance(spec.viscosity, Kinematic):
                 density = spec.density
                 if density is None:
-                    density = properties(**{**asked, "viscosity": None}).density
-                asked["viscosity"] = float(spec.viscosity) * density
-                spec = spec.model_copy(update={"viscosity": asked["viscosity"]})
-            return spec, properties(**asked)
+                    density = properties(**{**stated, "viscosity": None}).density
+                stated["viscosity"] = float(spec.viscosity) * density
+                spec = spec.model_copy(update={"viscosity": stated["viscosity"]})
+            return spec, properties(**stated)
         except FluidError as error:
-            self.fault(("fluid", error.key), error.message + self.in_celsius(asked, error.key))
+            self.fault(("fluid", error.key), error.message + self.in_celsius(stated, error.key))
             return spec, None
 
-    def in_celsius(self, asked: dict[str, Any], key: str) -> str:
-        """What to add where a bare temperature is none of the fluid's in kelvin, but one in degrees Celsius."""
+    def in_celsius(self, stated: dict[str, Any], key: str) -> str:
+        """Hint for a temperature in kelvin outside the fluid's range that would be valid in degrees Celsius."""
         given = self.raw.get(("fluid", "temperature"))
         if key != "temperature" or isinstance(given, str):
             return ""
         try:
-            properties(**{**asked, "temperature": asked["temperature"] + 273.15})
+            properties(**{**stated, "temperature": stated["temperature"] + 273.15})
         except FluidError:
             return ""
         return f'; a bare number is in K, did you mean "{given:g} degC"?'
 
     def kinds(self, group: str) -> dict[str, Any]:
-        found = {}
+        result = {}
         for name, part in self.group(group).items():
             kind = part.get("type") if isinstance(part, dict) else None
-            found[name] = KINDS[group].get(kind) if isinstance(kind, str) else None
-            if group == "nodes" and found[name] is not None:
-                found[name] = found[name].variant(part)
-        return found
+            result[name] = KINDS[group].get(kind) if isinstance(kind, str) else None
+            if group == "nodes" and result[name] is not None:
+                result[name] = result[name].variant(part)
+        return result
 
     def parts(self, group: str) -> dict[str, Any]:
-        alone = (*ALONE, None)  # what is at fault may be one
-        basin = any(check.kind_name(one) in alone for one in self.group("nodes").values())
+        alone = (*ALONE, None)  # faulty ones
+        basin = any(check.kind_name(node) in alone for node in self.group("nodes").values())
         if group not in self.raw.table and not (group == "links" and basin):
             self.fault((), f"[{group}] is missing: {GROUPS[group]}")
-        made = {}
+        result = {}
         for name, part in self.group(group).items():
             if not re.fullmatch(r"[\w-]+", name):
-                self.fault((group, name), f"{show(name)} is no name; a name has letters, digits, _ and -")
+                self.fault((group, name), f"{show(name)} is not a valid name; a name has only letters, digits, _ and -")
             if len(name) > size.LONGEST_NAME:
-                self.fault((group, name), f"has {len(name)} letters; wanted {size.LONGEST_NAME} at most")
+                self.fault((group, name), f"has {len(name)} letters; expected at most {size.LONGEST_NAME}")
             if not isinstance(part, dict):
-                self.fault((group, name), f"{show(part)} is no table; wanted one with a type")
+                self.fault((group, name), f"{show(part)} is not a table; expected a table with a type")
                 continue
             kind = self.kind(group, name, part)
             if kind is None or (group, name) in self.lost:
                 continue
             try:
-                made[name] = self.kept((group, name), part, functools.partial(self.part, kind, part))
+                result[name] = self.kept((group, name), part, functools.partial(self.part, kind, part))
             except ValueError as error:
                 self.misfit((group, name), error)
-        return made
+        return result
 
     def uncounted(self) -> list[str]:
-        """Parts at fault whose places cannot be told, and pipes of whose pieces the number is not known."""
+        """Faulty parts whose places are unknown, and pipes whose number of pieces is unknown."""
         nodes, links = self.group("nodes"), self.group("links")
-        bent = [name for name, one in links.items()
-                if placing.is_pipe(one) and not isinstance(one.get("bends", []), list)]  # fmt: skip
-        return bent + [name for name in (*nodes, *links) if check.lost(name, nodes, links)]
+        pipes = [name for name, link in links.items()
+                if placing.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
+        return pipes + [name for name in (*nodes, *links) if check.lost(name, nodes, links)]
 
     def part(self, kind: Any, given: dict[str, Any]) -> Any:
-        """A part of a kind, as its table has it."""
+        """Read a part of a type from its table."""
         rest = {key: value for key, value in defaults.filled(self.raw.table, given).items() if key != "type"}
         kind = kind.variant(rest) if issubclass(kind, Node) else kind
         return kind.model_validate(rest, context=self.setting)
 
     def meshes(self, nodes: dict[str, Any]) -> dict[str, Any]:
-        """Meshes of basins by name; basins without one leave the nodes, as at fault themselves."""
-        made = {}
+        """Meshes of basins by name; basins with a faulty mesh are removed from `nodes`."""
+        result = {}
         for name, node in [*nodes.items()]:
             try:
                 if isinstance(node, Basin):
                     mesh = self.kept(("meshes", name), node, functools.partial(basins.mesh_of, node, self.setting))
-                    (self.lumped if node.lumped else made)[name] = mesh
+                    (self.lumped if node.lumped else result)[name] = mesh
             except Misfit as error:
                 self.misfit(("nodes", name), error)
                 del nodes[name]
-        return made
+        return result
 
     def drawn(self, meshes: dict[str, Any]) -> dict[str, Any]:
-        """The table as the file has it, basins with all the patches of their meshes, what is lost as a junction.
+        """Table of the file for the check of connections: basins with all patches of their meshes.
 
-        A basin whose mesh is lost has the patches that are named of it.
+        A lost node is a junction. A basin with a faulty mesh has the patches that links name.
         """
         nodes, links = self.group("nodes"), self.group("links")
         patches = {name: basins.patch_names(mesh) for name, mesh in meshes.items()}
-        lost = [name for name, one in nodes.items() if check.has_mesh(one) and name not in (*meshes, *self.lumped)]
+        lost = [name for name, part in nodes.items() if check.has_mesh(part) and name not in (*meshes, *self.lumped)]
         patches |= {name: check.named_of(name, links) for name in lost}
         if not patches and not self.lost:
             return self.raw.table
-        own = {name: {**nodes[name], "patches": dict.fromkeys(found, {}) | (nodes[name].get("patches") or {})}
-               for name, found in patches.items()}  # fmt: skip
+        own = {name: {**nodes[name], "patches": dict.fromkeys(names, {}) | (nodes[name].get("patches") or {})}
+               for name, names in patches.items()}  # fmt: skip
         own |= {name: {"type": "junction"} for group, name in self.lost if group == "nodes"}
         unfit = [name for group, name in self.lost if group == "links" and not placing.is_pipe(links[name])]
-        links = {name: one for name, one in links.items() if name not in unfit}
+        links = {name: part for name, part in links.items() if name not in unfit}
         return {**self.raw.table, "nodes": {**nodes, **own}, "links": links}
 
     def kind(self, group: str, name: str, part: dict[str, Any]) -> Any:
         known = KINDS[group]
         if "type" not in part:
-            self.fault((group, name), f"type is missing; wanted one of {listing(sorted(known))}")
+            self.fault((group, name), f"type is missing; expected one of {listing(sorted(known))}")
             return None
         kind = part["type"]
         if not isinstance(kind, str) or kind not in known:
@@ -500,22 +500,22 @@ class _Reader:
             hint = did_you_mean(str(kind), known)
             if isinstance(kind, str) and kind in KINDS[other]:
                 hint = f"; it belongs under [{other}]"
-            said = MEANT.get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
-            hint = f"; say {said}" if said else f"; types are {listing(sorted(known))}{hint}"
-            self.fault((group, name, "type"), f"no type {show(kind)}{hint}")
+            synonym = MEANT.get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
+            hint = f"; use {synonym}" if synonym else f"; types are {listing(sorted(known))}{hint}"
+            self.fault((group, name, "type"), f"unknown type {show(kind)}{hint}")
             return None
         return known[kind]
 
     def scalars(self) -> dict[str, Any]:
-        """What the fluid carries, by name; None in the place of what is at fault itself."""
-        found = {}
+        """Scalars by name; None for a faulty scalar."""
+        result = {}
         for name, given in self.group("scalars").items():
-            found[name] = None
+            result[name] = None
             try:
-                found[name] = Scalar.model_validate(given, context=self.setting)
+                result[name] = Scalar.model_validate(given, context=self.setting)
             except ValueError as error:
                 self.misfit(("scalars", name), error)
-        return found
+        return result
 
     def unused_signals(self) -> None:
         for name, given in self.setting.signals.items():
@@ -555,13 +555,13 @@ class _Reader:
 
     def output(self, numerics: Numerics | None, kinds: dict) -> Output | None:
         output = self.table("output", Output)
-        asked = output if output is not None else self.in_order("output", Output)
-        if asked.probes is None:
+        valid = output if output is not None else self.in_order("output", Output)
+        if valid.probes is None:
             probes = default_probes(kinds)
         else:
-            named = [self.probe(one, ("output", "probes", n), kinds) for n, one in enumerate(asked.probes)]
+            named = [self.probe(text, ("output", "probes", n), kinds) for n, text in enumerate(valid.probes)]
             probes = list({probe.text: probe for probe in named if probe is not None}.values())
-        self.add(basins.line_faults(asked, kinds["nodes"]))
+        self.add(basins.line_faults(valid, kinds["nodes"]))
         if output is None:
             return None
         changes: dict[str, Any] = {"probes": probes}
@@ -570,56 +570,56 @@ class _Reader:
         return output.model_copy(update=changes)
 
     def routes(self, links: dict[str, Any]) -> dict[str, Route | None]:
-        """Routes by name; None in the place of what is at fault itself."""
-        made: dict[str, Route | None] = {}
+        """Routes by name; None for a faulty route."""
+        result: dict[str, Route | None] = {}
         named, odd = self.group("links"), set()
         for name, given in self.group("routes").items():
-            made[name] = None
+            result[name] = None
             if name in self.group("nodes") or name in named or name in ALL:
-                self.fault(("routes", name), f"{show(name)} is the name of something else; wanted one of its own")
+                self.fault(("routes", name), f"{show(name)} is also the name of something else; expected another name")
                 continue
             try:
-                made[name] = spread(Route.model_validate(given, context=self.setting), self.pieces, links)
+                result[name] = spread(Route.model_validate(given, context=self.setting), self.pieces, links)
             except ValueError as error:
                 self.misfit(("routes", name), error)
                 with suppress(KeyError, TypeError, ValueError):
                     pipes = Route.values()["pipes"].read(given["pipes"], self.setting)
-                    made[name] = spread(Route.model_construct(pipes=pipes), self.pieces, links)
+                    result[name] = spread(Route.model_construct(pipes=pipes), self.pieces, links)
                     odd.add(name)
-        faulty = list(route_misfits(made, links, named, self.pieces)) if self.joined else []
+        faulty = list(route_misfits(result, links, named, self.pieces)) if self.joined else []
         self.add(faulty)
         lost = odd | {keys[1] for keys, _ in faulty}
         pipes = {name for name, link in links.items() if isinstance(link, Pipe)}
-        lost |= {name for name, one in made.items()
-                 if one and (not pipes.issuperset(one.pipes) or broken(one, links) is not None)}  # fmt: skip
-        return {name: None if name in lost else one for name, one in made.items()}
+        lost |= {name for name, route in result.items()
+                 if route and (not pipes.issuperset(route.pipes) or broken(route, links) is not None)}  # fmt: skip
+        return {name: None if name in lost else route for name, route in result.items()}
 
     def limits(self, kinds: dict, routes: dict, links: dict[str, Any], *about: Any) -> dict[str, DesignLimit | None]:
-        """Limits by name."""
-        made = {}
+        """Design limits by name."""
+        result = {}
         for name, given in self.group("limits").items():
             try:
-                made[name] = read_limit(name, given, kinds, routes, links, self.setting)
-                self.add((("limits", name, *keys), text) for keys, text in limit_faults(made[name], *about))
+                result[name] = read_limit(name, given, kinds, routes, links, self.setting)
+                self.add((("limits", name, *keys), text) for keys, text in limit_faults(result[name], *about))
             except ValueError as error:
                 self.misfit(("limits", name), error)
-        return made
+        return result
 
     def expect(self, kinds: dict, routes: dict) -> dict[str, Expect]:
-        made = {}
+        result = {}
         for claim, given in self.group("expect").items():
             try:
-                made[claim] = read_expect(claim, given, kinds, routes, self.setting)
+                result[claim] = read_expect(claim, given, kinds, routes, self.setting)
             except ValueError as error:
                 self.misfit(("expect", claim), error)
-        return made
+        return result
 
     def compare(self, kinds: dict) -> dict[str, Compare]:
-        made = {}
+        result = {}
         for name, given in self.group("compare").items():
             probe = self.probe(name, ("compare", name), kinds)
             try:
-                made[name] = read_compare(probe, given, self.setting)
+                result[name] = read_compare(probe, given, self.setting)
             except ValueError as error:
                 self.misfit(("compare", name), error)
-        return made
+        return result

@@ -1,4 +1,4 @@
-"""A case that was read before, with numbers of its parts moved. Knows what they cannot change; reads nothing else."""
+"""Fast update of a case that was read before, after numbers of its parts were changed."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Quantity
 
 GROUPS = ("nodes", "links")
-SEEN = ("required_pressure",)  # of which it counts whether they are there
+SEEN = ("required_pressure",)  # keys whose presence alone changes the case
 
 
 def moved(reader: Any) -> Case | None:
-    """The case as it would be read anew; None where more than numbers of parts may be other, or something is wrong.
+    """Update the case before with new numbers of parts; None if more than numbers may change, or for any fault.
 
-    Names, kinds, what joins what, and so probes and claims are those of before, and so is every other table.
+    Names, types, connections, probes, claims and every other table stay as they were.
     """
     before, raw = reader.before, reader.raw
     if before is None or reader.faults or not whole(before) or not all(number(raw, keys) for keys in raw.overridden):
         return None
     setting = reader.setting
     setting.ambient, reader.read = before.ambient_pressure, dict(before.read)
-    found = {}
+    parts = {}
     for group in GROUPS:
-        found[group] = {}
+        parts[group] = {}
         for name, given in raw.table.get(group, {}).items():
             known = before.read.get((group, name))
             if known is None:
@@ -40,37 +40,39 @@ def moved(reader: Any) -> Case | None:
                 except ValueError:
                     return None
                 reader.read[group, name] = known
-            found[group][name] = known[1]
-    nodes, numerics = heights.lent(**found), before.numerics
+            parts[group][name] = known[1]
+    nodes, numerics = heights.lent(**parts), before.numerics
     about = before.ambient_pressure, before.gravity, before.properties, raw
-    reader.add(check.parts(nodes, found["links"], *about, numerics.start, {}, {}))
-    links = reader.cells(found["links"], before.properties, numerics)
+    reader.add(check.parts(nodes, parts["links"], *about, numerics.start, {}, {}))
+    links = reader.cells(parts["links"], before.properties, numerics)
     if setting.asked or reader.faults:
         return None
     reader.add(reader.sizes(numerics, before.output, links, {}, before.properties))
     if reader.faults:
         return None
-    made = replace(before, nodes=nodes, links=links, raw=raw.table, read=reader.read)
-    return made if before.exact is None else reader.exact(made)
+    case = replace(before, nodes=nodes, links=links, raw=raw.table, read=reader.read)
+    return case if before.exact is None else reader.exact(case)
 
 
 def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dict[str, Any]:
-    """A part's table with numbers over time as they were read before, where what they were read from stays."""
-    said = vars(part)
-    same = {key: found for key, value in given.items() if isinstance(found := said.get(key), Schedule)
+    """Table of a part, with schedules as they were read before if their raw values are unchanged."""
+    values = vars(part)
+    same = {key: schedule for key, value in given.items() if isinstance(schedule := values.get(key), Schedule)
             and isinstance(value, dict) and before.get(key) is value}  # fmt: skip
     return {**given, **same}
 
 
 def whole(case: Case) -> bool:
-    """Whether nothing of a case comes from files or signals, and nothing looks at numbers of parts but parts."""
-    alone = not (placed(bent(case.raw)) or case.signals or case.scalars or case.compare or case.copies or case.found)
-    settled = case.exact is None or "exact" in case.raw
-    return alone and settled and not any(isinstance(node, Basin) for node in case.nodes.values())
+    """True if a case uses no files or signals, and only parts depend on the numbers of parts."""
+    no_outer_input = not (
+        placed(bent(case.raw)) or case.signals or case.scalars or case.compare or case.copies or case.found
+    )
+    exact_in_file = case.exact is None or "exact" in case.raw
+    return no_outer_input and exact_in_file and not any(isinstance(node, Basin) for node in case.nodes.values())
 
 
 def number(raw: Any, keys: tuple) -> bool:
-    """Whether what is set at a place is a number, or one over time, of a part."""
+    """True if a key path is a number or a schedule of a part."""
     if len(keys) < 3 or keys[0] not in GROUPS or keys[2] in SEEN:
         return False
     part = raw.get(keys[:2])
@@ -79,6 +81,6 @@ def number(raw: Any, keys: tuple) -> bool:
 
 @functools.cache
 def numbers(kind: type | None) -> frozenset[str]:
-    """Keys of a kind of part that are numbers, or numbers over time."""
+    """Keys of a type of part that are numbers or schedules."""
     values = {} if kind is None else kind.values()
     return frozenset(key for key, value in values.items() if isinstance(value, (Quantity, Scheduled)))

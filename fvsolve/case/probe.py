@@ -1,4 +1,4 @@
-"""A quantity of a part that is recorded. Knows how probes are written; knows no values."""
+"""Probes: recorded quantities of parts."""
 
 from __future__ import annotations
 
@@ -24,8 +24,13 @@ DEFAULT_OF_LINKS = ("flow", "flow_P", "flow_T", "flow_A", "flow_B", "force")
 
 @dataclass(frozen=True)
 class Probe:
-    """What is recorded: text of the case, part and quantity; along a pipe the fraction from `from`, in a basin the
-    point [m]; straight : read along a straight line between cells, not by the scheme's polynomial."""
+    """Recorded quantity of a part.
+
+    text : as the case writes it
+    fraction : place along a pipe as a fraction of its length from the `from` end, else None
+    point : x, y in a basin [m], else None
+    straight : True to interpolate linearly between cells, not by the polynomial of the scheme
+    """
 
     text: str
     part: str  # "nodes" | "links"
@@ -42,63 +47,63 @@ Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | Pool | Scalar | Non
 
 
 def read_probe(given: object, kinds: Kinds) -> Probe | None:
-    """The probe a text names; None where its part is at fault itself.
+    """Probe of a text; None if its part is faulty. Raises ValueError.
 
-    `kinds` holds for "nodes" and "links" the class of each name (None where its type is unknown), of a basin what of
-    it can be read, and the "scalars". Raises ValueError.
+    kinds : for "nodes" and "links" the class of each name (None if its type is unknown, for a basin its probes), and
+    the "scalars"
     """
     match = _PROBE.fullmatch(given.strip()) if isinstance(given, str) else None
     if match is None:
-        raise ValueError(f'{show(given)} is no probe; wanted NAME.QUANTITY, for example "gate.pressure"')
+        raise ValueError(f'{show(given)} is not a probe; expected NAME.QUANTITY, for example "gate.pressure"')
     part, name, quantity, place = match.groups()
     parts = [part] if part else [part for part in ("nodes", "links") if name in kinds[part]]
     parts = [part for part in parts if name in kinds[part]]
     if not parts and part != "nodes" and name in kinds.get("routes", {}):
         return of_route(given.strip(), name, quantity, place, kinds)
     if not parts and kinds["nodes"].get(name.partition(".")[0], name) is None:
-        return None  # a patch of a basin that is at fault
+        return None  # a patch of a faulty basin
     if not parts and of_uncut(name, kinds):
         return None
     if not parts:
         names = [*kinds["nodes"], *kinds["links"]] if part is None else list(kinds[part])
-        what = {"nodes": "node", "links": "link"}.get(part or "", "part")
-        raise ValueError(f"no {what} named {show(name)}; {what}s are {listing(names)}{did_you_mean(name, names)}")
+        noun = {"nodes": "node", "links": "link"}.get(part or "", "part")
+        raise ValueError(f"no {noun} named {show(name)}; {noun}s are {listing(names)}{did_you_mean(name, names)}")
     if any(kinds[part][name] is None for part in parts):
         return None
-    found, problems = [], []
+    probes, problems = [], []
     for part in parts:
         try:
-            found.append(_probe(given.strip(), part, name, quantity, place, kinds))
+            probes.append(_probe(given.strip(), part, name, quantity, place, kinds))
         except ValueError as error:
             problems.append(str(error))
-    if not found:
+    if not probes:
         raise ValueError("; ".join(problems))
-    if len(found) > 1:
+    if len(probes) > 1:
         raise ValueError(f"a node and a link are named {show(name)}; write nodes.{given} or links.{given}")
-    return found[0]
+    return probes[0]
 
 
 def of_uncut(name: str, kinds: Kinds) -> bool:
-    """Whether a name may be that of a piece, bend or place of a part of which it is not known what it has."""
-    return any(name.startswith((f"{whole}-", f"{whole}.")) for whole in kinds.get("uncut", ()))
+    """True if a name may be that of a piece, bend or place of a faulty part, whose places are unknown."""
+    return any(name.startswith((f"{pipe}-", f"{pipe}.")) for pipe in kinds.get("uncut", ()))
 
 
 def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
-    """A place along a route, by a share of its length or a chainage; None where the route is at fault itself."""
+    """Probe at a fraction of the length or a chainage of a route; None if the route is faulty. Raises ValueError."""
     along = Pipe.along | _carried(Pipe, kinds, "along")
     if quantity not in along:
         near = did_you_mean(quantity, along)
-        raise ValueError(f"{name} is a route, without {show(quantity)}; it has {', '.join(along)}{near}")
+        raise ValueError(f"{name} is a route, which has no {show(quantity)}; it has {', '.join(along)}{near}")
     if kinds["routes"][name] is None:
         return None
     legs, _ = kinds["routes"][name]
     if place is None and quantity not in Pipe.quantities:
-        raise ValueError(f'{name} is a route: say where, for example "{name}.{quantity}@0.5"')
+        raise ValueError(f'{name} is a route, and a probe of it needs a place, for example "{name}.{quantity}@0.5"')
     begin, end = legs[0].begin, legs[-1].end
     at = begin + share_of(place or "0", end - begin, begin) * (end - begin)
-    leg = next((one for one in legs if at <= one.end), legs[-1])
+    leg = next((item for item in legs if at <= item.end), legs[-1])
     if leg.backwards and quantity in ("flow", "velocity"):
-        raise ValueError(f"{name} runs against {leg.pipe} there; wanted {leg.pipe}.{quantity}@x, whose sign is its own")
+        raise ValueError(f"{name} and {leg.pipe} have opposite directions there; expected {leg.pipe}.{quantity}@x")
     share = min(max((at - leg.begin) / (leg.end - leg.begin), 0.0), 1.0)
     share = 1.0 - share if leg.backwards else share
     scalar = kinds["scalars"].get(quantity)
@@ -106,43 +111,48 @@ def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kind
 
 
 def share_of(place: str, length: float | None, begin: float) -> float:
-    """A place as a share of a length [m] that begins at a chainage [m]; ValueError where it is none.
+    """Fraction of a length that a text gives as a fraction, or as a chainage with its unit. Raises ValueError.
 
-    length : None of a pipe that is at fault itself, along which any chainage will do
+    length : length [m]; None for a faulty pipe, where every chainage is accepted
+    begin : chainage of the start [m]
     """
     try:
-        found = float(place)
-        said = f'"@{place}" is no fraction of the length; wanted 0 to 1'
+        share = float(place)
+        text = f'"@{place}" is not a fraction of the length; expected 0 to 1'
     except ValueError:
         try:
-            found = units.parse(place, "length") - begin
-            found = 0.0 if length is None else found / length
+            share = units.parse(place, "length") - begin
+            share = 0.0 if length is None else share / length
         except ValueError:
             raise ValueError(
-                f'"@{place}" is no fraction of the length; wanted 0 to 1, or a chainage with its unit'
+                f'"@{place}" is not a fraction of the length; expected 0 to 1, or a chainage with its unit'
             ) from None
-        said = "" if length is None else f'"@{place}" is not within {begin:.10g} m to {begin + length:.10g} m'
-    if not -1e-12 <= found <= 1.0 + 1e-12:
-        raise ValueError(said or f'"@{place}" is no fraction of the length; wanted 0 to 1')
-    return min(max(found, 0.0), 1.0)
+        text = "" if length is None else f'"@{place}" is outside {begin:.10g} m to {begin + length:.10g} m'
+    if not -1e-12 <= share <= 1.0 + 1e-12:
+        raise ValueError(text or f'"@{place}" is not a fraction of the length; expected 0 to 1')
+    return min(max(share, 0.0), 1.0)
 
 
 def default_probes(kinds: Kinds) -> list[Probe]:
-    """All nodes (pressure, head, level; position, velocity) and all links (flows; force)."""
-    found = []
+    """Default probes: all nodes (pressure, head, level; motion of masses and bodies) and all links (flows; force)."""
+    probes = []
     for part, quantities in (("nodes", DEFAULT_OF_NODES), ("links", DEFAULT_OF_LINKS)):
         other = kinds["links" if part == "nodes" else "nodes"]
         for name, kind in kinds[part].items():
-            own = [one for one in quantities if one in kind.quantities] if kind is not None else []
-            own = [one for one in own if one not in getattr(kind, "asked", ())]
+            own = (
+                [quantity_name for quantity_name in quantities if quantity_name in kind.quantities]
+                if kind is not None
+                else []
+            )
+            own = [quantity_name for quantity_name in own if quantity_name not in getattr(kind, "asked", ())]
             for quantity in [*own, *_carried(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
-                found.append(_probe(text, part, name, quantity, None, kinds))
-    return found
+                probes.append(_probe(text, part, name, quantity, None, kinds))
+    return probes
 
 
 def _carried(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict[str, str]:
-    """Scalars that the places of a kind carry: those that have a pressure."""
+    """Scalars that a kind of part has: all if it has a pressure, else none."""
     return dict.fromkeys(kinds["scalars"] if "pressure" in getattr(kind, where, {}) else (), "number")
 
 
@@ -173,12 +183,14 @@ def _quantity(
     known = {**along, **own, **getattr(kind, "fields", {})}
     article = "an" if kind.kind[0] in "aeiou" else "a"
     if quantity not in known:
-        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "its water is one with its body"
-        raise ValueError(f"{name} is {article} {kind.kind}, without {show(quantity)}; {has}")
+        has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "its water is part of its body"
+        raise ValueError(f"{name} is {article} {kind.kind}, which has no {show(quantity)}; {has}")
     if place is None:
         if quantity not in own:
-            raise ValueError(f'{name} is a {kind.kind}: say where, for example "{name}.{quantity}@0.5"')
+            raise ValueError(
+                f'{name} is a {kind.kind}, and this probe needs a place, for example "{name}.{quantity}@0.5"'
+            )
         return (0.0 if quantity in along else None), known[quantity]
     if quantity not in along:
-        raise ValueError(f"{name} is {article} {kind.kind}: {quantity} has no place along it; leave @{place} out")
+        raise ValueError(f"{name} is {article} {kind.kind}, and {quantity} has no place along it; leave @{place} out")
     return share_of(place, length, begin), known[quantity]

@@ -1,4 +1,4 @@
-"""A case before it is understood: nested dicts, their lines, overrides. Knows no key's meaning."""
+"""Raw case before it is read: nested dicts, line numbers, overrides."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DEEPEST = 40
 
 @dataclass
 class Raw:
-    """What a source says and where: `table` as nested dicts, `text` it comes from, `overridden` paths."""
+    """Nested dicts `table` of a source, with its `text` and the key paths that settings have `overridden`."""
 
     table: dict[str, Any]
     name: str = "case"
@@ -31,45 +31,45 @@ class Raw:
 
     @functools.cached_property
     def lines(self) -> dict[tuple, int]:
-        """Key path -> line; found when the first fault asks."""
+        """Key path -> line number; computed at the first fault."""
         return key_lines(self.text)
 
     @property
     def file(self) -> str:
-        """How messages call it."""
+        """Name of the source in messages."""
         return self.path.name if self.path else self.name
 
     def line(self, keys: tuple) -> int | None:
-        """The line of a key path, or of the nearest table that holds it."""
+        """Line of a key path, or of the nearest table that contains it."""
         for count in range(len(keys), 0, -1):
             if keys[:count] in self.lines:
                 return self.lines[keys[:count]]
         return None
 
     def is_override(self, keys: tuple) -> bool:
-        """Whether a key path was set, lies below one that was, or came to be by one."""
-        if any(keys[: len(one)] == one for one in self.overridden):
+        """True if a key path was set, lies below a path that was set, or was created by a setting."""
+        if any(keys[: len(path)] == path for path in self.overridden):
             return True
-        made = bool(self.lines) and keys not in self.lines
-        return made and any(one[: len(keys)] == keys for one in self.overridden if keys)
+        created = bool(self.lines) and keys not in self.lines
+        return created and any(path[: len(keys)] == keys for path in self.overridden if keys)
 
     def get(self, keys: tuple) -> Any:
-        """What stands at a key path, or None."""
-        found: Any = self.table
+        """Value at a key path, or None."""
+        value: Any = self.table
         for key in keys:
             try:
-                found = found[key]
+                value = value[key]
             except (KeyError, IndexError, TypeError):
                 return None
-        return found
+        return value
 
 
 def read_raw(source: Any) -> Raw:
-    """The raw case of a TOML file or a dict; CaseError where it is neither."""
+    """Read the raw case of a TOML file or a dict. Raises CaseError."""
     if isinstance(source, Mapping):
         return Raw(_copy(source))
     if not isinstance(source, (str, Path)):
-        raise CaseError([Fault("", f"a {type(source).__name__} is no case; wanted a path or a dict")])
+        raise CaseError([Fault("", f"a {type(source).__name__} is not a case; expected a path or a dict")])
     path = Path(source)
     text = _read_text(path)
     try:
@@ -78,27 +78,27 @@ def read_raw(source: Any) -> Raw:
         raise CaseError([Fault("", "tables or lists nested too deep")], path.name) from None
     except ValueError as error:
         if re.search(r"^\s*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", text, re.MULTILINE | re.IGNORECASE):
-            what = f"an EPANET network, no case; fvsolve new {path.stem} --from {path} makes one of it"
-            raise CaseError([Fault("", what)], path.name) from None
+            message = f"is an EPANET network, not a case; fvsolve new {path.stem} --from {path} translates it"
+            raise CaseError([Fault("", message)], path.name) from None
         raise CaseError([syntax_fault(error, text)], path.name) from None
     return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)
 
 
 def opened(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str, Any]:
-    """The same table, copied along paths that are to be written; all else that it holds is shared."""
-    made = dict(table)
+    """Copy a table along the paths that are to be written; share all other values with the original."""
+    copy = dict(table)
     for key in {path[0] for path in paths}:
         below = [path[1:] for path in paths if path[0] == key and path[1:]]
-        if below and isinstance(made.get(key), dict):
-            made[key] = opened(made[key], below)
-    return made
+        if below and isinstance(copy.get(key), dict):
+            copy[key] = opened(copy[key], below)
+    return copy
 
 
 def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str, ...]]) -> list[Fault]:
-    """Put settings (dotted key -> value, text parsed as TOML where it can be) into a raw case; their faults.
+    """Put settings (dotted key -> value, text parsed as TOML where possible) into a raw case; return their faults.
 
-    A setting takes the place of what the file says under one of its `alternatives`, keys of which a table
-    has one at most.
+    A setting replaces the key of the file that belongs to the same group of `alternatives`. A table may have at most
+    one key of each group.
     """
     faults = []
     groups = {group: raw.get((group,)) for group in ("nodes", "links")}
@@ -126,11 +126,11 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
 
 
 def located(error: CaseError, case: Any) -> CaseError:
-    """The same faults of a case that was read before, each with its line or as an override, under the file's name."""
+    """Locate the faults of a case that was read before: add line numbers or mark overrides, with the file's name."""
     if case.path is None:
         return CaseError(error.faults, case.name)
     try:
-        said = read_raw(case.path)
+        source = read_raw(case.path)
     except CaseError:  # the file has gone since
         return error
     now = Raw(case.raw)
@@ -138,13 +138,13 @@ def located(error: CaseError, case: Any) -> CaseError:
     for fault in error.faults:
         keys = place(case.raw, tuple(fault.place.split(".")))
         fault = replace(fault, place=".".join(keys))
-        found, before = now.get(keys), said.get(keys)
-        whole = len(keys) == 2 and isinstance(found, dict)  # a part, of which some other key may be set
-        if found is not None and (before is None or (found != before and not whole)):
+        value, before = now.get(keys), source.get(keys)
+        is_part = len(keys) == 2 and isinstance(value, dict)  # some other key of the part may have been set
+        if value is not None and (before is None or (value != before and not is_part)):
             faults.append(replace(fault, override=True))
         else:
-            faults.append(replace(fault, line=fault.line or said.line(keys)))
-    return CaseError(faults, said.file)
+            faults.append(replace(fault, line=fault.line or source.line(keys)))
+    return CaseError(faults, source.file)
 
 
 def _read_text(path: Path) -> str:
@@ -154,7 +154,7 @@ def _read_text(path: Path) -> str:
         near = [other.name for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
         raise CaseError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path)) from None
     except IsADirectoryError:
-        raise CaseError([Fault("", "is a directory; wanted a TOML file")], str(path)) from None
+        raise CaseError([Fault("", "is a directory; expected a TOML file")], str(path)) from None
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
         message = f"byte {show(error.object[error.start : error.start + 1])} is not UTF-8 text"
@@ -165,45 +165,47 @@ def _read_text(path: Path) -> str:
 
 
 def syntax_fault(error: ValueError, text: str) -> Fault:
-    """What is wrong with a text that is no TOML, and the line."""
+    """Fault of a text that is not valid TOML, with its line."""
     message = str(error)
     match = re.search(r"\s*\(at line (\d+), column (\d+)\)", message)
     line = int(match[1]) if match else text.count("\n") + 1
-    said = text.splitlines()[line - 1].strip() if 0 < line <= len(text.splitlines()) else ""
+    line_text = text.splitlines()[line - 1].strip() if 0 < line <= len(text.splitlines()) else ""
     message = message.replace(match[0], "") if match else message
     message = message[:1].lower() + message[1:]
-    if bare := _bare_name(said):
-        return Fault("", f"TOML: {bare}: {show(said)}", line)
+    if bare := _bare_name(line_text):
+        return Fault("", f"TOML: {bare}: {show(line_text)}", line)
     if message == "cannot overwrite a value":
         message = "this key is given twice"
     elif message.startswith("cannot declare"):
         message = "this table is given twice"
-    return Fault("", f"TOML: {message}: {show(said)}" if said else f"TOML: {message}", line)
+    return Fault("", f"TOML: {message}: {show(line_text)}" if line_text else f"TOML: {message}", line)
 
 
-def _bare_name(said: str) -> str:
-    """What is wrong with names outside quotes on a line of TOML; empty where they are in order."""
-    match = re.fullmatch(r"\[+([^\[\]\"']+)\]+\s*(?:#.*)?|([^=\[\]\"'#]+?)\s*=.*", said)
+def _bare_name(line_text: str) -> str:
+    """Describe a wrong unquoted name on a line of TOML; empty if there is none."""
+    match = re.fullmatch(r"\[+([^\[\]\"']+)\]+\s*(?:#.*)?|([^=\[\]\"'#]+?)\s*=.*", line_text)
     names = [name.strip() for name in (match[1] or match[2]).split(".")] if match else []
     odd = next((name for name in names if name and not re.fullmatch(r"[A-Za-z0-9_-]+", name)), None)
     if odd is None:
         return ""
     if re.fullmatch(r"[\w-]+", odd):
-        return f"a name with letters beyond a to z wants quotes: {show(odd)}"
+        return f"a name with letters beyond a to z needs quotes: {show(odd)}"
     joined = re.sub(r"\s+", "_", odd)
     if joined != odd:
-        return f"a bare name has no blank; write {joined} (in quotes a key may have one, the name of a part may not)"
-    return f"a bare name has letters, digits, _ and -; wanted quotes: {show(odd)}"
+        return (
+            f"an unquoted name has no blank; write {joined} (a quoted key may have a blank, the name of a part may not)"
+        )
+    return f"an unquoted name has only letters, digits, _ and -; expected quotes: {show(odd)}"
 
 
 def _copy(value: Any, depth: int = 0) -> Any:
-    """Plain dicts, lists and scalars; NumPy arrays and numbers become lists and Python's own."""
+    """Copy to plain dicts, lists and scalars; NumPy arrays and numbers become Python's own."""
     if depth > DEEPEST:
         raise CaseError([Fault("", "tables or lists nested too deep")])
     if isinstance(value, Mapping):
-        return {str(key): _copy(one, depth + 1) for key, one in value.items()}
+        return {str(key): _copy(item, depth + 1) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_copy(one, depth + 1) for one in value]
+        return [_copy(item, depth + 1) for item in value]
     if isinstance(value, Path):
         return str(value)
     if type(value).__module__ == "numpy" and hasattr(value, "tolist"):
@@ -213,18 +215,18 @@ def _copy(value: Any, depth: int = 0) -> Any:
 
 @functools.lru_cache(maxsize=4096)
 def dotted(key: str) -> tuple[str, ...]:
-    """The keys of a path as TOML writes it: "links.valve.area"."""
+    """Keys of a path written as in TOML: "links.valve.area"."""
     try:
-        found: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
+        table: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None
     except ValueError:
-        found = None
-    if not found:
+        table = None
+    if not table:
         return tuple(key.split("."))
     keys = []
-    while isinstance(found, dict):
-        name = next(iter(found))
+    while isinstance(table, dict):
+        name = next(iter(table))
         keys.append(name)
-        found = found[name]
+        table = table[name]
     return tuple(keys)
 
 
@@ -232,16 +234,16 @@ def parsed(value: Any) -> Any:
     if not isinstance(value, str):
         return value
     try:
-        found = tomllib.loads(f"value = {value}")
+        table = tomllib.loads(f"value = {value}")
     except (ValueError, RecursionError):
         return value
-    return found["value"] if len(found) == 1 else value
+    return table["value"] if len(table) == 1 else value
 
 
 def _put(table: dict[str, Any], keys: tuple[str, ...], value: Any) -> None:
     for key in keys[:-1]:
         inner = table.setdefault(key, {})
         if not isinstance(inner, dict):
-            raise ValueError(f"{show(key)} is no table but {show(inner)}; it has no keys below it")
+            raise ValueError(f"{show(key)} is {show(inner)}, not a table; no key can be set below it")
         table = inner
     table[keys[-1]] = value

@@ -1,4 +1,4 @@
-"""What must hold between what rides on bodies and the rest of a case, and what it weighs. Knows no network."""
+"""Checks and mass of basins on bodies."""
 
 from __future__ import annotations
 
@@ -20,48 +20,59 @@ Found = Iterator[tuple[tuple, str]]
 
 
 def misfits(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Found:
-    """Faults of a basin that rides on a body."""
+    """Faults of a basin on a body."""
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
     if basin.on is None:
         if basin.sloshing != "cells":
-            yield (*key, "sloshing"), "is of water that rides on a body; name that with on"
+            yield (*key, "sloshing"), "applies only to water on a body; name the body with on"
         return
     if not basin.own.rides:
-        wanted = " or ".join(show(name) for name, one in Physics.kinds.items() if one.rides)
-        yield (*key, "on"), f"physics {show(basin.physics)} rides on no body; wanted {wanted}"
+        kinds = " or ".join(show(name) for name, patch_options in Physics.kinds.items() if patch_options.rides)
+        yield (*key, "on"), f"physics {show(basin.physics)} cannot be on a body; expected {kinds}"
     if basin.sloshing != "cells" and not basin.own.sloshes:
-        yield (*key, "sloshing"), f'is of a free surface; physics {show(basin.physics)} rides by "cells" alone'
-    if any(one.moves for one in basin.patches.values()):
-        yield (*key, "on"), "its walls move, and its axes too; wanted one of both"
+        yield (*key, "sloshing"), f'needs a free surface; physics {show(basin.physics)} on a body has only "cells"'
+    if any(patch_options.moves for patch_options in basin.patches.values()):
+        yield (
+            (*key, "on"),
+            "a basin on a body cannot have moving walls; leave on out, or body and travel of its patches",
+        )
     free = next(free_joints(basin.on, nodes), None)
-    for patch, one in basin.patches.items():
-        opened = "impedance" if one.impedance is not None else "boundary" if one.boundary == "open" else None
+    for patch, patch_options in basin.patches.items():
+        opened = (
+            "impedance"
+            if patch_options.impedance is not None
+            else "boundary"
+            if patch_options.boundary == "open"
+            else None
+        )
         if opened is not None and free is not None and not basin.lumped:
-            text = f"{free} moves freely, and would have to feel what leaves here; wanted a wall, or a driven joint"
+            text = (
+                f"{free} moves freely, and the reaction to outflow is not modelled; expected a wall or a driven joint"
+            )
             yield (*key, "patches", patch, opened), text
 
 
 def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any) -> Found:
-    """Faults of where something rides."""
+    """Faults of the place of a node on a body."""
     key = ("nodes", name)
     if node.on is None:
         for other in ("at", "attitude"):
             if getattr(node, other, None) is not None:
-                yield (*key, other), "is a place on a body; name that with on"
+                yield (*key, other), "is a place on a body; name the body with on"
         return
-    if node.on in nodes or node.on not in named:  # else at fault itself
+    if node.on in nodes or node.on not in named:  # otherwise the body itself is faulty
         yield from (((*key, "on"), text) for text in body_faults(node.on, nodes, named))
     if node.elevation is not None:
-        yield (*key, "elevation"), f"it rides on {node.on}; say where with at, in axes of that body"
+        yield (*key, "elevation"), f"the node is on {node.on}; give its place with at, in the axes of that body"
 
 
 def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Found:
-    """Faults of water upside down on fixed joints: nothing ever presses it on its bed."""
+    """Faults of water on fixed joints whose bed is overturned: gravity never presses it on the bed."""
     for name, node in nodes.items():
         on = getattr(node, "on", None)
         wet = node.kind == "tank" or (node.kind == "basin" and node.own.sloshes and node.sloshing != "frozen")
-        if not wet or on not in poses or any(nodes[one].joint.kind != "fixed" for one in carriers(on, nodes)):
+        if not wet or on not in poses or any(nodes[body].joint.kind != "fixed" for body in carriers(on, nodes)):
             continue
         turn = poses[on].attitude @ getattr(node, "turn", np.eye(3))
         if turn[2, 2] <= 0.0:
@@ -70,17 +81,17 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Found:
 
 
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:
-    """Faults of the body that something rides on; named : tables of all nodes, of those at fault too."""
-    bodies = [one for one, node in nodes.items() if isinstance(node, Body)]
-    bodies += [one for one in named if one not in nodes and getattr(named[one], "get", {}.get)("type") == "body"]
+    """Faults of the body that carries a node; named : tables of all nodes, also of faulty ones."""
+    bodies = [body for body, node in nodes.items() if isinstance(node, Body)]
+    bodies += [body for body in named if body not in nodes and getattr(named[body], "get", {}.get)("type") == "body"]
     if not isinstance(nodes.get(on), Body):
-        what = f"is a {nodes[on].kind}" if on in nodes else "is not there"
-        yield f"{show(on)} {what}; wanted a body: {listing(bodies) or 'there is none'}{did_you_mean(on, bodies)}"
+        state = f"is a {nodes[on].kind}" if on in nodes else "is not a node"
+        yield f"{show(on)} {state}; expected a body: {listing(bodies) or 'the case has none'}{did_you_mean(on, bodies)}"
         return
 
 
 def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """Bodies between one and the world whose joints forces move."""
+    """Bodies from `on` down to the world whose joints move freely (neither fixed nor driven)."""
     for body in carriers(on, nodes):
         joint = nodes[body].joint
         if joint.kind != "fixed" and joint.driven is None:
@@ -88,7 +99,7 @@ def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 
 
 def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
-    """A body and those that it hangs on."""
+    """Body `on` and all bodies that carry it."""
     seen: set[str] = set()
     while isinstance(nodes.get(on), Body) and on not in seen:
         seen.add(on)
@@ -97,15 +108,15 @@ def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
 
 
 def loaded(nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravity: float, t: float) -> dict[str, Any]:
-    """Nodes, bodies with the mass, centre and inertia of the water that rides on them as one, and its modes as bodies.
+    """Nodes with lumped water: its mass, centre and inertia are added to bodies, its modes are extra bodies.
 
-    lumped : meshes of basins that have no cells; t : of the start [s]
+    lumped : meshes of basins without cells; density [kg/m3]; gravity [m/s2]; t : start time [s]
     """
-    found = dict(nodes)
+    result = dict(nodes)
     for name, mesh in lumped.items():
-        basin, body = nodes[name], found[nodes[name].on]
-        weigh = as_mass if basin.sloshing == "frozen" else sloshing.ice
-        mass, centre, inertia = weigh(basin, mesh, density)
+        basin, body = nodes[name], result[nodes[name].on]
+        mass_of = as_mass if basin.sloshing == "frozen" else sloshing.ice
+        mass, centre, inertia = mass_of(basin, mesh, density)
         turn = basin.turn
         centre = np.array(basin.place) + turn @ centre
         both, own = body.mass + mass, np.array(body.centre_of_mass)
@@ -117,16 +128,16 @@ def loaded(nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravit
             + point_inertia(mass, centre - middle)
         )
         change = {"mass": both, "centre_of_mass": tuple(middle.tolist()), "inertia": tuple(map(tuple, total.tolist()))}
-        found[nodes[name].on] = body.model_copy(update=change)
+        result[nodes[name].on] = body.model_copy(update=change)
     swinging = {name: mesh for name, mesh in lumped.items() if nodes[name].sloshing == "modes"}
-    stand = poses(found, t) if swinging else {}
+    stand = poses(result, t) if swinging else {}
     for name, mesh in swinging.items():
-        found |= sloshing.sliders(name, nodes[name], mesh, stand[nodes[name].on], density, gravity)
-    return found
+        result |= sloshing.sliders(name, nodes[name], mesh, stand[nodes[name].on], density, gravity)
+    return result
 
 
 def as_mass(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """(mass [kg], centre [m], inertia about it [kg m2]) of water at rest, in axes of its basin: prisms on cells."""
+    """(mass [kg], centre [m], inertia about it [kg m2]) of water at rest as prisms on cells, in axes of the basin."""
     bed = means(samples(basin.bed, mesh))
     depth = np.maximum(basin.level - bed, 0.0)
     mass = density * mesh.area * depth
@@ -140,6 +151,6 @@ def as_mass(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, n
         along = across = wide
     high = depth**2 / 12.0
     inertia = np.diag([mass @ (across + high), mass @ (along + high), mass @ (along + across)])
-    for one, place in zip(mass, places - centre, strict=True):
-        inertia += point_inertia(float(one), place)
+    for m, place in zip(mass, places - centre, strict=True):
+        inertia += point_inertia(float(m), place)
     return total, centre, inertia

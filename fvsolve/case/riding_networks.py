@@ -1,4 +1,4 @@
-"""What must hold of places of a network that ride on bodies, and of links that join them. Knows no basin's fields."""
+"""Checks of places on bodies, and of links that join them."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from fvsolve.parts.node import Node, Rider
 from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
-PIPE_THERE = "wanted a pipe there, or a chamber"
-CLOSE = 1e-6  # of a length, and of no way [m]: places are typed with a few digits
+PIPE_THERE = "expected a pipe there, or a chamber"
+CLOSE = 1e-6  # relative tolerance of a length, and tolerance of zero distance [m]: typed places have few digits
 
 
 def standing(node: Node, poses: dict[str, Any]) -> Node:
-    """A node whose elevation is that at the start where it rides on a body."""
+    """Node with its elevation at the start, if it is on a body; else the node itself."""
     pose = poses.get(getattr(node, "on", None))
     if pose is None or isinstance(node, Basin):
         return node
@@ -26,112 +26,128 @@ def standing(node: Node, poses: dict[str, Any]) -> Node:
 
 
 def has_height(node: Node, poses: dict[str, Any]) -> bool:
-    """Whether a node has one elevation: a basin on a body has none, nor what rides on one unknown."""
+    """True if a node has a single known elevation: not a basin on a body, nor a node on an unknown body."""
     on = getattr(node, "on", None)
     return on is None or (on in poses and not isinstance(node, Basin))
 
 
 def misfits(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Found:
-    """Faults of places of a network that ride on bodies, and of links that join them; patches : of basins that do."""
+    """Faults of places on bodies, and of links that join them; patches : those of basins on bodies, by full name."""
     for name, node in nodes.items():
         if isinstance(node, Basin) or not isinstance(node, Rider):
             continue
         yield from place_faults(name, node, nodes, named)
         if node.on is not None and getattr(node, "head", None) is not None:
-            yield ("nodes", name, "head"), f"it rides on {node.on}, and a head counts from the ground; wanted pressure"
+            yield (
+                ("nodes", name, "head"),
+                f"the node is on {node.on}, and a head counts from the ground; expected pressure",
+            )
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
         yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes, patches))
     for place, text in unfelt(nodes, links, free=True):
-        yield place, f"{text}, or a driven joint in place of a free one"
+        yield place, f"{text}, or a driven joint instead of a free one"
 
 
 def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> Found:
-    """What bodies would not feel of networks on them; of those alone that move freely, where that is asked."""
+    """Faults of networks whose reaction on their bodies is not modelled; free : only of bodies that move freely."""
 
-    def riding(name: str) -> bool:
+    def on_body(name: str) -> bool:
         on = getattr(whose(name, nodes), "on", None)
         return on is not None and (not free or any(free_joints(on, nodes)))
 
-    tanks = [name for name, node in nodes.items() if node.kind == "tank" and riding(name)]
+    tanks = [name for name, node in nodes.items() if node.kind == "tank" and on_body(name)]
     for name in tanks:
         for key in ("connection", "height"):
             if getattr(nodes[name], key) is not None:
-                yield ("nodes", name, key), "what passes here is not felt by its body yet; leave it out"
+                yield ("nodes", name, key), "the reaction of its flow on the body is not modelled yet; leave it out"
         if hasattr(nodes[name].area, "area"):
-            yield ("nodes", name, "area"), "a body feels tanks of one area alone yet; wanted a number"
+            yield ("nodes", name, "area"), "a tank on a body has only one area yet; expected a number"
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
-        if not any(map(riding, ends)):
+        if not any(map(on_body, ends)):
             continue
         key = ("links", name)
         for end in dict.fromkeys(end for end in ends if isinstance(whose(end, nodes), Basin)):
-            yield key, f"what passes {end} is not felt by its body yet; wanted a tank in place of the basin"
+            yield (
+                key,
+                f"the reaction of the flow through {end} is not modelled yet; expected a tank instead of the basin",
+            )
         if link.kind == "leak":
-            yield key, "what leaves here is not felt by its body yet; wanted a valve to a reservoir"
+            yield key, "the reaction of the leak on the body is not modelled yet; expected a valve to a reservoir"
         elif link.kind == "rigid-column":
             for end in ends:
                 if end in nodes and led(end, nodes, links):
-                    yield key, f"at {end} it meets none but valves and columns, which is not felt yet; {PIPE_THERE}"
+                    yield (
+                        key,
+                        f"at {end} it joins only valves and columns, whose reaction is not modelled yet; {PIPE_THERE}",
+                    )
         elif link.kind != "pipe" or free:
             for end in dict.fromkeys(end for end in ends if end in tanks):
-                what = "a pipe answers at once" if link.kind == "pipe" else "a valve has no inertia"
-                yield key, f"{what} to {end}, whose own flow has none either; wanted a rigid-column between"
+                reason = "the flow of a pipe" if link.kind == "pipe" else "the flow of a valve"
+                yield (
+                    key,
+                    f"{reason} has no inertia at {end}, nor has the tank; expected a rigid-column between",
+                )
 
 
 def led(end: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
-    """Whether none but rigid columns and restrictions set the pressure of a place."""
+    """True if only rigid columns and restrictions set the pressure of a place."""
     kinds = {link.kind for link in links.values() if end in link.ports.values()}
     return nodes[end].kind in ("junction", "inflow") and "pipe" not in kinds
 
 
 def whose(place: str, nodes: dict[str, Any]) -> Any:
-    """The node that a place is, or the basin whose patch it is."""
+    """Node at a place, or the basin that has it as a patch."""
     return nodes.get(place, nodes.get(place.rpartition(".")[0]))
 
 
 def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]) -> Found:
-    """Faults of a link between places of which one or more ride."""
+    """Faults of a link with at least one end on a body."""
     stand = [whose(place, nodes) for place in ends]
     on = [getattr(node, "on", None) for node in stand]
     if None in stand or any(body is not None and body not in nodes for body in on):
-        return  # at fault itself
+        return  # an end is faulty
     if not any(on):
         if getattr(link, "route", None):
-            yield ("route",), "is a way on a body, and its ends ride on none; give both on and at"
+            yield ("route",), "is a route on a body, but no end of the pipe is on a body; give both ends on and at"
         return
     if len(set(on)) > 1:
         each = zip(ends, on, strict=True)
-        said = " and ".join(f"{end}, on {body}" if body else f"{end}, which stands still" for end, body in each)
-        yield (), f"joins {said}: between these goes a hose, which there is not yet"
+        words = " and ".join(f"{end}, on {body}" if body else f"{end}, which is fixed" for end, body in each)
+        yield (), f"joins {words}: this would be a flexible hose, which is not supported yet"
         return
-    unable = [*dict.fromkeys(said for end, node in zip(ends, stand, strict=True) for said in shut(end, node))]
+    unable = [*dict.fromkeys(words for end, node in zip(ends, stand, strict=True) for words in shut(end, node))]
     yield from (((), text) for text in unable)
     where = [patches.get(end, node) for end, node in zip(ends, stand, strict=True)]
     if unable or any(isinstance(node, Basin) for node in where):
-        return  # at fault itself
+        return  # an end is faulty
     length = getattr(link, "length", None)
     points = np.array([where[0].place, *getattr(link, "route", []), where[-1].place])
     way = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
     if length is None and way > CLOSE:
-        text = f"its ends lie {way:g} m apart{said_of(ends, patches)}, and a {link.kind} has no way between"
-        yield (), f"{text}; wanted both at one place, and a pipe or rigid-column to the next"
+        text = f"its ends lie {way:g} m apart{said_of(ends, patches)}, and a {link.kind} has no length"
+        yield (), f"{text}; expected both ends at one place, and a pipe or rigid-column to the other place"
     elif length is not None and way > length * (1.0 + CLOSE):
-        yield ("length",), f"{length:g} m is too short: its way on {on[0]} is {way:g} m long{said_of(ends, patches)}"
+        yield ("length",), f"{length:g} m is too short: its route on {on[0]} is {way:g} m long{said_of(ends, patches)}"
 
 
 def shut(end: str, node: Any) -> Iterator[str]:
-    """Why nothing can join a patch of a basin that rides, if so."""
+    """Reasons why no link can join a patch of a basin on a body."""
     if not isinstance(node, Basin):
         return
     if not node.own.docks:
-        what = f"of a basin that rides, which physics {show(node.physics)} does not go with yet"
-        yield f"joins {end} {what}; wanted a free surface, or a tank"
+        place = f"of a basin on a body, which physics {show(node.physics)} does not support yet"
+        yield f"joins {end} {place}; expected a free surface, or a tank"
     elif node.lumped:
-        yield f'joins {end}, behind which there are no cells; wanted sloshing = "cells"'
+        yield f'joins {end}, a patch without cells; expected sloshing = "cells"'
 
 
 def said_of(ends: list[str], patches: dict[str, Any]) -> str:
-    """Where patches are that nobody stated."""
-    found = [f"{end} at [{', '.join(f'{one:.7g}' for one in patches[end].at)}]" for end in ends if end in patches]
-    return f" ({' and '.join(found)})" if found else ""
+    """Text of the computed positions of patches."""
+    texts = [
+        f"{end} at [{', '.join(f'{coordinate:.7g}' for coordinate in patches[end].at)}]"
+        for end in ends
+        if end in patches
+    ]
+    return f" ({' and '.join(texts)})" if texts else ""

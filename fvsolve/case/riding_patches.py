@@ -1,4 +1,4 @@
-"""Patches of basins that ride, as places on bodies. Knows meshes; knows no network."""
+"""Places on bodies of the patches of basins."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ import numpy as np
 
 from fvsolve.case.cells import means, samples
 
-ENOUGH = 200  # halvings
+ENOUGH = 200  # bisections
 
 
 def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) -> dict[str, Any]:
-    """Of a patch at rest, where it is: amid its faces, on the bed behind, and there what stands over it at the start.
+    """Add to the state at rest of a patch its place: the middle of its faces, on the bed of the cells next to it.
 
-    pose : of its body at the start; None where that is not asked for
+    pose : pose of the body at the start, for elevation and depth of water; None leaves both as they are
     """
     faces = mesh.patch(patch)
     x, y = mesh.length[faces] @ mesh.middle[faces] / mesh.length[faces].sum()
     own = np.array([x, y, rest["elevation"] or 0.0])
     at = np.array(basin.place) + basin.turn @ own
-    found = rest | {"on": basin.on, "at": tuple(at.tolist())}
+    result = rest | {"on": basin.on, "at": tuple(at.tolist())}
     if pose is not None:
-        found["elevation"] = float(pose.at(at)[2])
+        result["elevation"] = float(pose.at(at)[2])
         if rest["depth"] is not None:
-            found["depth"] = depth_over(basin, mesh, own, pose.attitude)
-    return found
+            result["depth"] = depth_over(basin, mesh, own, pose.attitude)
+    return result
 
 
 def depth_over(basin: Any, mesh: Any, place: np.ndarray, attitude: np.ndarray) -> float:
-    """Height of the surface, level in the world, over a place in axes of a basin, not below it [m]."""
+    """Depth of water with a horizontal surface over a place in axes of a basin, at least 0 [m]."""
     down = (attitude @ basin.turn).T @ np.array([0.0, 0.0, -1.0])
     if not down[2] < 0.0:
         return 0.0
@@ -42,7 +42,10 @@ def depth_over(basin: Any, mesh: Any, place: np.ndarray, attitude: np.ndarray) -
 
 
 def level_over(drawn: np.ndarray, tilt: np.ndarray, area: np.ndarray, volume: float) -> float:
-    """Where water of a volume stands over a bed, less its level, that is tilted by so much [m]; 0 where by nothing."""
+    """Level of a volume of water over a tilted bed relative to its level at rest [m]; 0 without tilt.
+
+    drawn : height of the bed above the level at rest [m]; tilt : its rise by the tilt [m]; area [m2]; volume [m3]
+    """
     ground = drawn + tilt
     if not np.ptp(ground - drawn) > 0.0:
         return 0.0

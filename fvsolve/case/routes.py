@@ -1,4 +1,4 @@
-"""Routes: pipes strung into one chainage. Knows which links meet; knows no flow."""
+"""Routes: consecutive pipes with one chainage."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from fvsolve.units import show
 
 
 class PipeNames(Value):
-    """A list of names of pipes, in the order in which they follow each other."""
+    """List of names of consecutive pipes."""
 
-    about = "pipes in their order; the next begins where one ends, or behind links without length between"
+    about = "names of consecutive pipes; each begins where the previous pipe ends, or across links without length"
     takes = "list of names"
     changes = VALUE
 
     def read(self, given: Any, setting: Setting) -> tuple[str, ...]:
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f'{show(given)} is no list; wanted one such as ["suction", "main"]')
-        faults = [((k,), f"{show(one)} is no name") for k, one in enumerate(given) if not isinstance(one, str)]
-        faults += [((k,), f"{show(one)} stands twice") for k, one in enumerate(given) if one in given[:k]]
+            raise ValueError(f'{show(given)} is not a list; expected for example ["suction", "main"]')
+        faults = [((k,), f"{show(item)} is not a name") for k, item in enumerate(given) if not isinstance(item, str)]
+        faults += [((k,), f"{show(item)} is given twice") for k, item in enumerate(given) if item in given[:k]]
         if faults:
             raise Misfit(faults)
         return tuple(given)
@@ -35,19 +35,23 @@ class PipeNames(Value):
 
 
 class Route(Table):
-    """`[routes.NAME]`: pipes strung into one chainage."""
+    """`[routes.NAME]`: consecutive pipes with one chainage."""
 
     pipes: Annotated[tuple[str, ...], PipeNames()]
     start: Annotated[
         float | None,
-        Quantity("length", about="chainage where it begins [m]; that of its first pipe, or 0 if left out",
+        Quantity("length", about="chainage of its start [m]; that of its first pipe, or 0 if left out",
                  changes=VALUE),
     ] = None  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Leg:
-    """A pipe on a route: chainage where the route enters it and where it leaves [m], and whether it runs against it."""
+    """Pipe on a route.
+
+    begin, end : chainages where the route enters and leaves the pipe [m]
+    backwards : True if the route runs from the `to` end of the pipe to its `from` end
+    """
 
     pipe: str
     begin: float
@@ -55,58 +59,58 @@ class Leg:
     backwards: bool
 
     def chainage(self, distance: Any) -> Any:
-        """Of places at distances from the pipe's `from` end [m]."""
+        """Chainage at distances from the `from` end of the pipe [m]."""
         return self.end - distance if self.backwards else self.begin + distance
 
     def distance(self, chainage: Any) -> Any:
-        """From the pipe's `from` end [m] of places at chainages."""
+        """Distance from the `from` end of the pipe at chainages [m]."""
         return self.end - chainage if self.backwards else chainage - self.begin
 
 
 def is_cut(name: str, pipes: Sequence[str]) -> bool:
-    """Whether a route is but the way along a pipe that was cut."""
+    """True if a route consists of the pieces of one cut pipe."""
     return list(pipes) == [f"{name}-{k + 1}" for k in range(len(pipes))]
 
 
 def alone(pipe: str, links: dict[str, Any]) -> Leg:
-    """The way along a pipe as it is drawn, by the chainages of its profile where it has one."""
+    """Leg of a single pipe from `from` to `to`, with the chainages of its profile if it has one."""
     profile = links[pipe].profile
     begin = 0.0 if profile is None else float(profile.chainage[0])
     return Leg(pipe, begin, begin + links[pipe].length, False)
 
 
 def spread(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) -> Route:
-    """A route with the pieces of cut pipes in their place, in the order in which it runs through them."""
+    """Replace cut pipes of a route by their pieces, in the direction of the route."""
     cut = [name for name in route.pipes if name in pieces]
     options = []
     for turned in itertools.product((1, -1), repeat=len(cut)):
         ways_of = dict(zip(cut, turned, strict=True))
-        whole = [pieces[name][:: ways_of[name]] if name in ways_of else [name] for name in route.pipes]
-        options.append(route.model_copy(update={"pipes": tuple(itertools.chain(*whole))}))
+        names = [pieces[name][:: ways_of[name]] if name in ways_of else [name] for name in route.pipes]
+        options.append(route.model_copy(update={"pipes": tuple(itertools.chain(*names))}))
         if not cut or (all(pipe in links for pipe in options[-1].pipes) and broken(options[-1], links) is None):
             return options[-1]
     return options[0]
 
 
 def is_pipe(given: Any) -> bool:
-    """Whether a table of a file says that it is a pipe."""
+    """True if a raw link is a pipe."""
     return isinstance(given, dict) and given.get("type") == "pipe"
 
 
 def is_known(given: Any) -> bool:
-    """Whether a table of a file says a type of link that there is."""
+    """True if a raw link has a known type."""
     return isinstance(given, dict) and str(given.get("type")) in KINDS["links"]
 
 
 def misfits(
     routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any], pieces: dict[str, list[str]]
 ) -> Iterator[tuple]:
-    """Faults of routes: what is no pipe, and pipes that do not follow each other.
+    """Faults of routes: names that are not pipes, and pipes that are not consecutive.
 
-    named : links as the file has them, those at fault too; pieces : of pipes that are cut
+    named : raw links, also faulty ones; pieces : cut pipe -> names of its pieces
     """
-    pipes = [one for one, given in named.items() if one not in links and (is_pipe(given) or not is_known(given))]
-    pipes += [one for one, link in links.items() if link.kind == "pipe"]
+    pipes = [item for item, given in named.items() if item not in links and (is_pipe(given) or not is_known(given))]
+    pipes += [item for item, link in links.items() if link.kind == "pipe"]
     for name, route in routes.items():
         if route is None:
             continue
@@ -118,7 +122,7 @@ def misfits(
                 continue
             unknown = True
             if pipe in links:
-                yield place, f"{show(pipe)} is no pipe but a {links[pipe].kind}; leave it out"
+                yield place, f"{show(pipe)} is a {links[pipe].kind}, not a pipe; leave it out"
             else:
                 known = [*pipes, *pieces]
                 near = did_you_mean(pipe, known) or f"; pipes are {listing(known)}"
@@ -128,20 +132,20 @@ def misfits(
         k = broken(route, links, named)
         if k is not None:
             pairs = [(pipe, links[pipe]) for pipe in route.pipes[k - 1 : k + 1]]
-            ends = " and ".join(f"{pipe} joins {one.from_} and {one.to}" for pipe, one in pairs)
-            text = f"{route.pipes[k]} does not follow: {ends}, and no link without length lies between"
+            ends = " and ".join(f"{pipe} joins {item.from_} and {item.to}" for pipe, item in pairs)
+            text = f"{route.pipes[k]} does not join the previous pipe: {ends}, and no link without length lies between"
             yield ("routes", name, "pipes", as_said(route, pieces, k)), text
 
 
 def as_said(route: Route, pieces: dict[str, list[str]], k: int) -> int:
-    """Which name of the file pipe k of a route came from, pieces of one pipe from the same."""
-    whole = {piece: name for name, own in pieces.items() for piece in own}
-    names = [whole.get(pipe, pipe) for pipe in route.pipes[: k + 1]]
-    return sum(one != before for one, before in itertools.pairwise(names))
+    """Index in the file of the name that pipe k of a route came from; pieces of a pipe share a name."""
+    cut_pipe = {piece: name for name, own in pieces.items() for piece in own}
+    names = [cut_pipe.get(pipe, pipe) for pipe in route.pipes[: k + 1]]
+    return sum(following != before for following, before in itertools.pairwise(names))
 
 
 def joined(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:  # noqa: B006
-    """Place -> one that stands for all that links without length join it to, those at fault too."""
+    """Place -> representative of all places joined to it by links without length, also by faulty links."""
     root: dict[str, str] = {}
 
     def find(name: str) -> str:
@@ -160,42 +164,45 @@ def joined(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:
 
 
 def ways(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
-    """Of every pipe of a route: how it can be run, each with the way before it that leads there."""
-    one = joined(links, named)
-    ends = [[one.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]
-    found: list[list[tuple[int, bool]]] = [[(-1, False), (-1, True)]]
+    """Possible directions of each pipe of a route: (index of the choice for the previous pipe, backwards).
+
+    The first entry is a start before the first pipe. The list ends with an empty entry at the first gap.
+    """
+    root = joined(links, named)
+    ends = [[root.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]
+    result: list[list[tuple[int, bool]]] = [[(-1, False), (-1, True)]]
     for k in range(1, len(ends)):
         now = []
         for backwards in (False, True):
             into = ends[k][1 if backwards else 0]
-            before = [j for j, (_, turned) in enumerate(found[-1]) if ends[k - 1][0 if turned else 1] == into]
+            before = [j for j, (_, turned) in enumerate(result[-1]) if ends[k - 1][0 if turned else 1] == into]
             now += [(before[0], backwards)] if before else []
-        found.append(now)
+        result.append(now)
         if not now:
             break
-    return found
+    return result
 
 
 def broken(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> int | None:  # noqa: B006
-    """Number of the first pipe of a route that does not follow the one before it."""
-    found = ways(route, links, named)
-    return None if found[-1] else len(found) - 1
+    """Index of the first pipe of a route that is not connected to the previous pipe; None if there is no gap."""
+    result = ways(route, links, named)
+    return None if result[-1] else len(result) - 1
 
 
 def legs(route: Route, links: dict[str, Any]) -> list[Leg]:
-    """The pipes of a route with their chainages."""
-    found = ways(route, links)
+    """Legs of a route: its pipes with chainages and directions."""
+    choices = ways(route, links)
     turned, at = [], 0
-    for options in reversed(found):
+    for options in reversed(choices):
         before, backwards = options[at]
         turned.append(backwards)
         at = before
-    begin, made = route.start, []
+    begin, result = route.start, []
     for pipe, backwards in zip(route.pipes, reversed(turned), strict=True):
         link = links[pipe]
         if begin is None:
             begin = 0.0 if link.profile is None or backwards else float(link.profile.chainage[0])
         end = begin + link.length
-        made.append(Leg(pipe, begin, end, backwards))
+        result.append(Leg(pipe, begin, end, backwards))
         begin = end
-    return made
+    return result

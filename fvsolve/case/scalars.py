@@ -1,4 +1,4 @@
-"""What must hold of scalars and between them and the rest of a case. Knows names and kinds; knows no network."""
+"""Checks of scalars against the rest of a case."""
 
 from __future__ import annotations
 
@@ -19,55 +19,61 @@ TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "least_pressur
 
 
 def taken() -> set[str]:
-    """Names with a meaning of their own: what is written, quantities of parts, and fields of basins but velocities."""
+    """Reserved names: columns of output files, quantities of parts, and fields of basins except velocities."""
     kinds = [kind for group in KINDS.values() for kind in group.values()]
     fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in MOVES}
     return TAKEN | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 
 
 def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
-    """Faults of names, of values that parts cannot have, and of what scalars do not go with yet."""
+    """Faults of names, of values that parts cannot have, and of parts that do not support scalars yet."""
     for name in scalars:
         if len(name) > LONGEST_NAME:
-            yield ("scalars", name), f"has {len(name)} letters; wanted {LONGEST_NAME} at most"
+            yield ("scalars", name), f"has {len(name)} letters; expected at most {LONGEST_NAME}"
         if not re.fullmatch(r"[\w-]+", name):
-            yield ("scalars", name), f"{show(name)} is no name; a name has letters, digits, _ and -"
+            yield ("scalars", name), f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
         elif name in taken():
-            yield ("scalars", name), f"{show(name)} has a meaning of its own; wanted another name"
+            yield ("scalars", name), f"{show(name)} is a reserved name; expected another name"
     for group, parts in (("nodes", nodes), ("links", links)):
         for name, part in parts.items():
             for scalar, value in getattr(part, "scalars", {}).items():
-                if (said := _wrong(scalar, value, part, scalars)) is not None:
-                    yield (group, name, "scalars", scalar), said
+                if (text := _wrong(scalar, value, part, scalars)) is not None:
+                    yield (group, name, "scalars", scalar), text
             if scalars and isinstance(part, Basin) and not part.own.carries:
-                said = f"is a basin of {part.physics}, whose waves carry no scalars; wanted a free surface"
-                yield (group, name), said
-            for patch, one in getattr(part, "patches", {}).items():
-                for scalar in one.scalars:
+                text = f"is a basin of {part.physics}, which does not support scalars; expected a free surface"
+                yield (group, name), text
+            for patch, patch_options in getattr(part, "patches", {}).items():
+                for scalar in patch_options.scalars:
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:
                         yield place, _unknown(scalar, scalars)
-                    elif part.own.joined and one.boundary != "open":
-                        yield place, 'comes with what links bring; it goes with a given velocity or boundary = "open"'
+                    elif part.own.joined and patch_options.boundary != "open":
+                        yield (
+                            place,
+                            'follows from the joined links; it applies only with a given velocity or boundary = "open"',
+                        )
             if scalars and part.no_scalars:
                 article = "an" if part.kind[0] in "aeiou" else "a"
                 yield (group, name), f"is {article} {part.kind}; {part.no_scalars}"
     if not scalars:
         return
     if fluid is not None and not LAWS[fluid.law].scalars:
-        yield ("fluid", "law"), f"{show(fluid.law)} carries no scalars yet; wanted {named(lambda law: law.scalars)}"
+        yield (
+            ("fluid", "law"),
+            f"{show(fluid.law)} does not support scalars yet; expected {named(lambda law: law.scalars)}",
+        )
 
 
 def _wrong(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:
-    """What is wrong with the value of a scalar that a part states."""
+    """Fault of the value of a scalar that a part states; None if it is valid."""
     if scalar not in scalars:
         return _unknown(scalar, scalars)
     if isinstance(part, Basin):
         return None
     if part.own_scalars == "start" and not value.constant:
-        return "is what it holds at the start; wanted a number, no schedule"
+        return "is the value at the start; expected a number, not a schedule"
     if not part.own_scalars:
-        return f"a {part.kind} has none of its own; wanted an inflow, a reservoir, a tank, a chamber or a pipe"
+        return f"a {part.kind} has no value of a scalar; expected an inflow, a reservoir, a tank, a chamber or a pipe"
     return None
 
 

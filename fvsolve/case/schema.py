@@ -1,4 +1,4 @@
-"""The JSON schema of a case file, for editors. Knows the parts' own schemas; adds nothing to them."""
+"""JSON schema of a case file, for editors."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from fvsolve.parts.schedule import Scheduled
 from fvsolve.parts.table import keys_json
 from fvsolve.parts.value import Quantity
 
-BESIDE = ("description", "default")  # words that may stand beside a reference
+BESIDE = ("description", "default")  # words allowed beside a $ref
 WORDS = ("properties", "items", "anyOf", "additionalProperties", "$defs")
-SHORT = 60  # letters: what is shorter is said again
+SHORT = 60  # letters of JSON; shorter schemas are repeated, not shared
 
 
 def schema() -> dict[str, Any]:
-    """The JSON schema (draft 2020-12) of a case file; what is said twice stands once under `$defs`."""
+    """JSON schema (draft 2020-12) of a case file, with repeated parts under `$defs`."""
     return shared(whole())
 
 
-def printed(made: dict[str, Any]) -> str:
-    """A schema as text, lists of words or numbers in a line, and bare references."""
-    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", dumps(made, indent=2))
+def printed(content: dict[str, Any]) -> str:
+    """JSON text of a schema; flat lists and bare references are written on one line."""
+    text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda match: f"[{' '.join(match[1].split())}]", dumps(content, indent=2))
     return re.sub(r'\{\s+("\$ref": "[^"]*")\s+\}', r"{ \1 }", text)
 
 
 def whole() -> dict[str, Any]:
-    """The schema with everything said where it holds."""
+    """Schema of a case file without shared definitions."""
     definitions: dict[str, Any] = {}
     properties: dict[str, Any] = dict.fromkeys(KEYS, {})
     properties |= keys_json(TOP)["properties"]
@@ -42,7 +42,7 @@ def whole() -> dict[str, Any]:
     for name, model in (("fluid", FluidSpec), ("numerics", Numerics), ("output", Output), ("exact", ExactSpec)):
         properties[name] = _hoisted(model, definitions)
     for group, kinds in KINDS.items():
-        any_kind = [_typed(kind, made, definitions) for kind, made in sorted(kinds.items())]
+        any_kind = [_typed(kind, part, definitions) for kind, part in sorted(kinds.items())]
         properties[group] = {"type": "object", "additionalProperties": {"anyOf": any_kind}}
     properties["defaults"] = _defaults(definitions)
     scalar = _hoisted(Scalar, definitions)
@@ -70,8 +70,8 @@ def whole() -> dict[str, Any]:
     }
 
 
-def shared(made: dict[str, Any]) -> dict[str, Any]:
-    """The same schema with what is said twice said once, under `$defs`; words and defaults stand beside references."""
+def shared(full: dict[str, Any]) -> dict[str, Any]:
+    """Move repeated parts of a schema to `$defs`; descriptions and defaults stay beside the references."""
     times: Counter[str] = Counter()
     names: dict[str, str] = {}
 
@@ -79,15 +79,15 @@ def shared(made: dict[str, Any]) -> dict[str, Any]:
         if isinstance(part, dict) and _schema(part):
             text = dumps(_bare(part), sort_keys=True)
             times[text] += 1
-            if times[text] > 1:  # all below it is said where this is
+            if times[text] > 1:  # its inner parts are counted already
                 return
             names[text] = _name(part) or key
         for word, inner in part.items() if isinstance(part, dict) else [(key, inner) for inner in part]:
             if isinstance(inner, (dict, list)):
                 count(inner, key if word in WORDS else word)
 
-    count(made, "case")
-    names = _apart({text: names[text] for text, many in times.items() if many > 1 and len(text) > SHORT})
+    count(full, "case")
+    names = _apart({text: names[text] for text, times_used in times.items() if times_used > 1 and len(text) > SHORT})
 
     def replaced(part: Any, whole: bool = False) -> Any:
         if isinstance(part, dict):
@@ -96,31 +96,31 @@ def shared(made: dict[str, Any]) -> dict[str, Any]:
             return {key: replaced(inner) for key, inner in part.items()}
         return [replaced(inner) for inner in part] if isinstance(part, list) else part
 
-    found = replaced(made)
-    found["$defs"] |= {name: replaced(loads(text), whole=True) for text, name in names.items()}
-    return found
+    result = replaced(full)
+    result["$defs"] |= {name: replaced(loads(text), whole=True) for text, name in names.items()}
+    return result
 
 
 def _bare(part: dict[str, Any]) -> dict[str, Any]:
-    return {key: one for key, one in part.items() if key not in BESIDE}
+    return {key: value for key, value in part.items() if key not in BESIDE}
 
 
 def _schema(part: dict[str, Any]) -> bool:
-    """Whether it says what a value may be, and is no table of such by key."""
+    """True if a dict is the schema of a value, not a table of schemas by key."""
     return any(isinstance(part.get(word), (str, list)) for word in ("type", "anyOf", "enum"))
 
 
 def _apart(names: dict[str, str]) -> dict[str, str]:
-    """Names numbered where they are alike."""
-    many: Counter[str] = Counter()
+    """Number equal names."""
+    counts: Counter[str] = Counter()
     for text, name in names.items():
-        many[name] += 1
-        names[text] = f"{name}-{many[name]}" if many[name] > 1 else name
+        counts[name] += 1
+        names[text] = f"{name}-{counts[name]}" if counts[name] > 1 else name
     return names
 
 
 def _name(part: dict[str, Any]) -> str:
-    """What a part that may be shared is called: its dimension, of a schedule its values', of a table its keys."""
+    """Name of a shared schema: its dimension, that of the values of a schedule, or the keys of a table."""
     first = next(iter(part.get("anyOf", [])), part)
     if isinstance(first, dict) and set(first) <= {"type", "examples", "x-dimension", *BESIDE} and "anyOf" in part:
         return f"schedule-of-{first.get('x-dimension', 'number')}"
@@ -134,37 +134,37 @@ def _name(part: dict[str, Any]) -> str:
 
 
 def _without_titles(part: Any) -> Any:
-    """The same without what pydantic adds to every key: its name again, and that nothing is the default."""
+    """Remove what pydantic adds to every key: its title, and a default of null."""
     if isinstance(part, list):
-        return [_without_titles(one) for one in part]
+        return [_without_titles(item) for item in part]
     if not isinstance(part, dict):
         return part
-    made = {key: _without_titles(one) for key, one in part.items() if (key, one) != ("default", None)}
-    if isinstance(made.get("properties"), dict):
-        made["properties"] = {key: {word: said for word, said in one.items() if word != "title"}
-                              for key, one in made["properties"].items()}  # fmt: skip
-    return made
+    result = {key: _without_titles(item) for key, item in part.items() if (key, item) != ("default", None)}
+    if isinstance(result.get("properties"), dict):
+        result["properties"] = {key: {word: value for word, value in item.items() if word != "title"}
+                              for key, item in result["properties"].items()}  # fmt: skip
+    return result
 
 
 def _hoisted(model: Any, definitions: dict[str, Any]) -> dict[str, Any]:
-    """A model's schema with its definitions moved to the top."""
-    made = _without_titles(model.model_json_schema(by_alias=True))
-    definitions |= made.pop("$defs", {})
-    return made
+    """Schema of a model; its definitions are moved to `definitions`."""
+    result = _without_titles(model.model_json_schema(by_alias=True))
+    definitions |= result.pop("$defs", {})
+    return result
 
 
 def _defaults(definitions: dict[str, Any]) -> dict[str, Any]:
-    """Keys of `[defaults.KIND]`: those of the parts, none of them needed."""
-    made = {}
+    """Schema of `[defaults.KIND]`: keys of the parts, all optional."""
+    result = {}
     for kind, model in defaults.KINDS.items():
         keys = _hoisted(model, definitions)["properties"]
-        own = {key: _bare(one) for key, one in keys.items() if key not in defaults.OWN}
-        made[kind] = {"type": "object", "properties": own, "additionalProperties": False}
-    return {"type": "object", "properties": made, "additionalProperties": False}
+        own = {key: _bare(value) for key, value in keys.items() if key not in defaults.OWN}
+        result[kind] = {"type": "object", "properties": own, "additionalProperties": False}
+    return {"type": "object", "properties": result, "additionalProperties": False}
 
 
 def _typed(kind: str, model: Any, definitions: dict[str, Any]) -> dict[str, Any]:
-    made = _hoisted(model, definitions)
-    made["properties"] = {"type": {"const": kind}, **made["properties"]}
-    made["required"] = ["type", *made.get("required", [])]
-    return made
+    result = _hoisted(model, definitions)
+    result["properties"] = {"type": {"const": kind}, **result["properties"]}
+    result["required"] = ["type", *result.get("required", [])]
+    return result

@@ -1,4 +1,4 @@
-"""The tables fluid, numerics and output of a case. Knows their keys and defaults; knows no part."""
+"""Tables fluid, numerics, output and exact of a case: keys and defaults."""
 
 from __future__ import annotations
 
@@ -45,38 +45,40 @@ from fvsolve.units import show
 STARTS = ("steady", "equilibrium", "rest")
 CAVITY_SCHEMES = tuple(name for name, one in SCHEMES.items() if one.cavities)
 
-# Every default of [numerics] and [output], chosen by docs/accuracy-and-speed.md. Steps: Courant where there are cells,
-# error control elsewhere.
+# Defaults of [numerics] and [output], chosen in docs/accuracy-and-speed.md. Steps: Courant number with cells, error
+# control without cells.
 DEFAULT_SCHEME, DEFAULT_LIMITER = "weno5", "van-leer"
 DEFAULT_METHOD, DEFAULT_COURANT = "rk4", 0.9
-DEFAULT_METHOD_SSP = "ssp-rk3"  # where basins carry scalars, whose bounds rk4 does not keep, or have friction
-CAVITY_SCHEME, CAVITY_METHOD, CAVITY_COURANT = "muscl", "ssp-rk2", 0.5  # where cavities are followed in pipes
-CAVITY_AIR = 1e-7  # of a degassed liquid, what they grow from
+DEFAULT_METHOD_SSP = "ssp-rk3"  # for basins with scalars (rk4 violates their bounds) or with friction
+CAVITY_SCHEME, CAVITY_METHOD, CAVITY_COURANT = "muscl", "ssp-rk2", 0.5  # with cavities in pipes
+CAVITY_AIR = 1e-7  # air fraction of a degassed liquid: nuclei of cavities
 DEFAULT_METHOD_RTOL, DEFAULT_RTOL = AUTO, 1e-6
-DEFAULT_CELLS = 100  # in the pipe that takes a wave longest; the others get cells of the same travel time
+DEFAULT_CELLS = 100  # in the pipe with the longest travel time; other pipes get cells of the same travel time
 DEFAULT_ROWS, DEFAULT_FRAMES = 1000, 50
-DEFAULT_ACCURACY = 1e-2  # of the greatest jump
+DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 
 
-# What liquids have, after CoolProp's and the CRC Handbook's: liquid hydrogen to mercury, light ones to cold heavy oil.
-TEMPERATURES = Usual(60.0, 1000.0, "liquefied gases to molten salt")  # of "user": others know their own
+# Ranges of liquids, after CoolProp and the CRC Handbook: liquid hydrogen to mercury, light liquids to cold heavy oil.
+TEMPERATURES = Usual(
+    60.0, 1000.0, "liquefied gases to molten salt"
+)  # for fluid "user"; other fluids have their own range
 DENSITIES = Usual(60.0, 14e3, "liquid hydrogen to mercury")
 MODULI = Usual(1e7, 4e10, "liquefied gases to mercury")
 VISCOSITIES = Usual(1e-5, 5.0, "liquefied gases to heavy fuel oil")
 
 
 class FluidSpec(Table):
-    """`[fluid]`: which fluid, at which state, under which density law; numbers here override CoolProp's."""
+    """`[fluid]`: fluid, its state and its density law; numbers here override those of CoolProp."""
 
     name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', COUNTED)]
     temperature: Annotated[
-        float, Quantity("temperature", positive, "where properties are taken [K]", changes=COUNTED)
+        float, Quantity("temperature", positive, "at which properties are evaluated [K]", changes=COUNTED)
     ] = 293.15
-    pressure: Annotated[float, Quantity("pressure", positive, "where properties are taken [Pa]", changes=COUNTED)] = (
-        101325.0
-    )
+    pressure: Annotated[
+        float, Quantity("pressure", positive, "at which properties are evaluated [Pa]", changes=COUNTED)
+    ] = 101325.0
     law: Annotated[
-        str, Choice("density law", tuple(LAWS), "one for the case; linear (with cavitation mixture) if left out")
+        str, Choice("density law", tuple(LAWS), "for the whole case; linear (with cavitation mixture) if left out")
     ] = "linear"
     density: Annotated[float | None, Quantity("density", positive, "[kg/m3]", DENSITIES, COUNTED)] = None
     bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]", MODULI, COUNTED)] = None
@@ -84,13 +86,17 @@ class FluidSpec(Table):
     vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "[Pa]")] = None
     air_fraction: Annotated[
         float | None,
-        Number(between(0, 1), f"of the volume at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out"),
+        Number(
+            between(0, 1), f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out"
+        ),
     ] = None
-    gas_exponent: Annotated[float | None, Number(between(1, 2), "polytropic, 1 isothermal, 1.4 adiabatic")] = None
-    saturation_pressure: Annotated[float | None, Quantity("pressure", positive, "where all gas is dissolved [Pa]")] = (
+    gas_exponent: Annotated[float | None, Number(between(1, 2), "polytropic exponent, 1 isothermal, 1.4 adiabatic")] = (
         None
     )
-    cavitation: Annotated[bool | None, Flag("vapour pressure adds to that of the gas, law mixture")] = None
+    saturation_pressure: Annotated[
+        float | None, Quantity("pressure", positive, "above which all gas is dissolved [Pa]")
+    ] = None
+    cavitation: Annotated[bool | None, Flag("adds the vapour pressure to the gas pressure, law mixture")] = None
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
@@ -107,15 +113,15 @@ class FluidSpec(Table):
         )
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        found, usual = self.temperature, TEMPERATURES
-        if self.name == "user" and not usual.least <= found <= usual.greatest:
-            text = f"{found:g} K is outside {usual.least:g} to {usual.greatest:g} K, {usual.practice}"
-            text += units.likely(found, "temperature", usual.least, usual.greatest)
-            yield ("temperature",), found, usual.least if found < usual.least else usual.greatest, text
+        value, usual = self.temperature, TEMPERATURES
+        if self.name == "user" and not usual.least <= value <= usual.greatest:
+            text = f"{value:g} K is outside {usual.least:g} to {usual.greatest:g} K, {usual.practice}"
+            text += units.likely(value, "temperature", usual.least, usual.greatest)
+            yield ("temperature",), value, usual.least if value < usual.least else usual.greatest, text
 
 
 class MethodNames(Collection):
-    """`auto` and the names of all methods, those of the user included as soon as they are there."""
+    """`auto` and the names of all methods, with methods that the user adds later."""
 
     def __iter__(self) -> Iterator[str]:
         return iter((AUTO, *METHODS))
@@ -128,7 +134,7 @@ class MethodNames(Collection):
 
 
 class MethodChoice(Choice):
-    """A method by name, or by a file that holds its tableau as text."""
+    """Method by name, or by a file that contains its tableau as text."""
 
     def read(self, given: Any, setting: Setting) -> str:
         if not isinstance(given, str) or given in OWN or given == AUTO:
@@ -145,26 +151,26 @@ class MethodChoice(Choice):
 
     @property
     def takes(self) -> str:
-        return f'{super().takes}, or a file that holds a tableau as text, `"ssp43.txt"`'
+        return f'{super().takes}, or a file that contains a tableau as text, `"ssp43.txt"`'
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [super().json(), {"type": "string", "pattern": "[.]"}]}
 
 
 class Numerics(Table):
-    """`[numerics]`: the span of time, how space and time are cut, where to start from."""
+    """`[numerics]`: time span, discretisation in space and time, initial state."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("courant", "step", "rtol"),)
 
-    end: Annotated[float, Quantity("time", about="when the run ends [s]")]
-    start: Annotated[float, Quantity("time", about="when it begins [s]")] = 0.0
+    end: Annotated[float, Quantity("time", about="end time of the run [s]")]
+    start: Annotated[float, Quantity("time", about="start time of the run [s]")] = 0.0
     initial: Annotated[
         str,
         Choice(
             "start",
             STARTS,
-            "stated levels, pressures and flows are held and the rest in equilibrium; nothing may move, and bodies and "
-            "masses stand where their forces balance; or no flow",
+            "steady: stated levels, pressures and flows are kept, the rest is in equilibrium; equilibrium: nothing "
+            "moves and bodies and masses are placed where their forces balance; rest: no flow",
             changes=PROFILE,
         ),
     ] = "steady"
@@ -176,7 +182,7 @@ class Numerics(Table):
             f"reconstruction in the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
         ),
     ] = None
-    limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "of the scheme muscl")] = DEFAULT_LIMITER
+    limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "slope limiter of the scheme muscl")] = DEFAULT_LIMITER
     method: Annotated[
         str | None,
         MethodChoice(
@@ -191,7 +197,7 @@ class Numerics(Table):
         float | None,
         Number(
             positive,
-            f"step over the travel time of the quickest cell; {DEFAULT_COURANT} where there are cells (with cavitation "
+            f"step / shortest travel time of a wave through a cell; {DEFAULT_COURANT} with cells (with cavitation "
             f"{CAVITY_COURANT}) if left out",
             changes=VALUE,
         ),
@@ -201,42 +207,44 @@ class Numerics(Table):
         float | None,
         Number(
             between(0, 1, open=True),
-            f"error per step; {DEFAULT_RTOL:g} without cells, under auto and of implicit methods that can if left out",
+            f"error per step; {DEFAULT_RTOL:g} without cells, with auto or adaptive implicit methods if left out",
         ),
     ] = None
     linear_algebra: Annotated[
         str | None,
-        Choice("linear algebra", KINDS, "of implicit steps; by the structure of the scene if left out", changes=VALUE),
+        Choice("linear algebra", KINDS, "of implicit steps; by structure of the case if left out", changes=VALUE),
     ] = None
     cell_time: Annotated[
         float | None,
         Quantity(
             "time",
             positive,
-            f"of pipes that state no cells [s]; longest travel time of a pipe / {DEFAULT_CELLS} if left out",
+            f"travel time of a cell, for pipes without cells [s]; longest of a pipe / {DEFAULT_CELLS} if left out",
             changes=SHAPE,
         ),
     ] = None
     line: Annotated[
         str,
-        Choice("line", LINES, "how pipes that state no line are followed", changes=SHAPE),
+        Choice("line", LINES, "model of pipes that state no line", changes=SHAPE),
     ] = "cells"
     accuracy: Annotated[
         float,
         Number(
             between(0, 1, open=True),
-            "what lines chosen by auto may be off by, of the greatest jump; and the share of it below which a jump in "
-            "a delay line is smoothed",
+            "allowed error of pipe models chosen by auto, as a fraction of the largest jump; smaller jumps in a delay "
+            "line are smoothed",
             changes=SHAPE,
         ),
     ] = DEFAULT_ACCURACY
-    below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and go on, or stop")] = "continue"
+    below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and continue, or stop the run")] = (
+        "continue"
+    )
 
     def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> Numerics:
-        """The same with the scheme, step control and method that are the default.
+        """Fill in the default scheme, step control and method.
 
-        carries : whether basins carry scalars; rubs : whether their beds brake the flow; parts : whether
-        cavities are followed in pipes.
+        carries : True if basins carry scalars; rubs : True if their beds have friction; parts : True if cavities are
+        solved in pipes
         """
         changes: dict[str, Any] = {}
         if self.scheme is None:
@@ -253,13 +261,13 @@ class Numerics(Table):
 
 
 def steps_by_error(method: str | None) -> bool:
-    """Whether a method is meant for error control even where there are cells: `auto`, and implicit ones that can."""
-    found = METHODS.get(method or "")
-    return method == AUTO or (found is not None and found.adaptive and not found.explicit)
+    """True if a method uses error control even with cells: `auto`, and adaptive implicit methods."""
+    known = METHODS.get(method or "")
+    return method == AUTO or (known is not None and known.adaptive and not known.explicit)
 
 
 class OutputUnits(Value):
-    """`[output] units`: a unit per quantity of a probe, and of what is said of parts."""
+    """`[output] units`: a unit for each quantity of probes and parts."""
 
     about = 'unit per quantity, for example { pressure = "barg", flow = "l/s" }; SI, absolute if left out'
     takes = "`{ QUANTITY = UNIT }`"
@@ -288,7 +296,7 @@ class OutputUnits(Value):
 
     def read(self, given: Any, setting: Setting) -> dict[str, str]:
         if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is no table; wanted one such as {{ pressure = "barg" }}')
+            raise ValueError(f'{show(given)} is not a table; expected for example {{ pressure = "barg" }}')
         faults = []
         for quantity, unit in given.items():
             if quantity not in self.quantities:
@@ -297,7 +305,7 @@ class OutputUnits(Value):
                 continue
             try:
                 if not isinstance(unit, str):
-                    raise ValueError(f"{show(unit)} is no unit; wanted text")
+                    raise ValueError(f"{show(unit)} is not a unit; expected text")
                 units.find(unit, quantity)
             except ValueError as error:
                 faults.append(((quantity,), str(error)))
@@ -317,14 +325,14 @@ class OutputUnits(Value):
 
 
 class Names(Value):
-    """A list of texts, read as probes later, when the parts are known."""
+    """List of texts; they are read as probes later, when the parts are known."""
 
-    about = "what is recorded; those of all nodes and links if left out"
+    about = "recorded quantities; those of all nodes and links if left out"
     takes = "list of probes"
 
     def read(self, given: Any, setting: Setting) -> tuple[Any, ...]:
         if not isinstance(given, (list, tuple)):
-            raise ValueError(f'{show(given)} is no list; wanted one such as ["gate.pressure"]')
+            raise ValueError(f'{show(given)} is not a list; expected for example ["gate.pressure"]')
         return tuple(given)
 
     def json(self) -> dict[str, Any]:
@@ -332,27 +340,27 @@ class Names(Value):
 
 
 class Line(Table):
-    """A line across a basin along which its fields are written at every frame."""
+    """Line across a basin along which its fields are written with every frame."""
 
-    basin: Annotated[str, Text("its name", VALUE)]
+    basin: Annotated[str, Text("name of the basin", VALUE)]
     from_: Annotated[
         tuple[float, float],
-        Rows("length", length=2, about="x, y of its start [m]", changes=VALUE),
+        Rows("length", length=2, about="x, y of the start of the line [m]", changes=VALUE),
         Field(alias="from"),
     ]
-    to: Annotated[tuple[float, float], Rows("length", length=2, about="x, y of its end [m]", changes=VALUE)]
-    points: Annotated[int, Whole(between(2, 10**5), "evenly along it, both ends among them", VALUE)] = 101
+    to: Annotated[tuple[float, float], Rows("length", length=2, about="x, y of the end of the line [m]", changes=VALUE)]
+    points: Annotated[int, Whole(between(2, 10**5), "number of evenly spaced points, with both ends", VALUE)] = 101
 
 
 class Output(Table):
-    """`[output]`: when and what is recorded, and in which units it is shown."""
+    """`[output]`: recorded quantities, times and units."""
 
     every: Annotated[
         float | None,
         Quantity(
             "time",
             positive,
-            f"between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
+            f"interval between rows of the history [s]; (end - start) / {DEFAULT_ROWS} if left out",
             changes=VALUE,
         ),
     ] = None
@@ -364,12 +372,12 @@ class Output(Table):
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     def table(self) -> dict[str, Any]:
-        """What the file would say."""
-        made = {**super().table(), "probes": [probe.text for probe in self.probes]}
-        return {key: value for key, value in made.items() if value != {}}
+        """Table as in a case file."""
+        values = {**super().table(), "probes": [probe.text for probe in self.probes]}
+        return {key: value for key, value in values.items() if value != {}}
 
 
 class ExactSpec(Table):
-    """`[exact]`: the exact solution that this scene has; errors of a study are measured against it."""
+    """`[exact]`: exact solution of the case; studies measure errors against it."""
 
-    name: Annotated[str, Choice("exact solution", tuple(NAMES), "what the scene is exactly", changes=VALUE)]
+    name: Annotated[str, Choice("exact solution", tuple(NAMES), "name of the exact solution", changes=VALUE)]

@@ -1,4 +1,4 @@
-"""The cases that come with the package. Knows where they lie; knows not what they say."""
+"""Shipped cases of the package."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from pathlib import Path
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 
-SCHEMA = "schema.json"  # beside the cases: what editors complete and check them by
+SCHEMA = "schema.json"  # file beside the cases; editors use it for completion and checks
 
 
 def folder() -> Path:
-    """Where the cases are: inside the installed package, or beside it in a checkout."""
+    """Folder of the shipped cases: inside the installed package, or beside it in a checkout."""
     package = Path(__file__).resolve().parents[1]
     inside = package / "cases"
     return inside if inside.is_dir() else package.parent / "cases"
@@ -23,21 +23,21 @@ def names() -> list[str]:
 
 
 def find(name: str) -> Path:
-    """The file that is meant: one that exists, else a shipped case of that name. FvsolveError for neither."""
+    """Path of an existing file, or of the shipped case of that name. Raises FvsolveError if there is neither."""
     path = Path(name)
     if path.is_file():
         return path
-    if name in names():  # whatever folder of that name may stand here
+    if name in names():  # even if the working folder has a folder of that name
         return folder() / f"{name}.toml"
     if path.is_dir():
-        raise FvsolveError(f"{name} is a folder; wanted a case file or one of: {listing(names())}")
+        raise FvsolveError(f"{name} is a folder; expected a case file or one of: {listing(names())}")
     raise FvsolveError(f"no file and no shipped case {name}{did_you_mean(name, names())}; see `fvsolve list`")
 
 
 def titles() -> dict[str, str]:
-    """Name -> title of every shipped case."""
-    found = {}
+    """Title of every shipped case by name."""
+    result = {}
     for name in names():
         with open(folder() / f"{name}.toml", "rb") as file:
-            found[name] = tomllib.load(file).get("title", "")
-    return found
+            result[name] = tomllib.load(file).get("title", "")
+    return result

@@ -1,6 +1,6 @@
-"""What a case will take, before anything is built: memory, rows, frames, steps. Knows counts; runs nothing.
+"""Memory, disk space and step size that a case needs, checked before the model is built.
 
-Bytes are measured: a pipe cell takes 0.36 kB in a model (names of states, tables) and 0.16 kB in an explicit run.
+The bytes were measured: a pipe cell takes 0.36 kB in a model (names of states, tables) and 0.16 kB in an explicit run.
 """
 
 from __future__ import annotations
@@ -14,48 +14,58 @@ from fvsolve.parts import Pipe
 from fvsolve.steppers.methods import METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP
 
-LONGEST_NAME = 60  # letters, as names are parts of file names, of which systems take 255 bytes
-CELL, IMPLICIT_CELL, BASIN_CELL = 500, 3000, 600  # of memory [B]
-NUMBER = 8  # of a row in memory [B], which is copied once
-TEXT, LEAST_TEXT = 18, 4  # of a number in history.csv, usual and at least [B]
-LITTLE = 1e7  # B that any machine has
-FRAME_CELL = 60  # of a frame on disk [B]
+LONGEST_NAME = 60  # letters; names are parts of file names, which may have 255 bytes
+CELL, IMPLICIT_CELL, BASIN_CELL = 500, 3000, 600  # memory of a cell [B]
+NUMBER = 8  # memory of a number of a row [B]; rows are copied once
+TEXT, LEAST_TEXT = 18, 4  # size of a number in history.csv, usual and smallest [B]
+LITTLE = 1e7  # memory that every machine has [B]
+FRAME_CELL = 60  # size of a cell of a frame on disk [B]
 
 
 def misfits(numerics: Any, output: Any, links: dict[str, Any], meshes: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
-    """Faults of counts that cannot fit and of steps that cannot advance."""
+    """Faults of counts that do not fit into memory, and of output intervals below the rounding of the time."""
     pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
     method, span = METHODS.get(numerics.method), numerics.end - numerics.start
     implicit = method is None or not method.explicit
     cells = sum(pipe.cells or 0 for pipe in pipes.values())
-    memory = cells * (IMPLICIT_CELL if implicit else CELL) + sum(len(one.cells) for one in meshes.values()) * BASIN_CELL
+    memory = (
+        cells * (IMPLICIT_CELL if implicit else CELL) + sum(len(mesh.cells) for mesh in meshes.values()) * BASIN_CELL
+    )
     if pipes and not fits(memory):
         worst = max(pipes, key=lambda name: pipes[name].cells or 0)
-        said = (
-            f"{cells:.3g} cells take about {size(memory)} of memory, and {size(free_memory())} are free; wanted fewer"
+        text = (
+            f"{cells:.3g} cells take about {size(memory)} of memory, and {size(free_memory())} are free; expected fewer"
         )
-        yield ("links", worst, "cells"), said
+        yield ("links", worst, "cells"), text
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if output.every is not None and not output.every > least:
-        yield ("output", "every"), f"{output.every:g} s would not move the time; wanted more than {least:.2g} s"
+        yield (
+            ("output", "every"),
+            f"{output.every:g} s is below the rounding of the time; expected more than {least:.2g} s",
+        )
     elif output.every is not None and output.probes is not None and span > 0.0:
         rows, columns = span / output.every, 1 + len(output.probes)
         if not fits(2 * NUMBER * rows * columns):
-            said = f"{output.every:g} s makes {rows:.3g} rows of {columns} numbers, about "
-            said += f"{size(2 * NUMBER * rows * columns)} to read back, and {size(free_memory())} of memory are free"
-            yield ("output", "every"), f"{said}; wanted a longer one or fewer probes"
+            text = f"{output.every:g} s gives {rows:.3g} rows of {columns} numbers, about "
+            text += f"{size(2 * NUMBER * rows * columns)} to read back, and {size(free_memory())} of memory are free"
+            yield ("output", "every"), f"{text}; expected a longer interval or fewer probes"
 
 
 def standstill(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str]]:
-    """The fault of a Courant number whose steps do not move the time; crossing : of the quickest cell [s]."""
+    """Faults of a Courant number whose steps are below the rounding of the time.
+
+    crossing : shortest travel time of a wave through a cell [s]
+    """
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if numerics.courant is not None and not numerics.courant * crossing > least:
-        said = f"{numerics.courant:g} makes steps of {numerics.courant * crossing:.2g} s, which would not move the time"
-        yield ("numerics", "courant"), f"{said}; wanted more than {least / crossing:.2g}"
+        text = (
+            f"{numerics.courant:g} gives steps of {numerics.courant * crossing:.2g} s, below the rounding of the time"
+        )
+        yield ("numerics", "courant"), f"{text}; expected more than {least / crossing:.2g}"
 
 
 def on_disk(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:
-    """What history.csv and the frames will take, estimated [B]."""
+    """Estimated size of history.csv and the frames [B]."""
     numerics, output = case.numerics, case.output
     cells = sum(link.cells for link in case.links.values() if isinstance(link, Pipe))
     cells += sum(len(mesh.cells) for mesh in case.meshes.values())
@@ -64,7 +74,7 @@ def on_disk(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:
 
 
 def size(count: float) -> str:
-    """Bytes as people say them."""
+    """Text of a number of bytes, with a decimal prefix."""
     for unit in ("B", "kB", "MB", "GB"):
         if count < 1000.0:
             return f"{count:.3g} {unit}"
@@ -72,17 +82,17 @@ def size(count: float) -> str:
     return f"{count:.3g} TB"
 
 
-def fits(wanted: float) -> bool:
-    """Whether so many bytes can be had; of few the system is not asked."""
-    return wanted <= LITTLE or wanted <= free_memory()
+def fits(count: float) -> bool:
+    """True if `count` bytes are free; small counts are accepted without a query."""
+    return count <= LITTLE or count <= free_memory()
 
 
 def free_memory() -> float:
-    """Memory that can still be had [B], as far as the system tells; inf where it does not."""
+    """Available memory [B], or the total memory if the system reports no more; inf if it reports neither."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
-            told = dict(line.split(":", 1) for line in file)
-        return 1024.0 * int(told["MemAvailable"].split()[0])
+            entries = dict(line.split(":", 1) for line in file)
+        return 1024.0 * int(entries["MemAvailable"].split()[0])
     except (OSError, KeyError, ValueError):
         pass
     try:

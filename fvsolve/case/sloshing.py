@@ -1,14 +1,14 @@
-"""Water in a tank as its linear modes: masses on springs beside water that keeps a flat surface. Knows no network.
+"""Linear sloshing modes of a tank: masses on springs, and the water below a flat surface.
 
 Potential theory of a flat bed and upright walls, small motions, any depth h (Dodge, The New Dynamic Behavior of Liquids
 in Moving Containers, 2000, chapter 3). Odd mode n of a box along a side L, k = n pi / L, and of an upright cylinder of
-radius a, k = x / a with J1'(x) = 0, along x and along y alike, with w^2 = g k tanh(k h):
+radius a, k = x / a with J1'(x) = 0, both along x and along y, with w^2 = g k tanh(k h):
 
     box       m = M 8 tanh(k h) / (k h (k L)^2)         surface -4 tanh(k h) / (k L) cos(k x) per travel, x from a wall
     cylinder  m = M 2 tanh(k h) / (k h (x^2 - 1))       surface 2 x tanh(k h) / (x^2 - 1) J1(k r) / J1(x) cos(angle)
 
 each at h - (2 / k) tanh(k h / 2) above the bed. With its surface held flat the water has the inertia of an ideal fluid
-under a lid (Joukowski, 1885), not that of ice. Modes that are left out count as held: they follow what pushes them.
+under a lid (Joukowski, 1885), not that of a rigid body. Higher modes are left out: their water moves with the tank.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from fvsolve.parts.body.part import Body, Joint
 from fvsolve.parts.schedule import constant
 
 MANY = 3  # modes along x, and along y
-ROUND = 1e-3  # of the radius, by which corners of a circle's outline may lie off it
-UPRIGHT = 0.9  # least cosine between the normal of the bed and the vertical: modes are of nearly level tanks
-FLAT = 1e-9  # share of the depth by which a flat bed may rise
-TERMS = 2000  # of series
+ROUND = 1e-3  # allowed deviation of the corners of a circular outline, relative to the radius
+UPRIGHT = 0.9  # least cosine between the normal of the bed and the vertical: modes hold for nearly level tanks
+FLAT = 1e-9  # allowed rise of a flat bed, relative to the depth
+TERMS = 2000  # number of terms of a series
 Found = Iterator[tuple[tuple, str]]
 
 
 class Outline(NamedTuple):
-    """Of a box its sides, of a cylinder its diameter twice [m]; its middle [m]; whether it is round."""
+    """Outline of a tank: sides of a box, or twice the diameter of a cylinder; its centre [m]; True if round."""
 
     sides: tuple[float, float]
     middle: np.ndarray
@@ -40,9 +40,9 @@ class Outline(NamedTuple):
 
 
 class SloshingMode(NamedTuple):
-    """One that swings along x (0) or y (1): number, k [1/m], mass [kg], height above the bed [m], w^2 [1/s2].
+    """Sloshing mode along x (0) or y (1): number, k [1/m], mass [kg], height above the bed [m], w^2 [1/s2].
 
-    rise : of the surface at the wall ahead, per travel of the mass [-]
+    rise : rise of the surface at the wall in the positive direction per travel of the mass [-]
     """
 
     along: int
@@ -55,14 +55,14 @@ class SloshingMode(NamedTuple):
 
 
 class Slowest(NamedTuple):
-    """Of the slowest mode of a tank: k h, and by how much shallow water has it too fast [%]."""
+    """Slowest mode of a tank: k h, and the excess of its frequency in shallow-water theory [%]."""
 
     deep: float
     fast: float
 
 
 def slowest(basin: Any, mesh: Any) -> Slowest | None:
-    """The slowest mode of a tank with a flat bed; None of tanks whose modes are not known."""
+    """Slowest mode of a tank with a flat bed; None for tanks with unknown modes."""
     bed, outline = means(samples(basin.bed, mesh)), outline_of(mesh)
     if outline is None or np.ptp(bed) > FLAT * abs(basin.level - bed.min()) or not basin.level > bed[0]:
         return None
@@ -71,7 +71,7 @@ def slowest(basin: Any, mesh: Any) -> Slowest | None:
 
 
 def outline_of(mesh: Any) -> Outline | None:
-    """The box or the circle that a mesh fills; None of others."""
+    """Box or circle that a mesh fills; None for other outlines."""
     low, high = mesh.points.min(axis=0), mesh.points.max(axis=0)
     area, sides = float(mesh.area.sum()), high - low
     if abs(area / float(np.prod(sides)) - 1.0) < 1e-9:
@@ -84,21 +84,21 @@ def outline_of(mesh: Any) -> Outline | None:
 
 
 def bed_of(basin: Any, mesh: Any) -> float:
-    """Height of a flat bed above the origin [m]."""
+    """Height of a flat bed above the origin of the basin [m]."""
     return float(means(samples(basin.bed, mesh))[0])
 
 
 def depth_of(basin: Any, mesh: Any) -> float:
-    """Of water at rest over a flat bed [m]."""
+    """Depth of water at rest over a flat bed [m]."""
     return basin.level - bed_of(basin, mesh)
 
 
-def modes(outline: Outline, depth: float, density: float, gravity: float, many: int = MANY) -> list[SloshingMode]:
-    """The first modes of water in a tank, along x and y in turn."""
+def modes(outline: Outline, depth: float, density: float, gravity: float, count: int = MANY) -> list[SloshingMode]:
+    """First `count` modes of water in a tank, alternately along x and y."""
     from scipy.special import jnp_zeros
 
-    found = []
-    for number, root in enumerate(jnp_zeros(1, many), 1):
+    result = []
+    for number, root in enumerate(jnp_zeros(1, count), 1):
         for along, side in enumerate(outline.sides):
             k = 2.0 * root / side if outline.is_round else (2 * number - 1) * np.pi / side
             steep = float(np.tanh(k * depth))
@@ -108,18 +108,18 @@ def modes(outline: Outline, depth: float, density: float, gravity: float, many: 
                 share, rise = 8.0 * steep / (k * depth * (k * side) ** 2), 4.0 * steep / (k * side)
             height = depth - 2.0 / k * float(np.tanh(0.5 * k * depth))
             mass = density * area_of(outline) * depth * share
-            found.append(SloshingMode(along, number, float(k), mass, height, gravity * float(k) * steep, float(rise)))
-    return found
+            result.append(SloshingMode(along, number, float(k), mass, height, gravity * float(k) * steep, float(rise)))
+    return result
 
 
 def area_of(outline: Outline) -> float:
-    """Of its bed [m2]."""
+    """Area of the bed [m2]."""
     a, b = outline.sides
     return 0.25 * np.pi * a * a if outline.is_round else a * b
 
 
 def surface(outline: Outline, mode: SloshingMode, x: float, y: float) -> float:
-    """Rise of the surface at a point per travel of a mode's mass [-]."""
+    """Rise of the surface at a point per travel of the mass of a mode [-]."""
     from scipy.special import j1, jnp_zeros
 
     dx, dy = np.array([x, y]) - outline.middle
@@ -132,7 +132,7 @@ def surface(outline: Outline, mode: SloshingMode, x: float, y: float) -> float:
 
 
 def under_a_lid(outline: Outline, depth: float, density: float) -> np.ndarray:
-    """Inertia about its centre of an ideal fluid that fills a closed box or cylinder : float64[3, 3] [kg m2]."""
+    """Inertia about the centre of an ideal fluid that fills a closed box or cylinder : float64[3, 3] [kg m2]."""
     a, b = outline.sides
     if outline.is_round:
         across = density * turned_cylinder(0.5 * a, depth)
@@ -143,7 +143,7 @@ def under_a_lid(outline: Outline, depth: float, density: float) -> np.ndarray:
 
 
 def turned_rectangle(a: float, b: float) -> float:
-    """Polar moment of a rectangle less its torsion constant [m4]: what a fluid in it has when it turns."""
+    """Polar moment of a rectangle less its torsion constant [m4]: inertia of an ideal fluid / (density height)."""
     long, short = max(a, b), min(a, b)
     odd = np.arange(1, 2 * TERMS, 2)
     series = float(np.sum(np.tanh(0.5 * np.pi * odd * long / short) / odd**5))
@@ -152,87 +152,90 @@ def turned_rectangle(a: float, b: float) -> float:
 
 
 def turned_cylinder(a: float, h: float) -> float:
-    """What ideal fluid in a closed cylinder has about a diameter through its middle, over its density [m5].
+    """Inertia of an ideal fluid in a closed cylinder about a diameter through its centre / density [m5].
 
-    phi = (-r z + sum b I1(c r) sin(c z)) cos(angle), c = (2 j - 1) pi / h, has the velocity of all walls.
+    phi = (-r z + sum b I1(c r) sin(c z)) cos(angle), c = (2 j - 1) pi / h, has the normal velocity of all walls.
     """
     from scipy.special import ive
 
     j = np.arange(1, TERMS + 1)
     c, sign = (2 * j - 1) * np.pi / h, np.where(j % 2, 1.0, -1.0)
-    part = 4.0 * sign / (h * c * c)  # of z in sin(c z)
-    slope = 0.5 * (ive(0, c * a) + ive(2, c * a))  # I1', as ive scales it
+    part = 4.0 * sign / (h * c * c)  # coefficients of z in sin(c z)
+    slope = 0.5 * (ive(0, c * a) + ive(2, c * a))  # I1', scaled like ive
     wall = np.pi * a * (-a * h**3 / 12.0 + np.sum(2.0 * part**2 * ive(1, c * a) / (c * slope)) * h / 2.0)
     lids = 2.0 * np.pi * (h * a**4 / 8.0 - np.sum(2.0 * part * sign * a * a * ive(2, c * a) / (c * c * slope)))
     return float(wall + lids)
 
 
 def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]) -> Found:
-    """Faults of basins whose water is to be modes."""
+    """Faults of basins with water as modes."""
     for name, mesh in lumped.items():
         basin, key = nodes[name], ("nodes", name)
         if basin.sloshing != "modes" or not basin.own.sloshes:
             continue
         if outline_of(mesh) is None:
-            text = 'modes are known of boxes and of upright cylinders (a mesh of a circle); wanted "cells" or "frozen"'
+            text = (
+                'modes are known only for boxes and upright cylinders (a circular mesh); expected "cells" or "frozen"'
+            )
             yield (*key, "sloshing"), text
         elif np.ptp(bed := means(samples(basin.bed, mesh))) > FLAT * abs(basin.level - bed.min()):
-            yield (*key, "bed"), 'modes are known over a flat bed; wanted one height, or sloshing = "cells"'
+            yield (*key, "bed"), 'modes are known only over a flat bed; expected a single height, or sloshing = "cells"'
         elif not basin.level > bed[0]:
-            yield (*key, "level"), f"no water is above the bed, at {bed[0]:g} m"
+            yield (*key, "level"), f"there is no water above the bed, at {bed[0]:g} m"
         yield from left_out(key, basin)
         if (pose := poses.get(basin.on)) is not None:
             upright = float((pose.attitude @ basin.turn)[2, 2])
             if upright < UPRIGHT:
-                text = f"its bed is {np.degrees(np.arccos(upright)):.3g} deg off level at the start, where modes say "
-                yield (*key, "sloshing"), text + 'nothing; wanted "cells" or "frozen"'
+                text = f"its bed is {np.degrees(np.arccos(upright)):.3g} deg off level at the start, where modes are "
+                yield (*key, "sloshing"), text + 'not valid; expected "cells" or "frozen"'
 
 
 def weightless(nodes: dict[str, Any], gravity: float | None) -> Found:
-    """A fault of no gravity where water stands by it, or swings."""
+    """Fault of zero gravity with a free water surface."""
     for name, basin in nodes.items():
         if gravity == 0.0 and getattr(getattr(basin, "own", None), "sloshes", False):
             if not (basin.on and basin.sloshing == "frozen"):
                 yield (
                     ("gravity",),
-                    f'the water in {name} stands by it; wanted more than 0, or sloshing = "frozen" on a body',
+                    f'the water in {name} needs gravity; expected more than 0, or sloshing = "frozen" on a body',
                 )
                 return
 
 
 def left_out(key: tuple, basin: Any) -> Found:
-    """Faults of keys that modes have no place for."""
-    for what in sorted(basin.start.model_fields_set) if basin.start is not None else ():
-        yield (*key, "start", what), "modes start from level water at rest; leave it out"
-    for patch, one in basin.patches.items():
-        if one.boundary == "open":
-            yield (*key, "patches", patch, "boundary"), "modes are of closed tanks; wanted a wall"
-    for what in ("manning", "factor"):
-        if getattr(basin, what) is not None:
-            yield (*key, what), "modes have no friction; leave it out"
+    """Faults of keys that modes do not support."""
+    for key_name in sorted(basin.start.model_fields_set) if basin.start is not None else ():
+        yield (*key, "start", key_name), "modes start from level water at rest; leave it out"
+    for patch, patch_options in basin.patches.items():
+        if patch_options.boundary == "open":
+            yield (*key, "patches", patch, "boundary"), "modes hold only for closed tanks; expected a wall"
+    for key_name in ("manning", "factor"):
+        if getattr(basin, key_name) is not None:
+            yield (*key, key_name), "modes have no friction; leave it out"
 
 
 def ice(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
-    """(mass [kg], centre [m], inertia about it [kg m2]) of water whose surface is held, in axes of its basin."""
+    """(mass [kg], centre [m], inertia about it [kg m2]) of water with a fixed surface, in axes of the basin."""
     outline, depth = outline_of(mesh), depth_of(basin, mesh)
     centre = np.array([*outline.middle, bed_of(basin, mesh) + 0.5 * depth])
     return density * area_of(outline) * depth, centre, under_a_lid(outline, depth, density)
 
 
 def sliders(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Body]:
-    """Bodies that slide on springs where modes do, and one that takes their masses off the water that is held.
+    """Bodies that slide on springs for the modes, and a fixed body of negative mass.
 
-    Of a cylinder the two of one number are one mass, which slides along x on what slides along y.
+    The negative mass subtracts the modes from the water with a fixed surface. In a cylinder the two modes of a number
+    share a mass: it slides along y on a massless body that slides along x.
     """
-    outline, turn, every, found = outline_of(mesh), basin.turn, made(basin, mesh, density, gravity), {}
+    outline, turn, all_modes, result = outline_of(mesh), basin.turn, made(basin, mesh, density, gravity), {}
     bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
-    places = [bed + turn[:, 2] * one.height for one in every]
-    masses = np.array([one.mass for one in every]) * (0.5 if outline.is_round else 1.0)
+    places = [bed + turn[:, 2] * item.height for item in all_modes]
+    masses = np.array([item.mass for item in all_modes]) * (0.5 if outline.is_round else 1.0)
     held = masses @ np.array(places) / masses.sum()
     spread = sum(point_inertia(m, r - held) for m, r in zip(masses, places, strict=True))
-    found[f"{name} held"] = body(-float(masses.sum()), -spread, Joint.model_construct(kind="fixed", on=basin.on), held)
+    result[f"{name} held"] = body(-float(masses.sum()), -spread, Joint.model_construct(kind="fixed", on=basin.on), held)
     down = (pose.attitude @ turn).T @ np.array([0.0, 0.0, -gravity])
-    for mode, place in zip(every, places, strict=True):
+    for mode, place in zip(all_modes, places, strict=True):
         on, first = basin.on, f"{name} x{mode.number}"
         if outline.is_round and mode.along == 1:
             on, place = first, np.zeros(3)
@@ -241,27 +244,27 @@ def sliders(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity
             kind="prismatic", on=on, at=tuple(place.tolist()), axis=tuple(turn[:, mode.along].tolist()),
             travel=constant(float(down[mode.along] / mode.square)), stiffness=mode.mass * mode.square,
         )  # fmt: skip
-        found[slider(name, mode)] = body(carried, np.zeros((3, 3)), joint, np.zeros(3))
-    return found
+        result[slider(name, mode)] = body(carried, np.zeros((3, 3)), joint, np.zeros(3))
+    return result
 
 
 def reading(
     basin: Any, mesh: Any, x: float, y: float, density: float, gravity: float
 ) -> tuple[list[SloshingMode], list[float]]:
-    """The modes, and by how much the travel of each raises the surface at a point.
+    """Modes, and the rise of the surface at a point per travel of each mode.
 
-    Those that are left out would rest where they are pushed to, as the last one that is followed all but does: it
-    carries them along, so that what stands stands even.
+    Modes that are left out would follow the acceleration statically, like the last modelled modes. Their rise is added
+    to that of the last mode along each axis, so that a surface in equilibrium is plane.
     """
-    outline, every = outline_of(mesh), made(basin, mesh, density, gravity)
-    rises = [surface(outline, one, x, y) for one in every]
+    outline, all_modes = outline_of(mesh), made(basin, mesh, density, gravity)
+    rises = [surface(outline, mode, x, y) for mode in all_modes]
     rest = (np.array([x, y]) - outline.middle).tolist()
-    for one, rise in zip(every, rises, strict=True):
-        rest[one.along] -= gravity * rise / one.square
-    last = len(every) - 2
-    return every, [
+    for mode, rise in zip(all_modes, rises, strict=True):
+        rest[mode.along] -= gravity * rise / mode.square
+    last = len(all_modes) - 2
+    return all_modes, [
         *rises[:last],
-        *(rises[k] + rest[every[k].along] * every[k].square / gravity for k in (last, last + 1)),
+        *(rises[k] + rest[all_modes[k].along] * all_modes[k].square / gravity for k in (last, last + 1)),
     ]
 
 
@@ -271,12 +274,12 @@ def slider(name: str, mode: SloshingMode) -> str:
 
 
 def made(basin: Any, mesh: Any, density: float, gravity: float) -> list[SloshingMode]:
-    """The modes of a basin."""
+    """Modes of a basin."""
     return modes(outline_of(mesh), depth_of(basin, mesh), density, gravity)
 
 
 def body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
-    """A body that no file says, which may have less than no mass."""
+    """Body that is not in the file; its mass may be negative."""
     return Body.model_construct(
         mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},
         centre_of_mass=tuple(np.asarray(centre).tolist()),

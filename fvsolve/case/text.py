@@ -1,4 +1,4 @@
-"""A case as TOML text. Knows how TOML is written; knows no part."""
+"""TOML text of a case."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.errors import LONGEST
 
 
 def write(table: dict[str, Any]) -> str:
-    """TOML text of nested dicts; tables down to the second level get a header, deeper ones stand in line."""
+    """TOML text of nested dicts; tables down to the second level get a header, deeper tables are written inline."""
     lines = [f"{_key(key)} = {inline(value)}" for key, value in table.items() if not isinstance(value, dict)]
     for key, value in table.items():
         if isinstance(value, dict):
@@ -19,7 +19,7 @@ def write(table: dict[str, Any]) -> str:
 
 
 def path(keys: tuple[Any, ...]) -> str:
-    """A key path as a message shows it: `links.main.length`, `output.probes[2]`."""
+    """Key path as text of a message: `links.main.length`, `output.probes[2]`."""
     text = ""
     for key in keys:
         name = str(key) if len(str(key)) <= LONGEST else f"{str(key)[:57]}..."
@@ -45,7 +45,7 @@ def _key(key: str) -> str:
 
 
 def inline(value: Any) -> str:
-    """A value as it stands behind `key =`, tables in line."""
+    """TOML text of a value on the right of `key =`, with inline tables."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -53,7 +53,7 @@ def inline(value: Any) -> str:
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{_key(k)} = {inline(v)}" for k, v in value.items()) + " }" if value else "{}"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(inline(one) for one in value) + "]"
+        return "[" + ", ".join(inline(item) for item in value) + "]"
     return repr(value)
 
 

@@ -1,4 +1,4 @@
-"""The command line: the only room that prints or exits. Knows commands; computes nothing."""
+"""Command line interface; the only package that prints or exits."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from fvsolve.errors import FvsolveError, visible
 
 __all__ = ["main"]
 
-COMMANDS = (  # files that add commands to the application: those of one command each bear its name, but for `map`
+# Modules that add commands to the application. A module of a single command usually has the name of the command.
+COMMANDS = (
     "commands",
     "chart",
     "closing",
@@ -31,17 +32,17 @@ PLAIN = ("run", "check", "list", "new", "schema", "methods", "compare", "view") 
 
 
 def main() -> None:
-    """Entry point of `fvsolve`: every failure is a message on standard error and an exit code, no traceback.
+    """Entry point of `fvsolve`. Every failure is a message on standard error and an exit code, without a traceback.
 
-    0: done. 1: a run stopped early or an expectation failed. 2: bad input. 130: interrupted.
+    Exit codes: 0 done; 1 a run stopped early or an expectation failed; 2 bad input; 130 interrupted.
     """
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # not where a caller has put another file in its place
-            stream.reconfigure(errors="backslashreplace")  # a terminal of few letters ends no run
+        if hasattr(stream, "reconfigure"):  # false if a caller has replaced the stream by another file object
+            stream.reconfigure(errors="backslashreplace")  # a terminal with a small character set must not end a run
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
-        for room in _wanted(sys.argv[1:2]):
-            import_module(f"fvsolve.cli.{room}")
+        for module in _wanted(sys.argv[1:2]):
+            import_module(f"fvsolve.cli.{module}")
         from fvsolve.cli.app import app
 
         app(prog_name="fvsolve")
@@ -50,20 +51,20 @@ def main() -> None:
     except KeyboardInterrupt:
         _leave("interrupted", 130)
     except BrokenPipeError:
-        sys.stderr.close()  # the reader of our output has gone: nobody to tell
+        sys.stderr.close()  # the reader of the output is gone: no message can reach it
         sys.exit(0)
     except OSError as error:
         _leave(f"{error.filename or 'fvsolve'}: {error.strerror or error}", 2)
     except MemoryError:
-        _leave("out of memory: fewer cells, fewer probes, or a larger [output] every", 1)
-    except Exception as error:  # a fault of ours: say where, so that it can be reported
+        _leave("out of memory. Try fewer cells, fewer probes, or a longer output interval ([output] every)", 1)
+    except Exception as error:  # a defect of fvsolve: print its location, so that it can be reported
         _leave(f"internal error in {_where(error)}: {type(error).__name__}: {error}; please report it", 1)
     finally:
         warnings.formatwarning = before
 
 
 def _wanted(command: list[str]) -> tuple[str, ...]:
-    """The files that a command line needs: that of its command, or all where it names none."""
+    """Modules to import for a command line: `commands` for a basic command, otherwise all modules."""
     if command and command[0] in PLAIN:
         return COMMANDS[:1]
     return COMMANDS

@@ -1,4 +1,4 @@
-"""What all commands share: the application, their common options, how a case is read. Knows no command."""
+"""Typer application, options common to all commands, and the reading of a case."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         import fvsolve
 
         print(f"fvsolve {fvsolve.__version__}")
@@ -31,7 +31,7 @@ def _version(asked: bool) -> None:
 @app.callback()
 def all_commands(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and leave")
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version and exit")
     ] = False,
 ) -> None:
     """Hydraulic transients by finite volumes: a TOML file in; pressures, flows and fields out."""
@@ -39,15 +39,15 @@ def all_commands(
 
 Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 One = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override a key: links.main.cells=400")]
-Json = Annotated[bool, typer.Option("--json", help="one JSON object on standard output, nothing else there")]
+Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override of a key: links.main.cells=400")]
+Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output instead of text")]
 
 
 def load_case(name: str, overrides: list[str], scheme: str | None = None, method: str | None = None):
-    """The case, overridden; an override that is none is one more fault of it.
+    """Read a case and apply the overrides. Raises CaseError with all faults of the case and of the overrides.
 
-    scheme, method : lists that a study takes in place of the case's; what is no case with its own is read with their
-    first, to which the overrides may belong
+    scheme, method : lists of a study that replace those of the case, separated by commas. If the case is invalid with
+        its own scheme and method, it is read with the first of each list: the overrides may apply only to these.
     """
     from fvsolve.case import load, shipped
 
@@ -77,35 +77,35 @@ def _tell_of_compiling() -> None:
     from fvsolve.jit import cold, elsewhere
 
     if cold():
-        said = "the first run on this machine compiles the solver, some 10 to 30 s; once, it is kept for all later runs"
+        text = "the first run on this machine compiles the solver (about 10 to 30 s); later runs reuse the result"
         other = elsewhere()
-        print(f"fvsolve: {said}{f'; {other}' if other else ''}", file=sys.stderr)
+        print(f"fvsolve: {text}{f'; {other}' if other else ''}", file=sys.stderr)
 
 
 def _overrides(texts: list[str]) -> tuple[dict, list[Fault]]:
-    found, faults = {}, []
+    settings, faults = {}, []
     for text in texts:
         key, equals, value = text.partition("=")
         if not (equals and key.strip()):
-            faults.append(Fault(text, "wanted KEY=VALUE, for example links.main.cells=400", override=True))
+            faults.append(Fault(text, "expected KEY=VALUE, for example links.main.cells=400", override=True))
         else:
-            found[key.strip()] = value_of(value)
-    return found, faults
+            settings[key.strip()] = value_of(value)
+    return settings, faults
 
 
 def value_of(text: str):
-    """`400`, `true`, `[1, 2]` and `{ a = 1 }` as TOML reads them; everything else is text."""
+    """Parse `400`, `true`, `[1, 2]` and `{ a = 1 }` as TOML values; any other text is returned as text."""
     import tomllib
 
     try:
-        read = tomllib.loads(f"value = {text}")
+        parsed = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text.strip()
-    return read["value"] if read.keys() == {"value"} else text.strip()
+    return parsed["value"] if parsed.keys() == {"value"} else text.strip()
 
 
 def print_json(data) -> None:
-    """One object on standard output, numbers unrounded."""
+    """Print one JSON object on standard output, with unrounded numbers."""
     from fvsolve.output.summary import plain
 
     print(json.dumps(plain(data), allow_nan=False))

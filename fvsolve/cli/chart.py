@@ -1,4 +1,4 @@
-"""`fvsolve chart`: what accuracy costs. Knows the terminal; computes nothing."""
+"""`fvsolve chart`: work-precision charts of methods and models."""
 
 from __future__ import annotations
 
@@ -16,17 +16,25 @@ from fvsolve.studies.sheet import Column, Sheet
 @app.command()
 def chart(
     case: One,
-    scheme: Annotated[str | None, typer.Option(metavar="LIST", help="upwind,muscl,upwind5,weno5 by default")] = None,
-    method: Annotated[str | None, typer.Option(metavar="LIST", help="a telling few by default")] = None,
+    scheme: Annotated[
+        str | None, typer.Option(metavar="LIST", help="schemes to compare (default upwind,muscl,upwind5,weno5)")
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="LIST", help="methods to compare (default a representative selection)")
+    ] = None,
     cells: Annotated[
-        str | None, typer.Option(metavar="LIST", help="of the longest pipe, or side of a basin: 50,100,200")
+        str | None, typer.Option(metavar="LIST", help="cells of the longest pipe, or of a basin side: 50,100,200")
     ] = None,
-    rtol: Annotated[str | None, typer.Option(metavar="LIST", help="of a case without pipes: 1e-3,1e-6")] = None,
+    rtol: Annotated[
+        str | None, typer.Option(metavar="LIST", help="relative tolerances, for a case without pipes: 1e-3,1e-6")
+    ] = None,
     step: Annotated[
-        str | None, typer.Option(metavar="LIST", help="the same for methods that estimate no error")
+        str | None, typer.Option(metavar="LIST", help="steps [s], for methods without an error estimate: 1e-3,1e-4")
     ] = None,
-    target: Annotated[float | None, typer.Option(metavar="ERROR", help="print the lines for [numerics]")] = None,
-    models: Annotated[bool, typer.Option("--models", help="models of the scene in place of methods")] = False,
+    target: Annotated[
+        float | None, typer.Option(metavar="ERROR", help="error for which to print the cheapest [numerics] settings")
+    ] = None,
+    models: Annotated[bool, typer.Option("--models", help="compare models of the case instead of methods")] = False,
     jobs: Jobs = 1,
     dask: Dask = None,
     set: Set = [],  # noqa: B006
@@ -37,89 +45,95 @@ def chart(
     from fvsolve.studies.accuracy.chart import chart as study
     from fvsolve.studies.accuracy.files import write
 
-    found = load_case(case, set, scheme, method)
+    loaded = load_case(case, set, scheme, method)
     if target is not None and not 0.0 < target < 1.0:
-        raise FvsolveError(f"--target: {target:g} is no error; wanted a part of the range, above 0 and below 1")
+        raise FvsolveError(
+            f"--target: {target:g} is not a valid error. Expected a fraction of the range, between 0 and 1"
+        )
     if models:
-        several = None if jobs == 1 else jobs
-        _refuse(scheme=scheme, method=method, cells=cells, rtol=rtol, step=step, jobs=several, dask=dask, out=out)
+        several_jobs = None if jobs == 1 else jobs
+        _refuse(scheme=scheme, method=method, cells=cells, rtol=rtol, step=step, jobs=several_jobs, dask=dask, out=out)
         from fvsolve.cli.models import show_models
         from fvsolve.studies.accuracy.models import TARGET
 
-        return show_models(found, target or TARGET, as_json)
-    folder = folder_of(found, "chart", out)
+        return show_models(loaded, target or TARGET, as_json)
+    folder = folder_of(loaded, "chart", out)
     sizes = [_numbers(name, text) for name, text in (("cells", cells), ("rtol", rtol), ("step", step))]
     with told() as progress:
-        made = study(found, None, listed(scheme, "--scheme"), methods_of(method), *sizes, target, folder, progress,
+        result = study(loaded, None, listed(scheme, "--scheme"), methods_of(method), *sizes, target, folder, progress,
                      jobs, dask)  # fmt: skip
-    paths = write(made, folder)
+    paths = write(result, folder)
     if as_json:
-        print_json(made.plain() | {"files": paths})
+        print_json(result.plain() | {"files": paths})
     else:
-        _show(made, paths)
+        _show(result, paths)
 
 
-def _refuse(**given) -> None:
-    """FvsolveError that names what was given and means nothing beside --models."""
-    names = [f"--{name}" for name, value in given.items() if value is not None]
+def _refuse(**options) -> None:
+    """Raise FvsolveError that names the options without effect together with --models."""
+    names = [f"--{name}" for name, value in options.items() if value is not None]
     if names:
         raise FvsolveError(
-            f"{', '.join(names)}: not with --models, which runs models of the scene as [numerics] says and writes no "
-            "files; leave it out, or state it with --set"
+            f"{', '.join(names)}: not valid with --models, which compares models of the case with the settings of "
+            "[numerics] and writes no files. Remove the option, or set the key with --set"
         )
 
 
 def _numbers(name: str, text: str | None) -> list | None:
-    """`50,100` as numbers; FvsolveError that names what is none."""
-    found = []
+    """Convert `50,100` to numbers; raises FvsolveError for a word that is not a positive number."""
+    numbers = []
     for word in listed(text) or ():
         try:
             value = int(word) if name == "cells" else float(word)
         except ValueError:
             value = 0
         if not 0 < value < float("inf"):
-            wanted = "a whole number above 0" if name == "cells" else "a number above 0"
-            raise FvsolveError(f"--{name}: {word} is not {wanted}")
-        found.append(value)
-    return found or None
+            expected = "a whole number above 0" if name == "cells" else "a number above 0"
+            raise FvsolveError(f"--{name}: {word} is not {expected}")
+        numbers.append(value)
+    return numbers or None
 
 
-def _show(made, paths) -> None:
+def _show(result, paths) -> None:
     from fvsolve.cli.terminal import console, line, sheet
 
-    where = console()
-    floor = made.floor["trajectory"]
-    line(where, f"{made.case}: error over the trajectory (mean over time, of the worst probe's range)")
-    sheet(Sheet(FRONT, [vars(row) for row in made.front]), where)
-    stands = made.stands
-    line(where, f"default: {made.default}; times and updates between two runs of a curve are interpolated")
-    if stands is not None:
-        said = f"error {stands.trajectory:.2g} in {stands.seconds * 1e3:.3g} ms" if stands.ok else stands.reason
-        line(where, f"default as it stands, {stands.setting.fineness}: {said}")
+    terminal = console()
+    floor = result.floor["trajectory"]
     line(
-        where,
-        f"errors against {made.reference}; {made.second} differs from it by {floor:.2g}: below, the chart says nothing",
+        terminal,
+        f"{result.case}: error over the trajectory (mean over time, of the probe with the largest relative error)",
     )
-    if made.left_out:
-        line(where, f"left out: {', '.join(made.left_out)}, which do not follow cavities in pipes")
-    for text in made.told:
-        line(where, f"no reference: {text}")
-    for point in made.failed:
-        line(where, f"failed: {point.setting.name}, {point.setting.fineness}: {point.reason}")
-    line(where, f"compiled or loaded before in {made.compile_seconds:.2g} s, in no time above"
-         + (f"; {made.reused} points were known" if made.reused else ""))  # fmt: skip
-    line(where, "wrote " + ", ".join(str(path) for path in paths))
-    if made.aim is not None:
-        _show_aim(where, made)
+    sheet(Sheet(FRONT, [vars(row) for row in result.front]), terminal)
+    own = result.stands
+    line(terminal, f"default: {result.default}; times and updates are interpolated between the runs of a curve")
+    if own is not None:
+        outcome = f"error {own.trajectory:.2g} in {own.seconds * 1e3:.3g} ms" if own.ok else own.reason
+        line(terminal, f"default at its own resolution, {own.setting.fineness}: {outcome}")
+    line(
+        terminal,
+        f"errors against {result.reference}; {result.second} differs from it by {floor:.2g}: "
+        "smaller errors have no meaning",
+    )
+    if result.left_out:
+        line(terminal, f"left out: {', '.join(result.left_out)}; these methods cannot model cavities in pipes")
+    for text in result.told:
+        line(terminal, f"no reference: {text}")
+    for point in result.failed:
+        line(terminal, f"failed: {point.setting.name}, {point.setting.fineness}: {point.reason}")
+    line(terminal, f"compiling or loading took {result.compile_seconds:.2g} s, not included in the times above"
+         + (f"; {result.reused} points were reused from earlier runs" if result.reused else ""))  # fmt: skip
+    line(terminal, "wrote " + ", ".join(str(path) for path in paths))
+    if result.aim is not None:
+        _show_aim(terminal, result)
 
 
 def _ms(key: str) -> Callable[[Mapping], str]:
-    """What says the seconds of a row in milliseconds."""
+    """Function that formats the seconds of a row in milliseconds."""
     return lambda row: "-" if row[key] is None else f"{row[key] * 1e3:.3g}"
 
 
 def _times(row: Mapping) -> str:
-    """How many times as long the default takes."""
+    """Ratio of the default's time to the time of the row."""
     default = row["default_seconds"]
     return "-" if default is None else f"{default / row['seconds']:.2g}"
 
@@ -137,13 +151,14 @@ FRONT = (
 )
 
 
-def _show_aim(where, made) -> None:
+def _show_aim(terminal, result) -> None:
     from fvsolve.cli.terminal import line
 
-    point = made.aim.point
+    point = result.aim.point
     line(
-        where, f"\n# error {point.trajectory:.2g} of {made.aim.target:g} asked, {point.seconds * 1e3:.3g} ms; stands in"
+        terminal,
+        f"\n# error {point.trajectory:.2g} (target {result.aim.target:g}), {point.seconds * 1e3:.3g} ms; use in",
     )
-    line(where, "# [numerics] in place of scheme, method, courant, step, rtol and cell_time")
-    for text in made.aim.lines():
-        line(where, text)
+    line(terminal, "# [numerics] in place of scheme, method, courant, step, rtol and cell_time")
+    for text in result.aim.lines():
+        line(terminal, text)

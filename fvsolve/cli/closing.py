@@ -1,4 +1,4 @@
-"""The command `optimise`. Knows the terminal; leaves the search to `studies`."""
+"""`fvsolve optimise`: schedule of a valve that minimises a peak."""
 
 from __future__ import annotations
 
@@ -14,43 +14,47 @@ from fvsolve.errors import CaseError, gathered
 @app.command()
 def optimise(
     case: One,
-    law: Annotated[str, typer.Option("--law", metavar="KEY", help="a schedule that goes from one value to another")],
-    minimise: Annotated[str, typer.Option(metavar="CLAIM", help='"max(gate.pressure)", "greatest(main.head)"')],
-    knots: Annotated[int, typer.Option(metavar="N", help="inner knots of the law")] = 3,
-    runs: Annotated[int, typer.Option(metavar="N", help="how many at most")] = 60,
+    law: Annotated[str, typer.Option("--law", metavar="KEY", help="key of the schedule that is optimised")],
+    minimise: Annotated[
+        str, typer.Option(metavar="CLAIM", help='peak that is minimised: "max(gate.pressure)", "greatest(main.head)"')
+    ],
+    knots: Annotated[int, typer.Option(metavar="N", help="number of inner knots of the schedule")] = 3,
+    runs: Annotated[int, typer.Option(metavar="N", help="greatest number of runs")] = 60,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """The law of a valve that makes a peak least, by a few knots, beside the linear one."""
+    """Optimise a valve schedule, given by a few knots, to minimise a peak; compare it with the linear schedule."""
     from fvsolve.studies import closing
 
-    faults, made = [], None
+    faults, loaded = [], None
     with gathered(faults):
-        made = load_case(case, set)
-    faults += closing.asked(made, law, minimise, knots, runs)
+        loaded = load_case(case, set)
+    faults += closing.asked(loaded, law, minimise, knots, runs)
     if faults:
         raise CaseError(faults, case)
     with told(kept=False) as progress:
-        found = closing.optimise(made, law, minimise, knots, runs, None, lambda done, what: progress(done, runs, what))
+        result = closing.optimise(
+            loaded, law, minimise, knots, runs, None, lambda done, text: progress(done, runs, text)
+        )
     if as_json:
-        print_json(found.plain())
+        print_json(result.plain())
     else:
-        _show(found, made)
+        _show(result, loaded)
 
 
-def _show(found, case) -> None:
+def _show(result, case) -> None:
     from fvsolve.cli import terminal
     from fvsolve.output.column import column, time_column
     from fvsolve.studies.plans import quantity_of
 
     console, clock = terminal.console(), time_column(case)
-    quantity = quantity_of(case.raw, found.key)
+    quantity = quantity_of(case.raw, result.key)
     own = column("", "number" if quantity is None else quantity.dimension, case)
     bare, spec = own.dimension == "number", ".4f" if own.dimension == "number" else ".6g"
-    rows = [[f"{clock.from_si(t):.6g}", *(format(own.from_si(one), spec) for one in pair)]
-            for t, *pair in zip(found.best.time, found.linear.value, found.best.value, strict=True)]  # fmt: skip
+    rows = [[f"{clock.from_si(t):.6g}", *(format(own.from_si(value), spec) for value in pair)]
+            for t, *pair in zip(result.best.time, result.linear.value, result.best.value, strict=True)]  # fmt: skip
     heads = [name if bare else f"{name} [{own.unit}]" for name in ("linear", "best")]
     terminal.table([clock.header, *heads], rows, console)
-    peaks = ["-" if one.peak is None else f"{one.peak:.6g} {found.unit}" for one in (found.linear, found.best)]
-    terminal.line(console, f"{found.minimise}: linear {peaks[0]}, best {peaks[1]}; {found.runs} runs", "green")
-    terminal.line(console, found.schedule)
+    peaks = ["-" if value.peak is None else f"{value.peak:.6g} {result.unit}" for value in (result.linear, result.best)]
+    terminal.line(console, f"{result.minimise}: linear {peaks[0]}, best {peaks[1]}; {result.runs} runs", "green")
+    terminal.line(console, result.schedule)

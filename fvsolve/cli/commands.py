@@ -1,4 +1,4 @@
-"""Commands for runs, cases and methods. Knows what is asked; leaves the work to `run` and the words to `report`."""
+"""Commands for runs, cases and methods."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ def run(
     cases: Cases,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="run directory (default runs/NAME)")] = None,
     set: Set = [],  # noqa: B006
-    resume: Annotated[bool, typer.Option("--resume", help="go on from the last checkpoint")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="continue from the last checkpoint")] = False,
     force: Annotated[bool, typer.Option("--force", help="replace an earlier run")] = False,
-    threads: Annotated[int, typer.Option(metavar="N", help="that share out rows of basins")] = 1,
-    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="numbers alone")] = False,
+    threads: Annotated[
+        int, typer.Option(metavar="N", help="number of threads; rows of basin cells are distributed over them")
+    ] = 1,
+    no_pictures: Annotated[bool, typer.Option("--no-pictures", help="write no pictures")] = False,
     error: Annotated[
-        bool, typer.Option("--error", help="how far peaks are off, by runs of half and twice the resolution")
+        bool, typer.Option("--error", help="estimate the error of peaks, by runs of half and twice the resolution")
     ] = False,
     as_json: Json = False,
 ) -> None:
@@ -32,7 +34,7 @@ def run(
     from fvsolve.draw.beside import Painter
 
     results = []
-    with Painter(beside=not no_pictures) as painter:  # before anything else is fetched
+    with Painter(beside=not no_pictures) as painter:  # its process starts before other modules are imported
         from fvsolve.cli import report
         from fvsolve.run import model_of, ranks
 
@@ -50,20 +52,20 @@ def run(
             if results[-1].reason.startswith("interrupted"):
                 break
     if as_json:
-        said = [one.summary | {"directory": str(one.directory)} for one in results]
-        print_json(said[0] if len(cases) == 1 else {"runs": said})
-    sys.exit(max(report.exit_code(one) for one in results))
+        summaries = [result.summary | {"directory": str(result.directory)} for result in results]
+        print_json(summaries[0] if len(cases) == 1 else {"runs": summaries})
+    sys.exit(max(report.exit_code(result) for result in results))
 
 
 def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool, error: bool):
-    """Solve one case and say what came out, then draw it."""
+    """Solve a case, print its results, then draw them."""
     from fvsolve.cli import report
     from fvsolve.cli.progress import watched
     from fvsolve.run import draw, sink_of, solved
     from fvsolve.run.expected import expected
 
-    if said := expected(model):
-        print(visible(said), file=sys.stderr, flush=True)
+    if text := expected(model):
+        print(visible(text), file=sys.stderr, flush=True)
     with closing(sink_of(model, place, force, resume, threads)) as sink:
         with watched(model.case) as progress:
             result = solved(model, sink, progress, threads)
@@ -80,11 +82,11 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
 
 
 def _judge(result, case) -> None:
-    """How far the peaks of a run are off, into its summary."""
+    """Estimate the error of the peaks of a run and write it into the summary."""
     from fvsolve.output.summary import write_summary
     from fvsolve.studies.peaks import peak_errors
 
-    peak_errors(result, case, lambda what: print(f"{case.name} again: {what}", file=sys.stderr, flush=True))
+    peak_errors(result, case, lambda text: print(f"{case.name} again: {text}", file=sys.stderr, flush=True))
     write_summary(result.directory / "summary.json", result.summary)
 
 
@@ -92,23 +94,23 @@ def _judge(result, case) -> None:
 def check(
     case: One,
     set: Set = [],  # noqa: B006
-    every: Annotated[bool, typer.Option("--all", help="all rows of long tables")] = False,
+    every: Annotated[bool, typer.Option("--all", help="print all rows of long tables")] = False,
     as_json: Json = False,
 ) -> None:
-    """What was understood of a case, how it starts, what it will cost."""
+    """Print the contents of a case as read, its initial state and its expected cost."""
     from fvsolve.cli import report
     from fvsolve.limits.step import step_limits
     from fvsolve.run import model_of
     from fvsolve.solve.bands import shared
 
     model = model_of(load_case(case, set))
-    found = model.checks
-    found["warnings"] += [one.plain() for one in step_limits(model)]
-    found["threads"] = shared(model)
+    report_data = model.checks
+    report_data["warnings"] += [notice.plain() for notice in step_limits(model)]
+    report_data["threads"] = shared(model)
     if as_json:
-        print_json(found)
+        print_json(report_data)
     else:
-        report.checks(model.case, found, every)
+        report.checks(model.case, report_data, every)
 
 
 @app.command("list")
@@ -127,13 +129,19 @@ def list_cases(as_json: Json = False) -> None:
 @app.command()
 def new(
     name: Annotated[str | None, typer.Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")] = None,
-    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="default NAME.toml")] = None,
-    source: Annotated[Path | None, typer.Option("--from", metavar="NET.inp", help="an EPANET network")] = None,
-    hour: Annotated[float | None, typer.Option(metavar="H", help="of EPANET's run (default 0)")] = None,
-    wave_speed: Annotated[str | None, typer.Option(metavar="A", help='of all pipes (default "1200 m/s")')] = None,
-    shortest: Annotated[str | None, typer.Option(metavar="L", help="make shorter pipes as long, as cells want")] = None,
+    file: Annotated[Path | None, typer.Argument(metavar="FILE", help="file to write (default NAME.toml)")] = None,
+    source: Annotated[Path | None, typer.Option("--from", metavar="NET.inp", help="EPANET network to import")] = None,
+    hour: Annotated[
+        float | None, typer.Option(metavar="H", help="hour of the EPANET run that gives the initial state (default 0)")
+    ] = None,
+    wave_speed: Annotated[
+        str | None, typer.Option(metavar="A", help='wave speed of all pipes (default "1200 m/s")')
+    ] = None,
+    shortest: Annotated[
+        str | None, typer.Option(metavar="L", help="least pipe length; shorter pipes are lengthened to it")
+    ] = None,
 ) -> None:
-    """Copy a shipped case and the files it uses; or with --from write the case NAME of an EPANET network."""
+    """Copy a shipped case and the files it uses; or import an EPANET network with --from as the case NAME."""
     from fvsolve.case import copying
     from fvsolve.cli import imported
 
@@ -141,7 +149,10 @@ def new(
         imported.write(source, name, file, hour, wave_speed, shortest)
         return
     if name is None or hour is not None or wave_speed is not None or shortest is not None:
-        raise FvsolveError("fvsolve new NAME copies a shipped case, fvsolve new --from NET.inp [--hour H] imports one")
+        raise FvsolveError(
+            "expected fvsolve new NAME, which copies a shipped case, or fvsolve new --from NET.inp [--hour H] "
+            "[--wave-speed A] [--shortest L], which imports an EPANET network"
+        )
     for path in copying.copy(name, file or Path(f"{name}.toml")):
         print(path)
 
@@ -157,20 +168,22 @@ def schema() -> None:
 
 @app.command()
 def methods(
-    name: Annotated[str | None, typer.Argument(metavar="NAME", help="all methods by default")] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="of NAME's picture (default NAME.png)")] = None,
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="name of a method (default all methods)")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="picture of the stability region (default NAME.png)")
+    ] = None,
     as_json: Json = False,
 ) -> None:
-    """Runge-Kutta methods: order, stability, cost; of one NAME its tableau, R(s) and stability region too."""
+    """List Runge-Kutta methods: order, stability, cost. With NAME also print the tableau, R(s) and stability region."""
     from fvsolve.cli import methods
 
     if name is None and out is not None:
-        raise FvsolveError("--out is for the picture of one method; give its NAME")
-    said = methods.table() if name is None else methods.one(name, out)
+        raise FvsolveError("--out is valid for a single method only. Add the NAME of the method")
+    output = methods.table() if name is None else methods.one(name, out)
     if as_json:
-        print_json(said.plain)
+        print_json(output.plain)
     else:
-        said.show()
+        output.show()
 
 
 @app.command()
@@ -179,29 +192,35 @@ def compare(
     run_b: Annotated[Path, typer.Argument(metavar="RUN_B")],
     as_json: Json = False,
 ) -> None:
-    """Differences of two runs, per shared probe."""
+    """Compare two runs: differences of each probe that both have."""
     from fvsolve.cli import report
     from fvsolve.run import open_run
     from fvsolve.run.comparison import differences
 
-    one = open_run(run_a)
-    found = differences(one, open_run(run_b))
+    first = open_run(run_a)
+    result = differences(first, open_run(run_b))
     if as_json:
-        print_json(found)
+        print_json(result)
     else:
-        report.differences(found, one.summary)
+        report.differences(result, first.summary)
 
 
 @app.command()
 def view(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
-    time: Annotated[str | None, typer.Option(metavar="T", help='"1.2 s"; the last frame by default')] = None,
-    field: Annotated[str | None, typer.Option(help="pressure, head, velocity, flow, depth, a scalar, ...")] = None,
-    contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="lines of equal values")] = 0,
-    animate: Annotated[Path | None, typer.Option(metavar="FILE", help="all frames, as .gif or .mp4")] = None,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="default RUN/view-FIELD.png")] = None,
+    time: Annotated[
+        str | None, typer.Option(metavar="T", help='time of the frame: "1.2 s" (default the last frame)')
+    ] = None,
+    field: Annotated[
+        str | None, typer.Option(help="quantity: pressure, head, velocity, flow, depth, a scalar, ...")
+    ] = None,
+    contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="number of contour lines")] = 0,
+    animate: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="animation of all frames, a .gif or .mp4 file")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="picture file (default RUN/view-FIELD.png)")] = None,
 ) -> None:
-    """Draw a field at a time, or all times, off screen, with PyVista."""
+    """Draw a field at a time, or an animation of all times, off screen with PyVista."""
     from fvsolve.run import open_run
     from fvsolve.units import parse
 
@@ -210,22 +229,24 @@ def view(
     except ValueError as error:
         raise FvsolveError(f"--time: {error}") from None
     if animate is not None and not time is out is None:
-        raise FvsolveError("--animate draws all times into its own file; leave --time and --out out")
+        raise FvsolveError("--animate draws all times into its own file. Remove --time and --out")
     run = open_run(directory)
     print(run.view(when, field, out, contours) if animate is None else run.animate(animate, field, contours))
 
 
 def _places(cases: list[str], out: Path | None) -> dict[str, Path]:
-    """Case -> its run directory; FvsolveError where two would have the same one."""
+    """Map each case to its run directory. Raises FvsolveError if two cases would have the same directory."""
     from fvsolve.case import shipped
 
-    found, taken = {}, {}
+    paths, taken = {}, {}
     for name in cases:
         stem = shipped.find(name).stem
         place = out if out and len(cases) == 1 else (out or Path("runs")) / stem
         other = taken.setdefault(os.path.normcase(place), name)
-        if name in found or other != name:
-            twice = f"{name} is named twice" if other == name else f"{other} and {name} would both write {place}"
-            raise FvsolveError(f"{twice}; run one at a time, each with an --out DIR of its own, or rename one")
-        found[name] = place
-    return found
+        if name in paths or other != name:
+            conflict = f"{name} is named twice" if other == name else f"{other} and {name} would both write {place}"
+            raise FvsolveError(
+                f"{conflict}. Run each case in a command of its own with its own --out DIR, or rename a case"
+            )
+        paths[name] = place
+    return paths

@@ -1,4 +1,4 @@
-"""The command `study`. Knows the terminal; leaves the runs to `studies`."""
+"""`fvsolve study`: runs of a study file, all events with all protections."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ def study(
     force: Annotated[bool, typer.Option("--force", help="replace earlier runs")] = False,
     as_json: Json = False,
 ) -> None:
-    """Run every event with every protection of a design, and say which limits hold."""
+    """Run every event with every protection of a study file and report the limits that hold."""
     from fvsolve.studies import design
 
     with told() as progress:
-        found = design.study(file, out, jobs, dask, force, progress)
+        result = design.study(file, out, jobs, dask, force, progress)
     if as_json:
-        print_json(found.plain() | {"directory": str(found.folder)})
+        print_json(result.plain() | {"directory": str(result.folder)})
     else:
-        _show(found)
-    sys.exit(0 if found.ok else 1)
+        _show(result)
+    sys.exit(0 if result.ok else 1)
 
 
-def _show(found) -> None:
+def _show(result) -> None:
     from fvsolve.cli import terminal
     from fvsolve.cli.report import REASONS_SHOWN, open_as, when, where_and_when
     from fvsolve.run.result import FAILS, OPEN
@@ -41,16 +41,20 @@ def _show(found) -> None:
     from fvsolve.units import span
 
     console = terminal.console()
-    if found.design.title:
-        terminal.line(console, found.design.title, "bold")
-    limits = {one["name"]: f"{one['name']} [{span(one['unit'])}]" for row in found.rows for one in row["verdicts"]}
+    if result.design.title:
+        terminal.line(console, result.design.title, "bold")
+    limits = {
+        verdict["name"]: f"{verdict['name']} [{span(verdict['unit'])}]"
+        for row in result.rows
+        for verdict in row["verdicts"]
+    }
     rows = []
-    for row in found.rows:
-        verdicts = {one["name"]: one for one in row["verdicts"]}
+    for row in result.rows:
+        verdicts = {verdict["name"]: verdict for verdict in row["verdicts"]}
         cells = [_cell(verdicts.get(name), row) for name in limits]
         rows.append([name_of(row), standing(row), *cells])
     terminal.table(["run", "", *(f"margin of {name}" for name in limits.values())], rows, console)
-    for row in found.rows:
+    for row in result.rows:
         if not row["ok"]:
             terminal.line(console, f"{name_of(row)}: {row['reason']}", "bold red")
         if row["marks"]:
@@ -60,39 +64,41 @@ def _show(found) -> None:
         for note in row["warnings"]:
             if note["kind"] == "end":
                 terminal.line(console, f"{name_of(row)}: {note['text']}", "yellow")
-        for one in verdicts_of(row):
-            if one.state in (FAILS, OPEN):
-                value = "-" if one.value is None else f"{one.value:.6g}"
-                text = f"{name_of(row)}: {one.name}: {value} {one.unit} ({where_and_when(one._asdict(), row)})"
-                why = "" if one.state == FAILS else f": open, as {open_as(one, row)}"
-                terminal.line(console, text + why, "red" if one.state == FAILS else "yellow")
+        for verdict in verdicts_of(row):
+            if verdict.state in (FAILS, OPEN):
+                value = "-" if verdict.value is None else f"{verdict.value:.6g}"
+                text = (
+                    f"{name_of(row)}: {verdict.name}: {value} {verdict.unit} ({where_and_when(verdict._asdict(), row)})"
+                )
+                reason = "" if verdict.state == FAILS else f": open, because {open_as(verdict, row)}"
+                terminal.line(console, text + reason, "red" if verdict.state == FAILS else "yellow")
         for text in row.get("resolution", {"reasons": []})["reasons"][:REASONS_SHOWN]:
             terminal.line(console, f"{name_of(row)}: error of {text}", "yellow")
-    names = [name or "the case as it is" for name in found.holds]
-    if found.limited:
-        told = f"all limits hold in all events: {', '.join(names)}"
-        told = told if names else "nothing holds all limits in all events"
-        terminal.line(console, told, "green" if names else "bold red")
+    names = [name or "the case as it is" for name in result.holds]
+    if result.limited:
+        message = f"all limits hold in all events with: {', '.join(names)}"
+        message = message if names else "no protection holds all limits in all events"
+        terminal.line(console, message, "green" if names else "bold red")
     else:
-        terminal.line(console, "no limits are stated, so none can hold or fail", "yellow")
-    terminal.line(console, f"{found.folder}: study.json, study.csv and a run directory for each")
+        terminal.line(console, "the case states no limits, so none is checked", "yellow")
+    terminal.line(console, f"{result.folder}: study.json, study.csv and a directory for each run")
 
 
 def verdicts_of(row: dict) -> list:
-    """Of a run."""
+    """Limit verdicts of a run."""
     from fvsolve.run.result import LimitVerdict
 
-    return [LimitVerdict(**one) for one in row["verdicts"]]
+    return [LimitVerdict(**verdict) for verdict in row["verdicts"]]
 
 
 def standing(row: dict) -> str:
-    """Of a run in one word."""
+    """One-word status of a run."""
     from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN
 
-    states = [FAILS] * (not row["ok"]) + [one.state for one in verdicts_of(row)]
+    states = [FAILS] * (not row["ok"]) + [entry.state for entry in verdicts_of(row)]
     if not states:
         return "-"
-    return IN_WORDS[next((one for one in (FAILS, OPEN) if one in states), HOLDS)]
+    return IN_WORDS[next((entry for entry in (FAILS, OPEN) if entry in states), HOLDS)]
 
 
 def _cell(verdict, row: dict) -> str:

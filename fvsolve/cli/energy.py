@@ -1,4 +1,4 @@
-"""`fvsolve energy`: the ledger of energy of a run, and who keeps a network passive. Knows words; computes nothing."""
+"""`fvsolve energy`: energy ledger of a run, and passivity of schemes, methods and ports."""
 
 from __future__ import annotations
 
@@ -16,17 +16,19 @@ from fvsolve.cli.studying import Out, cleared, folder_of, listed, methods_of, re
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Column, Sheet, text
 
-Asked = Annotated[str | None, typer.Argument(metavar="[CASE]", help="a case; without one, schemes and methods alone")]
-Port = Annotated[str | None, typer.Option(metavar="NODE", help="ask whether the network is passive at this port")]
-Schemes = Annotated[str | None, typer.Option(metavar="S,S,...", help="schemes to try, or to say what they claim of")]
-Methods = Annotated[str | None, typer.Option(metavar="M,M,...", help="methods, likewise")]
-LINES = 12  # of one kind on the terminal; the rest is in energy.csv
-AGAIN = "the same command starts anew"
+Asked = Annotated[
+    str | None, typer.Argument(metavar="[CASE]", help="case to run (default: judge schemes and methods without a case)")
+]
+Port = Annotated[str | None, typer.Option(metavar="NODE", help="port at which passivity of the network is checked")]
+Schemes = Annotated[str | None, typer.Option(metavar="S,S,...", help="schemes to run or to judge")]
+Methods = Annotated[str | None, typer.Option(metavar="M,M,...", help="methods to run or to judge")]
+LINES = 12  # greatest number of lines of a kind on the terminal; energy.csv has all
+AGAIN = "the same command starts from the beginning"
 FILES = ("energy.csv", "energy.png", "energy.svg")
 
 
 def _limit(key: str) -> Callable[[Mapping], str]:
-    """What says the greatest step of a row: any, none or a number."""
+    """Function that formats the greatest step of a row: "any", "none" or a number."""
     return lambda row: "any" if math.isinf(row[key]) else "none" if row[key] == 0.0 else f"{row[key]:.6g}"
 
 
@@ -52,7 +54,7 @@ def energy(
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """What energy came in, where it is, what was dissipated, and what the numbers made of it."""
+    """Print the energy ledger of a run: energy supplied, stored, dissipated, and changed by the numerical method."""
     schemes, methods = listed(scheme, "--scheme"), methods_of(method)
     if case is None:
         refuse({"--port": port, "--out": out, "--set": set})
@@ -64,16 +66,16 @@ def energy(
 
 
 def refuse(options: dict) -> None:
-    """FvsolveError for options that ask about a run, where there is no case."""
+    """Raise FvsolveError for options that need a run if there is no case."""
     given = [name for name, value in options.items() if value]
     if given:
-        raise FvsolveError(f"{', '.join(given)}: only with a case, as fvsolve energy CASE {given[0]} ...; "
-                           "without one, schemes and methods alone are judged and no file is written")  # fmt: skip
+        raise FvsolveError(f"{', '.join(given)}: valid only with a case. Expected fvsolve energy CASE {given[0]} ...; "
+                           "without a case schemes and methods are judged and no file is written")  # fmt: skip
 
 
 @contextmanager
 def leaving(words: str) -> Iterator[None]:
-    """At Ctrl-C: say so in these words and end with exit code 130."""
+    """Context manager: at Ctrl-C print `words` and exit with code 130."""
     try:
         yield
     except KeyboardInterrupt:
@@ -82,7 +84,7 @@ def leaving(words: str) -> Iterator[None]:
 
 
 def ledger(case, port, out, as_json: bool) -> None:
-    """One run of a case: its ledger, its picture, the verdict at a port."""
+    """Run a case, write its energy ledger and picture, and print them with the passivity verdict at the port."""
     from fvsolve.cli.progress import watched
     from fvsolve.draw.energy import energy_figure
     from fvsolve.output.column import column, time_column
@@ -91,62 +93,65 @@ def ledger(case, port, out, as_json: bool) -> None:
 
     folder = folder_of(case, "energy", out)
     replaced(folder, FILES[0])
-    with leaving(f"interrupted: no ledger, {folder} may lack files; {AGAIN}"):
+    with leaving(f"interrupted: no ledger is written, {folder} may lack files; {AGAIN}"):
         with watched(case) as progress:
-            one = study(case, port=port, progress=progress)
-        write_table(one, cleared(folder, *FILES) / FILES[0])
-        at_port = None if one.port is None else (one.port.node, one.port.course, one.port.bound)
+            result = study(case, port=port, progress=progress)
+        write_table(result, cleared(folder, *FILES) / FILES[0])
+        at_port = None if result.port is None else (result.port.node, result.port.course, result.port.bound)
         clock, own = time_column(case), column("", "energy", case)
         units = clock.unit, None if own.plain else (own.to_si(1.0), own.unit)
-        figure = energy_figure(clock.from_si(one.t), one.supplied, one.stored, one.dissipated, one.numerical(),
-                               case.title or case.name, at_port, units)  # fmt: skip
+        figure = energy_figure(clock.from_si(result.t), result.supplied, result.stored, result.dissipated,
+                               result.numerical(), case.title or case.name, at_port, units)  # fmt: skip
         for name in FILES[1:]:
             figure.savefig(folder / name)
     if as_json:
-        print_json(one.plain() | {"directory": str(folder), "files": list(FILES)})
+        print_json(result.plain() | {"directory": str(folder), "files": list(FILES)})
     else:
-        _ledger(one, case, folder)
-    sys.exit(130 if one.reason == "interrupted" else 0 if one.ok else 1)
+        _ledger(result, case, folder)
+    sys.exit(130 if result.reason == "interrupted" else 0 if result.ok else 1)
 
 
-def _ledger(one, case, folder) -> None:
+def _ledger(result, case, folder) -> None:
     from fvsolve.cli.terminal import console, line, table
     from fvsolve.output.column import column
 
-    where, rows, joules = console(), [], column("energy", "energy", case)
+    terminal, rows, joules = console(), [], column("energy", "energy", case)
 
     def amount(value: float) -> list[str]:
-        share = f"{100.0 * value / one.through:.4g}" if one.through > 0.0 else "-"
+        share = f"{100.0 * value / result.through:.4g}" if result.through > 0.0 else "-"
         return [f"{joules.from_si(value):.6g}", share]
 
-    for what in ("supplied", "stored", "dissipated"):
-        lines = getattr(one, what)
+    for kind in ("supplied", "stored", "dissipated"):
+        lines = getattr(result, kind)
         order = sorted(lines, key=lambda name: -abs(lines[name][-1]))
-        rows += [[what, name, *amount(lines[name][-1])] for name in order[:LINES]]
+        rows += [[kind, name, *amount(lines[name][-1])] for name in order[:LINES]]
         if len(order) > LINES:
             rest = sum(lines[name][-1] for name in order[LINES:])
-            rows.append([what, f"{len(order) - LINES} others", *amount(rest)])
-    rows += [["numerical", name, *amount(values[-1])] for name, values in one.numerical().items()]
-    table(["what", "part", joules.header, "share [%]"], rows, where)
-    line(where, "")
-    said, left = f"remainder {case.amount(one.remainder[-1], 'energy')}", one.newton_counts
+            rows.append([kind, f"{len(order) - LINES} others", *amount(rest)])
+    rows += [["numerical", name, *amount(values[-1])] for name, values in result.numerical().items()]
+    table(["kind", "part", joules.header, "share [%]"], rows, terminal)
+    line(terminal, "")
+    text, left = f"remainder {case.amount(result.remainder[-1], 'energy')}", result.newton_counts
     if left:
-        said += f", what Newton leaves: {case.amount(one.newton[-1], 'energy')}, the rest"
-    passed = case.amount(one.through, "energy", 6)
-    line(where, f"{said}{'' if left else ','} {one.relative:.3g} of the {passed} that passed: {one.verdict}")
-    if one.port is not None:
-        line(where, one.port.text, None if one.port.passive else "bold red")
-    for mark in one.marks:
-        line(where, mark, "yellow")
-    cut = one.reason == "interrupted"
-    ended = f"{one.reason} at t = {case.amount(one.t[-1], 'time', 6)}" if one.ok or cut else one.reason
-    line(where, f"{ended}; {one.steps} steps{f': the ledger is up to there, {AGAIN}' if cut else ''}",
-         None if one.ok else "bold red")  # fmt: skip
-    line(where, f"{folder}: {', '.join(FILES)}")
+        text += f"; of it Newton residuals cause {case.amount(result.newton[-1], 'energy')}; the rest is"
+    passed = case.amount(result.through, "energy", 6)
+    line(
+        terminal,
+        f"{text}{'' if left else ','} {result.relative:.3g} of the energy throughput {passed}: {result.verdict}",
+    )
+    if result.port is not None:
+        line(terminal, result.port.text, None if result.port.passive else "bold red")
+    for mark in result.marks:
+        line(terminal, mark, "yellow")
+    cut = result.reason == "interrupted"
+    ended = f"{result.reason} at t = {case.amount(result.t[-1], 'time', 6)}" if result.ok or cut else result.reason
+    line(terminal, f"{ended}; {result.steps} steps{f': the ledger ends at this time, {AGAIN}' if cut else ''}",
+         None if result.ok else "bold red")  # fmt: skip
+    line(terminal, f"{folder}: {', '.join(FILES)}")
 
 
 def pairs(case, schemes, methods, port, out, as_json: bool) -> None:
-    """A case by several schemes and methods: what each makes of its energy."""
+    """Run a case with several schemes and methods, and print the energy that each pair creates."""
     from fvsolve.cli.progress import stoppable
     from fvsolve.cli.terminal import console, line, sheet
     from fvsolve.studies.energy.pairs import PAIR, measured
@@ -159,62 +164,62 @@ def pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     if as_json:
         print_json({"pairs": rows, "directory": str(folder), "files": ["pairs.csv"]})
         sys.exit(2 if all(row["creates"] is None for row in rows) else 0)
-    where = console()
-    heads = [_in_unit(one, case) for one in PAIR if port or one.key not in ("relative", "margin")]
-    sheet(Sheet(heads, rows), where)
-    refused = _outcome(case, rows, where)
-    line(where, f"{folder}: pairs.csv, points.jsonl")
+    terminal = console()
+    heads = [_in_unit(column, case) for column in PAIR if port or column.key not in ("relative", "margin")]
+    sheet(Sheet(heads, rows), terminal)
+    refused = _outcome(case, rows, terminal)
+    line(terminal, f"{folder}: pairs.csv, points.jsonl")
     if len(refused) == len(rows):
         sys.exit(2)
 
 
-def _in_unit(one: Column, case) -> Column:
-    """A column of energies as the reader wants them; others as they are."""
+def _in_unit(heading: Column, case) -> Column:
+    """Convert a column of energies from J to the unit of `[output]`; returns any other column unchanged."""
     from fvsolve.output.column import column
 
-    if not one.head.endswith(" [J]"):
-        return one
-    own = column(one.head.removesuffix(" [J]"), "energy", case)
+    if not heading.head.endswith(" [J]"):
+        return heading
+    own = column(heading.head.removesuffix(" [J]"), "energy", case)
 
     def words(row: Mapping) -> str:
-        return text(None if row[one.key] is None else own.from_si(row[one.key]), one.words)
+        return text(None if row[heading.key] is None else own.from_si(row[heading.key]), heading.words)
 
-    return replace(one, head=own.header, words=words)
+    return replace(heading, head=own.header, words=words)
 
 
-def _outcome(case, rows, where) -> list[dict]:
-    """Which pairs create energy, which were refused and why, and the way out; returns the refused ones."""
+def _outcome(case, rows, terminal) -> list[dict]:
+    """Print the pairs that create energy, and the refused pairs with reason and remedy; returns the refused pairs."""
     from fvsolve.cli.terminal import line
 
     refused = [row for row in rows if row["reason"].startswith("refused")]
     ran = [row for row in rows if row not in refused]
     for row in ran:
         if ":" in row["reason"]:
-            line(where, f"{_pair(row)}: {row['reason']}", "yellow")
+            line(terminal, f"{_pair(row)}: {row['reason']}", "yellow")
     for reason, pairs in _by_reason(refused).items():
-        line(where, f"{', '.join(pairs)}: {reason}", "bold red")
+        line(terminal, f"{', '.join(pairs)}: {reason}", "bold red")
     if case.numerics.step is None and any("estimates no error" in row["reason"] for row in refused):
         span = case.numerics.end - case.numerics.start
         line(
-            where, f"or give all of them one step: --set numerics.step={span / 1000.0:.1g} (s, a thousandth of the run)"
+            terminal, f"or set a fixed step for all pairs: --set numerics.step={span / 1000.0:.1g} (s, run time / 1000)"
         )
     bad = [_pair(row) for row in ran if row["creates"]]
     if bad:
-        line(where, f"create energy in this run: {', '.join(bad)}")
+        line(terminal, f"create energy in this run: {', '.join(bad)}")
     elif ran:
-        line(where, f"none of {'those that ran' if refused else 'them'} creates energy in this run")
+        line(terminal, f"none of {'the pairs that ran' if refused else 'the pairs'} creates energy in this run")
     else:
-        line(where, "none of them ran, so nothing is known of them")
+        line(terminal, "no pair ran, so the creation of energy was not checked")
     return refused
 
 
 def _by_reason(rows) -> dict[str, list[str]]:
-    """Pairs by why they were refused; what is said of several methods alike is said once."""
-    found: dict[str, list] = {}
+    """Group pairs by the reason of their refusal; a reason common to several methods appears once."""
+    groups: dict[str, list] = {}
     for row in rows:
-        found.setdefault(row["reason"].replace(f'method "{row["method"]}"', "each"), []).append(row)
+        groups.setdefault(row["reason"].replace(f'method "{row["method"]}"', "each"), []).append(row)
     return {reason if len(several) > 1 else several[0]["reason"]: [_pair(row) for row in several]
-            for reason, several in found.items()}  # fmt: skip
+            for reason, several in groups.items()}  # fmt: skip
 
 
 def _pair(row) -> str:
@@ -222,31 +227,37 @@ def _pair(row) -> str:
 
 
 def claims(schemes, methods, as_json: bool) -> None:
-    """What schemes and methods promise by their coefficients."""
+    """Print the passivity of schemes and methods that follows from their coefficients."""
     from fvsolve.cli.terminal import console, line, sheet
     from fvsolve.studies.energy.passivity import CELLS, passivity
 
-    with told() as progress, leaving(f"interrupted: nothing is kept; {AGAIN}"):
-        found = passivity(schemes, methods, progress)
+    with told() as progress, leaving(f"interrupted: no results are saved; {AGAIN}"):
+        result = passivity(schemes, methods, progress)
     if as_json:
-        print_json(found.plain())
+        print_json(result.plain())
         return
-    where = console()
-    known = [one for one in found.schemes if one.passive is not None]
-    line(where, f"Schemes: energy of a closed pipe of {CELLS} cells, continuous in time", "bold")
-    sheet(Sheet(SCHEME, [vars(one) for one in known]), where)
-    for one in found.schemes:
-        if one.passive is None:
-            line(where, f"{one.scheme} is limited and has no matrix: try it on a case")
-    line(where, "")
-    line(where, "Methods: any network at any step; limits on a leaking chamber, a resonator, and a closed pipe", "bold")
-    good = [one.scheme for one in known if one.passive]
-    limit = {(one.scheme, one.method): one.courant for one in found.pairs}
-    rows = [vars(one) | {name: limit[name, one.method] for name in good} for one in found.methods]
-    sheet(Sheet([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows), where)
-    bad = [one.scheme for one in known if not one.passive]
+    terminal = console()
+    known = [entry for entry in result.schemes if entry.passive is not None]
+    line(terminal, f"Schemes: energy of a closed pipe of {CELLS} cells, continuous in time", "bold")
+    sheet(Sheet(SCHEME, [vars(entry) for entry in known]), terminal)
+    for entry in result.schemes:
+        if entry.passive is None:
+            line(terminal, f"{entry.scheme} is limited (nonlinear) and has no matrix. Check it with a case")
+    line(terminal, "")
+    line(
+        terminal,
+        "Methods: any network at any step; limits on a leaking chamber, a resonator, and a closed pipe",
+        "bold",
+    )
+    good = [entry.scheme for entry in known if entry.passive]
+    limit = {(entry.scheme, entry.method): entry.courant for entry in result.pairs}
+    rows = [vars(entry) | {name: limit[name, entry.method] for name in good} for entry in result.methods]
+    sheet(Sheet([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows), terminal)
+    bad = [entry.scheme for entry in known if not entry.passive]
     if bad:
-        line(where, f"{', '.join(bad)}: create energy at pipe ends with every method, up to the gain above")
-    never = [f"{one.scheme} with {one.method}" for one in found.pairs if one.courant == 0.0 and one.scheme in good]
+        line(terminal, f"{', '.join(bad)}: create energy at pipe ends with every method, up to the gain above")
+    never = [
+        f"{entry.scheme} with {entry.method}" for entry in result.pairs if entry.courant == 0.0 and entry.scheme in good
+    ]
     if never:
-        line(where, f"create energy at every step: {', '.join(never)}")
+        line(terminal, f"create energy at every step size: {', '.join(never)}")

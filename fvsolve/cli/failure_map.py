@@ -1,4 +1,4 @@
-"""`fvsolve map`: where methods fail on a case. Knows options and words; leaves the runs to `studies`."""
+"""`fvsolve map`: map of the failures of methods on a case."""
 
 from __future__ import annotations
 
@@ -17,19 +17,25 @@ from fvsolve.units import parse
 @app.command("map")
 def map_(
     case: One,
-    scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes, one panel each")] = None,
-    method: Annotated[str | None, typer.Option(metavar="A,B", help="methods, one row each")] = None,
-    courant: Annotated[str | None, typer.Option(metavar="A,B", help="columns: Courant numbers")] = None,
-    step: Annotated[str | None, typer.Option(metavar="A,B", help='columns: steps, "1 ms,2 ms"')] = None,
-    key: Annotated[str | None, typer.Option(metavar="KEY=A,B", help="columns: values of a key of the case")] = None,
-    tolerance: Annotated[float, typer.Option(metavar="X", help="mean error over a probe's range")] = 0.02,
+    scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes, one panel for each")] = None,
+    method: Annotated[str | None, typer.Option(metavar="A,B", help="methods, one row for each")] = None,
+    courant: Annotated[str | None, typer.Option(metavar="A,B", help="Courant numbers, one column for each")] = None,
+    step: Annotated[
+        str | None, typer.Option(metavar="A,B", help='time steps, one column for each: "1 ms,2 ms"')
+    ] = None,
+    key: Annotated[
+        str | None, typer.Option(metavar="KEY=A,B", help="values of a key of the case, one column for each")
+    ] = None,
+    tolerance: Annotated[
+        float, typer.Option(metavar="X", help="greatest mean error of a probe, as a fraction of its range")
+    ] = 0.02,
     jobs: Jobs = 1,
     dask: Dask = None,
     out: Out = None,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """Failure map: methods against steps or a key, each square run for real: stable, ringing, wrong, blown up ..."""
+    """Map failures: methods against steps or a key, each square by a run: stable, ringing, wrong, blown up ..."""
     from fvsolve.studies.failure.failure_map import failures
     from fvsolve.studies.plans import headed
     from fvsolve.studies.points import Points
@@ -37,23 +43,25 @@ def map_(
     read_case = load_case(case, set, scheme, method)
     folder = folder_of(read_case, "map", out)
     with told() as progress, Points(folder) as points:
-        found = failures(
+        result = failures(
             read_case, listed(scheme, "--scheme"), methods_of(method), _numbers("--courant", courant),
             _steps(step), _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
         )  # fmt: skip
-    head = found.key if found.key == "step" else headed(read_case.raw, found.key, found.values)
-    files = _written(found, folder, head)
+    head = result.key if result.key == "step" else headed(read_case.raw, result.key, result.values)
+    files = _written(result, folder, head)
     if as_json:
-        print_json(found.plain() | {"files": [str(file) for file in files]})
+        print_json(result.plain() | {"files": [str(file) for file in files]})
     else:
-        _show(found, files, head)
+        _show(result, files, head)
 
 
 def _numbers(option: str, text: str | None) -> list[float] | None:
     try:
         return None if text is None else [float(word) for word in listed(text)]
     except ValueError:
-        raise FvsolveError(f"{option} {text} is not made of numbers; wanted, for example, {option} 0.5,0.9,1") from None
+        raise FvsolveError(
+            f"{option} {text}: not a list of numbers. Expected numbers with commas, for example {option} 0.5,0.9,1"
+        ) from None
 
 
 def _steps(text: str | None) -> list[float] | None:
@@ -70,72 +78,79 @@ def _key(text: str | None) -> tuple[str, list] | None:
         return None
     name, equals, values = text.partition("=")
     if not equals or not name.strip():
-        raise FvsolveError(f"--key {text}: wanted KEY=A,B, for example nodes.body.volume=1e-6,1e-5")
+        raise FvsolveError(f"--key {text}: expected KEY=A,B, for example nodes.body.volume=1e-6,1e-5")
     return name.strip(), [value_of(word) for word in listed(values)]
 
 
-def _written(found, folder: Path, head: str) -> list[Path]:
+def _written(result, folder: Path, head: str) -> list[Path]:
     from fvsolve.draw.failure_map import failure_map_figure
 
-    rows = [{"value": found.values[row["column"]]} | row for row in found.plain()["squares"]]
+    rows = [{"value": result.values[row["column"]]} | row for row in result.plain()["squares"]]
     table = Sheet([Column(key) for key in rows[0]], rows).write(
         cleared(folder, "map.csv", "map.png", "map.svg") / "map.csv"
     )
-    figure = failure_map_figure(found, f"{found.case}: where methods fail", head)
+    figure = failure_map_figure(result, f"{result.case}: where methods fail", head)
     pictures = [folder / f"map.{kind}" for kind in ("png", "svg")]
     for picture in pictures:
         figure.savefig(picture)
     return [table, *pictures]
 
 
-def _show(found, files: list[Path], head: str) -> None:
+def _show(result, files: list[Path], head: str) -> None:
     from fvsolve.cli import terminal
     from fvsolve.draw.failure_map import column_labels
     from fvsolve.studies.failure.verdict import VERDICTS
 
     console = terminal.console()
-    for scheme in found.schemes:
-        what = "steps" if found.key == "step" else head
-        terminal.line(console, f"{scheme}, {what}:" if found.wave_rate else f"{what}:", "bold")
+    for scheme in result.schemes:
+        heading = "steps" if result.key == "step" else head
+        terminal.line(console, f"{scheme}, {heading}:" if result.wave_rate else f"{heading}:", "bold")
         heads = [
             "method",
-            *(label.split("\n")[-1 if _by_courant(found) else 0] for label in column_labels(found)),
+            *(label.split("\n")[-1 if _by_courant(result) else 0] for label in column_labels(result)),
             "predicted",
         ]
         rows = [
-            [method, *(one.verdict for one in found.row(scheme, method)), _limit(found, found.row(scheme, method))]
-            for method in found.methods
+            [
+                method,
+                *(square.verdict for square in result.row(scheme, method)),
+                _limit(result, result.row(scheme, method)),
+            ]
+            for method in result.methods
         ]
         terminal.table(heads, rows, console)
         terminal.line(console, "")
-    seen = {one.verdict: None for one in found.squares}
+    present = {square.verdict: None for square in result.squares}
     for word in VERDICTS:
-        if word in seen:
+        if word in present:
             terminal.line(console, f"{word}: {VERDICTS[word]}")
-    terminal.line(console, f"tolerance: {found.tolerance:g} of a probe's range, mean over the run, worst probe")
-    terminal.line(console, f"reference: {found.reference}; off by up to {found.doubt:.2g}")
+    terminal.line(console, f"tolerance: {result.tolerance:g} of a probe's range, mean over the run, worst probe")
+    terminal.line(console, f"reference: {result.reference}; its error is at most {result.doubt:.2g}")
     terminal.line(console, "predicted limit: first step at which an eigenvalue grows by 1000 within the run (13)")
-    if found.lines:
-        terminal.line(console, "or a wave between a store and a delay line does, of which jumps are not known")
-    if found.limited:
+    if result.lines:
         terminal.line(
-            console, f"of {', '.join(found.limited)}: by the weights in smooth flow, an estimate and no bound"
+            console,
+            "or a wave between a storage element and a delay line does; growth caused by jumps is not predicted",
         )
-    for reason in {one.measures.reason: None for one in found.squares if one.verdict == "refused"}:
+    if result.limited:
+        terminal.line(
+            console, f"of {', '.join(result.limited)}: by the weights in smooth flow, an estimate and not a bound"
+        )
+    for reason in {square.measures.reason: None for square in result.squares if square.verdict == "refused"}:
         terminal.line(console, f"refused: {reason}")
     for file in files:
         terminal.line(console, str(file))
 
 
-def _by_courant(found) -> bool:
-    """Whether Courant numbers are the shorter words for the columns."""
-    return found.key == "step" and bool(found.wave_rate) and min(found.values) * found.wave_rate >= 0.01
+def _by_courant(result) -> bool:
+    """True if Courant numbers are shorter column labels than steps in seconds."""
+    return result.key == "step" and bool(result.wave_rate) and min(result.values) * result.wave_rate >= 0.01
 
 
-def _limit(found, row) -> str:
+def _limit(result, row) -> str:
     from fvsolve.draw.failure_map import seconds
 
-    limits = {one.limit for one in row}
+    limits = {square.limit for square in row}
     if len(limits) > 1:
         return "by column"
     (limit,) = limits
@@ -145,4 +160,4 @@ def _limit(found, row) -> str:
         return "none"
     if limit == 0.0:
         return "any step"
-    return f"C {limit * found.wave_rate:.3g}" if _by_courant(found) else seconds(limit)
+    return f"C {limit * result.wave_rate:.3g}" if _by_courant(result) else seconds(limit)

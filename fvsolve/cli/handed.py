@@ -1,4 +1,4 @@
-"""`fvsolve report` and `plot`: what is handed over. Knows what is asked; leaves the work to `report`."""
+"""`fvsolve report`, `fvsolve plot` and `fvsolve cycles`: HTML report, pictures and pressure cycles of a run."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ from fvsolve.errors import FvsolveError
 @app.command()
 def report(
     directory: Annotated[Path, typer.Argument(metavar="RUN_OR_STUDY", help="directory of a run or a study")],
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="default report.html there")] = None,
-    xlsx: Annotated[bool, typer.Option("--xlsx", help="the tables too, as a workbook beside it")] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="file of the report (default RUN_OR_STUDY/report.html)")
+    ] = None,
+    xlsx: Annotated[
+        bool, typer.Option("--xlsx", help="write a workbook with the tables too, beside the report")
+    ] = False,
 ) -> None:
-    """One offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
+    """Write an offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
     from fvsolve.report.report import write_report
 
     for path in write_report(directory, out, xlsx):
@@ -27,12 +31,14 @@ def report(
 @app.command()
 def plot(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
-    probes: Annotated[str, typer.Option(metavar="A,B", help="histories of these")] = "",
-    route: Annotated[str, typer.Option(metavar="NAME", help="one long section; all where nothing is asked")] = "",
-    phase: Annotated[list[str], typer.Option(metavar="X:Y", help="one probe over another")] = [],  # noqa: B006
-    out: Annotated[Path | None, typer.Option(metavar="DIR", help="default RUN")] = None,
+    probes: Annotated[str, typer.Option(metavar="A,B", help="probes whose histories are drawn")] = "",
+    route: Annotated[
+        str, typer.Option(metavar="NAME", help="route whose long section is drawn (default all, without other options)")
+    ] = "",
+    phase: Annotated[list[str], typer.Option(metavar="X:Y", help="phase plane: probe Y over probe X")] = [],  # noqa: B006
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="folder of the pictures (default RUN)")] = None,
 ) -> None:
-    """Pictures without a browser: long sections with what was met along them, histories by choice, phase planes."""
+    """Draw long sections with events along the route, histories of probes and phase planes, without a browser."""
     from fvsolve.report.pictures import write_pictures
 
     for path in write_pictures(directory, probes, route, phase, out):
@@ -42,33 +48,41 @@ def plot(
 @app.command()
 def cycles(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
-    probes: Annotated[str, typer.Option(metavar="A,B", help="of pressure or head; all of these by default")] = "",
+    probes: Annotated[
+        str, typer.Option(metavar="A,B", help="probes of pressure or head (default all such probes)")
+    ] = "",
     range: Annotated[
-        float | None, typer.Option(metavar="R", help="that a part bears, in the unit of the probe")
+        float | None, typer.Option(metavar="R", help="pressure range of the fatigue strength, in the unit of the probe")
     ] = None,
-    bears: Annotated[float | None, typer.Option(metavar="N", help="so many cycles of it")] = None,
-    slope: Annotated[float | None, typer.Option(metavar="M", help="N (R / r)^M of a range r")] = None,
-    per_day: Annotated[float, typer.Option(metavar="N", help="runs a day, for how long it lasts")] = 1.0,
+    bears: Annotated[float | None, typer.Option(metavar="N", help="number of cycles of --range to failure")] = None,
+    slope: Annotated[
+        float | None, typer.Option(metavar="M", help="exponent of the strength: N (R / r)^M cycles of a range r")
+    ] = None,
+    per_day: Annotated[float, typer.Option(metavar="N", help="number of such runs a day, for the service life")] = 1.0,
     as_json: Json = False,
 ) -> None:
-    """Cycles of pressure that a run puts on its parts, by rainflow counting, and how long these bear it."""
+    """Count pressure cycles of a run by rainflow counting, and estimate the fatigue life of its parts."""
     from fvsolve.cli import terminal
     from fvsolve.report import cycles as counting
     from fvsolve.run import open_run
 
-    given = [one for one in (range, bears, slope) if one is not None]
-    if len(given) not in (0, 3) or any(not one > 0.0 for one in given) or not per_day > 0.0:
-        raise FvsolveError("what a part bears is said by --range, --bears and --slope together, each above 0")
+    given = [entry for entry in (range, bears, slope) if entry is not None]
+    if len(given) not in (0, 3) or any(not entry > 0.0 for entry in given) or not per_day > 0.0:
+        raise FvsolveError("expected --range, --bears and --slope together (fatigue strength), and all values above 0")
     strength = counting.Strength(*given) if given else None
     names = [name.strip() for name in probes.split(",") if name.strip()]
-    found = counting.cycles(open_run(directory), names or None, strength)
+    results = counting.cycles(open_run(directory), names or None, strength)
     if as_json:
-        print_json({"probes": found})
+        print_json({"probes": results})
         return
     console = terminal.console()
-    rows = [[one["probe"], one["unit"], f"{size:.5g}", f"{count:g}"] for one in found for size, count in one["cycles"]]
+    rows = [[entry["probe"], entry["unit"], f"{size:.5g}", f"{count:g}"]
+            for entry in results for size, count in entry["cycles"]]  # fmt: skip
     terminal.table(["probe", "unit", "range up to", "cycles"], rows, console)
-    for one in found if strength else ():
-        years = 1.0 / (one["share"] * per_day * 365.25) if one["share"] > 0.0 else float("inf")
-        lasts = "without end" if years == float("inf") else f"{years:.4g} years"
-        terminal.line(console, f"{one['probe']}: a run uses {one['share']:.3g} of it; {per_day:g} a day last {lasts}")
+    for entry in results if strength else ():
+        years = 1.0 / (entry["share"] * per_day * 365.25) if entry["share"] > 0.0 else float("inf")
+        life = "unlimited" if years == float("inf") else f"{years:.4g} years"
+        terminal.line(
+            console,
+            f"{entry['probe']}: a run uses {entry['share']:.3g} of the fatigue life; {per_day:g} runs a day: {life}",
+        )

@@ -1,4 +1,4 @@
-"""`fvsolve linearise`. Knows what is asked and how it is shown; leaves the derivatives to `studies`."""
+"""`fvsolve linearise`: state-space matrices and poles of a case."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.studying import Out, cleared, folder_of, listed, replaced
 from fvsolve.studies.sheet import Sheet, write
 
-SHOWN = 24  # poles on the terminal; the others are in the file
+SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 
-At = Annotated[str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms`; default the start")]
-Before = Annotated[bool, typer.Option("--before", help="at a kink or jump of a schedule: just before it")]
+At = Annotated[str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms` (default start)")]
+Before = Annotated[bool, typer.Option("--before", help="use the state just before a kink or jump of a schedule")]
 
 
 def time_of(text: str | None) -> float | None:
-    """A time as a case file writes it [s]; raises FvsolveError for a text that is none."""
+    """Parse a time in the format of a case file [s]. Raises FvsolveError if the text is not a time."""
     from fvsolve import units
     from fvsolve.cli.app import value_of
     from fvsolve.errors import FvsolveError
@@ -33,21 +33,27 @@ def time_of(text: str | None) -> float | None:
 @app.command()
 def linearise(
     case: One,
-    inputs: Annotated[str | None, typer.Option(metavar="A,B", help="inputs: valve.opening, lake.pressure")] = None,
-    outputs: Annotated[str | None, typer.Option(metavar="A,B", help="probes; default those of the case")] = None,
+    inputs: Annotated[
+        str | None, typer.Option(metavar="A,B", help="inputs, such as valve.opening,lake.pressure (default none)")
+    ] = None,
+    outputs: Annotated[
+        str | None, typer.Option(metavar="A,B", help="probes used as outputs (default probes of the case)")
+    ] = None,
     at: At = None,
     before: Before = False,
-    scheme: Annotated[str | None, typer.Option(metavar="NAME", help="a linear scheme in place of the case's")] = None,
+    scheme: Annotated[
+        str | None, typer.Option(metavar="NAME", help="linear scheme (default scheme of the case)")
+    ] = None,
     out: Out = None,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """A case as A, B, C, D about a state, with its poles."""
+    """Linearise a case about a state: matrices A, B, C, D and poles."""
     from fvsolve.model.energy import energy_form
     from fvsolve.studies.linear.linearise import linearise as ask
     from fvsolve.studies.linear.spectrum import POLES, poles_of
 
-    found = ask(
+    system = ask(
         load_case(case, set),
         listed(inputs, "--inputs") or (),
         listed(outputs, "--outputs"),
@@ -55,67 +61,67 @@ def linearise(
         before,
         scheme,
     )
-    values = poles_of(found.a, energy_form(found.at.model, found.at.y))
+    values = poles_of(system.a, energy_form(system.at.model, system.at.y))
     poles = values.poles()
-    folder = folder_of(found.at.model.case, "linearise", out)
+    folder = folder_of(system.at.model.case, "linearise", out)
     replaced(folder, "linear.npz")
-    cleared(folder, "A.csv", "A-sparse.csv")  # of which one is written
+    cleared(folder, "A.csv", "A-sparse.csv")  # only one of the two files is written
     Sheet(POLES, poles).write(folder / "poles.csv")
-    write_matrices(folder, found)
-    said = found.plain() | {"poles": poles, "poles_are": values.said, "directory": str(folder)}
+    write_matrices(folder, system)
+    result = system.plain() | {"poles": poles, "poles_are": values.said, "directory": str(folder)}
     if as_json:
-        print_json(said)
+        print_json(result)
     else:
-        say(found, values, poles, folder)
+        say(system, values, poles, folder)
 
 
-def write_matrices(folder: Path, found) -> None:
-    """linear.npz, and A, B, C, D as tables with names."""
-    a, names = found.a, found.states
-    kept = {"A": a}
-    if found.sparse:
-        kept = {"A_data": a.data, "A_indices": a.indices, "A_indptr": a.indptr, "A_shape": np.array(a.shape)}
+def write_matrices(folder: Path, system) -> None:
+    """Write linear.npz, and A, B, C, D as CSV tables with named rows and columns."""
+    a, names = system.a, system.states
+    arrays = {"A": a}
+    if system.sparse:
+        arrays = {"A_data": a.data, "A_indices": a.indices, "A_indptr": a.indptr, "A_shape": np.array(a.shape)}
     np.savez(
-        folder / "linear.npz", **kept, B=found.b, C=found.c, D=found.d, states=np.array(names),
-        state_units=np.array(found.state_units), inputs=np.array(found.inputs, dtype=str),
-        outputs=np.array(found.outputs, dtype=str), input_units=np.array(found.input_units, dtype=str),
-        output_units=np.array(found.output_units, dtype=str), state=found.at.y, rate=found.at.rate,
-        time=np.array(found.at.t),
+        folder / "linear.npz", **arrays, B=system.b, C=system.c, D=system.d, states=np.array(names),
+        state_units=np.array(system.state_units), inputs=np.array(system.inputs, dtype=str),
+        outputs=np.array(system.outputs, dtype=str), input_units=np.array(system.input_units, dtype=str),
+        output_units=np.array(system.output_units, dtype=str), state=system.at.y, rate=system.at.rate,
+        time=np.array(system.at.t),
     )  # fmt: skip
     rates = [f"d {name} / dt" for name in names]
-    if found.sparse:
+    if system.sparse:
         entries = a.tocoo()
         rows = zip((rates[i] for i in entries.row), (names[j] for j in entries.col), entries.data.tolist(), strict=True)
         write(folder / "A-sparse.csv", ["rate", "state", "value"], rows)
     else:
         write(folder / "A.csv", ["", *names], labelled(rates, a))
-    write(folder / "B.csv", ["", *found.inputs], labelled(rates, found.b))
-    write(folder / "C.csv", ["", *names], labelled(found.outputs, found.c))
-    write(folder / "D.csv", ["", *found.inputs], labelled(found.outputs, found.d))
+    write(folder / "B.csv", ["", *system.inputs], labelled(rates, system.b))
+    write(folder / "C.csv", ["", *names], labelled(system.outputs, system.c))
+    write(folder / "D.csv", ["", *system.inputs], labelled(system.outputs, system.d))
 
 
 def labelled(names, matrix):
-    """Rows of a matrix behind their names."""
+    """Rows of a matrix, each preceded by its name."""
     return ([name, *row] for name, row in zip(names, matrix.tolist(), strict=True))
 
 
-def say(found, values, poles: list[dict], folder: Path) -> None:
-    """What a person reads: where, how well, and the slowest poles."""
+def say(system, values, poles: list[dict], folder: Path) -> None:
+    """Print the state, the accuracy of the differences and the slowest poles."""
     from fvsolve.cli import terminal
     from fvsolve.studies.linear.spectrum import POLES
 
-    where = terminal.console()
-    moving = np.abs(found.at.rate) / found.at.model.scale
-    terminal.line(where, f"{found.at.model.case.name} at {found.at.when}: {len(found.states)} states, "
-                         f"{len(found.inputs)} inputs, {len(found.outputs)} outputs; SI")  # fmt: skip
+    output = terminal.console()
+    moving = np.abs(system.at.rate) / system.at.model.scale
+    terminal.line(output, f"{system.at.model.case.name} at {system.at.when}: {len(system.states)} states, "
+                         f"{len(system.inputs)} inputs, {len(system.outputs)} outputs; SI")  # fmt: skip
     if np.max(moving) > 1e-9:
-        terminal.line(where, f"  not at rest there: {found.states[int(np.argmax(moving))]} changes quickest; schedules "
-                             "stand still at that time")  # fmt: skip
-    worst = max(found.error.values())
-    terminal.line(where, f"  two steps of the differences agree to {worst:.1e} of each row")
-    terminal.sheet(Sheet([one for one in POLES if one.key != "pair"], poles[:SHOWN]), where)
+        terminal.line(output, f"  not a steady state: {system.states[int(np.argmax(moving))]} changes fastest; "
+                              "schedules are held at their values of that time")  # fmt: skip
+    worst = max(system.error.values())
+    terminal.line(output, f"  derivatives by two difference steps agree to {worst:.1e}, relative to each row")
+    terminal.sheet(Sheet([column for column in POLES if column.key != "pair"], poles[:SHOWN]), output)
     more = len(poles) - SHOWN
-    terminal.line(where, f"poles: {values.said}" + (f"; {more} more, quicker ones, in poles.csv" if more > 0 else ""))
+    terminal.line(output, f"poles: {values.said}" + (f"; {more} faster poles are in poles.csv" if more > 0 else ""))
     terminal.line(
-        where, f"{folder}: linear.npz, {'A-sparse' if found.sparse else 'A'}.csv, B.csv, C.csv, D.csv, poles.csv"
+        output, f"{folder}: linear.npz, {'A-sparse' if system.sparse else 'A'}.csv, B.csv, C.csv, D.csv, poles.csv"
     )

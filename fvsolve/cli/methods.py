@@ -1,4 +1,4 @@
-"""What `fvsolve methods` says. Knows words and tables; leaves what is to be known of a method to `steppers`."""
+"""Output of `fvsolve methods`: table of all methods, or the tableau and properties of one method."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 
 PICTURES = (".png", ".svg", ".pdf")
-LONG = 28  # characters of an entry that is shown whole
-SHORT = 14  # digits that stand for a longer one
-TERM = 40  # characters of a coefficient of R that is shown exactly
+LONG = 28  # greatest length of a tableau entry that is printed in full, in characters
+SHORT = 14  # digits printed of a longer entry
+TERM = 40  # greatest length of a coefficient of R that is printed exactly, in characters
 
 
 @dataclass(frozen=True)
 class Said:
-    """The same for programs and for people."""
+    """Output in two forms: plain values for JSON, and a function that prints text."""
 
     plain: dict
     show: Callable[[], None]
 
 
 def table() -> Said:
-    """All methods, explicit ones first."""
-    found = {name: analyse(method) for name, method in METHODS.items()}
-    return Said({name: one.plain() for name, one in found.items()}, lambda: _table(found))
+    """Table of all methods, explicit methods first."""
+    all_facts = {name: analyse(method) for name, method in METHODS.items()}
+    return Said({name: facts.plain() for name, facts in all_facts.items()}, lambda: _table(all_facts))
 
 
 def one(name: str, out: Path | None) -> Said:
-    """One method: its tableau, R(s), facts and a picture of its stability region, which is written."""
+    """Tableau, stability function R(s) and properties of a method; writes a picture of its stability region."""
     from fvsolve.draw.region import region_figure
 
     name = method_from(name)
@@ -43,34 +43,34 @@ def one(name: str, out: Path | None) -> Said:
     facts = analyse(method)
     path = out or Path(f"{name}.png")
     if path.suffix.lower() not in PICTURES:
-        raise FvsolveError(f"{path}: pictures end in {' or '.join(PICTURES)}")
+        raise FvsolveError(f"{path}: unknown type of picture. Expected a name that ends in {' or '.join(PICTURES)}")
     path.parent.mkdir(parents=True, exist_ok=True)
     region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1").savefig(path)
     array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}
     return Said(facts.plain() | array | {"picture": str(path)}, lambda: _show(method, facts, path))
 
 
-def _table(found: dict[str, Facts]) -> None:
+def _table(all_facts: dict[str, Facts]) -> None:
     console = terminal.console()
-    first = {name: one for name, one in found.items() if name == one.name}
+    first = {name: facts for name, facts in all_facts.items() if name == facts.name}
     heads = ["method", "order", "error", "stage", "stages", "kind", "A", "L", "real", "imaginary", "SSP", "Padé"]
     rows = [
         [
-            name, str(one.order), str(one.error_order) if one.adaptive else "-", str(one.stage_order),
-            str(one.stages), one.kind, _yes(one.a_stable), _yes(one.l_stable), _length(one.real_interval),
-            _length(one.imaginary_interval), _length(one.ssp_radius), _pade(one),
+            name, str(facts.order), str(facts.error_order) if facts.adaptive else "-", str(facts.stage_order),
+            str(facts.stages), facts.kind, _yes(facts.a_stable), _yes(facts.l_stable), _length(facts.real_interval),
+            _length(facts.imaginary_interval), _length(facts.ssp_radius), _pade(facts),
         ]
-        for name, one in first.items()
+        for name, facts in first.items()
     ]  # fmt: skip
     terminal.table(heads, rows, console)
     terminal.line(console, "")
-    for name, one in found.items():
-        if name != one.name:
-            terminal.line(console, f"{name} is {one.name}")
+    for name, facts in all_facts.items():
+        if name != facts.name:
+            terminal.line(console, f"{name} is {facts.name}")
     terminal.line(
         console, "error: order of the embedded solution; stage: stage order; real, imaginary: greatest stable"
     )
-    terminal.line(console, "|h lambda| on these axes; SSP: greatest step in Euler steps; Padé (k, m): R is that entry")
+    terminal.line(console, "|h lambda| on these axes; SSP: greatest step in Euler steps; Padé: degrees (k, m) of R")
 
 
 def _show(method: Method, facts: Facts, path: Path) -> None:
@@ -86,33 +86,34 @@ def _show(method: Method, facts: Facts, path: Path) -> None:
     terminal.line(console, f"stability region: {path}")
 
 
-def _sentences(one: Facts) -> list[str]:
-    estimate = f"error estimate of order {one.error_order}" if one.adaptive else "no error estimate"
-    kind = [f"{one.stages} stages", one.kind]
-    kind += ["stiffly accurate"] if one.stiffly_accurate else []
-    kind += ["first rate same as last"] if one.first_same_as_last else []
-    sector = "no sector" if one.angle is None else f"A(alpha) with alpha = {one.angle:.8g} degrees"
-    found = [
-        f"order {one.order}, {estimate}; stage order {one.stage_order}",
+def _sentences(facts: Facts) -> list[str]:
+    estimate = f"error estimate of order {facts.error_order}" if facts.adaptive else "no error estimate"
+    kind = [f"{facts.stages} stages", facts.kind]
+    kind += ["stiffly accurate"] if facts.stiffly_accurate else []
+    kind += ["first rate same as last"] if facts.first_same_as_last else []
+    sector = "no sector" if facts.angle is None else f"A(alpha) with alpha = {facts.angle:.8g} degrees"
+    sentences = [
+        f"order {facts.order}, {estimate}; stage order {facts.stage_order}",
         ", ".join(kind),
-        f"A-stable: {_yes(one.a_stable)}; L-stable: {_yes(one.l_stable)}; I-stable: {_yes(one.i_stable)}; {sector}",
-        f"stable on the real axis {_reach(one.real_interval, '-', '')}, on the imaginary axis "
-        f"{_reach(one.imaginary_interval, '', 'i')}; SSP radius {_length(one.ssp_radius, 13)}",
-        f"R(s) - e^s = {one.error_constant:.6g} s^{one.stability_function.error_constant[0] + 1} + ...",
+        f"A-stable: {_yes(facts.a_stable)}; L-stable: {_yes(facts.l_stable)}; "
+        f"I-stable: {_yes(facts.i_stable)}; {sector}",
+        f"stable on the real axis {_reach(facts.real_interval, '-', '')}, on the imaginary axis "
+        f"{_reach(facts.imaginary_interval, '', 'i')}; SSP radius {_length(facts.ssp_radius, 13)}",
+        f"R(s) - e^s = {facts.error_constant:.6g} s^{facts.stability_function.error_constant[0] + 1} + ...",
     ]
-    if one.pade:
-        found.append(f"R is the Padé approximation of e^s of degrees {one.pade[0]} over {one.pade[1]}")
-    if one.digits:
-        found.append(f"decided with the numbers as published, to {one.digits} digits")
-    return found
+    if facts.pade:
+        sentences.append(f"R is the Padé approximation of e^s of degrees {facts.pade[0]} over {facts.pade[1]}")
+    if facts.digits:
+        sentences.append(f"coefficients are used as published, with {facts.digits} digits")
+    return sentences
 
 
 def _reach(value: float, before: str, after: str) -> str:
-    return "without end" if math.isinf(value) else "nowhere" if value == 0 else f"to {before}{value:.13g}{after}"
+    return "everywhere" if math.isinf(value) else "nowhere" if value == 0 else f"to {before}{value:.13g}{after}"
 
 
 def _array(method: Method) -> list[str]:
-    """The tableau as its source prints it, in columns; long decimals cut."""
+    """Lines of the tableau in the notation of its source, in aligned columns; long decimals are cut."""
     rows, width = [], method.stages
     for text in method.text.strip().splitlines():
         left, bar, right = text.partition("|")
@@ -130,11 +131,11 @@ def _array(method: Method) -> list[str]:
 
 
 def _given(method: Method) -> list[str]:
-    """What the entries of the tableau refer to."""
-    found = [f"{name} = {near:.10g}, a root of {polynomial}" for name, (polynomial, near) in method.numbers.items()]
+    """Notes on the tableau: values of its algebraic numbers, and the weight of f(t, y) in the embedded solution."""
+    notes = [f"{name} = {near:.10g}, a root of {polynomial}" for name, (polynomial, near) in method.numbers.items()]
     if method.start_weight is not None:
-        found.append(f"embedded solution: f(t, y) weighs {method.start_weight}, the rest follows by quadrature")
-    return found
+        notes.append(f"embedded solution: f(t, y) has weight {method.start_weight}; other weights follow by quadrature")
+    return notes
 
 
 def _entry(text: str) -> str:
@@ -143,8 +144,8 @@ def _entry(text: str) -> str:
     return text
 
 
-def _quotient(one: Facts) -> str:
-    r = one.stability_function
+def _quotient(facts: Facts) -> str:
+    r = facts.stability_function
     up, down = _polynomial(r.numerator), _polynomial(r.denominator)
     return up if r.denominator.degree == 0 else f"({up}) / ({down})"
 
@@ -177,5 +178,5 @@ def _length(value: float, digits: int = 6) -> str:
     return "infinite" if math.isinf(value) else f"{value:.{digits}g}"
 
 
-def _pade(one: Facts) -> str:
-    return f"({one.pade[0]}, {one.pade[1]})" if one.pade else "-"
+def _pade(facts: Facts) -> str:
+    return f"({facts.pade[0]}, {facts.pade[1]})" if facts.pade else "-"

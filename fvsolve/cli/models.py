@@ -1,4 +1,4 @@
-"""What `fvsolve chart --models` says. Knows words and tables; leaves the runs to `studies`."""
+"""Output of `fvsolve chart --models`: errors and computing times of a hierarchy of models."""
 
 from __future__ import annotations
 
@@ -14,31 +14,37 @@ TABLE = (
 
 
 def show_models(case, target: float, as_json: bool) -> None:
-    """The ladder of models of a case: what each rung errs and costs, the cheapest within the target, and why."""
+    """Run the model hierarchy of a case and print error and cost of each model, and the cheapest within the target."""
     from fvsolve.studies import ladder
 
     with told(kept=False) as progress:
-        found = ladder(case, target=target, progress=progress)
+        hierarchy = ladder(case, target=target, progress=progress)
     if as_json:
-        print_json(found.plain())
+        print_json(hierarchy.plain())
         return
     console = terminal.console()
-    rows = [vars(one) | {"of": one.worst, "ms": 1e3 * one.seconds} for one in found.rungs if one.error is not None]
+    rows = [
+        vars(level) | {"of": level.worst, "ms": 1e3 * level.seconds}
+        for level in hierarchy.rungs
+        if level.error is not None
+    ]
     terminal.sheet(Sheet(TABLE, rows), console)
-    richest, cheapest = found.richest, found.cheapest
+    richest, cheapest = hierarchy.richest, hierarchy.cheapest
     terminal.line(
-        console, "error: root mean square over time, of the worst probe, over its range; greatest: at any time;"
+        console, "error: root mean square over time of the worst probe, over its range; greatest: greatest at any time;"
     )
-    terminal.line(console, f"both from {richest.name}, {richest.law}")
-    for reason in dict.fromkeys(one.reason for one in found.rungs if one.error is None):
-        rungs = [one for one in found.rungs if one.error is None and one.reason == reason]
-        terminal.line(console, f"{', '.join(dict.fromkeys(f'{one.name} ({one.law})' for one in rungs))}: {reason}")
+    terminal.line(console, f"reference for both: {richest.name}, {richest.law}")
+    for reason in dict.fromkeys(level.reason for level in hierarchy.rungs if level.error is None):
+        levels = [level for level in hierarchy.rungs if level.error is None and level.reason == reason]
+        terminal.line(
+            console, f"{', '.join(dict.fromkeys(f'{level.name} ({level.law})' for level in levels))}: {reason}"
+        )
     gain = richest.seconds / cheapest.seconds
     terminal.line(
         console,
         f"cheapest within {target:g}: {cheapest.name}, {cheapest.law}, {cheapest.states} states, "
-        f"{gain:.3g} times quicker than the richest",
+        f"{gain:.3g} times faster than the most detailed model",
         "bold",
     )
-    for text in found.thumb:
+    for text in hierarchy.thumb:
         terminal.line(console, text)

@@ -1,4 +1,4 @@
-"""`fvsolve order CASE`: how fast the error falls. Knows words, tables and files; leaves the study to `studies`."""
+"""`fvsolve order CASE`: observed order of convergence."""
 
 from __future__ import annotations
 
@@ -32,106 +32,114 @@ TABLE = (
 def order(
     case: One,
     overrides: Set = [],  # noqa: B006
-    refine: Annotated[str | None, typer.Option(help="both (cells and steps), space or time")] = None,
-    key: Annotated[str | None, typer.Option(metavar="KEY", help="one resolution alone: links.main.cells")] = None,
-    levels: Annotated[int | None, typer.Option(help="rows")] = None,
-    cells: Annotated[int | None, typer.Option(help="of the coarsest row")] = None,
-    scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes, in place of the case's")] = None,
-    method: Annotated[str | None, typer.Option(metavar="A,B", help="methods, in place of the case's")] = None,
-    against: Annotated[str, typer.Option(help="auto, exact, finer or richardson")] = "auto",
+    refine: Annotated[
+        str | None, typer.Option(help="resolution to refine: both (cells and steps), space or time")
+    ] = None,
+    key: Annotated[
+        str | None, typer.Option(metavar="KEY", help="single resolution key to refine: links.main.cells")
+    ] = None,
+    levels: Annotated[int | None, typer.Option(help="number of refinement levels")] = None,
+    cells: Annotated[int | None, typer.Option(help="number of cells at the coarsest level")] = None,
+    scheme: Annotated[
+        str | None, typer.Option(metavar="A,B", help="schemes to study (default scheme of the case)")
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="A,B", help="methods to study (default method of the case)")
+    ] = None,
+    against: Annotated[str, typer.Option(help="reference solution: auto, exact, finer or richardson")] = "auto",
     jobs: Jobs = 1,
     dask: Dask = None,
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Measure how fast the error of a case falls with refinement: a table, order.csv and order.png."""
+    """Measure the order of convergence of a case under refinement: a table, order.csv and order.png."""
     from fvsolve.studies.accuracy.order import order as study
     from fvsolve.studies.points import Points
 
-    scene = load_case(case, overrides, scheme, method)
-    folder = folder_of(scene, "order", out)
+    loaded = load_case(case, overrides, scheme, method)
+    folder = folder_of(loaded, "order", out)
     with told() as progress, Points(folder) as points:
-        found = study(scene, refine=refine, key=key, levels=levels, cells=cells, schemes=listed(scheme, "--scheme"),
+        studies = study(loaded, refine=refine, key=key, levels=levels, cells=cells, schemes=listed(scheme, "--scheme"),
                       methods=methods_of(method), against=against, out=points, progress=progress,
                       jobs=jobs, dask=dask)  # fmt: skip
-    found = found if isinstance(found, list) else [found]
+    studies = studies if isinstance(studies, list) else [studies]
     files = [
-        Sheet(FILE, [*lines(found)]).write(cleared(folder, "order.csv", "order.png", "order-*.png") / "order.csv"),
-        *draw(folder, found),
+        Sheet(FILE, [*lines(studies)]).write(cleared(folder, "order.csv", "order.png", "order-*.png") / "order.csv"),
+        *draw(folder, studies),
     ]
     if as_json:
-        print_json({"studies": [one.plain() for one in found], "files": [str(file) for file in files],
+        print_json({"studies": [result.plain() for result in studies], "files": [str(file) for file in files],
                     "reused": points.reused})  # fmt: skip
         return
-    for one in found:
-        say(one)
+    for result in studies:
+        say(result)
     terminal.line(terminal.console(), f"files: {', '.join(str(file) for file in files)}")
 
 
-def draw(folder: Path, found) -> list[Path]:
-    """A picture of every study."""
+def draw(folder: Path, studies) -> list[Path]:
+    """Write a picture of every study; returns the paths."""
     files = []
-    for one in found:
-        name = "order.png" if len(found) == 1 else f"order-{one.scheme}-{one.method}.png"
-        one.plot(folder / name)
+    for result in studies:
+        name = "order.png" if len(studies) == 1 else f"order-{result.scheme}-{result.method}.png"
+        result.plot(folder / name)
         files.append(folder / name)
     return files
 
 
-def lines(found) -> Iterator[dict]:
-    """A line of order.csv for each row of each study, variable and norm, SI."""
-    for one in found:
-        known = {"scheme": one.scheme, "method": one.method, "reference": one.kind}
-        for variable, fits in one.fits.items():
+def lines(studies) -> Iterator[dict]:
+    """Rows of order.csv: a row for each level of each study, variable and norm, in SI."""
+    for result in studies:
+        head = {"scheme": result.scheme, "method": result.method, "reference": result.kind}
+        for variable, fits in result.fits.items():
             for norm in NORMS:
-                what = {"variable": variable, "unit": unit(variable, one.units), "norm": norm}
-                pairs = zip(one.rows, [None, *fits[norm].pairwise], fits[norm].marks, strict=True)
+                labels = {"variable": variable, "unit": unit(variable, result.units), "norm": norm}
+                pairs = zip(result.rows, [None, *fits[norm].pairwise], fits[norm].marks, strict=True)
                 for row, pairwise, mark in pairs:
-                    yield known | what | vars(fits[norm]) | vars(row) | vars(row.level) | {
+                    yield head | labels | vars(fits[norm]) | vars(row) | vars(row.level) | {
                         "error": row.errors.get(variable, {}).get(norm), "pairwise": pairwise, "mark": mark,
                         "updates": row.cell_updates,
                     }  # fmt: skip
 
 
-def say(one) -> None:
-    """What a person reads."""
+def say(result) -> None:
+    """Print the tables, fitted orders and notes of a study."""
     console = terminal.console()
-    terminal.line(console, f"{one.case}: {title(one)}", "bold")
-    terminal.line(console, f"errors against: {one.words}")
-    for variable in one.variables[:SHOWN]:
+    terminal.line(console, f"{result.case}: {title(result)}", "bold")
+    terminal.line(console, f"errors against: {result.words}")
+    for variable in result.variables[:SHOWN]:
         terminal.line(console, "")
-        where = " at the end, all pipes" if variable in ("pressure", "flow") else ""
-        terminal.line(console, f"{variable} [{one.told(variable)[1]}]{where}")
-        terminal.sheet(rows_of(one, variable), console)
+        place = " at the end, all pipes" if variable in ("pressure", "flow") else ""
+        terminal.line(console, f"{variable} [{result.told(variable)[1]}]{place}")
+        terminal.sheet(rows_of(result, variable), console)
     terminal.line(console, "")
-    terminal.table(["fitted order of", "L1", "L2", "max"], fitted(one), console)
-    for text in dict.fromkeys([*reasons(one), *one.notes]):
+    terminal.table(["fitted order of", "L1", "L2", "max"], fitted(result), console)
+    for text in dict.fromkeys([*reasons(result), *result.notes]):
         terminal.line(console, text)
     terminal.line(console, "")
 
 
-def rows_of(one, variable: str) -> Sheet:
-    """A variable's table."""
-    fits, found, size = one.fits[variable], [], one.told(variable)[0]
-    for k, row in enumerate(one.rows):
-        step = f"rtol {row.level.size:g}" if one.plan.measure == "rtol" else row.level.step
+def rows_of(result, variable: str) -> Sheet:
+    """Table of a variable: errors and pairwise orders of all levels."""
+    fits, rows, size = result.fits[variable], [], result.told(variable)[0]
+    for k, row in enumerate(result.rows):
+        step = f"rtol {row.level.size:g}" if result.plan.measure == "rtol" else row.level.step
         cells = {"cells": row.level.cells or None, "step": step, "rhs": row.rhs, "seconds": row.seconds}
         cells |= {norm: size * error for norm, error in row.errors.get(variable, {}).items()}
         cells |= {f"order {norm}": fits[norm].pairwise[k - 1] if k else None for norm in NORMS}
         marks = {norm: fits[norm].marks[k] for norm in NORMS}
         same = len(set(marks.values())) == 1
-        told = marks["L1"] if same else ", ".join(f"{mark} ({norm})" for norm, mark in marks.items() if mark)
-        found.append(plain(cells | {"mark": told}))
-    return Sheet(TABLE, found)
+        mark_text = marks["L1"] if same else ", ".join(f"{text} ({norm})" for norm, text in marks.items() if text)
+        rows.append(plain(cells | {"mark": mark_text}))
+    return Sheet(TABLE, rows)
 
 
-def fitted(one) -> list[list[str]]:
-    """The fitted orders of all variables."""
-    return [[f"{name}", *(slope(fits[norm]) for norm in NORMS)] for name, fits in one.fits.items()]
+def fitted(result) -> list[list[str]]:
+    """Fitted orders of all variables, in L1, L2 and max norm."""
+    return [[f"{name}", *(slope(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
 
 
 def slope(fit) -> str:
-    """An order with its spread, or that there is none."""
+    """Text of a fitted order with its spread, or "none" or "no error"."""
     from fvsolve.studies.accuracy.fit import NO_ERROR
 
     if fit.reason:
@@ -139,17 +147,17 @@ def slope(fit) -> str:
     return f"{fit.order:.2f} ± {fit.spread:.2f}"
 
 
-def reasons(one):
-    """Why shown variables have no number, what is beside it, and how many others have none."""
+def reasons(result):
+    """Reasons for missing orders and notes on orders, for the variables on the terminal."""
     from fvsolve.studies.accuracy.fit import NO_ERROR
 
-    for name in one.variables[:SHOWN]:
-        told: dict[str, list[str]] = {}
-        for norm, fit in one.fits[name].items():
+    for name in result.variables[:SHOWN]:
+        notes: dict[str, list[str]] = {}
+        for norm, fit in result.fits[name].items():
             if (fit.reason or fit.note) and fit.reason != NO_ERROR:
-                told.setdefault(fit.reason or fit.note, []).append(norm)
-        for text, norms in told.items():
+                notes.setdefault(fit.reason or fit.note, []).append(norm)
+        for text, norms in notes.items():
             yield f"{name} ({', '.join(norms)}): {text}"
-    others = [fit.reason for name in one.variables[SHOWN:] for fit in one.fits[name].values()]
+    others = [fit.reason for name in result.variables[SHOWN:] for fit in result.fits[name].values()]
     if any(reason and reason != NO_ERROR for reason in others):
-        yield "other variables without an order: --json says why"
+        yield "other variables have no order either; --json gives the reasons"

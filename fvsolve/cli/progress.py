@@ -1,4 +1,4 @@
-"""How a run is doing, while it runs, and Ctrl-C. Knows the terminal; knows no numerics."""
+"""Progress bars of runs, and handling of Ctrl-C."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from fvsolve.errors import visible
 
 @contextmanager
 def watched(case) -> Iterator[Callable[[float, float, int], None]]:
-    """A `progress` function for a run of `case`: draws a bar on a terminal, ends the run at Ctrl-C.
+    """Context manager that yields a `progress` function for a run: it draws a bar and ends the run at Ctrl-C.
 
-    The first Ctrl-C ends the run where its state is whole, the second one breaks it off.
+    The first Ctrl-C ends the run after a complete step; the second interrupts it at once.
     """
     stop = threading.Event()
     bar = Bar(case) if sys.stderr.isatty() else None
@@ -32,7 +32,7 @@ def watched(case) -> Iterator[Callable[[float, float, int], None]]:
 
 @contextmanager
 def stoppable() -> Iterator[Callable[[float, float, int], None]]:
-    """A `progress` function for runs one after another that shows nothing and ends the run at Ctrl-C, likewise."""
+    """Context manager that yields a silent `progress` function, which ends a run at Ctrl-C like `run_progress`."""
     stop = threading.Event()
 
     def progress(t: float, seconds: float, steps: int) -> None:
@@ -62,8 +62,8 @@ def _nothing() -> Iterator[None]:
 
 
 @contextmanager
-def counted(what: str) -> Iterator[Callable[[int, int, str], None]]:
-    """A `progress(done, total, next)` function: a bar on a terminal, elsewhere a line now and then."""
+def counted(label: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Context manager that yields `progress(done, total, next)`: a bar on a terminal, otherwise lines at intervals."""
     if not sys.stderr.isatty():
         from fvsolve.cli.studying import told
 
@@ -74,15 +74,15 @@ def counted(what: str) -> Iterator[Callable[[int, int, str], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        task = shown.add_task(what, total=None)
-        yield lambda done, total, last: shown.update(
-            task, completed=done, total=total, description=f"{what}: {visible(last)}"
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, total=None)
+        yield lambda done, total, text: bar.update(
+            task, completed=done, total=total, description=f"{label}: {visible(text)}"
         )
 
 
 class Bar:
-    """A rich bar with simulated time, speed and what remains."""
+    """Progress bar with simulated time, speed and remaining time."""
 
     def __init__(self, case):
         from rich.console import Console

@@ -1,4 +1,4 @@
-"""The commands `sensitivity` and `fit`. Know how ranges are said; leave the runs to `studies`."""
+"""`fvsolve sensitivity` and `fvsolve fit`: sensitivity indices and calibration of keys."""
 
 from __future__ import annotations
 
@@ -14,9 +14,13 @@ from fvsolve.cli.sweep import ranges
 @app.command()
 def sensitivity(
     case: One,
-    vary: Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="the two ends of a key")],
-    outcome: Annotated[str, typer.Option(metavar="max(PROBE)", help="min, max or final of a probe")],
-    samples: Annotated[int, typer.Option(metavar="N", help="a power of two: N (keys + 2) runs and some")] = 64,
+    vary: Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="range of a key to vary")],
+    outcome: Annotated[
+        str, typer.Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")
+    ],
+    samples: Annotated[
+        int, typer.Option(metavar="N", help="base sample size, a power of two; needs about N (keys + 2) runs")
+    ] = 64,
     seed: Seed = 0,
     jobs: Jobs = 1,
     dask: Dask = None,
@@ -24,69 +28,69 @@ def sensitivity(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """Which keys an outcome hangs on: Sobol's indices and Morris's effects over ranges."""
+    """Compute the sensitivity of an outcome to keys: Sobol indices and Morris effects over ranges."""
     from fvsolve import studies
 
-    found = load_case(case, set)
-    folder = folder_of(found, "sensitivity", out)
+    loaded = load_case(case, set)
+    folder = folder_of(loaded, "sensitivity", out)
     with told() as progress:
-        made = studies.sensitivity(
-            found, ranges(vary, "--vary"), outcome, samples, seed, None, jobs, dask, folder, progress
+        result = studies.sensitivity(
+            loaded, ranges(vary, "--vary"), outcome, samples, seed, None, jobs, dask, folder, progress
         )
     paths = [
-        made.sheet.write(cleared(folder, "sensitivity.csv", "sensitivity.png") / "sensitivity.csv"),
+        result.sheet.write(cleared(folder, "sensitivity.csv", "sensitivity.png") / "sensitivity.csv"),
         folder / "sensitivity.png",
     ]
-    made.plot(paths[1])
+    result.plot(paths[1])
     if as_json:
-        print_json(made.plain() | {"directory": str(folder)})
+        print_json(result.plain() | {"directory": str(folder)})
     else:
-        show(made, f"{paths[0]}: {made.outcome}, {made.runs} runs")
+        show(result, f"{paths[0]}: {result.outcome}, {result.runs} runs")
 
 
 @app.command()
 def fit(
     case: One,
-    free: Annotated[list[str], typer.Option("--free", metavar="KEY=LOW,HIGH", help="a key and where it may lie")],
+    free: Annotated[list[str], typer.Option("--free", metavar="KEY=LOW,HIGH", help="key to fit and its range")],
     seed: Seed = 0,
     jobs: Jobs = 1,
     dask: Dask = None,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """Values of keys by which a case comes nearest to the measured series of its [compare]."""
+    """Calibrate keys of a case against the measured series in its [compare]."""
     from fvsolve import studies
 
-    found = load_case(case, set)
+    loaded = load_case(case, set)
     with told(kept=False) as progress:
-        made = studies.calibrate(found, ranges(free, "--free"), None, seed, jobs, dask, progress)
+        result = studies.calibrate(loaded, ranges(free, "--free"), None, seed, jobs, dask, progress)
     if as_json:
-        print_json(made.plain())
+        print_json(result.plain())
         return
     from fvsolve.cli import terminal
     from fvsolve.studies.plans import bare_unit
 
-    probes = {one.probe.text: one.probe for one in found.compare.values() if one.probe is not None}
-    left = [f"rms of {name} {difference(found, probes[name], rms)}" for name, rms in made.rms.items()]
-    units = {key: f"{key} [{unit}]" if (unit := bare_unit(found.raw, key)) else key for key in made.values}
-    show(made, ", ".join([*left, f"{made.runs} runs"]), units)
+    probes = {series.probe.text: series.probe for series in loaded.compare.values() if series.probe is not None}
+    texts = [f"rms of {name} {difference(loaded, probes[name], rms)}" for name, rms in result.rms.items()]
+    units = {key: f"{key} [{unit}]" if (unit := bare_unit(loaded.raw, key)) else key for key in result.values}
+    show(result, ", ".join([*texts, f"{result.runs} runs"]), units)
 
-    for doubt in made.doubts:
+    for doubt in result.doubts:
         terminal.line(terminal.console(), doubt, "yellow")
 
 
 def difference(case, probe, value: float) -> str:
-    """A difference of a probe [SI] with the unit that it is recorded in."""
+    """Text of a difference of a probe [SI], in the unit of the probe's record."""
     from fvsolve.output.column import column
 
-    own = column(probe.text, probe.dimension, case, probe.unit)
-    return f"{own.span_from_si(value):.6g} {own.span_unit}"
+    unit_column = column(probe.text, probe.dimension, case, probe.unit)
+    return f"{unit_column.span_from_si(value):.6g} {unit_column.span_unit}"
 
 
-def show(made, last: str, units: dict[str, str] = {}) -> None:  # noqa: B006
-    """A table of keys, those in `units` as these say them, and a line below."""
+def show(result, text: str, units: dict[str, str] = {}) -> None:  # noqa: B006
+    """Print a table of keys and a line below it; `units` maps a key to its heading with unit."""
     from fvsolve.cli import terminal
 
-    console, (heads, rows) = terminal.console(), made.sheet.words()
+    console, (heads, rows) = terminal.console(), result.sheet.words()
     terminal.table(heads, [[units.get(key, key), *row] for key, *row in rows], console)
-    terminal.line(console, last)
+    terminal.line(console, text)

@@ -1,4 +1,4 @@
-"""The command `size`. Knows the terminal; leaves the search to `studies`."""
+"""`fvsolve size`: value of a key at which all limits of a case hold."""
 
 from __future__ import annotations
 
@@ -16,75 +16,86 @@ from fvsolve.errors import CaseError, FvsolveError, gathered
 @app.command()
 def size(
     case: One,
-    vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="what is sized, and between which ends")],
-    goal: Annotated[str, typer.Option(metavar="least|greatest", help="which value that holds all limits")] = "least",
+    vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range")],
+    goal: Annotated[
+        str,
+        typer.Option(
+            metavar="least|greatest", help="value to find: the least or the greatest that satisfies all limits"
+        ),
+    ] = "least",
     tie: Annotated[
-        list[str], typer.Option(metavar='"KEY = formula"', help="another key as a formula of x, the value in SI")
+        list[str],
+        typer.Option(
+            metavar='"KEY = formula"', help="dependent key as a formula of x, the value of the sized key in SI"
+        ),
     ] = [],  # noqa: B006
-    rtol: Annotated[float, typer.Option(help="how closely it is bracketed, of itself")] = 0.01,
+    rtol: Annotated[float, typer.Option(help="relative tolerance of the bracket")] = 0.01,
     error: Annotated[
-        bool, typer.Option("--error", help="limits hold by more than their errors, by two more runs of each value")
+        bool,
+        typer.Option("--error", help="require margins larger than their errors, from two more runs of each value"),
     ] = False,
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """The value of a key at which all limits of a case hold, by bracketing."""
+    """Find by bracketing the least or greatest value of a key at which all limits of a case hold."""
     from fvsolve.studies import sizing
 
-    faults, key, listed, ties, made = [], "", [], {}, None
+    faults, key, values, ties, loaded = [], "", [], {}, None
     with gathered(faults):
-        key, listed = values_of(vary, "--vary", RANGE)
-        if len(listed) != 2:
-            listed = []
-            raise FvsolveError(f"--vary {vary}: wanted {RANGE}")
+        key, values = values_of(vary, "--vary", RANGE)
+        if len(values) != 2:
+            values = []
+            raise FvsolveError(f"--vary {vary}: expected {RANGE}")
     with gathered(faults):
         ties = sizing.tied(tie)
     with gathered(faults):
-        made = load_case(case, set)
-    faults += sizing.asked(made, key, listed, goal, ties, rtol)
+        loaded = load_case(case, set)
+    faults += sizing.asked(loaded, key, values, goal, ties, rtol)
     if faults:
         raise CaseError(faults, case)
     with told(kept=False) as progress:
-        found = sizing.size(made, key, *listed, goal, ties, None, rtol,
-                            lambda done, what: progress(done, sizing.MOST_RUNS, what), error)  # fmt: skip
+        result = sizing.size(loaded, key, *values, goal, ties, None, rtol,
+                            lambda done, label: progress(done, sizing.MOST_RUNS, label), error)  # fmt: skip
     if as_json:
-        print_json(found.plain())
+        print_json(result.plain())
     else:
-        _show(found)
-    sys.exit(0 if found.value is not None else 1)
+        _show(result)
+    sys.exit(0 if result.value is not None else 1)
 
 
-def _show(found) -> None:
+def _show(result) -> None:
     from fvsolve.cli import terminal
 
     console = terminal.console()
-    rows = [[f"{one.value:.6g}", "holds" if one.ok else "open" if one.open else "FAILS",
-             "-" if one.margin is None else f"{one.margin:.4g}",
-             one.limit if one.reason == "finished" else one.reason] for one in found.runs]  # fmt: skip
-    unit = f" {found.unit}" if found.unit else ""
-    key = f"{found.key} [{found.unit}]" if unit else found.key
+    rows = [[f"{run.value:.6g}", "holds" if run.ok else "open" if run.open else "FAILS",
+             "-" if run.margin is None else f"{run.margin:.4g}",
+             run.limit if run.reason == "finished" else run.reason] for run in result.runs]  # fmt: skip
+    unit = f" {result.unit}" if result.unit else ""
+    key = f"{result.key} [{result.unit}]" if unit else result.key
     terminal.table([key, "", "least margin over limit", "of"], rows, console)
-    for text in found.ties:
+    for text in result.ties:
         terminal.line(console, f"with {text}")
-    for text in dict.fromkeys(one.open for one in found.runs if one.open):
+    for text in dict.fromkeys(run.open for run in result.runs if run.open):
         terminal.line(console, f"open: {text}", "yellow")
-    if found.value is None:
-        terminal.line(console, _unmet(found), "bold red")
+    if result.value is None:
+        terminal.line(console, _unmet(result), "bold red")
         return
-    where = "at the end of the range" if found.bracket is None else (
-        f"{min(found.bracket):.6g} to {max(found.bracket):.6g}{unit} bracket it")  # fmt: skip
-    said = f"{found.goal} value that holds all limits: {found.value:.6g}{unit}; {where}; {len(found.runs)} runs"
-    terminal.line(console, said, "green")
+    bracket = "at the end of the range" if result.bracket is None else (
+        f"bracket {min(result.bracket):.6g} to {max(result.bracket):.6g}{unit}")  # fmt: skip
+    line = f"{result.goal} value that holds all limits: {result.value:.6g}{unit}; {bracket}; {len(result.runs)} runs"
+    terminal.line(console, line, "green")
 
 
-def _unmet(found) -> str:
-    """What came nearest, by how much it fell short, and where it might be met."""
-    near, tried = found.nearest, sorted(one.value for one in found.runs)
-    unit = f" {found.unit}" if found.unit else ""
-    text = (f"no value between {tried[0]:.6g} and {tried[-1]:.6g}{unit} that was tried holds all limits; "
-            f"{near.value:.6g} comes nearest")  # fmt: skip
-    if near.margin is None:
-        return f"{text}; of none is a margin known"
-    text += f", with a margin of {near.margin:.3g} of the limit {near.limit}"
-    beyond = {tried[0]: "below", tried[-1]: "above"}.get(near.value)
-    return f"{text}; margins grow to that end: look {beyond} it, or change something else" if beyond else text
+def _unmet(result) -> str:
+    """Text for a failed search: the nearest value, its margin, and the direction in which to search."""
+    nearest, values = result.nearest, sorted(run.value for run in result.runs)
+    unit = f" {result.unit}" if result.unit else ""
+    text = (f"none of the values tried between {values[0]:.6g} and {values[-1]:.6g}{unit} holds all limits; "
+            f"the nearest is {nearest.value:.6g}")  # fmt: skip
+    if nearest.margin is None:
+        return f"{text}; no margin is known"
+    text += f", with a margin of {nearest.margin:.3g} of the limit {nearest.limit}"
+    beyond = {values[0]: "below", values[-1]: "above"}.get(nearest.value)
+    return (
+        f"{text}; margins increase towards that end. Try values {beyond} it or change another key" if beyond else text
+    )

@@ -1,4 +1,4 @@
-"""`fvsolve stability`. Knows what is asked and how it is shown; leaves the numbers to `studies`."""
+"""`fvsolve stability`: greatest stable step, predicted and measured, and bounds on it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fvsolve.cli.linearise import At, Before, time_of
 from fvsolve.cli.studying import Dask, Jobs, Out, cleared, folder_of, listed, methods_of, told
 from fvsolve.studies.sheet import Column, Sheet, columns
 
-PICTURES = 12  # pairs beyond which no picture is drawn
+PICTURES = 12  # greatest number of pairs of scheme and method for which pictures are drawn
 FILE = columns(
     scheme="scheme", method="method", steps="steps", threshold="threshold", states="states",
     predicted="predicted [s]", predicted_courant="predicted Courant", after="after steps",
@@ -25,12 +25,20 @@ FILE = columns(
 
 @app.command()
 def stability(
-    case: Annotated[str | None, typer.Argument(metavar="[CASE]", help="a case; without one, a periodic grid")] = None,
-    scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes; default that of the case")] = None,
-    method: Annotated[str | None, typer.Option(metavar="A,B", help="methods; default that of the case")] = None,
-    steps: Annotated[int | None, typer.Option(help="within which growth counts, default 1000")] = None,
-    cells: Annotated[int | None, typer.Option(help="without a case: measure on so many cells")] = None,
-    courant: Annotated[float | None, typer.Option(help="without a case: growth at this Courant number")] = None,
+    case: Annotated[
+        str | None, typer.Argument(metavar="[CASE]", help="case file (default advection on a periodic grid)")
+    ] = None,
+    scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes (default scheme of the case)")] = None,
+    method: Annotated[str | None, typer.Option(metavar="A,B", help="methods (default method of the case)")] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="number of steps in which growth is measured (default 1000)")
+    ] = None,
+    cells: Annotated[
+        int | None, typer.Option(help="number of cells of the periodic grid to measure on (only without a case)")
+    ] = None,
+    courant: Annotated[
+        float | None, typer.Option(help="Courant number at which growth is computed (only without a case)")
+    ] = None,
     at: At = None,
     before: Before = False,
     jobs: Jobs = 1,
@@ -39,7 +47,7 @@ def stability(
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """The greatest safe step of a case, predicted and measured, and what bounds say of it."""
+    """Compute the greatest stable step of a case, predicted and measured, and bounds on it."""
     of_a_case = {"--set": set, "--at": at, "--before": before, "--jobs": jobs if jobs != 1 else None, "--dask": dask}
     refuse(case, of_a_case, {"--cells": cells, "--courant": courant})
     if case is None:
@@ -50,11 +58,11 @@ def stability(
     from fvsolve.studies.stability.growth import STEPS
     from fvsolve.studies.stability.stability import stability as ask
 
-    read = load_case(case, set, scheme, method)
-    folder = folder_of(read, "stability", out)
+    loaded = load_case(case, set, scheme, method)
+    folder = folder_of(loaded, "stability", out)
     with told() as progress:
-        found = ask(
-            read,
+        result = ask(
+            loaded,
             listed(scheme, "--scheme"),
             methods_of(method),
             time_of(at),
@@ -65,94 +73,97 @@ def stability(
             jobs=jobs,
             dask=dask,
         )
-    table = Sheet(FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in found.rows])
+    table = Sheet(FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in result.rows])
     files = [table.write(cleared(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
-    if len(found.rows) <= PICTURES:
-        files += pictures(found, folder)
+    if len(result.rows) <= PICTURES:
+        files += pictures(result, folder)
     if as_json:
-        print_json(found.plain() | {"directory": str(folder), "files": files})
+        print_json(result.plain() | {"directory": str(folder), "files": files})
     else:
-        say(found, folder, files)
+        say(result, folder, files)
 
 
 def refuse(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
-    """Raise FvsolveError for options that say nothing here."""
+    """Raise FvsolveError for options without effect: those of a case without it, those of a grid with a case."""
     from fvsolve.errors import FvsolveError
 
-    idle = [name for name, value in (of_a_grid if case else of_a_case).items() if value not in (None, False, [])]
-    if idle:
-        where = "with a case: only a periodic grid has them" if case else "without a case: fvsolve stability CASE"
-        raise FvsolveError(f"{', '.join(idle)}: nothing to say {where}")
+    useless = [name for name, value in (of_a_grid if case else of_a_case).items() if value not in (None, False, [])]
+    if useless:
+        reason = "not valid with a case, only without" if case else "needs a case: fvsolve stability CASE"
+        raise FvsolveError(f"{', '.join(useless)}: {reason}")
 
 
-def pictures(found, folder: Path) -> list[str]:
-    """One picture for each row of a linear scheme: the spectrum over the method's region; returns their names."""
+def pictures(result, folder: Path) -> list[str]:
+    """Draw the spectrum over the stability region for each row with a linear scheme; returns the file names."""
     from fvsolve.draw.spectrum import spectrum_figure
     from fvsolve.steppers import analyse
 
     names = []
-    for row in found.rows:
+    for row in result.rows:
         if row.limited or row.lines:
             continue
-        side = found.side(row.scheme)
-        known = np.isfinite(row.predicted) and row.predicted > 0.0
-        h = row.predicted if known else 1.0 / max(np.abs(side.spectrum.values).max(), 1e-300)
+        side = result.side(row.scheme)
+        is_known = np.isfinite(row.predicted) and row.predicted > 0.0
+        h = row.predicted if is_known else 1.0 / max(np.abs(side.spectrum.values).max(), 1e-300)
         field = None if "field_of_values" in row.left_out else h * side.field
-        title = f"{found.case}, {row.scheme} with {row.method}: spectrum times h = {h:.4g} s"
+        title = f"{result.case}, {row.scheme} with {row.method}: spectrum times h = {h:.4g} s"
         if row.rate == 0.0:
-            title = f"{found.case}, {row.method}: spectrum times h = {h:.4g} s"
+            title = f"{result.case}, {row.method}: spectrum times h = {h:.4g} s"
         figure = spectrum_figure(analyse(row.method).stability_function, h * side.spectrum.values, field, title)
         names.append(f"spectrum-{row.scheme}-{row.method}.png" if row.rate > 0.0 else f"spectrum-{row.method}.png")
         figure.savefig(folder / names[-1])
     return names
 
 
-def say(found, folder: Path, files: list[str]) -> None:
-    """The table, and below it where a bound misleads."""
+def say(result, folder: Path, files: list[str]) -> None:
+    """Print the table, and notes on bounds that mislead."""
     from fvsolve.cli import terminal
 
-    rows = found.rows
-    where, first = terminal.console(), rows[0]
-    cells = first.rate > 0.0
-    terminal.line(where, f"{found.case} at {first.when}: {first.states} states; a step fails where a deviation grows "
-                         f"by {first.threshold:g} (energy norm) within {first.steps} steps")  # fmt: skip
+    rows = result.rows
+    console, first_row = terminal.console(), rows[0]
+    cells = first_row.rate > 0.0
+    terminal.line(
+        console,
+        f"{result.case} at {first_row.when}: {first_row.states} states; a step fails if a deviation grows by "
+        f"{first_row.threshold:g} (energy norm) within {first_row.steps} steps",
+    )
     if cells:
-        terminal.line(where, f"Courant number: step times {first.rate:.6g} 1/s; bounds as Courant numbers")
-    terminal.sheet(Sheet(shown(cells), [line for row in rows for line in lines(row)]), where)
+        terminal.line(console, f"Courant number: step times {first_row.rate:.6g} 1/s; bounds as Courant numbers")
+    terminal.sheet(Sheet(shown(cells), [line for row in rows for line in lines(row)]), console)
     for row in rows:
         for note in row.notes:
-            terminal.line(where, f"  {label(row)}: {note}")
-        for what, why in row.left_out.items():
-            terminal.line(where, f"  {label(row)}: {what.replace('_', ' ')}: {why}")
-    for text in found.said:
-        terminal.line(where, f"  {text}")
-    terminal.line(where, f"{folder}: {', '.join(files)}")
+            terminal.line(console, f"  {label(row)}: {note}")
+        for bound, reason in row.left_out.items():
+            terminal.line(console, f"  {label(row)}: {bound.replace('_', ' ')}: {reason}")
+    for text in result.said:
+        terminal.line(console, f"  {text}")
+    terminal.line(console, f"{folder}: {', '.join(files)}")
 
 
 def shown(cells: bool) -> list[Column]:
-    """Columns on the terminal; with cells steps stand as Courant numbers too, and bounds as these alone."""
+    """Columns on the terminal. With cells, steps are given also as Courant numbers, and bounds only so."""
     heads = {"scheme": "scheme", "method": "method"}
-    for what in ("predicted", "measured"):
-        heads |= {what: f"{what} [s]", f"{what}_courant": "Courant"}
+    for quantity in ("predicted", "measured"):
+        heads |= {quantity: f"{quantity} [s]", f"{quantity}_courant": "Courant"}
     heads["percent"] = "difference"
     for bound in ("eigenvalues", "field_of_values", "von_neumann"):
         heads[f"{bound}_courant" if cells else bound] = bound.replace("_", " ").replace("von n", "von N")
     heads["part"] = "grows in"
-    idle = () if cells else ("scheme", "predicted_courant", "measured_courant", "von_neumann")
-    return [Column(key, head, ".5g") for key, head in heads.items() if key not in idle]
+    omitted = () if cells else ("scheme", "predicted_courant", "measured_courant", "von_neumann")
+    return [Column(key, head, ".5g") for key, head in heads.items() if key not in omitted]
 
 
 def lines(row) -> list[dict]:
-    """Lines of the table that one row takes: a limited scheme has one for each frozen one."""
+    """Lines of the table for a row; a limited scheme has an additional line for each frozen linear scheme."""
     from fvsolve.studies.stability.row import said
 
-    found = [{"scheme": f"{row.scheme}: {name}", "method": row.method, "predicted": said(h),
+    frozen_lines = [{"scheme": f"{row.scheme}: {name}", "method": row.method, "predicted": said(h),
               "predicted_courant": said(row.courant(h))} for name, h in row.frozen.items()]  # fmt: skip
     percent = f"{100 * row.difference:+.2f} %" if np.isfinite(row.difference) else None
     part = f"{row.where} ({100 * row.share:.0f} %)" if row.where else None
-    return [*found, row.plain() | {"percent": percent, "part": part}]
+    return [*frozen_lines, row.plain() | {"percent": percent, "part": part}]
 
 
 def label(row) -> str:
-    """What a line below the table is about."""
+    """Label of a row in the notes: scheme and method, or the method alone without cells."""
     return f"{row.scheme}, {row.method}" if row.rate > 0.0 else row.method

@@ -1,4 +1,4 @@
-"""The command `sweep`. Knows how values are listed on a command line; leaves the runs to `studies`."""
+"""`fvsolve sweep`: one run for every combination of values of keys."""
 
 from __future__ import annotations
 
@@ -14,16 +14,19 @@ from fvsolve.cli.studying import Dask, Jobs, Out, Seed, cleared, folder_of, told
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
-    list[str], typer.Option("--set", metavar="KEY=a,b,c", help="values of a key, one run each; one value holds for all")
+    list[str],
+    typer.Option(
+        "--set", metavar="KEY=a,b,c", help="values of a key, one run for each; a single value holds for all runs"
+    ),
 ]
-Ranges = Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="ends of a key, for --sample")]
+Ranges = Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="range of a key, for --sample")]
 Outcomes = Annotated[
-    list[str], typer.Option("--outcome", metavar="max(PROBE)", help="what is charted, in place of all extremes")
+    list[str], typer.Option("--outcome", metavar="max(PROBE)", help="outcome to chart (default all extremes)")
 ]
 WANTED = "KEY=a,b,c, for example links.main.cells=100,200,400"
 RANGE = "KEY=LOW,HIGH, for example links.main.length=900,1000"
-SHOWN = 6  # columns of a table on a terminal, beside the keys
-MOST = 100  # rows of it
+SHOWN = 6  # greatest number of columns of the table on a terminal, without the keys
+MOST = 100  # greatest number of rows of that table
 
 
 @app.command()
@@ -31,10 +34,11 @@ def sweep(
     case: One,
     set: Values = [],  # noqa: B006
     points: Annotated[
-        Path | None, typer.Option(metavar="FILE.csv", help="values of every run: a column for each key")
+        Path | None,
+        typer.Option(metavar="FILE.csv", help="CSV file with the values of every run: a column for each key"),
     ] = None,
     sample: Annotated[
-        str | None, typer.Option(metavar="sobol:N", help="N runs between the ends of --vary; or lhs:N")
+        str | None, typer.Option(metavar="sobol:N", help="sample of N runs within the ranges of --vary; or lhs:N")
     ] = None,
     vary: Ranges = [],  # noqa: B006
     seed: Seed = 0,
@@ -44,63 +48,68 @@ def sweep(
     out: Out = None,
     as_json: Json = False,
 ) -> None:
-    """One run for every combination of values: a table with a row for each, failed ones with their reason."""
+    """Run a case for every combination of values. The table has a row for each run; a failed run has its reason."""
     from fvsolve import studies
     from fvsolve.studies.plans import headed
 
-    given = dict(values_of(text) for text in set)
-    fixed = {key: values[0] for key, values in given.items() if len(values) == 1}
+    values_by_key = dict(values_of(text) for text in set)
+    fixed = {key: values[0] for key, values in values_by_key.items() if len(values) == 1}
     if vary and sample is None:
-        raise FvsolveError(f"--vary {vary[0]}: wants --sample sobol:N beside it; values of a grid are --set KEY=a,b,c")
-    moved = {key: values for key, values in given.items() if key not in fixed} | ranges(vary, "--vary")
-    found = load_case(case, [])
-    folder = folder_of(found, "sweep", out)
+        raise FvsolveError(f"--vary {vary[0]}: expected --sample sobol:N too. For a grid of values use --set KEY=a,b,c")
+    varied = {key: values for key, values in values_by_key.items() if key not in fixed} | ranges(vary, "--vary")
+    loaded = load_case(case, [])
+    folder = folder_of(loaded, "sweep", out)
     with told() as progress:
-        made = studies.sweep(found, moved, fixed, jobs, folder, progress, points, sample, seed, dask)
-    heads = {key: headed(found.raw, key, [row[key] for row in made.rows]) for key in made.keys}
-    charts = write_charts(made, outcome, folder, heads)
+        result = studies.sweep(loaded, varied, fixed, jobs, folder, progress, points, sample, seed, dask)
+    heads = {key: headed(loaded.raw, key, [row[key] for row in result.rows]) for key in result.keys}
+    charts = write_charts(result, outcome, folder, heads)
     if as_json:
-        print_json(made.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]})
+        print_json(result.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]})
     else:
-        _show(made, folder, heads)
-    sys.exit(0 if all(row["ok"] for row in made.rows) else 1)
+        _show(result, folder, heads)
+    sys.exit(0 if all(row["ok"] for row in result.rows) else 1)
 
 
 def ranges(texts: list[str], option: str) -> dict[str, list]:
-    """`KEY=LOW,HIGH` of each key as its two ends."""
-    found = [values_of(text, option, RANGE) for text in texts]
-    twice = [key for key, _ in found if [one for one, _ in found].count(key) > 1]
-    if twice:
-        raise FvsolveError(f"{option} {twice[0]} is given twice; keep one")
-    return dict(found)
+    """Parse `KEY=LOW,HIGH` texts: key -> [low, high]. Raises FvsolveError for a key that is given twice."""
+    pairs = [values_of(text, option, RANGE) for text in texts]
+    duplicates = [key for key, _ in pairs if [name for name, _ in pairs].count(key) > 1]
+    if duplicates:
+        raise FvsolveError(f"{option} {duplicates[0]} is given twice. Give it once")
+    return dict(pairs)
 
 
-def write_charts(made, outcomes: list[str], folder: Path, heads: dict[str, str]) -> list[Path]:
-    """A picture for each outcome in `charts`, all extremes if none is named, keys under their heads; their paths."""
+def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str]) -> list[Path]:
+    """Draw a picture of each outcome (default all extremes) in the folder `charts`; returns the paths.
+
+    heads : key -> heading of the key with its unit
+    """
     from fvsolve.draw.sweep import outcome_figure
 
-    known = made.outcomes
-    names = [made.outcome(name) for name in outcomes] or [one for one in known if one.startswith(("max(", "min("))]
+    available = result.outcomes
+    names = [result.outcome(name) for name in outcomes] or [
+        column for column in available if column.startswith(("max(", "min("))
+    ]
     cleared(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
     paths = []
     for name in names:
-        plain = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
-        path = writable(folder / "charts") / f"{plain}.png"
-        outcome_figure(made, name, heads).savefig(path)
+        stem = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
+        path = writable(folder / "charts") / f"{stem}.png"
+        outcome_figure(result, name, heads).savefig(path)
         paths.append(path)
     return paths
 
 
-def values_of(text: str, option: str = "--set", wanted: str = WANTED) -> tuple[str, list]:
-    """`KEY=a,b,c` as the key and its values."""
+def values_of(text: str, option: str = "--set", expected: str = WANTED) -> tuple[str, list]:
+    """Parse `KEY=a,b,c` into the key and its values. Raises FvsolveError for any other text."""
     key, equals, listed = text.partition("=")
     if not (equals and key.strip() and listed.strip()):
-        raise FvsolveError(f"{option} {text}: wanted {wanted}")
-    return key.strip(), [value_of(one) for one in split(listed)]
+        raise FvsolveError(f"{option} {text}: expected {expected}")
+    return key.strip(), [value_of(entry) for entry in split(listed)]
 
 
 def split(text: str) -> list[str]:
-    """The parts between commas that stand in no brackets, braces or quotes."""
+    """Split a text at commas outside of brackets, braces and quotes."""
     parts, depth, quote = [""], 0, ""
     for letter in text:
         if quote:
@@ -115,25 +124,27 @@ def split(text: str) -> list[str]:
     return [part.strip() for part in parts if part.strip()]
 
 
-def _show(made, folder: Path, heads: dict[str, str]) -> None:
+def _show(result, folder: Path, heads: dict[str, str]) -> None:
     from fvsolve.cli import terminal
     from fvsolve.studies.sweep import pasted
 
     console = terminal.console()
-    columns = [*made.keys, "ok", *(name for name in made.columns if name.startswith(("min(", "max(")))]
-    shown = columns[len(made.keys) : len(made.keys) + 1 + SHOWN]
-    first = made.rows[:MOST]
-    rows = [[*(pasted(row[key]) for key in made.keys), *(_text(row.get(name)) for name in shown)] for row in first]
+    columns = [*result.keys, "ok", *(name for name in result.columns if name.startswith(("min(", "max(")))]
+    shown = columns[len(result.keys) : len(result.keys) + 1 + SHOWN]
+    first_rows = result.rows[:MOST]
+    rows = [
+        [*(pasted(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)] for row in first_rows
+    ]
     terminal.table([*heads.values(), *shown], rows, console)
-    for row in first:
-        where = ", ".join(f"{key} = {pasted(row[key])}" for key in made.keys)
+    for row in first_rows:
+        values = ", ".join(f"{key} = {pasted(row[key])}" for key in result.keys)
         if not row["ok"]:
-            terminal.line(console, f"{where}: {row['reason']}", "bold red")
+            terminal.line(console, f"{values}: {row['reason']}", "bold red")
         if row.get("marks"):
-            terminal.line(console, f"{where}: {row['marks']}", "yellow")
-    reused = f", {made.reused} of them found before" if made.reused else ""
-    reused += f", the first {MOST} of them here" if len(made.rows) > MOST else ""
-    terminal.line(console, f"{folder / 'sweep.csv'}: {len(made.rows)} rows{reused}")
+            terminal.line(console, f"{values}: {row['marks']}", "yellow")
+    reused = f", {result.reused} of them reused from an earlier sweep" if result.reused else ""
+    reused += f", the first {MOST} are printed here" if len(result.rows) > MOST else ""
+    terminal.line(console, f"{folder / 'sweep.csv'}: {len(result.rows)} rows{reused}")
 
 
 def _text(value) -> str:

@@ -1,4 +1,4 @@
-"""Lines and tables on the terminal. Knows rich; knows no run."""
+"""Lines and tables on the terminal."""
 
 from __future__ import annotations
 
@@ -6,38 +6,38 @@ import sys
 
 from fvsolve.errors import visible
 
-WIDTH = 160  # of output that goes to no terminal
+WIDTH = 160  # line width of output that does not go to a terminal
 
 
 def console():
-    """Where things are printed: plain and wide where no terminal listens."""
+    """Console for standard output; wide and without color if the output is not a terminal."""
     from rich.console import Console
 
     return Console() if sys.stdout.isatty() else Console(width=WIDTH, no_color=True)
 
 
-def line(where, text: str, style: str | None = None) -> None:
-    """One line, as it is: nothing in it is markup or steers the terminal."""
-    where.print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
+def line(output, text: str, style: str | None = None) -> None:
+    """Print a line literally: markup and control characters have no effect."""
+    output.print(visible(text), style=style, highlight=False, markup=False, soft_wrap=True)
 
 
-def table(headers: list[str], rows: list[list[str]], where=None) -> None:
-    """Rows under their headers; columns of numbers stand to the right."""
+def table(headers: list[str], rows: list[list[str]], output=None) -> None:
+    """Print a table of rows under their headers; columns of numbers are right-aligned."""
     from rich.table import Table
     from rich.text import Text
 
-    made = Table(box=None, pad_edge=False, header_style="bold", show_edge=False)
+    grid = Table(box=None, pad_edge=False, header_style="bold", show_edge=False)
     for i, header in enumerate(headers):
         text = all(not _numeric(row[i]) for row in rows)
-        made.add_column(Text(visible(header)), justify="left" if text else "right", overflow="fold")
+        grid.add_column(Text(visible(header)), justify="left" if text else "right", overflow="fold")
     for row in rows:
-        made.add_row(*(Text(visible(cell)) for cell in row))
-    (where or console()).print(made)
+        grid.add_row(*(Text(visible(cell)) for cell in row))
+    (output or console()).print(grid)
 
 
-def sheet(made, where=None) -> None:
-    """A sheet in its words."""
-    table(*made.words(), where)
+def sheet(table_data, output=None) -> None:
+    """Print a `ResultTable`, values formatted as its columns state."""
+    table(*table_data.words(), output)
 
 
 def _numeric(text: str) -> bool:

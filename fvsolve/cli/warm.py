@@ -1,4 +1,4 @@
-"""`fvsolve warm`. Knows the terminal; leaves the compiling to `run`."""
+"""`fvsolve warm`: compilation ahead of runs."""
 
 from __future__ import annotations
 
@@ -12,31 +12,36 @@ from fvsolve.cli.app import Json, app, print_json
 
 @app.command()
 def warm(
-    cases: Annotated[list[str], typer.Option("--for", metavar="CASE", help="only what these cases ask for")] = [],  # noqa: B006
+    cases: Annotated[
+        list[str], typer.Option("--for", metavar="CASE", help="case to compile for (default all shipped cases)")
+    ] = [],  # noqa: B006
     jobs: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="processes (default: as many as processors)")
+        int | None, typer.Option(metavar="N", min=1, help="number of processes (default number of processors)")
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Compile for this machine what all shipped cases ask for, so that no run waits for it."""
+    """Compile the functions that the shipped cases need on this machine, so that later runs start at once."""
     from fvsolve.case import load, shipped
     from fvsolve.cli import terminal
     from fvsolve.cli.progress import counted
     from fvsolve.run.warming import warm as warmed
 
     paths = [shipped.find(name) for name in cases or shipped.names()]
-    for path in paths:  # all that is wrong with one is said before anything is compiled
+    for path in paths:  # report faults of a case before compiling
         load(path)
     with counted("compiling") as progress:
-        found = warmed(paths, not cases, jobs, progress)
+        result = warmed(paths, not cases, jobs, progress)
     if as_json:
-        print_json(asdict(found))
+        print_json(asdict(result))
         return
-    where = terminal.console()
-    said = (
-        f"{found.compiled} functions compiled in {found.seconds:.0f} s"
-        if found.compiled
-        else "nothing was left to compile"
+    console = terminal.console()
+    text = (
+        f"{result.compiled} functions compiled in {result.seconds:.0f} s"
+        if result.compiled
+        else "all functions were compiled already"
     )
-    terminal.line(where, f"{said}; {found.functions} are kept, {found.bytes / 1e6:.1f} MB, for {found.target}")
-    terminal.line(where, f"{found.directory}")
+    terminal.line(
+        console,
+        f"{text}; the cache holds {result.functions} functions, {result.bytes / 1e6:.1f} MB, for {result.target}",
+    )
+    terminal.line(console, f"{result.directory}")

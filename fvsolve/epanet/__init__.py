@@ -1,4 +1,4 @@
-"""EPANET files as cases. Knows both sides' words; runs nothing of fvsolve."""
+"""Import of EPANET files as cases."""
 
 from fvsolve.epanet.importing import Imported, import_network
 

@@ -1,4 +1,4 @@
-"""The only door to WNTR: an EPANET file as WNTR's network, and EPANET's own state at an hour. Knows no case."""
+"""EPANET files read by WNTR, and EPANET's own solution at an hour."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ from typing import Any
 
 from fvsolve.errors import FvsolveError
 
-ACCURACY, TRIALS = 1e-5, 200  # of EPANET's own iteration; 1e-5 is the least it takes
-SHUT = (0, 1, 2)  # statuses of links: a pump beyond its head, shut by a full or empty tank, shut by a control
-LISTING = 60.0  # seconds that EPANET gets to list the faults of a file
+ACCURACY, TRIALS = 1e-5, 200  # of EPANET's iteration; EPANET accepts no accuracy below 1e-5
+SHUT = (0, 1, 2)  # status codes of closed links: pump beyond its head, full or empty tank, closed by a control
+LISTING = 60.0  # time limit for EPANET to list the faults of a file [s]
 
 
 @dataclass(frozen=True)
 class Hour:
-    """EPANET's answer at one time of its own run; name -> value, SI.
+    """EPANET's solution at a time of its own run; name -> value, SI.
 
-    head [m], demand and flow [m3/s]; status: EPANET's code, see SHUT; setting: relative speed of pumps; factor: Darcy's
+    head [m], demand and flow [m3/s]
+    status : EPANET's code, see `SHUT`; setting : of a pump its relative speed; factor : Darcy friction factor
     """
 
     seconds: float
@@ -36,7 +37,7 @@ class Hour:
 
 
 def wntr() -> Any:
-    """The package; FvsolveError that says what to install where it is not."""
+    """Import WNTR. Raises FvsolveError with an installation hint if it is missing."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -46,35 +47,35 @@ def wntr() -> Any:
             f"EPANET files are read by WNTR, which is not installed ({error}); "
             'try `pip install "fvsolve[epanet]"`, or `pip install wntr six`'
         ) from None
-    logging.getLogger("wntr").setLevel(logging.CRITICAL)  # what it warns of is said by us, or is no fault
+    logging.getLogger("wntr").setLevel(logging.CRITICAL)  # its warnings repeat our messages, or are no faults
     return wntr
 
 
 def read_network(path: Path) -> Any:
-    """WNTR's network of an EPANET file.
+    """Read an EPANET file as a network of WNTR.
 
-    Raises FvsolveError with what EPANET or WNTR finds wrong with it, its line where they say one.
+    Raises FvsolveError with the faults that EPANET or WNTR finds, with their lines if reported.
     """
     package = wntr()
     if not path.is_file():
-        raise FvsolveError(f"{path}: no such file; wanted an EPANET network (.inp)")
-    found = None
+        raise FvsolveError(f"{path}: no such file; expected an EPANET network (.inp)")
+    network = None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found, faults = package.network.WaterNetworkModel(str(path)), []
-    except Exception as error:  # WNTR raises whatever its parser stumbles over
+            network, faults = package.network.WaterNetworkModel(str(path)), []
+    except Exception as error:  # WNTR raises any exception of its parser
         faults = [_innermost(error)]
-    listed = _listed(package, path)  # of what WNTR lets pass too, for example a pattern that is nowhere
+    listed = _listed(package, path)  # also faults that WNTR ignores, for example an undefined pattern
     if faults or listed:
-        raise FvsolveError(_said(path, listed or faults, "EPANET" if listed else "WNTR, which reads it for us,"))
-    return found
+        raise FvsolveError(_said(path, listed or faults, "EPANET" if listed else "WNTR"))
+    return network
 
 
 def state_at(network: Any, hour: float) -> Hour:
-    """EPANET's own run of a network up to an hour, with all its controls and rules.
+    """Run EPANET on a network up to an hour, with all controls and rules; return its state at that hour.
 
-    Raises FvsolveError where EPANET refuses the network or finds no solution.
+    Raises FvsolveError if EPANET rejects the network or finds no solution.
     """
     package, seconds = wntr(), round(3600.0 * hour)
     options = network.options
@@ -86,47 +87,49 @@ def state_at(network: Any, hour: float) -> Hour:
         warnings.simplefilter("ignore")
         simulator = package.sim.EpanetSimulator(network, reader=package.epanet.io.BinFile(convert_status=False))
         try:
-            found = simulator.run_sim(file_prefix=str(Path(folder) / "net"), convergence_error=True)
+            results = simulator.run_sim(file_prefix=str(Path(folder) / "net"), convergence_error=True)
         except Exception as error:
             report = Path(folder) / "net.rpt"
-            said = _complaints(report) or [_innermost(error)]
-            raise FvsolveError(_said(Path(network.name), said, "EPANET")) from None
-    if seconds not in found.node["head"].index:
-        raise FvsolveError(f"{network.name}: EPANET's run holds no hour {hour:g}")
+            messages = _complaints(report) or [_innermost(error)]
+            raise FvsolveError(_said(Path(network.name), messages, "EPANET")) from None
+    if seconds not in results.node["head"].index:
+        raise FvsolveError(f"{network.name}: EPANET's run has no results at hour {hour:g}")
     rows = [
-        found.node["head"],
-        found.node["demand"],
-        *(found.link[key] for key in ("flowrate", "status", "setting", "friction_factor")),
+        results.node["head"],
+        results.node["demand"],
+        *(results.link[key] for key in ("flowrate", "status", "setting", "friction_factor")),
     ]
     return Hour(float(seconds), *({str(k): v for k, v in row.loc[seconds].items()} for row in rows))
 
 
 def _innermost(error: BaseException) -> str:
-    """The fault at the bottom of a chain of exceptions, as a person reads it."""
+    """Readable text of the first cause in a chain of exceptions."""
     chain = [error]
     while chain[-1].__cause__ is not None:
         chain.append(chain[-1].__cause__)
     if isinstance(chain[-1], UnicodeDecodeError):
-        found = chain[-1]
-        return f"byte {found.object[found.start]:#x} is not UTF-8 text, as EPANET on Windows writes; save it as UTF-8"
-    coded = [one for one in chain if "(Error " in str(one)]
-    said = str(coded[-1] if coded else chain[-1]).replace("%s", "").replace(" ()", "")
-    if said[:1] == said[-1:] and said[:1] in "\"'":
-        said = said[1:-1]
+        cause = chain[-1]
+        return (
+            f"byte {cause.object[cause.start]:#x} is not UTF-8 text, as from EPANET on Windows; save the file as UTF-8"
+        )
+    coded = [link for link in chain if "(Error " in str(link)]
+    text = str(coded[-1] if coded else chain[-1]).replace("%s", "").replace(" ()", "")
+    if text[:1] == text[-1:] and text[:1] in "\"'":
+        text = text[1:-1]
     if not coded and isinstance(chain[-1], KeyError):
-        said = f"WNTR does not know {said!r}"
-    return re.sub(r"\s+", " ", re.sub(r"^\(Error \d+\) ", "", said)).strip()
+        text = f"unknown to WNTR: {text!r}"
+    return re.sub(r"\s+", " ", re.sub(r"^\(Error \d+\) ", "", text)).strip()
 
 
-def _said(path: Path, faults: list[str], who: str) -> str:
-    """One message with every fault once."""
+def _said(path: Path, faults: list[str], source: str) -> str:
+    """Message that lists every fault once; source : program that reported the faults."""
     faults = list(dict.fromkeys(faults))
-    head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, as {who} says"
+    head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, reported by {source}"
     return "\n".join([head, *(f"  {fault}" for fault in faults)])
 
 
 def _listed(package: Any, path: Path) -> list[str]:
-    """All faults that EPANET itself lists of a file; by a second process, since broken files can break its library."""
+    """Faults that EPANET itself lists; it runs in a second process, since a faulty file can crash its library."""
     library = package.epanet.toolkit.ENepanet(version=2.2).ENlib._name
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "net.rpt"
@@ -147,8 +150,8 @@ engine.ENclose()
 
 
 def _complaints(report: Path) -> list[str]:
-    """`undefined curve c9 in [PUMPS] section: q r b HEAD c9` of every error in EPANET's report but the closing one."""
+    """Texts such as `undefined curve c9 in [PUMPS] section: q r b HEAD c9` of the errors in EPANET's report."""
     text = report.read_text(encoding="utf-8", errors="replace") if report.is_file() else ""
-    found = re.findall(r"^ *Error \d+: (.*(?:\n +\S.*)?)", text, re.MULTILINE)
-    said = [re.sub(r"\s+", " ", one).strip() for one in found]
-    return [one for one in said if not one.startswith("one or more errors")]
+    matches = re.findall(r"^ *Error \d+: (.*(?:\n +\S.*)?)", text, re.MULTILINE)
+    messages = [re.sub(r"\s+", " ", item).strip() for item in matches]
+    return [item for item in messages if not item.startswith("one or more errors")]

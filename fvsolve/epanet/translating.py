@@ -1,4 +1,4 @@
-"""A network of EPANET's, part by part, as the parts of a case. Knows what stands for what; words are elsewhere."""
+"""Translation of an EPANET network into parts of a case."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from fvsolve.epanet import words
 from fvsolve.epanet.names import FreeNames
 from fvsolve.epanet.reading import SHUT, Hour
 
-STALLED = 1e-7  # flow below which EPANET's pumps of constant power have stuck [m3/s]
-LEAST_REQUIRED = 0.1  # pressure at which a demand is met whole, at least, in metres or psi as the file counts
-STEEPEST = 0.99  # climb per length where the file has more than 1
+STALLED = 1e-7  # flow below which EPANET's pumps of constant power have stalled [m3/s]
+LEAST_REQUIRED = 0.1  # smallest required pressure of a full demand, in metres or psi as in the file
+STEEPEST = 0.99  # rise per length given to pipes for which the file has more than 1
 SWITCHED_OFF, ACTIVE = 2, 4  # EPANET's codes of a link
 PSI_OF_METRE = 0.4333 / 0.3048
 US_UNITS = ("CFS", "GPM", "MGD", "IMGD", "AFD")
-REGULATES = 2  # WNTR's code of a valve that nobody holds open or shut
+REGULATES = 2  # WNTR's code of a valve that is neither fixed open nor fixed closed
 
 
 class Translation:
-    """Nodes and links of a case, and notes on what is not as EPANET has it.
+    """Nodes and links of a case, and notes on differences from EPANET.
 
-    nodes, links : name -> what the case file says; lengths : EPANET's name -> of a pipe; notes : (what, EPANET's names)
+    nodes, links : name -> table of the case file
+    lengths : EPANET's name of a pipe -> its length in the case [m]
+    notes : (text, EPANET's names)
     """
 
     def __init__(self, network: Any, hour: Hour, wave_speed: float, shortest: float) -> None:
@@ -33,7 +35,7 @@ class Translation:
         self.node_names, self.link_names = FreeNames(), FreeNames()
         hydraulic = network.options.hydraulic
         self.formula, self.multiplier = hydraulic.headloss, hydraulic.demand_multiplier
-        self.gravity = hydraulic.specific_gravity  # a pressure in metres is one of water, a head one of the fluid
+        self.gravity = hydraulic.specific_gravity  # pressures in metres refer to water, heads to the fluid
         self.follows = hydraulic.demand_model in ("PDA", "PDD")
         self.clock = hour.seconds + network.options.time.pattern_start
         self.drawn = any(any(node.coordinates) for _, node in network.nodes())
@@ -49,65 +51,67 @@ class Translation:
             for name, ours in names.changed().items():
                 self.note("has another name here", f"{name} is {ours}")
 
-    def note(self, what: str, name: str) -> None:
-        names = self.noted.setdefault(what, [])
+    def note(self, text: str, name: str) -> None:
+        names = self.noted.setdefault(text, [])
         if name not in names:
             names.append(name)
 
     @property
     def notes(self) -> list[tuple[str, list[str]]]:
-        """What is not as EPANET has it, and the names it is true of."""
+        """Differences from EPANET : list of (text, EPANET's names)."""
         return list(self.noted.items())
 
     # nodes ------------------------------------------------------------------------------------------------
 
     def elevations(self) -> dict[str, float]:
-        """Elevations [m] of junctions and tanks, none of which a pipe is too short to reach.
+        """Elevations of junctions and tanks [m], moved where a pipe is shorter than its rise.
 
-        EPANET accepts a pipe of 6 m that climbs 200 m. Heads and flows of a network do not depend on them, but where
-        what is drawn follows the pressure: there the pipe grows, see `length`.
+        EPANET accepts a pipe of 6 m that rises by 200 m. Heads and flows of a network do not depend on elevations,
+        except where a demand depends on pressure: there the pipe is lengthened instead, see `length`.
         """
-        found = {name: node.elevation for name, node in self.network.nodes() if node.node_type != "Reservoir"}
-        pipes = [pipe for _, pipe in self.network.pipes() if {pipe.start_node_name, pipe.end_node_name} <= found.keys()]
+        result = {name: node.elevation for name, node in self.network.nodes() if node.node_type != "Reservoir"}
+        pipes = [
+            pipe for _, pipe in self.network.pipes() if {pipe.start_node_name, pipe.end_node_name} <= result.keys()
+        ]
         moved = True
         while moved:
             moved = False
             for pipe in pipes:
-                low, high = sorted((pipe.start_node_name, pipe.end_node_name), key=found.get)
-                if found[high] - found[low] <= pipe.length:
+                low, high = sorted((pipe.start_node_name, pipe.end_node_name), key=result.get)
+                if result[high] - result[low] <= pipe.length:
                     continue
                 if self.feels(low) or self.feels(high):
                     continue
                 if self.network.get_node(low).node_type == "Junction":
-                    name, found[low] = low, found[high] - STEEPEST * pipe.length
+                    name, result[low] = low, result[high] - STEEPEST * pipe.length
                 else:
-                    name, found[high] = high, found[low] + STEEPEST * pipe.length
+                    name, result[high] = high, result[low] + STEEPEST * pipe.length
                 moved = True
-                self.note("elevation moved, no pipe can be shorter than its climb; heads and flows stay", name)
-        return found
+                self.note("elevation changed, since a pipe cannot be shorter than its rise; heads and flows stay", name)
+        return result
 
     def feels(self, name: str) -> bool:
-        """Whether what leaves a node depends on its pressure, and so on its elevation."""
+        """True if the outflow of a node depends on its pressure, and so on its elevation."""
         node = self.network.get_node(name)
         return node.node_type == "Junction" and bool(node.emitter_coefficient or (self.follows and self.wanted(node)))
 
     def wanted(self, node: Any) -> float:
-        """Demand of a junction at the hour, by its patterns [m3/s]."""
+        """Demand of a junction at the hour, from its patterns [m3/s]."""
         return node.demand_timeseries_list.at(self.clock, multiplier=self.multiplier)
 
     def position(self, node: Any) -> Any:
-        """Where a node is drawn; None in a file without coordinates, of which WNTR puts every node at the origin."""
+        """Coordinates of a node; None if the file has none (WNTR then puts every node at the origin)."""
         return node.coordinates if self.drawn else None
 
     def junction(self, name: str, node: Any) -> words.Part:
         demand = self.wanted(node)
-        made = words.junction(self.elevation[name], demand, self.position(node))
+        part = words.junction(self.elevation[name], demand, self.position(node))
         if self.follows and demand > 0.0:
             hydraulic = self.network.options.hydraulic
             least = LEAST_REQUIRED * (1.0 / PSI_OF_METRE if hydraulic.inpfile_units in US_UNITS else 1.0)
             required = max(hydraulic.required_pressure, least)
-            made |= words.follows_pressure(hydraulic.minimum_pressure, required, hydraulic.pressure_exponent)
-        return made
+            part |= words.follows_pressure(hydraulic.minimum_pressure, required, hydraulic.pressure_exponent)
+        return part
 
     def reservoir(self, name: str, node: Any) -> words.Part:
         return words.reservoir(node.head_timeseries.at(self.clock), self.position(node))
@@ -117,8 +121,8 @@ class Translation:
         area = math.pi / 4.0 * node.diameter**2
         if node.vol_curve is not None:
             area = curve_slope(node.vol_curve.points, level)
-            self.note("volume curve: taken as the area at its level", name)
-        level = min(round(level, 6), node.max_level)  # EPANET's own may be above it by rounding
+            self.note("volume curve: replaced by the area at its level", name)
+        level = min(round(level, 6), node.max_level)  # EPANET's level may exceed it by rounding
         return words.tank(self.elevation[name], area, level, node.max_level, self.position(node))
 
     # links ------------------------------------------------------------------------------------------------
@@ -127,7 +131,7 @@ class Translation:
         return tuple(self.node_names.given[end] for end in (link.start_node_name, link.end_node_name))
 
     def between(self, name: str, link: Any) -> str:
-        """A new junction without demand next to the end of a pipe."""
+        """Add a junction without demand before the end of a pipe; return its name."""
         end = self.network.get_node(link.end_node_name)
         start = link.start_node_name if link.end_node_name not in self.elevation else link.end_node_name
         place = self.node_names.new(f"{self.link_names.given[name]}-end")
@@ -148,24 +152,26 @@ class Translation:
                 if link.check_valve
                 else words.valve(last, link.diameter, 0.0, opening=0.0)
             )
-            what = "check valve" if link.check_valve else "shut at this hour"
-            self.note(f"{what}: a pipe and {'a check valve' if link.check_valve else 'a shut valve'} at its end", name)
+            reason = "check valve" if link.check_valve else "shut at this hour"
+            self.note(
+                f"{reason}: a pipe and {'a check valve' if link.check_valve else 'a shut valve'} at its end", name
+            )
             end = place
         law = words.friction(self.formula, link.roughness)
         length = self.lengths[name] = self.length(link)
         if length > link.length:
             law = self.spread(name, link, length)
-            self.note(f"{length:.4g} m long here, with the loss of its own length", name)
+            self.note(f"lengthened to {length:.4g} m, with the loss of its own length", name)
         return words.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
 
     def length(self, link: Any) -> float:
-        """No less than the shortest that was asked for, nor than a climb that stays [m]."""
+        """Length of a pipe in the case [m]: at least `shortest`, and at least its rise / `STEEPEST`."""
         low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start_node_name, link.end_node_name))
         inside = {link.start_node_name, link.end_node_name} <= self.elevation.keys()
         return max(link.length, self.shortest, (high - low) / STEEPEST if inside and high - low > link.length else 0.0)
 
     def spread(self, name: str, link: Any, length: float) -> words.Part:
-        """Friction of a pipe made longer that takes what the pipe took."""
+        """Friction of a lengthened pipe that gives the loss of its original length."""
         ratio = link.length / length
         if self.formula == "H-W":
             return words.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852))
@@ -178,7 +184,7 @@ class Translation:
             self.note("pump is off at this hour: a shut valve", name)
             return words.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
         if link.pump_type == "POWER" and abs(self.hour.flow[name]) < STALLED:
-            self.note("pump of constant power stands at no flow in EPANET, which no power allows: a shut valve", name)
+            self.note("pump of constant power has zero flow in EPANET, which contradicts its power: a shut valve", name)
             return words.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
         given = link.pump_type == "POWER"
         law = words.power(self.gravity * link.power) if given else words.curve(link.get_pump_curve().points)
@@ -191,7 +197,7 @@ class Translation:
             self.note(f"{kind} set above every source: {'an open' if kind == 'PRV' else 'a shut'} valve", name)
             return words.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
         if kind in words.REGULATING and link.initial_status == REGULATES:
-            self.note(f"{kind}: EPANET knows no time constant, here {words.TIME_CONSTANT}", name)
+            self.note(f"{kind}: EPANET has no time constant, here {words.TIME_CONSTANT}", name)
             return words.regulating(kind, ends, diameter, self.setting(name, link), link.minor_loss)
         if status in SHUT:
             self.note(f"{kind} is shut at this hour: a shut valve", name)
@@ -201,9 +207,11 @@ class Translation:
         if kind == "TCV" and status == ACTIVE:
             return words.valve(ends, diameter, self.hour.setting[name])
         if kind in ("PBV", "GPV") and flow * drop < 0.0:
-            self.note(f"{kind} raises heads along its flow, as no valve does: an open valve, and heads differ", name)
+            self.note(
+                f"{kind} raises the head along its flow, which a valve cannot do: an open valve, and heads differ", name
+            )
         elif kind in ("PBV", "GPV") and flow and drop:
-            self.note(f"{kind}: a valve that stays as it stands at this hour", name)
+            self.note(f"{kind}: a valve with the constant loss coefficient of this hour", name)
             return words.valve(ends, diameter, words.loss_of(abs(drop), flow, diameter))
         return words.valve(ends, diameter, link.minor_loss)
 
@@ -214,31 +222,31 @@ class Translation:
         return max((pipe.diameter for pipe in near if pipe.link_type == "Pipe"), default=otherwise)
 
     def size(self, link: Any) -> float:
-        """Diameter of a valve [m]; where it has no loss that could mean it, no more than a pipe next to it has."""
+        """Diameter of a valve [m]; without a loss that refers to it, at most that of the widest pipe next to it."""
         widest = self.bore(link, link.diameter)
         if link.minor_loss or link.valve_type in ("TCV", "GPV") or widest >= link.diameter:
             return link.diameter
-        self.note("valve wider than every pipe next to it: as wide as the widest", link.name)
+        self.note("valve wider than every pipe next to it: diameter of the widest pipe", link.name)
         return widest
 
     def out_of_reach(self, name: str, link: Any) -> bool:
-        """Whether no reservoir and no tank has the head that a PRV or PSV is to hold, and no pump lifts any water."""
-        network, held = self.network, link.end_node_name if link.valve_type == "PRV" else link.start_node_name
+        """True if the head set for a PRV or PSV exceeds that of all reservoirs and tanks, and there is no pump."""
+        network, controlled = self.network, link.end_node_name if link.valve_type == "PRV" else link.start_node_name
         sources = [*network.reservoir_name_list, *network.tank_name_list]
-        most = max(self.hour.head[source] for source in sources)
-        head = self.hour.setting[name] / self.gravity + network.get_node(held).elevation
-        return not network.num_pumps and head > most
+        greatest = max(self.hour.head[source] for source in sources)
+        head = self.hour.setting[name] / self.gravity + network.get_node(controlled).elevation
+        return not network.num_pumps and head > greatest
 
     def setting(self, name: str, link: Any) -> float:
-        """What a valve holds: a head of water above its end [m] or a flow [m3/s]; a moved elevation moves it along."""
-        held = link.end_node_name if link.valve_type == "PRV" else link.start_node_name
-        if link.valve_type == "FCV" or held not in self.elevation:
+        """Set point of a valve: head of water above its end [m], corrected for a moved elevation, or flow [m3/s]."""
+        controlled = link.end_node_name if link.valve_type == "PRV" else link.start_node_name
+        if link.valve_type == "FCV" or controlled not in self.elevation:
             return self.hour.setting[name]
-        moved = self.network.get_node(held).elevation - self.elevation[held]
+        moved = self.network.get_node(controlled).elevation - self.elevation[controlled]
         return self.hour.setting[name] + self.gravity * moved
 
     def emitters(self) -> None:
-        """Emitters as leaks. WNTR turns coefficients per psi into ones per metre as if every exponent were a half."""
+        """Add emitters as leaks. WNTR converts coefficients from psi to metres with exponent 0.5; corrected here."""
         hydraulic = self.network.options.hydraulic
         exponent = hydraulic.emitter_exponent
         unit = PSI_OF_METRE ** (exponent - 0.5) if hydraulic.inpfile_units in US_UNITS else 1.0
@@ -250,12 +258,12 @@ class Translation:
 
     def options(self, hydraulic: Any) -> None:
         if self.formula == "D-W":
-            self.note("Darcy factor by Colebrook, EPANET's by Swamee and Jain: within 3 % of each other", "D-W")
+            self.note("Darcy factor by Colebrook, in EPANET by Swamee and Jain: they differ by less than 3 %", "D-W")
 
 
 def curve_slope(points: list[tuple[float, float]], at: float) -> float:
-    """Slope of a curve that is linear between its points, at one place or next to it."""
+    """Slope of a piecewise linear curve at a place, or of the nearest piece."""
     for (x0, y0), (x1, y1) in zip(points[:-1], points[1:], strict=True):
         if at < x1 or (x1, y1) == tuple(points[-1]):
             return (y1 - y0) / (x1 - x0)
-    raise ValueError("a curve wants two points at least")
+    raise ValueError("the curve has fewer than two points; expected at least two")

@@ -1,4 +1,4 @@
-"""The words of a case for what EPANET knows, all in this one place. Knows numbers and units; knows no network."""
+"""Tables of a case file for the parts of EPANET."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from typing import Any
 
 Part = dict[str, Any]
 
-NO_LOSS = 0.01  # loss coefficient of an open valve that EPANET gives none: a case wants one that is positive
-TIME_CONSTANT = "5 s"  # of valves that regulate: EPANET knows none
+NO_LOSS = 0.01  # loss coefficient of an open valve without loss in EPANET: a case needs a positive one
+TIME_CONSTANT = "5 s"  # of regulating valves: EPANET has none
 REGULATING = {"PRV": "pressure-reducing", "PSV": "pressure-sustaining", "FCV": "flow-control"}
-DENSITY = 999.563  # EPANET's weight of water, 550 ft lbf/s / 8.814 per hp, over gravity [kg/m3]
+DENSITY = 999.563  # EPANET's density of water: 550 ft lbf/s / 8.814 per hp / gravity [kg/m3]
 GRAVITY = 9.80665
 
 
 def quantity(value: float, unit: str) -> str:
-    """A number of ten digits and its unit: `304.8 mm`."""
+    """Text of a value [SI] in a unit, with ten digits: `304.8 mm`."""
     factor = {"m": 1.0, "mm": 1e3, "l/s": 1e3, "m/s": 1.0, "m2": 1.0}[unit]
     return f"{value * factor:.10g} {unit}".replace("-0 ", "0 ")
 
 
 def number(value: float) -> float | int:
-    """A number of ten digits, whole where it is."""
+    """Number rounded to ten digits; an integer if it is whole."""
     short = float(f"{value:.10g}")
     return int(short) if short.is_integer() else short
 
 
 def junction(elevation: float, demand: float, position: Any) -> Part:
-    """A place with a demand [m3/s]."""
+    """Junction with a demand [m3/s]."""
     part = {"type": "junction", "elevation": quantity(elevation, "m")}
     if demand:
         part["demand"] = quantity(demand, "l/s")
@@ -35,7 +35,7 @@ def junction(elevation: float, demand: float, position: Any) -> Part:
 
 
 def follows_pressure(minimum: float, required: float, exponent: float) -> Part:
-    """Keys of a demand that grows from none at one pressure to all at another, heads of water [m]."""
+    """Keys of a demand that grows from zero at the `minimum` to full at the `required` pressure, heads of water [m]."""
     part = {"required_pressure": gauge(required)}
     if minimum:
         part["minimum_pressure"] = gauge(minimum)
@@ -43,24 +43,24 @@ def follows_pressure(minimum: float, required: float, exponent: float) -> Part:
 
 
 def gauge(head: float) -> str:
-    """Pressure above ambient of a head of water [m]."""
+    """Text of the gauge pressure of a head of water [m]."""
     return f"{DENSITY * GRAVITY * head * 1e-5:.10g} barg"
 
 
 def reservoir(head: float, position: Any) -> Part:
-    """A place of given head [m]."""
+    """Reservoir of given head [m]."""
     return {"type": "reservoir", "head": quantity(head, "m")} | _position(position)
 
 
 def tank(elevation: float, area: float, level: float, height: float, position: Any) -> Part:
-    """A vessel by its area [m2], its level and greatest level above its bottom [m]."""
+    """Tank with its area [m2], level and largest level above its bottom [m]."""
     part = {"type": "tank", "elevation": quantity(elevation, "m"), "area": quantity(area, "m2")}
     part |= {"level": quantity(level, "m"), "height": quantity(height, "m")}
     return part | _position(position)
 
 
 def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, minor: float, speed: float) -> Part:
-    """A pipe by its length [m], diameter [m], minor loss and wave speed [m/s]."""
+    """Pipe with its length [m], diameter [m], minor loss and wave speed [m/s]."""
     part = _link("pipe", ends) | {"length": quantity(length, "m"), "diameter": quantity(diameter, "mm")}
     part |= {"friction": friction}
     if minor:
@@ -69,7 +69,7 @@ def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, 
 
 
 def friction(formula: str, roughness: float) -> Part:
-    """Friction by EPANET's formula; roughness: C [-], height [m], or n [s/m^(1/3)]."""
+    """Friction by EPANET's formula; roughness : C [-], height [m], or n [s/m^(1/3)]."""
     if formula == "H-W":
         return {"model": "hazen-williams", "coefficient": number(roughness)}
     if formula == "C-M":
@@ -78,40 +78,40 @@ def friction(formula: str, roughness: float) -> Part:
 
 
 def darcy(factor: float) -> Part:
-    """Friction by Darcy's factor."""
+    """Friction by the Darcy factor."""
     return {"model": "steady", "factor": number(factor)}
 
 
 def valve(ends: tuple[str, str], diameter: float, loss: float, opening: float = 1.0) -> Part:
-    """A valve by its loss coefficient on the velocity in its diameter."""
+    """Valve with its loss coefficient on the velocity in its diameter."""
     part = _link("valve", ends) | {"diameter": quantity(diameter, "mm")}
     part["loss_coefficient"] = number(loss or NO_LOSS)
     return part if opening == 1.0 else part | {"opening": opening}
 
 
 def pump(ends: tuple[str, str], law: Part, speed: float) -> Part:
-    """A pump by its law at full speed; none of EPANET's lets flow back."""
+    """Pump with its law at full speed, and a check valve: EPANET's pumps have no reverse flow."""
     return _link("pump", ends) | law | {"speed": number(speed), "check_valve": True}
 
 
 def curve(points: list[tuple[float, float]]) -> Part:
-    """A pump's law by points of flow [m3/s] and head [m]; case and EPANET read one, three and more alike."""
+    """Pump curve by points of flow [m3/s] and head [m]; case and EPANET interpret the points equally."""
     flow, head = zip(*points, strict=True)
     return {"curve": {"flow": [quantity(q, "l/s") for q in flow], "head": [quantity(h, "m") for h in head]}}
 
 
 def power(watts: float) -> Part:
-    """A pump's law by a constant power [W]."""
+    """Pump law of constant power [W]."""
     return {"power": f"{watts * 1e-3:.10g} kW"}
 
 
 def check_valve(ends: tuple[str, str], diameter: float) -> Part:
-    """What lets nothing back."""
+    """Check valve."""
     return _link("check-valve", ends) | {"diameter": quantity(diameter, "mm"), "loss_coefficient": NO_LOSS}
 
 
 def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float) -> Part:
-    """A valve that holds a head of water above its end ("PRV", "PSV") [m] or a flow ("FCV") [m3/s]."""
+    """Valve that controls a head of water above its end ("PRV", "PSV") [m] or a flow ("FCV") [m3/s]."""
     part = _link(REGULATING[kind], ends)
     if kind == "FCV":
         part["set_flow"] = quantity(setting, "l/s")
@@ -122,13 +122,13 @@ def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float
 
 
 def leak(place: str, coefficient: float, exponent: float) -> Part:
-    """An emitter, flow [m3/s] = coefficient times a head of water [m] to the exponent; a case counts in Pa."""
+    """Leak for an emitter: flow [m3/s] = coefficient * (head of water [m])^exponent, converted to pressure in Pa."""
     per_pascal = coefficient / (DENSITY * GRAVITY) ** exponent
     return {"type": "leak", "from": place, "coefficient": number(per_pascal), "exponent": number(exponent)}
 
 
 def loss_of(drop: float, flow: float, diameter: float) -> float:
-    """Loss coefficient on the velocity in a diameter that takes a head [m] at a flow [m3/s]."""
+    """Loss coefficient on the velocity in a diameter for a head loss [m] at a flow [m3/s]."""
     velocity = flow / (math.pi / 4.0 * diameter**2)
     return 2.0 * GRAVITY * drop / velocity**2
 

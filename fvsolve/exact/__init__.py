@@ -1,4 +1,4 @@
-"""Exact solutions that a case may name under `[exact]`. Knows closed forms; knows no grid and no model."""
+"""Exact solutions that a case may name under `[exact]`."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from fvsolve.exact.solution import ExactStart, Solution, kinds_only, law_holds
 
 __all__ = ["NAMES", "Solution", "Start", "misfits", "solution"]
 
-NAMES = {  # name in the case file -> (module of this room, what it solves)
+NAMES = {  # name in the case file -> (module of this package, description)
     "rays": ("rays", "waves in frictionless pipes between reservoirs, junctions and valves, by ray tracing"),
-    "laminar-line": ("laminar_line", "a laminar pipe from a reservoir to a demand, its velocity profile and all"),
+    "laminar-line": ("laminar_line", "a laminar pipe from a reservoir to a demand, with its velocity profile"),
     "creeping-line": (
         "creeping_line",
-        "a pipe whose wall creeps, from a reservoir to a demand, frictionless or laminar",
+        "a pipe with wall creep from a reservoir to a demand, frictionless or laminar",
     ),
-    "levelling": ("levelling", "a tank or chamber on an orifice to a reservoir, or two on one: a parabola in time"),
+    "levelling": (
+        "levelling",
+        "a tank or chamber joined by an orifice to a reservoir, or to another tank or chamber: a parabola in time",
+    ),
     "column": ("column", "one rigid column between given pressures: tanh in time"),
     "oscillation": ("oscillation", "two open tanks, or a tank and a reservoir, joined by a frictionless rigid column"),
     "spring-mass": ("spring_mass", "one mass on linear springs and dampers under constant force"),
@@ -24,17 +27,17 @@ NAMES = {  # name in the case file -> (module of this room, what it solves)
 
 
 def misfits(case) -> Iterator[tuple[tuple, str]]:
-    """(keys, message) of everything in a case that its named exact solution does not hold for.
+    """(keys, message) of everything in a case that its exact solution does not cover.
 
-    What a solution says of parts it knows is asked only where there are no others.
+    Parts of other types are reported first; only without them the solution checks the keys of its parts.
     """
-    room = _module(case.exact.name)
+    module = _module(case.exact.name)
     yield from law_holds(case)
-    yield from list(kinds_only(case, room.NODES, room.LINKS)) or room.misfits(case)
+    yield from list(kinds_only(case, module.NODES, module.LINKS)) or module.misfits(case)
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """The exact solution that a case names, from the flows and pressures it starts with."""
+    """Exact solution that a case names, from its flows and pressures at the start."""
     return _module(case.exact.name).solution(case, start)
 
 

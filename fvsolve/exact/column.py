@@ -1,7 +1,7 @@
-"""One rigid column between given pressures, a valve in series or none. Knows quadratic losses alone.
+"""Rigid column between given pressures, with or without a valve in series; only quadratic losses.
 
-(L / A) dM/dt = D - K |M| M with constant D and K: tanh, coth, tan or a straight line in time, piece by piece between
-the jumps of the opening.
+(L / A) dM/dt = D - K |M| M with constant D and K: tanh, coth, tan or a straight line in time on each interval between
+jumps of the opening.
 """
 
 from __future__ import annotations
@@ -17,44 +17,44 @@ NODES, LINKS = ("reservoir", "junction"), ("rigid-column", "valve", "orifice")
 
 
 def misfits(case):
-    """What makes a case none of one column between constant pressures."""
+    """Faults of a case that is not a single column between constant pressures."""
     name, columns, valves = case.exact.name, *parts(case)
     yield from only_one(case, columns, "rigid-column")
     yield from only_one(case, valves, "valve") if len(valves) > 1 else ()
     for node, part in case.nodes.items():
         given = part.demand if part.kind == "junction" else part.pressure or part.head
         if not constant_from(given, -math.inf) or (part.kind == "junction" and given.first != 0.0):
-            yield ("nodes", node), f'the exact solution "{name}" wants constant pressures and no demand'
-    held = {node for node, part in case.nodes.items() if part.kind == "reservoir"}
-    held |= {end for _, part in valves if {part.from_, part.to} & held for end in (part.from_, part.to)}
+            yield ("nodes", node), f'the exact solution "{name}" needs constant pressures and no demand'
+    fixed = {node for node, part in case.nodes.items() if part.kind == "reservoir"}
+    fixed |= {end for _, part in valves if {part.from_, part.to} & fixed for end in (part.from_, part.to)}
     for link, part in columns:
-        for end in {part.from_, part.to} - held:
-            yield ("links", link), f'the exact solution "{name}" wants a reservoir at {end}, or a valve to one'
-        if {part.from_, part.to}.isdisjoint(node for node, one in case.nodes.items() if one.kind == "reservoir"):
-            yield ("links", link), f'the exact solution "{name}" wants a reservoir at one end at least'
+        for end in {part.from_, part.to} - fixed:
+            yield ("links", link), f'the exact solution "{name}" needs a reservoir at {end}, or a valve to a reservoir'
+        if {part.from_, part.to}.isdisjoint(node for node, item in case.nodes.items() if item.kind == "reservoir"):
+            yield ("links", link), f'the exact solution "{name}" needs a reservoir at one end or both'
         if part.friction.model not in ("none", "steady", "quasi-steady") or part.friction.roughness is not None:
-            yield ("links", link, "friction"), f'the exact solution "{name}" knows a Darcy factor alone'
+            yield ("links", link, "friction"), f'the exact solution "{name}" supports only a Darcy factor'
     joined = {end for _, part in columns for end in (part.from_, part.to)}
     for link, part in valves:
         if len(joined & {part.from_, part.to}) != 1:
-            yield ("links", link), f'the exact solution "{name}" wants the valve in series with the column'
+            yield ("links", link), f'the exact solution "{name}" needs the valve in series with the column'
         if part.opening.kind not in ("constant", "step") or min(part.opening.value) <= 0.0:
-            message = f'the exact solution "{name}" wants an opening that is constant or jumps, and never shuts'
+            message = f'the exact solution "{name}" needs an opening that is constant or jumps, and is never 0'
             yield ("links", link, "opening"), message
         if part.characteristic != "linear":
-            yield ("links", link, "characteristic"), f'the exact solution "{name}" knows "linear" alone'
+            yield ("links", link, "characteristic"), f'the exact solution "{name}" supports only "linear"'
         if part.laminar_reynolds is not None:
-            yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" knows the turbulent law alone'
+            yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" supports only the turbulent law'
 
 
 def parts(case) -> tuple[list, list]:
-    """(columns, valves) by name and part."""
-    columns = [one for one in case.links.items() if one[1].kind == "rigid-column"]
-    return columns, [one for one in case.links.items() if one[1].kind in ("valve", "orifice")]
+    """(columns, valves) as pairs (name, part)."""
+    columns = [item for item in case.links.items() if item[1].kind == "rigid-column"]
+    return columns, [item for item in case.links.items() if item[1].kind in ("valve", "orifice")]
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Flow and node pressures of a case that `misfits` finds nothing in."""
+    """Flow and node pressures of a case without faults."""
     [(name, column)], valves = parts(case)
     rho, t0 = case.properties.density, case.numerics.start
     area = 0.25 * math.pi * column.diameter**2
@@ -78,39 +78,39 @@ def solution(case, start: ExactStart) -> Solution:
     def mass_flow(t):
         return _by_piece(pieces, t, lambda s, piece: rise(piece[1], drive, piece[2], area / column.length, s))
 
-    def valve_drop(t):  # along the column's direction
+    def valve_drop(t):  # in the direction of the column
         m = mass_flow(t)
         return _by_piece(pieces, t, lambda s, piece: np.full(s.shape, piece[3])) * m * np.abs(m)
 
-    made = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
+    result = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
     if valve is not None:
-        made.flow[valves[0][0]] = lambda t: mass_flow(t) / rho * orientation(column, valve)
+        result.flow[valves[0][0]] = lambda t: mass_flow(t) / rho * orientation(column, valve)
         node = valve.from_ if valve.from_ in ends else valve.to
         sign = 1.0 if node == column.to else -1.0
         base = potential[far(case, node, valve)] - rho * case.gravity * case.elevation(node)
-        made.pressure[node] = lambda t: base + sign * valve_drop(t)
-    return made
+        result.pressure[node] = lambda t: base + sign * valve_drop(t)
+    return result
 
 
 def far(case, end: str, valve) -> str:
-    """The reservoir at an end of the column, or behind the valve there."""
+    """Reservoir at an end of the column, or on the other side of the valve there."""
     if case.nodes[end].kind == "reservoir":
         return end
     return valve.to if valve.from_ == end else valve.from_
 
 
 def orientation(column, valve) -> float:
-    """1 where the valve counts its flow as the column does."""
+    """1 if valve and column have the same flow direction, else -1."""
     return 1.0 if valve.from_ == column.to or valve.to == column.from_ else -1.0
 
 
 def _by_piece(pieces, t, law):
     t = np.asarray(t, dtype=float)
-    found = np.empty(t.shape)
-    which = np.clip(np.searchsorted([piece[0] for piece in pieces], t, side="right") - 1, 0, None)
+    result = np.empty(t.shape)
+    index = np.clip(np.searchsorted([piece[0] for piece in pieces], t, side="right") - 1, 0, None)
     for k, piece in enumerate(pieces):
-        found[which == k] = law(t[which == k] - piece[0], piece)
-    return found
+        result[index == k] = law(t[index == k] - piece[0], piece)
+    return result
 
 
 def rise(m: float, drive: float, k: float, a: float, t: np.ndarray) -> np.ndarray:
@@ -122,7 +122,7 @@ def rise(m: float, drive: float, k: float, a: float, t: np.ndarray) -> np.ndarra
     if drive == 0.0:
         return m / (1.0 + a * k * m * t)
     end, rate = math.sqrt(drive / k), a * math.sqrt(drive * k)
-    if m < 0.0:  # it turns at a finite time
+    if m < 0.0:  # the flow reverses at a finite time
         turn = math.atan(-m / end) / rate
         back = end * np.tan(rate * (np.minimum(t, turn) - turn))
         return np.where(t < turn, back, end * np.tanh(rate * np.maximum(t - turn, 0.0)))

@@ -1,8 +1,9 @@
-"""One pipe whose wall creeps, between a reservoir and a changing demand. Knows its Laplace transform; knows no cells.
+"""Pipe with wall creep between a reservoir and a changing demand, by its Laplace transform.
 
-A wall that gives way by elements of compliance J and time tau takes up C(s) = 1 + sum of G / (1 + tau s) times what
-liquid and elastic wall do at once, G = c D rho a^2 J / e (Covas et al. 2005): waves run as exp(-G d) with
-G = (s / a) sqrt(C), with impedance (a / A) / sqrt(C). With laminar friction that remembers, that of `laminar_line` too.
+Storage of a wall of Kelvin-Voigt elements with compliance J and time tau, relative to the instantaneous storage of
+liquid and elastic wall: C(s) = 1 + sum of g / (1 + tau s), g = c D rho a^2 J / e (Covas et al. 2005). Waves propagate
+as exp(-G d) with G = (s / a) sqrt(C) and impedance (a / A) / sqrt(C). Unsteady laminar friction adds the factor of
+`laminar_line`.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ __all__ = ["LINKS", "NODES", "misfits", "solution"]
 
 
 def misfits(case):
-    """What makes a case none of one line with a creeping wall and a demand at its end."""
+    """Faults of a case that is not a single pipe with wall creep and a demand at its end."""
     name = case.exact.name
     for keys, text in laminar_line.misfits(case):
         link = case.links[keys[1]] if keys[0] == "links" and len(keys) > 2 else None
@@ -25,17 +26,17 @@ def misfits(case):
             yield keys, text
     for link, pipe in case.links.items():
         if not pipe.yielding:
-            yield ("links", link, "wall"), f'the exact solution "{name}" wants a wall with creep'
+            yield ("links", link, "wall"), f'the exact solution "{name}" needs a wall with creep'
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures and flows along the line of a case that `misfits` finds nothing in."""
+    """Pressures and flows along the pipe of a case without faults."""
     [pipe] = case.links.values()
     return of_line(case, start, Creeping(case, pipe))
 
 
 class Creeping(LineDeviation):
-    """Deviations from the start along a pipe whose wall creeps."""
+    """Deviations from the start along a pipe with wall creep."""
 
     def __init__(self, case, pipe) -> None:
         super().__init__(case, pipe)

@@ -1,6 +1,6 @@
-"""Tanks and chambers on one orifice. Knows the turbulent law alone: what drives the flow is a parabola in time.
+"""Tanks and chambers on an orifice with the turbulent law: the pressure drop is a parabola in time.
 
-A drop d that drives q = Cd A sqrt(2 d / rho) and falls by k q has a square root that is linear in time, so it ends at
+A drop d with flow q = Cd A sqrt(2 d / rho) and d' = -k q has a square root that is linear in time. It reaches zero at
 the finite time 2 sqrt(d0) / s, s = k Cd A sqrt(2 / rho) (Torricelli 1644). A laminar transition near zero is left out.
 """
 
@@ -15,42 +15,42 @@ NODES, LINKS = ("reservoir", "tank", "chamber"), ("valve", "orifice")
 
 
 def misfits(case):
-    """What makes a case none of this solution, from its start to its end."""
-    found = list(_misfits(case))
-    yield from found
-    if not found:
+    """Faults of a case that the solution does not cover from start to end."""
+    faults = list(_misfits(case))
+    yield from faults
+    if not faults:
         yield from levels_hold(solution(case, ExactStart({}, {})))
 
 
 def _misfits(case):
-    """What makes a case none of a drop across one orifice."""
+    """Faults of a case that is not a drop across a single orifice."""
     yield from only_one(case, list(case.links), "orifice or valve")
     name, start = case.exact.name, case.numerics.start
     for node, part in case.nodes.items():
         if part.kind == "tank" and hasattr(part.area, "area"):
-            yield ("nodes", node, "area"), f'the exact solution "{name}" wants one area'
+            yield ("nodes", node, "area"), f'the exact solution "{name}" needs a constant area'
         if getattr(part, "connection", None) is not None:
-            yield ("nodes", node, "connection"), f'the exact solution "{name}" knows no connection'
+            yield ("nodes", node, "connection"), f'the exact solution "{name}" does not support a connection'
         if part.kind == "chamber" and part.initial_pressure is None:
-            yield ("nodes", node), f'the exact solution "{name}" wants an initial_pressure'
+            yield ("nodes", node), f'the exact solution "{name}" needs an initial_pressure'
         if part.kind == "reservoir" and not constant_from(part.pressure or part.head, start):
-            yield ("nodes", node), f'the exact solution "{name}" wants a constant pressure or head'
+            yield ("nodes", node), f'the exact solution "{name}" needs a constant pressure or head'
     for link, part in case.links.items():
         if not constant_from(part.opening, start):
-            yield ("links", link, "opening"), f'the exact solution "{name}" wants a constant opening'
+            yield ("links", link, "opening"), f'the exact solution "{name}" needs a constant opening'
         if part.characteristic != "linear":
-            yield ("links", link, "characteristic"), f'the exact solution "{name}" knows "linear" alone'
+            yield ("links", link, "characteristic"), f'the exact solution "{name}" supports only "linear"'
         if part.laminar_reynolds is not None:
-            yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" knows the turbulent law alone'
+            yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" supports only the turbulent law'
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures, levels and the flow of a case that `misfits` finds nothing in."""
+    """Pressures, levels and the flow of a case without faults."""
     (link, part), rho, t0 = next(iter(case.links.items())), case.properties.density, case.numerics.start
     ends, weight = (part.from_, part.to), rho * case.gravity
     area = part.flow_area() * float(value(part.opening, t0))
     pressures = [first_pressure(case, node) for node in ends]
-    softness = [stiffness(case, node) for node in ends]  # pressure per volume that flows in
+    softness = [stiffness(case, node) for node in ends]  # pressure per volume of inflow
     drop = sum(s * (p + weight * case.elevation(n)) for s, p, n in zip((1, -1), pressures, ends, strict=True))
     slope = sum(softness) * area * np.sqrt(2.0 / rho)
 
@@ -63,17 +63,17 @@ def solution(case, start: ExactStart) -> Solution:
     def moved(t):  # volume that has left `from`
         return np.sign(drop) * (abs(drop) - left(t) ** 2) / sum(softness) if sum(softness) else 0.0 * left(t)
 
-    made = Solution(case, flow={link: flow})
+    result = Solution(case, flow={link: flow})
     for k, (sign, node) in enumerate(zip((-1.0, 1.0), ends, strict=True)):
-        made.pressure[node] = lambda t, k=k, sign=sign: pressures[k] + sign * softness[k] * moved(t)
+        result.pressure[node] = lambda t, k=k, sign=sign: pressures[k] + sign * softness[k] * moved(t)
         if case.nodes[node].kind == "tank":
             tank = case.nodes[node]
-            made.level[node] = lambda t, tank=tank, sign=sign: tank.level + sign * moved(t) / tank.area
-    return made
+            result.level[node] = lambda t, tank=tank, sign=sign: tank.level + sign * moved(t) / tank.area
+    return result
 
 
 def first_pressure(case, node: str) -> float:
-    """Pressure of a node as the case states it [Pa]."""
+    """Stated pressure of a node at the start [Pa]."""
     part = case.nodes[node]
     if part.kind == "tank":
         return case.ambient_pressure + case.properties.density * case.gravity * part.level
@@ -83,7 +83,7 @@ def first_pressure(case, node: str) -> float:
 
 
 def stiffness(case, node: str) -> float:
-    """Pressure per volume that flows in [Pa/m3]."""
+    """Pressure rise per volume of inflow [Pa/m3]."""
     part = case.nodes[node]
     if part.kind == "tank":
         return case.properties.density * case.gravity / part.area

@@ -1,6 +1,6 @@
-"""Open tanks joined by a frictionless rigid column: a harmonic oscillation. Knows constant areas alone.
+"""Open tanks of constant area joined by a frictionless rigid column: a harmonic oscillation.
 
-D = P_from - P_to, M' = (A / L) D, D' = -g (1 / A_from + 1 / A_to) M; a reservoir counts as an area without end.
+D = P_from - P_to, M' = (A / L) D, D' = -g (1 / A_from + 1 / A_to) M; a reservoir has an infinite area.
 """
 
 from __future__ import annotations
@@ -17,35 +17,35 @@ NODES, LINKS = ("reservoir", "tank"), ("rigid-column",)
 
 
 def misfits(case):
-    """What makes a case none of this solution, from its start to its end."""
-    found = list(_misfits(case))
-    yield from found
-    if not found:
+    """Faults of a case that the solution does not cover from start to end."""
+    faults = list(_misfits(case))
+    yield from faults
+    if not faults:
         yield from levels_hold(
             solution(case, ExactStart({}, {name: link.initial_flow or 0.0 for name, link in case.links.items()}))
         )
 
 
 def _misfits(case):
-    """What makes a case none of one frictionless column between open tanks."""
+    """Faults of a case that is not a single frictionless column between open tanks."""
     yield from only_one(case, list(case.links), "rigid-column")
     name = case.exact.name
     for node, part in case.nodes.items():
         if part.kind == "tank" and hasattr(part.area, "area"):
-            yield ("nodes", node, "area"), f'the exact solution "{name}" wants one area'
+            yield ("nodes", node, "area"), f'the exact solution "{name}" needs a constant area'
         if getattr(part, "connection", None) is not None:
-            yield ("nodes", node, "connection"), f'the exact solution "{name}" knows no connection'
+            yield ("nodes", node, "connection"), f'the exact solution "{name}" does not support a connection'
         if part.kind == "reservoir" and not constant_from(part.pressure or part.head, -math.inf):
-            yield ("nodes", node), f'the exact solution "{name}" wants a constant pressure or head'
+            yield ("nodes", node), f'the exact solution "{name}" needs a constant pressure or head'
     if not any(node.kind == "tank" for node in case.nodes.values()):
-        yield ("nodes",), f'the exact solution "{name}" wants a tank'
+        yield ("nodes",), f'the exact solution "{name}" needs a tank'
     for link, part in case.links.items():
         if part.friction.model != "none" or part.minor_loss != 0.0:
-            yield ("links", link, "friction"), f'the exact solution "{name}" holds without friction and losses'
+            yield ("links", link, "friction"), f'the exact solution "{name}" holds only without friction and losses'
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Levels, pressures and the flow of a case that `misfits` finds nothing in."""
+    """Levels, pressures and the flow of a case without faults."""
     name, column = next(iter(case.links.items()))
     rho, g, t0 = case.properties.density, case.gravity, case.numerics.start
     slope = 0.25 * math.pi * column.diameter**2 / column.length
@@ -64,11 +64,11 @@ def solution(case, start: ExactStart) -> Solution:
         s = omega * (np.asarray(t, dtype=float) - t0)
         return (m0 * np.sin(s) + slope * drop / omega * (1.0 - np.cos(s))) / omega
 
-    made = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
+    result = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
     for k, (sign, node) in enumerate(zip((-1.0, 1.0), ends, strict=True)):
-        made.pressure[node] = lambda t, k=k, sign=sign: first[k] + sign * g * soft[k] * moved(t)
+        result.pressure[node] = lambda t, k=k, sign=sign: first[k] + sign * g * soft[k] * moved(t)
         if case.nodes[node].kind == "tank":
-            made.level[node] = lambda t, k=k, sign=sign, node=node: (
+            result.level[node] = lambda t, k=k, sign=sign, node=node: (
                 case.nodes[node].level + sign * soft[k] * moved(t) / rho
             )
-    return made
+    return result

@@ -1,9 +1,9 @@
-"""Exact waves in frictionless pipes by ray tracing. Knows the linear law, reservoirs, junctions and valves.
+"""Exact waves in frictionless pipes by ray tracing: linear law, reservoirs, junctions and valves.
 
-Each pipe end brings its node an incoming characteristic, P + Z M at `to`, P - Z M at `from` (P = p + rho g z,
-Z = a / A, M the mass flow); it is what the other end sent out one travel time before, 2 P - incoming. Backwards from
-times t all that matters happened at t - s, s a sum of travel times; these paths are one finite list, gone through once
-for all times together (d'Alembert; with one pipe and a valve, Allievi 1902).
+At each pipe end a characteristic arrives, P + Z M at `to`, P - Z M at `from` (P = p + rho g z, Z = a / A, M the mass
+flow). It left the other end one travel time before, where it was 2 P - incoming. The state at times t depends only on
+the states at t - s, with s a sum of travel times. These paths form a finite list, evaluated for all times together
+(d'Alembert; with one pipe and a valve, Allievi 1902).
 """
 
 from __future__ import annotations
@@ -15,39 +15,45 @@ from fvsolve.exact.solution import ExactStart, Solution, reservoirs
 
 NODES, LINKS = ("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice")
 MOST_PATHS = 20000
-BLOCK = 400_000  # values traced at once, times and sums of travel times together
-MERGE = 1e-11  # sums of travel times that lie closer are one, relative to the run
+BLOCK = 400_000  # values traced together: number of times x number of paths
+MERGE = 1e-11  # sums of travel times closer than this are merged, relative to the duration of the run
 
 
 def misfits(case):
-    """What makes a case none of plain waves."""
+    """Faults of a case that ray tracing does not cover."""
     valves: dict[str, list[str]] = {}
     for name, link in case.links.items():
         if link.kind == "pipe":
             if link.friction.model != "none":
-                yield ("links", name, "friction"), 'the exact solution "rays" holds without friction; wanted "none"'
+                yield (
+                    ("links", name, "friction"),
+                    'the exact solution "rays" holds only without friction; expected "none"',
+                )
             if link.yielding:
-                yield ("links", name, "wall", "creep"), 'the exact solution "rays" holds for walls that do not creep'
+                yield ("links", name, "wall", "creep"), 'the exact solution "rays" holds only for walls without creep'
             if link.minor_loss != 0.0:
-                yield ("links", name, "minor_loss"), 'the exact solution "rays" holds without losses; wanted 0'
+                yield ("links", name, "minor_loss"), 'the exact solution "rays" holds only without losses; expected 0'
         else:
             if link.characteristic != "linear":
-                yield ("links", name, "characteristic"), 'the exact solution "rays" knows "linear" alone'
+                yield ("links", name, "characteristic"), 'the exact solution "rays" supports only "linear"'
             if link.laminar_reynolds is not None:
-                yield ("links", name, "laminar_reynolds"), 'the exact solution "rays" knows the turbulent law alone'
+                yield ("links", name, "laminar_reynolds"), 'the exact solution "rays" supports only the turbulent law'
             for end in (link.from_, link.to):
                 valves.setdefault(end, []).append(name)
-    for node, found in valves.items():
-        if case.nodes[node].kind != "reservoir" and len(found) > 1:
-            yield ("links", found[1]), f'the exact solution "rays" knows one valve at {node}, and here are {len(found)}'
+    for node, names in valves.items():
+        if case.nodes[node].kind != "reservoir" and len(names) > 1:
+            yield (
+                ("links", names[1]),
+                f'the exact solution "rays" supports a single valve at {node}; the case has {len(names)}',
+            )
     piped = {end for link in case.links.values() if link.kind == "pipe" for end in (link.from_, link.to)}
     for node in valves:
         if case.nodes[node].kind in ("junction", "inflow") and node not in piped:
-            yield ("nodes", node), 'the exact solution "rays" wants a pipe at every junction'
+            yield ("nodes", node), 'the exact solution "rays" needs a pipe at every junction'
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Pressures, flows and fields of a case that `misfits` finds nothing in."""
+    """Pressures, flows and fields of a case without faults."""
     rays = Rays(case, start)
     nodes = {name: (lambda t, n=name: rays.pressure(n, t)) for name in case.nodes}
     valves = {name: (lambda t, n=name: rays.valve_flow(n, t)) for name in rays.valves}
@@ -55,7 +61,7 @@ def solution(case, start: ExactStart) -> Solution:
 
 
 class Rays:
-    """The pipes of a case with what their nodes do to waves; nodes that a valve joins are one group."""
+    """Wave paths of a case: pipes, and groups of nodes; nodes joined by a valve form a group."""
 
     def __init__(self, case, start: ExactStart) -> None:
         self.case, self.rho, self.t0 = case, case.properties.density, case.numerics.start
@@ -72,7 +78,7 @@ class Rays:
         self.group = {name: name for name in case.nodes}
         for valve in self.valves.values():
             old, new = self.group[valve.from_], self.group[valve.to]
-            self.group = {name: new if one == old else one for name, one in self.group.items()}
+            self.group = {name: new if member == old else member for name, member in self.group.items()}
         self.ends: dict[str, list[tuple[str, int]]] = {name: [] for name in self.group.values()}
         for name, link in self.pipes.items():
             self.ends[self.group[link.from_]].append((name, 0))
@@ -80,45 +86,45 @@ class Rays:
         self.paths = {group: self._paths(group) for group in self.ends}
 
     def node(self, pipe: str, end: int) -> str:
-        """The node at an end of a pipe, 0 `from` and 1 `to`."""
+        """Node at an end of a pipe: 0 `from`, 1 `to`."""
         return self.pipes[pipe].to if end else self.pipes[pipe].from_
 
     def _paths(self, group: str) -> list[tuple[float, str, dict]]:
-        """All that groups did which a group can feel: (how long ago, group, end -> place of what it brought).
+        """Past states of groups that affect a group : list of (age [s], group, pipe end -> index of its source).
 
-        Longest ago first; the last is the group itself, now.
+        The oldest is first; the last is the group itself at age 0.
         """
-        found, place = [(0.0, group, {})], {(0, group): 0}
-        for s, one, brought in found:
-            for pipe, end in self.ends[one]:
+        paths, place = [(0.0, group, {})], {(0, group): 0}
+        for s, here, sources in paths:
+            for pipe, end in self.ends[here]:
                 when, other = s + self.travel[pipe], self.group[self.node(pipe, 1 - end)]
                 if when > self.span + self.near:
                     continue
                 key = round(when / self.near)
                 known = next((place[k, other] for k in (key - 1, key, key + 1) if (k, other) in place), None)
                 if known is None:
-                    known = place[key, other] = len(found)
-                    found.append((when, other, {}))
-                brought[pipe, end] = known
-            if len(found) > MOST_PATHS:
-                raise OverflowError("too many reflections to trace; wanted a shorter run, or fewer pipes")
-        order = sorted(range(len(found)), key=lambda k: -found[k][0])
+                    known = place[key, other] = len(paths)
+                    paths.append((when, other, {}))
+                sources[pipe, end] = known
+            if len(paths) > MOST_PATHS:
+                raise OverflowError("too many reflections to trace; expected a shorter run, or fewer pipes")
+        order = sorted(range(len(paths)), key=lambda k: -paths[k][0])
         rank = {old: new for new, old in enumerate(order)}
-        return [(found[k][0], found[k][1], {end: rank[old] for end, old in found[k][2].items()}) for k in order]
+        return [(paths[k][0], paths[k][1], {end: rank[old] for end, old in paths[k][2].items()}) for k in order]
 
-    # what arrives, and what nodes answer -------------------------------------------------------------------------
+    # characteristics and nodes ---------------------------------------------------------------------------------------
 
     def first(self, pipe: str, end: int, age: np.ndarray) -> np.ndarray:
-        """The characteristic that arrives at an end at a time `age` after the start, from the pipe's own start."""
+        """Characteristic from the initial state of a pipe, arriving at an end a time `age` [s] after the start."""
         p = [
             self.start.pressure[node] + self.weight * self.z[node] for node in (self.node(pipe, 0), self.node(pipe, 1))
         ]
-        share = np.clip(age / self.travel[pipe], 0.0, 1.0)  # of the length, from this end
+        share = np.clip(age / self.travel[pipe], 0.0, 1.0)  # fraction of the length, from this end
         sign = 1.0 if end == 1 else -1.0
         return p[end] + share * (p[1 - end] - p[end]) + sign * self.impedance[pipe] * self.rho * self.start.flow[pipe]
 
     def trace(self, group: str, t: np.ndarray) -> dict:
-        """At times t: potentials of a group's nodes, flows of its valves and what its ends send out."""
+        """Potentials of the nodes of a group, flows of its valves and outgoing characteristics, at times t."""
         t = np.atleast_1d(np.asarray(t, dtype=float))
         span = max(float(t.max()) - self.t0, 0.0) + self.near
         size = max(256, BLOCK // len(self.paths[group]))
@@ -128,41 +134,41 @@ class Rays:
     def _trace(self, group: str, t: np.ndarray, span: float) -> dict:
         paths = self.paths[group]
         known: list[dict] = [{}] * len(paths)
-        for k, (s, one, brought) in enumerate(paths):
+        for k, (s, here, sources) in enumerate(paths):
             if s > span:
                 continue
             now, arrived = t - s, {}
-            for end in self.ends[one]:
+            for end in self.ends[here]:
                 age = now - self.t0
                 arrived[end] = self.first(*end, age)
-                if end in brought and known[brought[end]]:
-                    sent = known[brought[end]]["sent", end[0], 1 - end[1]]
+                if end in sources and known[sources[end]]:
+                    sent = known[sources[end]]["sent", end[0], 1 - end[1]]
                     arrived[end] = np.where(age < self.travel[end[0]], arrived[end], sent)
-            known[k] = self._answer(one, now, arrived)
+            known[k] = self._answer(here, now, arrived)
         return known[-1]
 
     def _answer(self, group: str, now, arrived) -> dict:
-        """Potentials of a group's nodes for what arrives, and with them what leaves."""
-        found, admittance, level = {}, {}, {}
-        for node in (name for name, one in self.group.items() if one == group):
+        """Potentials of the nodes of a group, flows of its valves and outgoing characteristics, for incoming ones."""
+        result, admittance, level = {}, {}, {}
+        for node in (name for name, own in self.group.items() if own == group):
             ends = [end for end in arrived if self.node(*end) == node]
             if node in self.reservoirs:
                 level[node], admittance[node] = self.reservoirs[node](now) + self.weight * self.z[node], np.inf
                 continue
             admittance[node] = sum(1.0 / self.impedance[pipe] for pipe, _ in ends)
-            brought = sum(arrived[end] / self.impedance[end[0]] for end in ends) - self.rho * self._demand(node, now)
-            level[node] = brought / admittance[node]
+            incoming = sum(arrived[end] / self.impedance[end[0]] for end in ends) - self.rho * self._demand(node, now)
+            level[node] = incoming / admittance[node]
         for name, valve in self.valves.items():
             if self.group[valve.to] != group:
                 continue
             i, j = valve.from_, valve.to
-            slack = 1.0 / admittance[i] + 1.0 / admittance[j]  # potential that a flow takes off the closed drop
+            slack = 1.0 / admittance[i] + 1.0 / admittance[j]  # decrease of the potential drop per flow
             flow = flow_through(self._conductance(valve, now), slack, level[i] - level[j])
-            found["valve", name, 0] = flow / self.rho
+            result["valve", name, 0] = flow / self.rho
             level[i], level[j] = level[i] - flow / admittance[i], level[j] + flow / admittance[j]
-        found |= {("node", node, 0): values for node, values in level.items()}
-        found |= {("sent", *end): 2.0 * level[self.node(*end)] - brought for end, brought in arrived.items()}
-        return found
+        result |= {("node", node, 0): values for node, values in level.items()}
+        result |= {("sent", *end): 2.0 * level[self.node(*end)] - incoming for end, incoming in arrived.items()}
+        return result
 
     def _demand(self, node, now):
         part = self.case.nodes[node]
@@ -171,7 +177,7 @@ class Rays:
     def _conductance(self, valve, now):
         return 2.0 * self.rho * (valve.flow_area() * value(valve.opening, now)) ** 2
 
-    # what is asked for -------------------------------------------------------------------------------------------
+    # results ---------------------------------------------------------------------------------------------------------
 
     def pressure(self, node: str, t) -> np.ndarray:
         """Pressure of a node [Pa]."""
@@ -182,7 +188,7 @@ class Rays:
         return self.trace(self.group[self.valves[name].to], t)["valve", name, 0]
 
     def inside(self, pipe: str, x, t) -> tuple[np.ndarray, np.ndarray]:
-        """Pressure [Pa] and flow [m3/s] in a pipe, x from its start."""
+        """Pressure [Pa] and flow [m3/s] in a pipe; x : distance from its `from` end [m]."""
         x, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(t, dtype=float))
         link = self.pipes[pipe]
         forward = self._sent(pipe, 0, t - x / self.speed[pipe], x)
@@ -192,53 +198,53 @@ class Rays:
         return p, 0.5 * (forward - backward) / (self.impedance[pipe] * self.rho)
 
     def _sent(self, pipe: str, end: int, when, x):
-        """The characteristic a distance x away from the end that sent it at a time; before the start, that start's."""
+        """Characteristic at a distance x from the end that it left at time `when`, or that of the initial state."""
         age = when + x / self.speed[pipe] - self.t0
         early = self.first(pipe, 1 - end, age + self.travel[pipe] - x / self.speed[pipe])
         sent = when >= self.t0
         if not np.any(sent):
             return early
-        found = early.copy()
-        found[sent] = self.trace(self.group[self.node(pipe, end)], when[sent])["sent", pipe, end]
-        return found
+        result = early.copy()
+        result[sent] = self.trace(self.group[self.node(pipe, end)], when[sent])["sent", pipe, end]
+        return result
 
     def kinks(self, pipe: str, t: float) -> np.ndarray:
-        """Where rays of any kink of a schedule, or of a start that is none of equilibrium, are at time t [m]."""
-        found, length = [np.zeros(0)], self.pipes[pipe].length
+        """Places of kinks in a pipe at time t [m]: rays from kinks of schedules, or from an unbalanced start."""
+        places, length = [np.zeros(0)], self.pipes[pipe].length
         for group, times in self._acting().items():
             for end in (0, 1):
                 here = self.group[self.node(pipe, end)]
-                after = np.array([s for s, one, _ in self.paths[group] if one == here])
+                after = np.array([s for s, own, _ in self.paths[group] if own == here])
                 run = self.speed[pipe] * (t - np.add.outer(times, after).ravel())
                 run = np.unique(np.round(run[(run > 0.0) & (run < length)], 9))
-                found.append(run if end == 0 else length - run)
-        return np.sort(np.concatenate(found))
+                places.append(run if end == 0 else length - run)
+        return np.sort(np.concatenate(places))
 
     def _acting(self) -> dict[str, np.ndarray]:
-        """Group -> times at which something has a kink there."""
+        """Group -> times of kinks of its schedules, or of the start if it is not in equilibrium."""
         parts = [(self.group[name], node) for name, node in self.case.nodes.items()]
         parts += [(self.group[valve.to], valve) for valve in self.valves.values()]
-        found: dict[str, set[float]] = {}
+        result: dict[str, set[float]] = {}
         for group, part in parts:
             for key in ("pressure", "head", "demand", "flow", "opening"):
                 if hasattr(getattr(part, key, None), "kind"):
-                    found.setdefault(group, set()).update(t for t in kinks(getattr(part, key)) if t >= self.t0)
+                    result.setdefault(group, set()).update(t for t in kinks(getattr(part, key)) if t >= self.t0)
             if not self._rests(group):
-                found.setdefault(group, set()).add(self.t0)
-        return {group: np.array(sorted(times)) for group, times in found.items() if times}
+                result.setdefault(group, set()).add(self.t0)
+        return {group: np.array(sorted(times)) for group, times in result.items() if times}
 
     def _rests(self, group: str) -> bool:
-        """Whether what a group does right after the start is what it did before."""
+        """True if the potentials of a group do not change at the start."""
         after = self.trace(group, np.array([self.t0 + self.near]))
         return all(
             abs(float(after["node", node, 0][0]) - self.start.pressure[node] - self.weight * self.z[node])
             <= 1e-9 * abs(self.start.pressure[node])
-            for node, one in self.group.items() if one == group
+            for node, own in self.group.items() if own == group
         )  # fmt: skip
 
 
 def flow_through(conductance, slack, drop) -> np.ndarray:
-    """M with M |M| = G (drop - slack M) : the valve equation between pipe ends, closed."""
+    """Flow M with M |M| = G (drop - slack M): closed solution of the valve equation between pipe ends."""
     b = conductance * slack
     size = np.abs(drop)
     root = np.sqrt(b * b + 4.0 * conductance * size)

@@ -1,4 +1,4 @@
-"""Values of schedules, written apart from the kernels so that both can be wrong only on their own. Knows no part."""
+"""Values of schedules, independent of the kernels, so that tests can compare the two."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
-    """Values of a schedule at times t : float64[...] [SI], from the right at jumps, or from the left."""
+    """Values of a schedule at times t : float64[...] [SI]; at jumps the right limit, or the left limit if `left`."""
     t = np.asarray(t, dtype=float)
     times, values = schedule.time, schedule.value
     if schedule.kind == "constant":
@@ -29,13 +29,13 @@ def value(schedule, t: np.ndarray, left: bool = False) -> np.ndarray:
 
 
 def kinks(schedule) -> list[float]:
-    """Times at which a schedule, or its slope, jumps; points of a smooth one are none but its ends."""
+    """Times at which a schedule or its slope jumps; for a smooth schedule only its two ends."""
     if schedule.kind in ("constant", "harmonic"):
         return []
     return [float(t) for t in (schedule.time[[0, -1]] if schedule.kind == "smooth" else schedule.time)]
 
 
 def constant_from(schedule, t: float) -> bool:
-    """Whether a schedule holds one value from time t on."""
+    """True if a schedule is constant from time t on."""
     later = schedule.time > t
     return schedule.constant or not np.any(later) or bool(np.all(schedule.value[later] == value(schedule, t)))

@@ -1,4 +1,4 @@
-"""What an exact solution has to say, whatever it is of: probes over time, fields of pipes. Knows no closed form."""
+"""Exact solution: values of probes over time, fields of pipes, and common checks."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ GAUSS = np.polynomial.legendre.leggauss(5)
 
 @dataclass(frozen=True)
 class ExactStart:
-    """What a case starts from: pressures of nodes [Pa] and volume flows of links [m3/s], by name."""
+    """Start of a case: pressures of nodes [Pa] and volume flows of links [m3/s], by name."""
 
     pressure: dict[str, float]
     flow: dict[str, float]
@@ -23,8 +23,9 @@ class ExactStart:
 
 @dataclass(frozen=True)
 class Solution:
-    """Laws in time by name: `pressure` of nodes [Pa], `level` [m], `flow` of links [m3/s], bodies; fields of pipes.
+    """Functions of time by name, and fields of pipes.
 
+    pressure : of nodes [Pa]; level : of tanks [m]; flow : of links [m3/s]; position, velocity : of masses [m], [m/s]
     pipe : pipe(name, x, t) -> (pressure [Pa], flow [m3/s]) at places x [m from `from`] and times t, broadcast
     kinks : kinks(name, t) -> places at which the field at time t is not smooth [m]
     """
@@ -39,7 +40,7 @@ class Solution:
     kinks: Callable[[str, float], np.ndarray] | None = None
 
     def probe(self, probe, t: np.ndarray) -> np.ndarray:
-        """Values of a probe at times t : float64[k] [SI]; NaN where the solution says nothing of it."""
+        """Values of a probe at times t : float64[k] [SI]; NaN if the solution does not include it."""
         t = np.asarray(t, dtype=float)
         name, quantity = probe.name, probe.quantity
         if probe.fraction is not None and self.pipe is not None:
@@ -51,17 +52,17 @@ class Solution:
             laws = reservoirs(self.case)
         if name not in laws:
             return np.full(t.shape, np.nan)
-        found = laws[name](t)
-        return self._counted(found, quantity, self.case.elevation(name) if quantity == "head" else 0.0)
+        values = laws[name](t)
+        return self._counted(values, quantity, self.case.elevation(name) if quantity == "head" else 0.0)
 
     def averages(self, name: str, edges: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """Pressure [Pa] and flow [m3/s] averaged between edges [m] of a pipe, by Gauss points between all kinks."""
+        """Averages of pressure [Pa] and flow [m3/s] between edges [m] of a pipe, by Gauss points between all kinks."""
         inner = self.kinks(name, t) if self.kinks is not None else np.zeros(0)
         cuts = np.unique(np.concatenate([edges, inner[(inner > edges[0]) & (inner < edges[-1])]]))
         return averages(lambda x: self.pipe(name, x, t), edges, cuts)
 
     def _force(self, pipe, t):
-        """Unbalanced force on a pipe without friction [N]: what its ends bear beyond what they do at the start."""
+        """Unbalanced force on a pipe without friction [N]: area times the change of its pressure difference."""
         start = np.array([self.case.numerics.start])
         rise, first = (self.pressure[pipe.to](at) - self.pressure[pipe.from_](at) for at in (t, start))
         return 0.25 * np.pi * pipe.diameter**2 * (rise - first)
@@ -78,7 +79,7 @@ class Solution:
         return self._counted(p, probe.quantity, here)
 
     def _counted(self, pressure, quantity: str, z: float):
-        """A pressure as gauge pressure or head; everything else as it is."""
+        """Convert a pressure to gauge pressure or head; other quantities are unchanged."""
         case = self.case
         if quantity == "gauge_pressure":
             return pressure - case.ambient_pressure
@@ -88,20 +89,20 @@ class Solution:
 
 
 def averages(f: Callable, edges: np.ndarray, cuts: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
-    """Averages between edges of all that f(x) returns, by five Gauss points between cuts (the edges among them)."""
+    """Averages between edges of each value of f(x), by five Gauss points between cuts (which include the edges)."""
     cuts = edges if cuts is None else cuts
     width, middle = np.diff(cuts), 0.5 * (cuts[1:] + cuts[:-1])
     x = middle[:, None] + 0.5 * width[:, None] * GAUSS[0]
     cell = np.clip(np.searchsorted(edges, middle) - 1, 0, len(edges) - 2)
-    found = []
+    result = []
     for values in f(x.ravel()):
         parts = np.broadcast_to(values, x.size).reshape(x.shape) @ (0.5 * GAUSS[1]) * width
-        found.append(np.bincount(cell, parts, len(edges) - 1) / np.diff(edges))
-    return tuple(found)
+        result.append(np.bincount(cell, parts, len(edges) - 1) / np.diff(edges))
+    return tuple(result)
 
 
 def reservoirs(case) -> dict[str, Law]:
-    """Pressures of the reservoirs of a case [Pa]."""
+    """Pressures of the reservoirs of a case [Pa], as functions of time."""
     weight = case.properties.density * case.gravity
 
     def law(name, node):
@@ -114,33 +115,36 @@ def reservoirs(case) -> dict[str, Law]:
 
 
 def law_holds(case):
-    """(keys, message) of a density law that changes."""
+    """Fault of a density law that is not linear."""
     if not case.law.linear:
-        yield ("fluid", "law"), f'the exact solution "{case.exact.name}" holds under the law "linear"'
+        yield ("fluid", "law"), f'the exact solution "{case.exact.name}" holds only with the law "linear"'
 
 
 def kinds_only(case, nodes: tuple[str, ...], links: tuple[str, ...]):
-    """(keys, message) of parts of other kinds than these."""
+    """Faults of parts of other types."""
     name = case.exact.name
     for group, parts, known in (("nodes", case.nodes, nodes), ("links", case.links, links)):
-        for part, one in parts.items():
-            if one.kind not in known:
-                yield (group, part), f'the exact solution "{name}" knows no {one.kind}; it knows {", ".join(known)}'
+        for part, item in parts.items():
+            if item.kind not in known:
+                yield (
+                    (group, part),
+                    f'the exact solution "{name}" does not support a {item.kind}; it supports {", ".join(known)}',
+                )
 
 
-def only_one(case, found: list, what: str):
-    """A misfit unless there is exactly one of something."""
-    if len(found) != 1:
-        yield ("exact", "name"), f'"{case.exact.name}" wants exactly one {what}, and here are {len(found)}'
+def only_one(case, items: list, noun: str):
+    """Fault unless there is exactly one item; noun : its name in the message."""
+    if len(items) != 1:
+        yield ("exact", "name"), f'"{case.exact.name}" needs exactly one {noun}; the case has {len(items)}'
 
 
-def levels_hold(made: Solution):
-    """(keys, message) of tanks that would run dry or spill before the end, where the solution ends too."""
-    numerics = made.case.numerics
+def levels_hold(exact: Solution):
+    """Faults of tanks that run dry or overflow before the end: the solution is not valid there."""
+    numerics = exact.case.numerics
     t = np.linspace(numerics.start, numerics.end, 2001)
-    for name, level in made.level.items():
+    for name, level in exact.level.items():
         low, high = float(np.min(level(t))), float(np.max(level(t)))
-        rim = made.case.nodes[name].height
+        rim = exact.case.nodes[name].height
         if low < -1e-9 or (rim is not None and high > rim + 1e-9):
-            what = "runs dry" if low < -1e-9 else "spills"
-            yield ("nodes", name), f'the exact solution "{made.case.exact.name}" ends where the tank {what}'
+            event = "runs dry" if low < -1e-9 else "overflows"
+            yield ("nodes", name), f'the exact solution "{exact.case.exact.name}" is not valid after the tank {event}'

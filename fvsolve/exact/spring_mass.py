@@ -1,6 +1,6 @@
-"""One mass on linear springs and dampers between frames, under constant force. Knows no fluid.
+"""Mass on linear springs and dampers between frames, under a constant force.
 
-m u'' = F - k u - c u' with u the travel from the start and F the force there without damping.
+m u'' = F - k u - c u', with u the displacement from the start and F the force there without damping.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ NODES, LINKS = ("mass", "frame", "reservoir"), ("spring", "damper", "force")
 
 
 def misfits(case):
-    """What makes a case none of one mass on springs."""
+    """Faults of a case that is not a single mass on springs."""
     yield from only_one(case, [node for node in case.nodes.values() if node.kind == "mass"], "mass")
     if not any(link.kind == "spring" for link in case.links.values()):
-        yield ("links",), f'the exact solution "{case.exact.name}" wants a spring'
+        yield ("links",), f'the exact solution "{case.exact.name}" needs a spring'
     for name, link in case.links.items():
         if not any(end is not None and case.nodes[end].kind == "mass" for end in (link.from_, link.to)):
-            yield ("links", name), f'the exact solution "{case.exact.name}" wants every link at the mass'
+            yield ("links", name), f'the exact solution "{case.exact.name}" needs every link at the mass'
         if link.kind == "force" and not constant_from(link.force, -math.inf):
-            yield ("links", name, "force"), f'the exact solution "{case.exact.name}" wants a constant force'
+            yield ("links", name, "force"), f'the exact solution "{case.exact.name}" needs a constant force'
 
 
 def solution(case, start: ExactStart) -> Solution:
-    """Position and velocity of the mass of a case that `misfits` finds nothing in."""
-    name, mass = next(one for one in case.nodes.items() if one[1].kind == "mass")
+    """Position and velocity of the mass of a case without faults."""
+    name, mass = next(item for item in case.nodes.items() if item[1].kind == "mass")
     at = {body: part.initial_position for body, part in case.nodes.items() if part.domain == "translational"}
     stiffness = damping = force = 0.0
     for link in case.links.values():
@@ -47,7 +47,7 @@ def solution(case, start: ExactStart) -> Solution:
     decay, v0, t0 = damping / (2.0 * mass.mass), mass.initial_velocity, case.numerics.start
     kappa = cmath.sqrt(decay**2 - stiffness / mass.mass)
     end, place = force / stiffness, mass.initial_position
-    if case.numerics.initial == "equilibrium":  # where it then starts
+    if case.numerics.initial == "equilibrium":  # the mass then starts at the equilibrium
         place, end, force = place + end, 0.0, 0.0
 
     def parts(t):

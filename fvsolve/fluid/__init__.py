@@ -1,4 +1,4 @@
-"""Fluid properties at one state. The only door to CoolProp; knows no part."""
+"""Fluid properties at one state."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Fluid:
     """A fluid at its reference state.
 
     temperature [K], pressure [Pa] absolute, density [kg/m3], bulk_modulus = rho a^2 at constant entropy [Pa],
-    viscosity, dynamic [Pa s] (None where nobody knows it), vapor_pressure [Pa] (0 where there is none).
+    viscosity, dynamic [Pa s] (None where unknown), vapor_pressure [Pa] (0 without vapour pressure).
     """
 
     name: str
@@ -45,7 +45,7 @@ class Fluid:
         return math.sqrt(self.bulk_modulus / self.density)
 
     def plain(self) -> dict[str, Any]:
-        """As JSON says it: the liquid at its reference state, SI, and where its numbers are from."""
+        """Data for JSON: the liquid at its reference state, SI, and the source of its numbers."""
         keys = ("name", "density", "bulk_modulus", "sound_speed", "viscosity", "vapor_pressure", "source")
         return {key: getattr(self, key) for key in keys}
 
@@ -66,9 +66,9 @@ def properties(
 ) -> Fluid:
     """Properties of a CoolProp fluid, an oil, "INCOMP::..." or "user" at temperature [K] and pressure [Pa].
 
-    Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] stand in place of
-    those; "user" has nothing else. `air_fraction` and the rest of Air are for the law "mixture",
-    which without any is "log".     Raises FluidError with the key that is to blame.
+    Given density [kg/m3], bulk_modulus [Pa], viscosity [Pa s] and vapor_pressure [Pa] replace
+    those of the fluid; "user" has no others. `air_fraction` and the rest of Air are for the law "mixture",
+    which without any is "log". Raises FluidError with the key at fault.
     """
     given = dict(density=density, bulk_modulus=bulk_modulus, viscosity=viscosity, vapor_pressure=vapor_pressure)
     given = {key: float(value) for key, value in given.items() if value is not None}
@@ -76,16 +76,16 @@ def properties(
     _check_numbers(given | state, law)
     name = oil_name(name) or name
     LAWS[law].check(name, given)
-    found = _found(name, law, **state)
-    boiling = max(found["vapor_pressure"], given.get("vapor_pressure", 0.0))
+    values = _found(name, law, **state)
+    boiling = max(values["vapor_pressure"], given.get("vapor_pressure", 0.0))
     if state["pressure"] <= boiling:
         raise FluidError("pressure", _not_liquid(name, boiling, **state))
     mixed = dict(air_fraction=air_fraction, gas_exponent=gas_exponent)
     mixed |= dict(saturation_pressure=saturation_pressure, cavitation=cavitation)
     air = LAWS[law].air({key: value for key, value in mixed.items() if value is not None})
     if given and name != "user":
-        found = found | {"source": f"{found['source']}; {', '.join(given)} given"}
-    fluid = Fluid(name=name, law=law, air=air, **(found | state | given))
+        values = values | {"source": f"{values['source']}; {', '.join(given)} given"}
+    fluid = Fluid(name=name, law=law, air=air, **(values | state | given))
     for key in ("density", "bulk_modulus"):
         if getattr(fluid, key) is None:
             raise FluidError(key, _missing(name, key))

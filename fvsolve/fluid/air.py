@@ -1,4 +1,4 @@
-"""What is mixed into a liquid: free gas, and vapour where cavities are asked for. Knows no law."""
+"""Free gas in a liquid, and vapour in cavities."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 from fvsolve.errors import FluidError
 
-ATMOSPHERE = 101325.0  # where air_fraction counts [Pa]
+ATMOSPHERE = 101325.0  # pressure to which air_fraction refers [Pa]
 AIR_KEYS = ("air_fraction", "gas_exponent", "saturation_pressure", "cavitation")
 
 
 @dataclass(frozen=True)
 class Air:
-    """What is mixed into a liquid.
+    """Free gas in a liquid, and cavitation.
 
-    fraction : volume of free gas over that of the mixture, at 1 atm; exponent : polytropic, of the gas;
-    saturation_pressure : where all of it is dissolved, falling linearly with the gas pressure [Pa], infinite for none;
-    cavitation : whether vapour pressure adds to the gas pressure, so that no pressure is below it.
+    fraction : volume of free gas over that of the mixture, at 1 atm; exponent : polytropic exponent of the gas;
+    saturation_pressure : gas pressure at which all of it is dissolved, free gas falls linearly [Pa]; infinite for none;
+    cavitation : true if vapour pressure adds to the gas pressure and is the lower bound of pressure.
     """
 
     fraction: float
@@ -26,7 +26,7 @@ class Air:
     cavitation: bool = False
 
     def gas(self, fluid, floor: float) -> float:
-        """Volume of the gas over the liquid's at the reference pressure, times x^(1 / exponent), x = p - floor."""
+        """Gas volume over the liquid volume at the reference pressure, times x^(1 / exponent), x = p - floor."""
         x, saturation = ATMOSPHERE - floor, self.saturation_pressure - floor
         liquid = 1.0 - (ATMOSPHERE - fluid.pressure) / fluid.bulk_modulus
         free = self.fraction / (1.0 - self.fraction) * liquid
@@ -34,7 +34,7 @@ class Air:
 
 
 def mixed(given: dict[str, float]) -> Air:
-    """What is mixed in, by the keys given."""
+    """Free gas and cavitation by the given keys."""
     fraction, cavitation = given.get("air_fraction", 0.0), bool(given.get("cavitation"))
     if not 0.0 <= fraction < 1.0:
         raise FluidError("air_fraction", f"{fraction:g} is no share of a volume; wanted at least 0 and below 1")
@@ -51,7 +51,7 @@ def mixed(given: dict[str, float]) -> Air:
 
 
 def check_cavities(fluid) -> None:
-    """Cavities need a vapour that is liquid at 1 atm."""
+    """Raise FluidError for cavitation of a fluid without vapour pressure, or that boils at 1 atm."""
     if fluid.air is None or not fluid.air.cavitation:
         return
     if fluid.vapor_pressure == 0.0:

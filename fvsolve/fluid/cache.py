@@ -1,4 +1,4 @@
-"""Fluid properties kept on disk, a file per fluid, state, law and CoolProp version. Knows no physics."""
+"""Disk cache of fluid properties: one file per fluid, state, law and CoolProp version."""
 
 from __future__ import annotations
 
@@ -16,45 +16,47 @@ from fvsolve.fluid.coolprop import ask
 from fvsolve.fluid.table import FluidTable
 from fvsolve.jit import cache_folder
 
-FORMAT = 1  # of the files and of what they hold; raise it when either changes
+FORMAT = 1  # version of file format and contents; increase it when either changes
 
 
 def cached(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
-    """What CoolProp says, from the disk where it was asked before: a warm hit does not import CoolProp."""
+    """CoolProp properties, from disk if cached; a cache hit does not import CoolProp."""
     key = json.dumps([FORMAT, coolprop(), name, temperature, pressure, law])
     stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
     path = cache_folder() / "fluids" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
-    found = _read(path, key)
-    if found is None:
-        found = ask(name, temperature, pressure, law) | {"source": f"CoolProp {coolprop()}"}
-        _write(path, key, found)
-    return found
+    properties = _read(path, key)
+    if properties is None:
+        properties = ask(name, temperature, pressure, law) | {"source": f"CoolProp {coolprop()}"}
+        _write(path, key, properties)
+    return properties
 
 
 @functools.cache
 def coolprop() -> str:
-    """The version of CoolProp, which is not imported for it."""
+    """Version of CoolProp, without importing it."""
     from importlib.metadata import version
 
     return version("CoolProp")
 
 
 def _read(path: Path, key: str) -> dict[str, Any] | None:
-    """The properties in a cache file; None where it is absent, damaged or of another key."""
+    """Properties in a cache file; None where it is absent, damaged or of another key."""
     try:
         digest, body = path.read_text(encoding="utf-8").split("\n", 1)
         if digest != hashlib.sha256(body.encode()).hexdigest():
             return None
-        held, found = json.loads(body)
-        found["table"] = found["table"] and FluidTable(**found["table"])
-        return found if held == key else None
+        stored_key, properties = json.loads(body)
+        properties["table"] = properties["table"] and FluidTable(**properties["table"])
+        return properties if stored_key == key else None
     except (OSError, ValueError, TypeError, KeyError):
         return None
 
 
-def _write(path: Path, key: str, found: dict[str, Any]) -> None:
-    """Write a cache file whole or not at all; a folder that cannot be written costs only time."""
-    body = json.dumps([key, found], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item))
+def _write(path: Path, key: str, properties: dict[str, Any]) -> None:
+    """Write a cache file atomically; ignore a folder that cannot be written."""
+    body = json.dumps(
+        [key, properties], default=lambda item: item.tolist() if hasattr(item, "tolist") else asdict(item)
+    )
     text = hashlib.sha256(body.encode()).hexdigest() + "\n" + body
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

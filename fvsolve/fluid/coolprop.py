@@ -1,4 +1,4 @@
-"""What CoolProp says of a fluid, its refusals put into words. Imports CoolProp only when asked."""
+"""Properties from CoolProp, with its errors as FluidError. CoolProp is imported on first use."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ OILY = ("oil", "hydraulic oil", "mineral oil", "hydraulic fluid", "hlp", "hm", "
 
 
 def ask(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
-    """The keys of Fluid that CoolProp knows; None: density where the fluid boils, bulk_modulus of INCOMP."""
+    """Fields of Fluid from CoolProp; None: density of a boiling fluid, bulk_modulus of INCOMP."""
     backend, _, rest = name.rpartition("::")
     if backend not in ("", "HEOS", "INCOMP"):
         raise FluidError("name", f'"{name}": wanted a CoolProp fluid without a prefix, or "INCOMP::..."')
@@ -29,22 +29,22 @@ def _ask_pure(name: str, temperature: float, pressure: float, law: str) -> dict[
     state = _pure_state(name)
     _check_range(state, name, temperature, pressure)
     vapor_pressure = _vapor_pressure(state, temperature)
-    found = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=vapor_pressure, table=None)
+    values = dict(density=None, bulk_modulus=None, viscosity=None, vapor_pressure=vapor_pressure, table=None)
     if pressure <= vapor_pressure:
-        return found
+        return values
     try:
         state.update(CoolProp.PT_INPUTS, pressure, temperature)
     except ValueError as error:
         raise FluidError("pressure", f"{name} is two-phase there, or unknown (CoolProp: {error})") from None
-    found |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
-    found["viscosity"] = known(state.viscosity)
+    values |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
+    values["viscosity"] = known(state.viscosity)
     if LAWS[law].tabulated:
-        found["table"] = isentrope(state, name, vapor_pressure)
-    return found
+        values["table"] = isentrope(state, name, vapor_pressure)
+    return values
 
 
 def _pure_state(name: str) -> Any:
-    """CoolProp's state of a pure (or pseudo-pure) fluid; raises FluidError for mixtures and unknown names."""
+    """CoolProp state of a pure (or pseudo-pure) fluid; raises FluidError for mixtures and unknown names."""
     from CoolProp import AbstractState
 
     if "&" in name or "[" in name or name.endswith(".mix"):
@@ -75,7 +75,7 @@ def _incompressible_names() -> list[str]:
     from CoolProp import CoolProp
 
     lists = ("incompressible_list_pure", "incompressible_list_solution")
-    return [name for one in lists for name in CoolProp.get_global_param_string(one).split(",")]
+    return [name for key in lists for name in CoolProp.get_global_param_string(key).split(",")]
 
 
 def _check_range(state: Any, name: str, temperature: float, pressure: float) -> None:
@@ -97,7 +97,7 @@ def _check_temperature(name: str, temperature: float, least: float, greatest: fl
 
 
 def _vapor_pressure(state: Any, temperature: float) -> float:
-    """Pressure of the boiling liquid [Pa]; 0 above the critical temperature, where nothing boils."""
+    """Pressure of the boiling liquid [Pa]; 0 above the critical temperature."""
     from CoolProp import CoolProp
 
     if temperature >= state.T_critical():
@@ -107,7 +107,7 @@ def _vapor_pressure(state: Any, temperature: float) -> float:
 
 
 def _ask_incompressible(name: str, temperature: float, pressure: float) -> dict[str, Any]:
-    """Density, viscosity and, where there is one, vapour pressure; INCOMP fluids have no compressibility."""
+    """Density, viscosity and vapour pressure if available; INCOMP fluids have no compressibility."""
     from CoolProp.CoolProp import PropsSI
 
     bare = re.sub(r"(\[[^]]*\]|-[0-9.]+%)$", "", name.removeprefix("INCOMP::"))
@@ -121,9 +121,9 @@ def _ask_incompressible(name: str, temperature: float, pressure: float) -> dict[
         raise FluidError(_blame(reason), f"{name}: {reason}") from None
     viscosity = known(lambda: PropsSI("V", "T", temperature, "P", pressure, name))
     vapor_pressure = known(lambda: PropsSI("P", "T", temperature, "Q", 0, name))
-    found = dict(density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None)
-    # CoolProp answers exactly 1 Pa s, exp(0), for those that have no viscosity, such as LiBr.
-    return found | dict(viscosity=None if viscosity == 1.0 else viscosity)
+    values = dict(density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None)
+    # CoolProp returns exactly 1 Pa s, exp(0), for fluids without viscosity data, such as LiBr.
+    return values | dict(viscosity=None if viscosity == 1.0 else viscosity)
 
 
 def _blame(reason: str) -> str:
@@ -133,5 +133,5 @@ def _blame(reason: str) -> str:
 
 
 def celsius(temperature: float) -> str:
-    """A temperature [K] as a message says it."""
+    """Text of a temperature [K] in degC."""
     return f"{temperature - 273.15:.6g} degC"

@@ -1,1 +1,1 @@
-"""Up to which step a scheme and a method hold. Knows schemes, methods and a model's waves; runs nothing."""
+"""Step limits of schemes and methods, computed before a run."""

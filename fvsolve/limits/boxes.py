@@ -1,8 +1,9 @@
-"""Whether a polynomial in two variables is nowhere negative in a box, proved in whole numbers. Knows no method.
+"""Sign of a polynomial in two variables on a box, proved in integers.
 
-In Bernstein's basis a polynomial lies between its least and its greatest coefficient, and those at the corners are
-its values there; halving the box draws the coefficients towards the values (Lane and Riesenfeld 1981). Coefficients
-are whole multiples of 2^-BITS of the largest one, rounded down, so that what is proved of them holds of the polynomial.
+In Bernstein's basis a polynomial lies between its least and its greatest coefficient. Coefficients at the corners are
+values of the polynomial; bisection of the box moves the coefficients towards the values (Lane and Riesenfeld 1981).
+Coefficients are integer multiples of 2^-BITS of the largest coefficient, rounded down, so that a proof of their sign
+holds for the polynomial.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from math import comb
 import numpy as np
 
 BITS = 400
-MOST_BOXES = 400  # after that many the question is left open
+MOST_BOXES = 400  # number of boxes after which the sign is left undecided
 
 Matrix = Sequence[Sequence[int]]  # g[m][i] of x^m y^i
 
@@ -24,8 +25,8 @@ def value(g: Matrix, x: Fraction, y: Fraction) -> Fraction:
     total = Fraction(0)
     for row in reversed(g):
         inner = Fraction(0)
-        for one in reversed(row):
-            inner = inner * y + one
+        for coefficient in reversed(row):
+            inner = inner * y + coefficient
         total = total * x + inner
     return total
 
@@ -35,7 +36,7 @@ def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, 
     boxes, seen = [(_bernstein(g, low, high), low, high, Fraction(0), Fraction(1))], 0
     while boxes:
         b, x0, x1, y0, y1 = boxes.pop()
-        if all(one >= 0 for one in b.flat):
+        if all(left >= 0 for left in b.flat):
             continue
         for corner, x, y in ((b[0, 0], x0, y0), (b[0, -1], x0, y1), (b[-1, 0], x1, y0), (b[-1, -1], x1, y1)):
             if corner < 0 and value(g, x, y) < 0:
@@ -44,33 +45,35 @@ def negative_point(g: Matrix, low: Fraction, high: Fraction) -> tuple[Fraction, 
         if seen > MOST_BOXES:
             return "open"
         if _bends(b) >= _bends(b.T):
-            one, two = _halves(b)
+            left, right = _halves(b)
             middle = (x0 + x1) / 2
-            boxes += [(one, x0, middle, y0, y1), (two, middle, x1, y0, y1)]
+            boxes += [(left, x0, middle, y0, y1), (right, middle, x1, y0, y1)]
         else:
-            one, two = _halves(b.T)
+            left, right = _halves(b.T)
             middle = (y0 + y1) / 2
-            boxes += [(one.T, x0, x1, y0, middle), (two.T, x0, x1, middle, y1)]
+            boxes += [(left.T, x0, x1, y0, middle), (right.T, x0, x1, middle, y1)]
     return None
 
 
 def _bernstein(g: Matrix, low: Fraction, high: Fraction) -> np.ndarray:
-    """Coefficients on low..high x 0..1, rounded down; positive factors are left out."""
-    a = np.array([[Fraction(one) for one in row] for row in g], dtype=object)
-    for k in range(a.shape[0] - 1):  # x = low + s: Horner's scheme, again and again
+    """Bernstein coefficients on low..high x 0..1, up to a positive factor, rounded down."""
+    a = np.array([[Fraction(entry) for entry in row] for row in g], dtype=object)
+    for k in range(a.shape[0] - 1):  # x = low + s, by repeated Horner schemes
         for m in range(a.shape[0] - 2, k - 1, -1):
             a[m] = a[m] + low * a[m + 1]
     width, power = high - low, Fraction(1)
     for m in range(a.shape[0]):
         a[m], power = a[m] * power, power * width
     a = _to_bernstein(_to_bernstein(a).T).T
-    largest = max(abs(one) for one in a.flat) or Fraction(1)
-    scaled = [(one.numerator << BITS) * largest.denominator // (one.denominator * largest.numerator) for one in a.flat]
+    largest = max(abs(entry) for entry in a.flat) or Fraction(1)
+    scaled = [
+        (entry.numerator << BITS) * largest.denominator // (entry.denominator * largest.numerator) for entry in a.flat
+    ]
     return np.array(scaled, dtype=object).reshape(a.shape)
 
 
 def _to_bernstein(a: np.ndarray) -> np.ndarray:
-    """From powers to Bernstein's basis along the first axis: b_j = sum_i C(j, i) / C(n, i) a_i."""
+    """Convert from powers to Bernstein's basis along the first axis: b_j = sum_i C(j, i) / C(n, i) a_i."""
     n = a.shape[0] - 1
     return np.array([sum(Fraction(comb(j, i), comb(n, i)) * a[i] for i in range(j + 1)) for j in range(n + 1)])
 
@@ -86,7 +89,7 @@ def _halves(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bends(b: np.ndarray) -> int:
-    """How far the coefficients are from a straight line along the first axis, over the whole degree."""
+    """Deviation of the coefficients from a straight line along the first axis, times the square of the degree."""
     if b.shape[0] < 3:
         return 0
-    return max(abs(one) for one in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2
+    return max(abs(difference) for difference in (b[:-2] - 2 * b[1:-1] + b[2:]).flat) * (b.shape[0] - 1) ** 2

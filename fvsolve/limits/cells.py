@@ -1,7 +1,7 @@
-"""Modes of cells beside their waves: what rubs, remembers, fades and spreads. Knows a model's start; no method.
+"""Eigenvalues of cells at the start: friction, unsteady friction, wall creep, decay and diffusion of scalars.
 
-Friction of slope g = d drag / d M turns both waves of a pipe into each other: with q z the symbol of a wave that
-crosses q cells a second, s = q Re z - g / 2 +- sqrt(g^2 / 4 - (q Im z)^2).
+Friction of slope g = d drag / d M couples the two waves of a pipe: with the symbol q z of a wave that crosses q cells a
+second, s = q Re z - g / 2 +- sqrt(g^2 / 4 - (q Im z)^2).
 """
 
 from __future__ import annotations
@@ -16,70 +16,70 @@ from fvsolve.model.creep import elements
 from fvsolve.schemes import SCHEMES
 
 PHASES = np.linspace(0.0, np.pi, 65)
-FEW = 3  # cells of a basin, below which nothing is asked
-SHORT = 1.0 - np.cos(PHASES)  # what spreads, by its wave
+FEW = 3  # least number of cells of a basin for diffusion modes
+SHORT = 1.0 - np.cos(PHASES)  # diffusion rate of a wave, relative to 2 D / dx^2
 
 Modes = list[tuple[str, np.ndarray]]  # places and eigenvalues there [1/s]
 
 
 def cell_modes(model) -> Modes:
-    """All of them."""
+    """All modes of cells."""
     return [*rubbed(model), *remembered(model), *carried(model), *spread(model)]
 
 
 def rubbed(model) -> Modes:
-    """Waves of pipes against friction, at the flow of the start."""
-    scheme, found = model.case.numerics.scheme, []
+    """Modes of waves in pipes with friction, at the initial flow."""
+    scheme, modes = model.case.numerics.scheme, []
     weights = SCHEMES[scheme].smooth.weights
     symbols = {n: between_ends(tuple(weights), n) for n in {mesh.cells for mesh in model.pipes}}
     for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
         g = slope(row)
         if g > 0.0 and row["delay"] < 0:
-            z = symbols[mesh.cells]  # between ends no wave is quite two cells long
+            z = symbols[mesh.cells]  # waves between two ends are longer than two cells
             root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
-            found.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
-    return found
+            modes.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
+    return modes
 
 
 @functools.lru_cache(maxsize=256)
 def between_ends(weights: tuple, n: int) -> np.ndarray:
-    """The symbol of waves between the ends of n cells."""
-    found = symbol(weights, PHASES * (1.0 - 0.5 / n))
-    found.flags.writeable = False
-    return found
+    """Symbol of waves between the ends of n cells."""
+    values = symbol(weights, PHASES * (1.0 - 0.5 / n))
+    values.flags.writeable = False
+    return values
 
 
 def remembered(model) -> Modes:
-    """Unsteady friction, and walls that creep: the quickest term, with the gain of all of them and the friction."""
-    found, floats = [], model.tables.floats
+    """Modes of unsteady friction and creeping walls: fastest term, with the gain of all terms and the friction."""
+    modes, floats = [], model.tables.floats
     for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
         if row["terms"] > 0:
             gain, rate = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2).T
-            found.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - slope(row)])))
+            modes.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - slope(row)])))
         if row["elements"] > 0:
             gain, rate = elements(floats, row).T
-            found.append((f"{mesh.name}.creep", np.array([-rate.max() - gain.sum()])))
-    return found
+            modes.append((f"{mesh.name}.creep", np.array([-rate.max() - gain.sum()])))
+    return modes
 
 
 def slope(row) -> float:
-    """d drag / d M of a pipe at the flow of the start [1/s]."""
+    """Slope d drag / d M of a pipe at the initial flow [1/s]."""
     return float(drag_slope(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))))
 
 
 def carried(model) -> Modes:
-    """Scalars in pipes, at the flow of the start."""
-    found, rho = [], model.case.properties.density
+    """Modes of scalars in pipes, at the initial flow."""
+    modes, rho = [], model.case.properties.density
     for name, scalar in model.case.scalars.items():
         for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
             q = abs(float(row["flow"])) / (rho * row["area"] * row["dx"])
             s = -q * (1.0 - np.exp(-1j * PHASES)) - 2.0 * scalar.diffusivity / row["dx"] ** 2 * SHORT - scalar.decay
-            found.append((f"{mesh.name}.{name}", s))
-    return found
+            modes.append((f"{mesh.name}.{name}", s))
+    return modes
 
 
 def spread(model) -> Modes:
-    """Scalars in basins, what spreads by its shortest wave."""
+    """Modes of scalars in basins, with diffusion at its shortest wave."""
     return [
         (f"{basin.name}.{name}", np.array([-scalar.decay - scalar.diffusivity * shortest(basin.mesh)]))
         for name, scalar in model.case.scalars.items()
@@ -89,7 +89,7 @@ def spread(model) -> Modes:
 
 
 def shortest(mesh) -> float:
-    """The greatest eigenvalue of diffusion over a mesh, without what leaves it [1/m2]."""
+    """Greatest eigenvalue of diffusion on a mesh, without flux through its boundary [1/m2]."""
     from scipy.sparse import coo_array, diags_array
     from scipy.sparse.linalg import eigsh
 
@@ -100,6 +100,6 @@ def shortest(mesh) -> float:
     through = coo_array((near, (left, right)), shape=(n, n))
     sides = np.bincount(left, near, n) + np.bincount(right, near, n)
     root = diags_array(1.0 / np.sqrt(mesh.area))
-    whole = root @ (diags_array(sides) - through - through.T) @ root
+    operator = root @ (diags_array(sides) - through - through.T) @ root
     start = np.random.default_rng(1).standard_normal(n)
-    return float(eigsh(whole.tocsr(), k=1, which="LM", tol=1e-3, v0=start, return_eigenvectors=False)[0])
+    return float(eigsh(operator.tocsr(), k=1, which="LM", tol=1e-3, v0=start, return_eigenvectors=False)[0])

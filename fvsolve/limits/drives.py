@@ -1,38 +1,38 @@
-"""What drives a scene: ranges of pressures, flows, and by them the size that states may have. Knows no run."""
+"""Forcing of a case: ranges of pressures and flows, and the size of states that follows from them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-FAR = 1e3  # times as much again for states that are driven by more than waves: contents, bodies, what is carried
-DRIVES = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # keys of nodes that are schedules
+FAR = 1e3  # further factor for states driven by more than waves: contents, bodies, scalars
+DRIVES = {"pressure": "pressure", "head": "head", "demand": "flow", "flow": "flow"}  # scheduled keys of nodes
 
 
 def drives(model) -> np.ndarray:
-    """The largest of what drives each state of pipes and basins; of others what is small, times FAR : float64[n]."""
-    found, linear = FAR * model.scale, model.case.properties
+    """Largest size that the forcing gives to states of pipes and basins; FAR scale for other states : float64[n]."""
+    largest, linear = FAR * model.scale, model.case.properties
     pressure, flow = given(model)
     pipes = model.tables.pipes
     flow = max([flow, *np.abs(pipes["flow"])])
     if len(pipes):
         pressure = max(pressure, flow / float(pipes["admittance"].min()))
     for mesh, row in zip(model.pipes, pipes, strict=True):
-        if row["delay"] >= 0:  # what it holds beside the profile
+        if row["delay"] >= 0:  # amount in a delay line, less that of the profile
             waves = pressure * float(row["admittance"]) * mesh.length / float(row["speed"])
-            found[row["y"]] = FAR * max(found[row["y"]], waves)
+            largest[row["y"]] = FAR * max(largest[row["y"]], waves)
             continue
         own = slice(row["y"], row["y"] + 2 * mesh.cells)
-        found[own] = np.maximum(max(pressure * float(row["admittance"]), flow), model.scale[own])
+        largest[own] = np.maximum(max(pressure * float(row["admittance"]), flow), model.scale[own])
     for basin in model.basins:
-        states, scales = basin.own(found), basin.own(model.scale)
+        states, scales = basin.own(largest), basin.own(model.scale)
         ratio = 1.0 + pressure / (linear.density * model.case.gravity)
         for own, scale, start in zip(states, scales, basin.own(model.start), strict=True):
             own[:] = np.maximum(ratio * scale, np.ptp(start))
-    return found
+    return largest
 
 
 def given(model) -> tuple[float, float]:
-    """Range of pressures [Pa] and greatest mass flow [kg/s] that the start and schedules of nodes bring."""
+    """Range of pressures [Pa] and greatest mass flow [kg/s] from the initial state and the schedules of nodes."""
     rho, gravity = model.case.properties.density, model.case.gravity
     at_start = model.tables.nodes["pressure"]
     pressures, flow = [float(np.ptp(at_start)) if len(at_start) else 0.0], 0.0
@@ -49,7 +49,7 @@ def given(model) -> tuple[float, float]:
 
 
 def lumped(model) -> np.ndarray:
-    """Numbers of the states that are no cell's and no line's: of vessels, columns, bodies and devices : int64[k]."""
+    """Numbers of the states outside cells and delay lines: vessels, columns, bodies, devices : int64[k]."""
     pipes = model.tables.pipes
     lines = set(pipes["y"][pipes["delay"] >= 0].tolist())
     names = model.state_names.single()
@@ -57,9 +57,9 @@ def lumped(model) -> np.ndarray:
 
 
 def spreads(model, share: float = 1.0) -> np.ndarray:
-    """What vessels hold more or less over the range of pressures; a share of what is small elsewhere : float64[n]."""
-    found, spread = share * model.scale, given(model)[0]
+    """Ranges of states: contents of vessels over the range of pressures; for others `share` of scale : float64[n]."""
+    ranges, spread = share * model.scale, given(model)[0]
     for row in model.tables.nodes:
         if row["y"] >= 0 and row["stiffness"] > 0.0 and spread > 0.0:
-            found[row["y"]] = spread / row["stiffness"]
-    return found
+            ranges[row["y"]] = spread / row["stiffness"]
+    return ranges

@@ -1,9 +1,10 @@
-"""The Courant limit of linear advection on a uniform periodic grid, exactly (von Neumann). Knows schemes and methods.
+"""Exact Courant limit of linear advection on a uniform periodic grid (von Neumann).
 
-A wave of phase theta a cell is multiplied by R(nu z(theta)) a step, R the method's stability function, z the scheme's
-symbol, nu the Courant number. With R = N / D and t = sin^2(theta / 2), E(nu, t) = |D|^2 - |N|^2 is a polynomial with
-rational coefficients; a Courant number is stable where E >= 0 for all t. Factors nu^a and t^p are divided out, so
-that waves of any length, however slowly they grow, are decided alike; at t = 0 what is left decides the longest.
+A wave of phase theta per cell is multiplied by R(nu z(theta)) in a step, with the stability function R of the method,
+the symbol z of the scheme and the Courant number nu. With R = N / D and t = sin^2(theta / 2), E(nu, t) = |D|^2 - |N|^2
+is a polynomial with rational coefficients; a Courant number is stable if E >= 0 for all t. Factors nu^a and t^p are
+divided out, so that slowly growing waves of any length are decided as well; the quotient at t = 0 decides the longest
+waves.
 """
 
 from __future__ import annotations
@@ -26,21 +27,22 @@ from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 from fvsolve.steppers.numbers.sturm import count_roots, odd_part
 from fvsolve.steppers.tableau import METHODS, Method, method_named
 
-RAYS = 240  # waves whose roots are looked at first
+RAYS = 240  # number of waves whose roots are computed first
 ZOOMS, ZOOM_RAYS = 9, 17
-MARGIN = Fraction(1, 10**9)  # of the limit, left on both sides of it by the proof
-TURNS = 8  # of a search that a proof may send back
-ALGEBRAIC_DIGITS = 30  # that an algebraic number is taken to
-BEYOND, SOME = 1.01, 0.5  # times the limit, and where there is none: where growth is quoted
+MARGIN = Fraction(1, 10**9)  # relative margin on both sides of the limit in the proof
+TURNS = 8  # greatest number of searches, each after a failed proof
+ALGEBRAIC_DIGITS = 30  # digits to which algebraic numbers are rounded
+# Courant number at which growth is reported: relative to the limit; absolute if the limit is 0.
+BEYOND, SOME = 1.01, 0.5
 THOUSANDFOLD = 1e3
-SEEN = 1e-8  # |R| - 1 that floating point finds to seven digits
+SEEN = 1e-8  # |R| - 1 above which floating point gives seven digits
 SLOW_WAVES, SLOW_ZOOMS = 24, 6
 EVERY, LONGEST, SHORTEST, BETWEEN, GROWS = "all", "longest", "shortest", "between", "grows"
 
 
 @dataclass(frozen=True)
 class RangeEnd:
-    """An end of a stable range: its Courant number and the wave that sets it, by t = sin^2(theta / 2) and in words."""
+    """End of a stable range: Courant number, and wave that determines it, as t = sin^2(theta / 2) and in words."""
 
     courant: float
     t: Fraction = Fraction(0)
@@ -48,7 +50,7 @@ class RangeEnd:
 
     @property
     def theta(self) -> float:
-        """Phase a cell [rad]."""
+        """Phase per cell [rad]."""
         return 2 * math.asin(math.sqrt(self.t))
 
 
@@ -57,14 +59,15 @@ EVERYTHING = [(RangeEnd(0.0), RangeEnd(math.inf))]
 
 @dataclass(frozen=True)
 class AdvectionLimit:
-    """Which Courant numbers of a uniform periodic grid are stable.
+    """Stable Courant numbers of a scheme and a method on a uniform periodic grid.
 
-    limit : the greatest Courant number all below which are stable; 0 where there is none, inf without end;
-    theta [rad a cell], wave : of the waves that set it, None where nothing does; stable : ranges (low, high) of stable
-    Courant numbers, more than one where stability comes back; proved : whether each range is proved in exact numbers
-    to one part in 10^9; digits : of a published tableau, None where its numbers are exact; courant, growth, steps : the
-    Courant number asked for, else 1 % above the limit (0.5 where it is 0), the greatest |R| - 1 there, 0 where it is
-    stable, and the steps to a thousandfold.
+    limit : greatest Courant number below which all are stable; 0 if there is none, inf without an upper end
+    theta, wave : phase [rad per cell] and name of the waves that determine the limit, None for an infinite limit
+    stable : ranges (low, high) of stable Courant numbers; more than one range if stability returns
+    proved : True if each range is proved in exact numbers to 1 part in 10^9
+    digits : significant digits of a published tableau, None where its numbers are exact
+    courant : given Courant number, else 1 % above the limit (0.5 if the limit is 0)
+    growth : greatest |R| - 1 at `courant`, 0 where it is stable; steps : number of steps to growth by a factor of 1000
     """
 
     scheme: str
@@ -80,18 +83,18 @@ class AdvectionLimit:
     steps: float | None
 
     def plain(self) -> dict:
-        """As JSON says it: None for infinity."""
-        found = asdict(self)
-        found["limit"] = _finite(self.limit)
-        found["stable"] = [[low, _finite(high)] for low, high in self.stable]
-        return found
+        """Return the values for JSON: None for infinity."""
+        values = asdict(self)
+        values["limit"] = _finite(self.limit)
+        values["stable"] = [[low, _finite(high)] for low, high in self.stable]
+        return values
 
 
 @door(scheme=NAME, method=NAME, courant=POSITIVE)
 def advection_limit(scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
-    """The exact Courant limit of a linear scheme and a method, and the growth at `courant`.
+    """Exact Courant limit of a linear scheme and a method, and the growth at `courant`.
 
-    Raises FvsolveError for names that are none, and for schemes that are not linear.
+    Raises FvsolveError for unknown names, and for schemes that are not linear.
     """
     return limit_of(weights_of(scheme), scheme, method, courant)
 
@@ -100,7 +103,7 @@ def advection_limit(scheme: str, method: str, courant: float | None = None) -> A
 def advection_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, courant: float | None = None
 ) -> list[AdvectionLimit]:
-    """Rows of the table, schemes inside methods; None for all of them."""
+    """Courant limits of all pairs, method by method; None for all schemes or all methods."""
     schemes, methods = ([x] if isinstance(x, str) else x for x in (schemes, methods))
     schemes = list(dict.fromkeys(schemes or WEIGHTS))
     for name in schemes:
@@ -110,16 +113,16 @@ def advection_limits(
 
 
 WHOLE = Kind(
-    lambda given: is_row(given, lambda one: isinstance(one, Rational)) and len(given) == 5 and sum(given) == 1,
-    "five whole numbers or fractions that add up to one",
+    lambda given: is_row(given, lambda x: isinstance(x, Rational)) and len(given) == 5 and sum(given) == 1,
+    "five integers or fractions with sum 1",
 )
 
 
 @door(weights=WHOLE, scheme=TEXT, method=NAME, courant=POSITIVE)
 def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
-    """The same for any face weights of cells u-2 .. u+2 that add up to one."""
-    known = method_named(method)
-    gaps, proved = _gaps(tuple(weights), *_rational(method), _is_a_stable(known))
+    """Exact Courant limit for any face weights of cells u-2 .. u+2 with sum 1, and the growth at `courant`."""
+    tableau = method_named(method)
+    gaps, proved = _gaps(tuple(weights), *_rational(method), _is_a_stable(tableau))
     edge = gaps[0][1] if gaps and gaps[0][0].courant == 0 else None
     limit = edge.courant if edge else 0.0
     stable = tuple((low.courant, high.courant) for low, high in gaps)
@@ -127,15 +130,17 @@ def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: flo
         courant = limit * BEYOND or SOME
     growth = steps = None
     if courant is not None:
-        still = any(low <= courant <= high for low, high in stable)
-        growth, fastest = (0.0, 0.0) if still else growth_of(weights, method, courant)
+        stable_there = any(low <= courant <= high for low, high in stable)
+        growth, fastest = (0.0, 0.0) if stable_there else growth_of(weights, method, courant)
         steps = math.log(THOUSANDFOLD) / math.log1p(growth) if growth > 0 else None
     theta, wave = (None, None) if math.isinf(limit) else (edge.theta, edge.wave) if edge else (fastest, GROWS)
-    return AdvectionLimit(scheme, known.name, limit, theta, wave, stable, proved, known.digits, courant, growth, steps)
+    return AdvectionLimit(
+        scheme, tableau.name, limit, theta, wave, stable, proved, tableau.digits, courant, growth, steps
+    )
 
 
 def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple[float, float]:
-    """(greatest |R(nu z(theta))| - 1, its theta) at a Courant number nu; by fractions where floats would not see it."""
+    """(greatest |R(nu z(theta))| - 1, its theta) at a Courant number nu; in fractions if too small for floats."""
     r = _function(method)
     theta = np.linspace(0.0, np.pi, 4001)
     for _ in range(6):
@@ -147,24 +152,24 @@ def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple
 
 
 def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) -> tuple[float, float]:
-    """The same in fractions, |R| - 1 = (|N|^2 - |D|^2) / (|D|^2 (1 + |R|)), on few waves, closer and closer."""
+    """`growth_of` in fractions, |R| - 1 = (|N|^2 - |D|^2) / (|D|^2 (1 + |R|)), on few waves, by repeated refinement."""
     (r, _), a, q = _rational(method), real_part(weights), square(weights)
     theta = [k * math.pi / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
     for _ in range(SLOW_ZOOMS):
-        found = []
+        growths = []
         for x in theta:
             t = _dyadic(math.sin(x / 2) ** 2, 60)
             up, down = (_modulus(p, courant * a(t), courant**2 * q(t)) for p in (r.numerator, r.denominator))
-            found.append(float((up - down) / down))
-        at = int(np.argmax(found))
+            growths.append(float((up - down) / down))
+        at = int(np.argmax(growths))
         low, high = theta[max(at - 1, 0)], theta[min(at + 1, len(theta) - 1)]
-        best, most = theta[at], found[at]
+        best, most = theta[at], growths[at]
         theta = [low + (high - low) * k / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
     return most / (1 + math.sqrt(1 + most)), best
 
 
 def _modulus(p: Polynomial, real: Fraction, size: Fraction) -> Fraction:
-    """|p(s)|^2 of s with that real part and that |s|^2: sum_jk p_j p_k |s|^2k Re(s^(j-k))."""
+    """|p(s)|^2 for s with this real part and |s|^2 = `size`: sum_jk p_j p_k |s|^2k Re(s^(j-k))."""
     cosines = [Fraction(1), real]
     while len(cosines) <= p.degree:
         cosines.append(2 * real * cosines[-1] - size * cosines[-2])
@@ -194,12 +199,12 @@ def _is_a_stable(method: Method) -> bool:
 
 
 def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
-    """R with fractions alone, and the relative size below which a coefficient of E is rounding."""
-    known, r = method_named(method), _function(method)
+    """(R with rational coefficients, relative size below which a coefficient of E is rounding)."""
+    tableau, r = method_named(method), _function(method)
     parts = (*r.numerator.coefficients, *r.denominator.coefficients)
     exact = all(isinstance(x, Fraction) for x in parts)
-    digits = known.digits - 2 if known.digits else ALGEBRAIC_DIGITS
-    tolerance = Fraction(0) if exact and not known.digits else Fraction(1, 10**digits)
+    digits = tableau.digits - 2 if tableau.digits else ALGEBRAIC_DIGITS
+    tolerance = Fraction(0) if exact and not tableau.digits else Fraction(1, 10**digits)
     if exact:
         return r, tolerance
     up, down = (Polynomial(_fraction(x) for x in p.coefficients) for p in (r.numerator, r.denominator))
@@ -214,7 +219,7 @@ def _fraction(x) -> Fraction:
 
 
 def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: Fraction) -> list[list[int]]:
-    """A positive multiple of E without the factors that all its terms share: whole coefficients of nu^m t^i.
+    """Integer coefficients of nu^m t^i of a positive multiple of E, without the common factors of its terms.
 
     E = sum_jk (d_j d_k - n_j n_k) nu^(j+k) Re(z^j conj(z)^k);
     Re(z^j conj(z)^k) = |z|^2k c_j-k, c_0 = 1, c_1 = Re z, c_m+1 = 2 Re z c_m - |z|^2 c_m-1.
@@ -226,16 +231,16 @@ def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: 
     for _ in range(2 * size):
         c.append(2 * a * c[-1] - q * c[-2])
         powers.append(powers[-1] * q)
-    found = []
+    rows = []
     for m in range(2 * size + 1):
         row, doubt = Polynomial([]), Polynomial([])
         for k in range(max(0, m - size), m // 2 + 1):
-            one = powers[k] * c[m - 2 * k]
+            factor = powers[k] * c[m - 2 * k]
             parts = [s * _at(p, k) * _at(p, m - k) * (1 if 2 * k == m else 2) for p, s in pairs]
-            row = row + sum(parts) * one
-            doubt = doubt + sum(map(abs, parts)) * Polynomial(map(abs, one.coefficients)) if tolerance else doubt
-        found.append(_chopped(row, doubt, tolerance))
-    return _reduced(found)
+            row = row + sum(parts) * factor
+            doubt = doubt + sum(map(abs, parts)) * Polynomial(map(abs, factor.coefficients)) if tolerance else doubt
+        rows.append(_chopped(row, doubt, tolerance))
+    return _reduced(rows)
 
 
 def _at(p: Polynomial, k: int) -> Fraction:
@@ -247,10 +252,10 @@ def _chopped(p: Polynomial, doubt: Polynomial, tolerance: Fraction) -> Polynomia
 
 
 def _reduced(rows: list[Polynomial]) -> list[list[int]]:
-    """In whole numbers, without nu^a and the factor in t that all terms share; empty where nothing is left.
+    """Integer coefficients without nu^a and the common factor in t; empty for the zero polynomial.
 
-    That factor is zero where z is: at t = 0, and at t = 1 for central differences. Where it changes its sign between,
-    E does at every nu, which a term -1 says.
+    The common factor is zero where z is zero: at t = 0, and at t = 1 for central differences. If it changes its sign
+    in between, E is negative somewhere at every nu, and [[-1]] is returned.
     """
     while rows and rows[0].degree < 0:
         rows = rows[1:]
@@ -266,12 +271,12 @@ def _reduced(rows: list[Polynomial]) -> list[list[int]]:
     common = common if 1 in _signs(common) else -common
     rows = [p // common for p in rows]
     wide = max(p.degree for p in rows) + 1
-    whole = math.lcm(*(x.denominator for p in rows for x in p.coefficients))
-    return [[int(_at(p, i) * whole) for i in range(wide)] for p in rows]
+    denominator = math.lcm(*(x.denominator for p in rows for x in p.coefficients))
+    return [[int(_at(p, i) * denominator) for i in range(wide)] for p in rows]
 
 
 def _signs(p: Polynomial) -> set[int]:
-    """The signs that p takes on 0 < t < 1, but for its zeros, decided."""
+    """Signs of p on 0 < t < 1, without its zeros, in exact arithmetic."""
     changes = odd_part(p) if p.degree > 0 else p
     for end in (0, 1):
         while changes.degree > 0 and changes(Fraction(end)) == 0:
@@ -300,28 +305,28 @@ def _gaps_of(weights: tuple, numerator: tuple, denominator: tuple, tolerance: Fr
     gaps: list = []
     for _ in range(TURNS):
         gaps = _candidates(g, sorted(rays))
-        found = [_refuted(g, low.courant, high.courant) for low, high in gaps]
-        points = [one for one in found if isinstance(one, tuple)]
+        counterexamples = [_refuted(g, low.courant, high.courant) for low, high in gaps]
+        points = [point for point in counterexamples if isinstance(point, tuple)]
         if not points:
-            return gaps, not any(found) and _fails_outside(g, gaps, rays)
+            return gaps, not any(counterexamples) and _fails_outside(g, gaps, rays)
         for _, t in points:
             rays |= {t, *(min(t * Fraction(k, 8), Fraction(1)) for k in (4, 6, 7, 9, 10, 16))}
-    return [gap for gap, one in zip(gaps, found, strict=True) if not isinstance(one, tuple)], False
+    return [gap for gap, point in zip(gaps, counterexamples, strict=True) if not isinstance(point, tuple)], False
 
 
 def _refuted(g, low: float, high: float):
-    """What `negative_point` says of the range, less a margin at its finite ends."""
+    """Result of `negative_point` for the range, reduced by a margin at its finite ends."""
     start = Fraction(low) * (1 + MARGIN)
     if math.isfinite(high):
         return negative_point(g, start, Fraction(high) * (1 - MARGIN))
     middle = max(start, Fraction(1))
-    found = negative_point(g, start, middle) if start < middle else None
-    far = negative_point(g[::-1], Fraction(0), 1 / middle) if found is None else found
-    return (1 / far[0], far[1]) if isinstance(far, tuple) and found is None and far[0] else far
+    below = negative_point(g, start, middle) if start < middle else None
+    above = negative_point(g[::-1], Fraction(0), 1 / middle) if below is None else below
+    return (1 / above[0], above[1]) if isinstance(above, tuple) and below is None and above[0] else above
 
 
 def _fails_outside(g, gaps, rays) -> bool:
-    """Whether some wave grows just outside of each end, and at every small step where no range starts at 0, decided."""
+    """True if a wave grows just outside each end, and at all small nu if no range starts at 0, in exact arithmetic."""
     if (not gaps or gaps[0][0].courant > 0) and not any(_falls(g, t) for t in rays):
         return False
     ends = [(low, 1 - MARGIN) for low, _ in gaps if low.courant > 0]
@@ -330,23 +335,23 @@ def _fails_outside(g, gaps, rays) -> bool:
 
 
 def _falls(g, t: Fraction) -> bool:
-    """Whether the polynomial at t is negative for all small nu > 0."""
+    """True if the polynomial at t is negative for all small nu > 0."""
     return next((x < 0 for x in _on(g, t) if x), False)
 
 
 def _candidates(g, rays: list[Fraction]):
-    """Stable ranges as the rays show them, their ends sharpened between the rays."""
-    unstable = sorted(one for t in rays for one in _negative(_on(g, t)))
+    """Stable ranges on the rays, with ends refined between the rays."""
+    unstable = sorted(range_ for t in rays for range_ in _negative(_on(g, t)))
     gaps, at = [], 0.0
     for low, high in [*unstable, (math.inf, math.inf)]:
         if low > at * (1 + 1e-9):
             gaps.append((at, low))
         at = max(at, high)
-    return [one for low, high in gaps if (one := _sharpened(g, rays, low, high))]
+    return [range_ for low, high in gaps if (range_ := _sharpened(g, rays, low, high))]
 
 
 def _sharpened(g, rays, low: float, high: float):
-    """The same range with its ends as edges; None where it closes."""
+    """Range with refined ends; None if it becomes empty."""
     inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
     start = _edge(g, rays, inside, -1) if low > 0 else RangeEnd(0.0)
     end = _edge(g, rays, inside, 1) if math.isfinite(high) else RangeEnd(math.inf)
@@ -354,7 +359,7 @@ def _sharpened(g, rays, low: float, high: float):
 
 
 def _edge(g, rays: list[Fraction], inside: float, side: int) -> RangeEnd:
-    """The end of the stable range around `inside`: the nearest change of sign over all t, by zooming in."""
+    """End of the stable range around `inside`: the nearest change of sign over all t, by successive refinement."""
 
     def reach(t: Fraction) -> float:
         ranges = _negative(_on(g, t))
@@ -365,23 +370,23 @@ def _edge(g, rays: list[Fraction], inside: float, side: int) -> RangeEnd:
     ends = reach(Fraction(0)), reach(Fraction(1))
     all_of = [reach(t) for t in rays]
     at = int(np.argmin(all_of))
-    best, where = float(all_of[at]), rays[at]
+    best, best_t = float(all_of[at]), rays[at]
     low, high = rays[max(at - 1, 0)], rays[min(at + 1, len(rays) - 1)]
     for _ in range(ZOOMS):
         points = [low + (high - low) * Fraction(k, ZOOM_RAYS - 1) for k in range(ZOOM_RAYS)]
-        found = [reach(t) for t in points]
-        k = int(np.argmin(found))
-        if found[k] < best:
-            best, where = float(found[k]), points[k]
+        reaches = [reach(t) for t in points]
+        k = int(np.argmin(reaches))
+        if reaches[k] < best:
+            best, best_t = float(reaches[k]), points[k]
         low, high = points[max(k - 1, 0)], points[min(k + 1, ZOOM_RAYS - 1)]
         low, high = _dyadic(low, 60), _dyadic(high, 60)
-    close = [abs(one - best) <= 1e-11 * abs(best) for one in (*ends, *all_of)]
+    close = [abs(reached - best) <= 1e-11 * abs(best) for reached in (*ends, *all_of)]
     if all(close):
         return RangeEnd(abs(best), Fraction(1), EVERY)
     for is_close, t, wave in ((close[0], Fraction(0), LONGEST), (close[1], Fraction(1), SHORTEST)):
         if is_close:
             return RangeEnd(abs(best), t, wave)
-    return RangeEnd(abs(best), where, BETWEEN)
+    return RangeEnd(abs(best), best_t, BETWEEN)
 
 
 def _dyadic(x, bits: int) -> Fraction:
@@ -389,18 +394,18 @@ def _dyadic(x, bits: int) -> Fraction:
 
 
 def _on(g, t: Fraction) -> np.ndarray:
-    """Coefficients in nu at t, each the nearest float to the exact one."""
-    powers = [1]  # of both terms of t, so that all stays whole
+    """Coefficients in nu at t, each the nearest float to the exact one, up to a positive factor."""
+    powers = [1]  # of the denominator of t, so that all numbers are integers
     for _ in range(len(g[0]) - 1):
         powers.append(powers[-1] * t.denominator)
-    found = []
+    coefficients = []
     for row in g:
         total = 0
-        for one, power in zip(reversed(row), powers, strict=True):
-            total = total * t.numerator + one * power
-        found.append(total)
-    largest = max(map(abs, found))
-    return np.array([x / largest for x in found]) if largest else np.zeros(1)
+        for entry, power in zip(reversed(row), powers, strict=True):
+            total = total * t.numerator + entry * power
+        coefficients.append(total)
+    largest = max(map(abs, coefficients))
+    return np.array([x / largest for x in coefficients]) if largest else np.zeros(1)
 
 
 def _negative(p: np.ndarray) -> list[tuple[float, float]]:
@@ -410,13 +415,13 @@ def _negative(p: np.ndarray) -> list[tuple[float, float]]:
     roots = np.roots(p[::-1])
     real = np.sort(roots.real[(np.abs(roots.imag) <= 1e-7 * np.abs(roots)) & (roots.real > 1e-13)])
     ends = [0.0, *map(float, real), math.inf]
-    found = []
+    ranges = []
     for low, high in zip(ends, ends[1:], strict=False):
         inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
         if high > low and np.polyval(p[::-1], inside) < 0:
-            joined = found and found[-1][1] == low
-            found[-1:] = [(found[-1][0], high)] if joined else [*found[-1:], (low, high)]
-    return found
+            joined = ranges and ranges[-1][1] == low
+            ranges[-1:] = [(ranges[-1][0], high)] if joined else [*ranges[-1:], (low, high)]
+    return ranges
 
 
 def _finite(x: float) -> float | None:

@@ -1,9 +1,9 @@
-"""How long a fixed step may be for what is no wave alone: vessels, columns, bodies, devices, what rubs and is carried.
+"""Greatest fixed step for modes other than plain waves: vessels, columns, bodies, devices, friction, scalars.
 
-An estimate of the start: eigenvalues of the rates of all states but those of cells, which stand still meanwhile, and
-the modes of cells (`limits.cells`). A deviation that is multiplied by |R(h s)| a step, and by
-|exp(h s)| in truth, has grown by the quotient. Slopes are those over a hundredth of what drives the scene: that of a
-valve at a drop of zero has no end, and a swing about it that is smaller is none that counts. Knows no run.
+It is estimated at the start, from the eigenvalues of the rates of all states outside cells, with the cells held
+constant, and the modes of cells (`limits.cells`). The method multiplies a deviation by |R(h s)| in a step, the exact
+solution by |exp(h s)|; the quotient is the growth by the method. Slopes are differences over a hundredth of the forcing
+range: the slope of a valve at zero pressure drop is infinite, and smaller oscillations about it are not relevant.
 """
 
 from __future__ import annotations
@@ -18,18 +18,20 @@ from fvsolve.limits.drives import lumped, spreads
 from fvsolve.steppers.analysis.stability_function import stability_function
 from fvsolve.steppers.tableau import method_named
 
-SHARE = 0.01  # of what drives the scene, over which slopes are taken
-MOST = 300  # states: of more, nothing is predicted
-GROWS = 10.0  # times that a mode or a wave grows in a run: less is not seen, where no step is without growth
-LEAST, FINE = 1e-15, 40  # of the step, where one that holds is looked for; halvings back from there
-FOLLOWED = 1.0  # of |h s|: such a mode is followed step by step, and grows as the start says
+SHARE = 0.01  # fraction of the forcing range over which slopes are taken
+MOST = 300  # number of states above which no prediction is made
+GROWS = 10.0  # growth factor of a mode or a wave in a run below which no notice is given: some growth is unavoidable
+LEAST, FINE = 1e-15, 40  # least step in the search for the limit, relative to the given step; number of bisections
+FOLLOWED = 1.0  # |h s| up to which a mode is resolved by the steps, and grows as predicted at the start
 
 
 class Mode(NamedTuple):
-    """What grows most in the run: its place, by how much, and up to which step it does not [s].
+    """Mode with the greatest growth in the run: its place, its growth factor, and its greatest stable step [s].
 
-    own : of what no cell holds, which may leave the state of the start before it has grown, or be bounded by what
-    bends; followed : whether steps follow it all the same; frequency : at which it swings [Hz]
+    own : True for states outside cells, which may leave the initial state before they have grown, or be bounded by
+    nonlinear laws
+    followed : True if the steps resolve the mode
+    frequency : of its oscillation [Hz]
     """
 
     place: str
@@ -41,23 +43,23 @@ class Mode(NamedTuple):
 
 
 def lumped_modes(model, method: str, step: float) -> list[Mode]:
-    """What a fixed step [s] makes grow: of what no cell holds, and of cells.
+    """Fastest growing modes under a fixed step [s]: of states outside cells, and of cells.
 
     Raises FvsolveError for a method without a stability function.
     """
     r, numerics = stability_function(method_named(method)), model.case.numerics
     span, fixed = numerics.end - numerics.start, numerics.step is not None
     own = own_modes(model) if fixed else []
-    cells = cell_modes(model) if fixed else rubbed(model)  # a Courant number minds the rest
-    found = [quickest(r, modes, step, span, modes is own) for modes in (own, cells)]
-    return [mode for mode in found if mode is not None]
+    cells = cell_modes(model) if fixed else rubbed(model)  # a Courant number limits the other modes
+    candidates = [quickest(r, modes, step, span, modes is own) for modes in (own, cells)]
+    return [mode for mode in candidates if mode is not None]
 
 
 def quickest(r, modes: Modes, step: float, span: float, own: bool, enough: float = GROWS) -> Mode | None:
-    """What grows most of some modes, if any grows `enough` times within the span [s]."""
+    """Mode with the greatest growth, if it grows by the factor `enough` within the span [s]; else None."""
     if not modes:
         return None
-    s = np.concatenate([one for _, one in modes])
+    s = np.concatenate([values for _, values in modes])
 
     def grown(h: float) -> float:
         return times(float(beyond(r, s, h).max()), span / h)
@@ -71,45 +73,45 @@ def quickest(r, modes: Modes, step: float, span: float, own: bool, enough: float
         middle = 0.5 * (low + high)
         low, high = (middle, high) if grown(middle) < enough else (low, middle)
     worst = int(np.argmax(beyond(r, s, step)))
-    at = int(np.searchsorted(np.cumsum([one.size for _, one in modes]), worst, side="right"))
+    at = int(np.searchsorted(np.cumsum([values.size for _, values in modes]), worst, side="right"))
     frequency = abs(float(s[worst].imag)) / (2.0 * math.pi)
     return Mode(modes[at][0], grown(step), low, own, bool(abs(step * s[worst]) <= FOLLOWED), frequency)
 
 
 def beyond(r, s: np.ndarray, h: float) -> np.ndarray:
-    """By how much more a step multiplies each mode than its own growth does, less one."""
+    """Growth factor of each mode in a step, over its exact growth factor (at least 1), less 1."""
     with np.errstate(over="ignore", invalid="ignore"):
-        found = np.abs(r(h * s)) / np.exp(np.maximum(h * s.real, 0.0))
-        return (found if np.isfinite(found).all() else np.nan_to_num(found, nan=np.inf)) - 1.0
+        ratio = np.abs(r(h * s)) / np.exp(np.maximum(h * s.real, 0.0))
+        return (ratio if np.isfinite(ratio).all() else np.nan_to_num(ratio, nan=np.inf)) - 1.0
 
 
 def times(excess: float, steps: float) -> float:
-    """What a factor of 1 + excess makes of one in so many steps."""
+    """(1 + excess)^steps, limited to exp(700); 1 for a negative excess."""
     return math.exp(min(700.0, steps * math.log1p(max(excess, 0.0))))
 
 
 def own_modes(model) -> Modes:
-    """Of what is no cell's, at the start, each at the state that moves most."""
-    which = lumped(model)
-    if not 0 < which.size <= MOST:
+    """Eigenvalues of the states outside cells at the start, each with the state of its greatest component."""
+    states = lumped(model)
+    if not 0 < states.size <= MOST:
         return []
     t, y, width = float(model.case.numerics.start), model.start, SHARE * spreads(model)
-    out, j = model.new_out(), np.zeros((which.size, which.size))
+    out, j = model.new_out(), np.zeros((states.size, states.size))
 
     def rates(moved: np.ndarray) -> np.ndarray:
-        found = np.zeros(model.y_size)
-        model.functions.rhs(t, moved, found, out, slate.handle)
-        return found[which]
+        result = np.zeros(model.y_size)
+        model.functions.rhs(t, moved, result, out, run_data.handle)
+        return result[states]
 
-    with model.slate() as slate:
-        slate.evaluate(t, y, np.inf)  # which sets what holds there
-        for k, i in enumerate(which):
+    with model.slate() as run_data:
+        run_data.evaluate(t, y, np.inf)  # sets the device states there
+        for k, i in enumerate(states):
             high, low = y.copy(), y.copy()
             high[i], low[i] = y[i] + width[i], y[i] - width[i]
             j[:, k] = (rates(high) - rates(low)) / (2.0 * SHARE)
-    j /= spreads(model)[which][:, None]
+    j /= spreads(model)[states][:, None]
     if not np.all(np.isfinite(j)):
         return []
     values, vectors = np.linalg.eig(j)
-    most = which[np.argmax(np.abs(vectors), axis=0)]
+    most = states[np.argmax(np.abs(vectors), axis=0)]
     return [(model.state_names[i], values[k : k + 1]) for k, i in enumerate(most)]

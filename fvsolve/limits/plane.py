@@ -1,14 +1,14 @@
-"""The limit of waves and of what is carried on a uniform grid in the plane (von Neumann). Knows schemes and methods.
+"""Courant limit of waves and of advection on a uniform grid in the plane (von Neumann).
 
-Waves p, u, v of speed c, each direction split into its characteristics: with z(theta) = a + i b the scheme's symbol and
-shares w_x + w_y = 1 of the rate c / dx + c / dy, a wave of phases (theta_x, theta_y) goes by du/dt = rate M u,
+Waves p, u, v of speed c, with each direction split into its characteristics: with the symbol z(theta) = a + i b and
+shares w_x + w_y = 1 of the rate c / dx + c / dy, a wave of phases (theta_x, theta_y) follows du/dt = rate M u,
 
     M = [ w_x a_x + w_y a_y   i w_x b_x   i w_y b_y ]
         [ i w_x b_x           w_x a_x     0         ]
         [ i w_y b_y           0           w_y a_y   ]
 
-and what is carried by w_x z(theta_x) + w_y z(theta_y). A Courant number at which one wave is found to grow is unstable,
-whatever the others do: beyond what is found here growth is proved; below, only phases between those tried are not.
+and an advected quantity w_x z(theta_x) + w_y z(theta_y). Growth of a single wave proves that a Courant number is
+unstable: so growth above the computed limit is proved; below it, only phases between the tested phases are not covered.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from fvsolve.limits.symbol import symbol, weights_of
 from fvsolve.steppers.analysis.stability_function import stability_function
 from fvsolve.steppers.tableau import method_named
 
-PHASES = 33  # from 0 to pi, of one direction; of the other from -pi to pi
-GROWTH = 1e-9  # of |R| - 1 that is taken for growth
+PHASES = 33  # number of phases from 0 to pi in x; with the same spacing from -pi to pi in y
+GROWTH = 1e-9  # |R| - 1 above which a wave counts as growing
 MOST, HALVINGS = 64.0, 40
 FINE = 1001  # phases along a line
-LITTLE = 1.01  # times: what holds there needs no proof
+LITTLE = 1.01  # margin of the Courant number: a step stable with it needs no further check
 
 
 @functools.lru_cache(maxsize=64)
 def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> float:
-    """The greatest Courant number, rate times step, up to which no wave grows; 0 where there is none.
+    """Greatest Courant number, rate times step, up to which no wave grows; 0 if waves always grow.
 
-    share : of the rate, in x; waves : of p, u, v, else of what is carried. Raises FvsolveError for a scheme
-    without weights.
+    share : share of the rate in x; waves : True for waves p, u, v, False for advection
+    Raises FvsolveError for a nonlinear scheme.
     """
     z = modes(scheme, share, waves)
 
@@ -53,7 +53,7 @@ def plane_limit(scheme: str, method: str, share: float, waves: bool = True) -> f
 
 @functools.lru_cache(maxsize=1024)
 def holds_well(scheme: str, method: str, courant: float, share: float = 1.0, waves: bool = False) -> bool:
-    """Whether no wave that is tried grows at a Courant number, nor at one that is a little greater."""
+    """True if no tested wave grows at a Courant number, nor at a Courant number 1 % greater."""
     if share == 1.0 and not waves:
         z = symbol(weights_of(scheme), np.linspace(0.0, np.pi, FINE))
     else:
@@ -62,12 +62,12 @@ def holds_well(scheme: str, method: str, courant: float, share: float = 1.0, wav
 
 
 def grows(z: np.ndarray, method: str, courant: float) -> bool:
-    """Whether one of the eigenvalues z, for a rate of one, is multiplied by more than one in a step."""
+    """True if |R| exceeds 1 for an eigenvalue z, given for a rate of 1."""
     return bool(np.abs(stability_function(method_named(method))(courant * z)).max() > 1.0 + GROWTH)
 
 
 def modes(scheme: str, share: float, waves: bool) -> np.ndarray:
-    """Eigenvalues of M over all pairs of phases, for a rate of one."""
+    """Eigenvalues of M over all pairs of phases, for a rate of 1."""
     weights = weights_of(scheme)
     x, y = np.meshgrid(np.linspace(0.0, np.pi, PHASES), np.linspace(-np.pi, np.pi, 2 * PHASES - 1))
     zx, zy = share * symbol(weights, x), (1.0 - share) * symbol(weights, y)

@@ -1,8 +1,9 @@
-"""A model's step against the limits of its scheme and method: a notice for each room beyond. Knows no run.
+"""Notices for the pipes, basins and modes of a model whose step exceeds the limit of scheme and method.
 
-Proved, for linear schemes where waves do not depend on the state: von Neumann's limit. Limited schemes count as what
-they are where all is smooth, and waves that depend on the state by the quickest one: these are estimates. So is the
-limit of a pipe of few cells, whose ends bring it down; there growth in the run decides, by what its own ends reflect.
+For linear schemes and waves that do not depend on the state the limit is proved: von Neumann's limit. Limited schemes
+count as their linear scheme in smooth flow, and waves that depend on the state by the fastest wave: these limits are
+estimates. So is the limit of a pipe of few cells, which its ends reduce; there the growth in the run decides, computed
+with the reflections of its own ends.
 """
 
 from __future__ import annotations
@@ -26,34 +27,36 @@ from fvsolve.schemes import ROOM, SCHEMES
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 
-SLACK = 1e-9  # by which a Courant number may exceed its limit through rounding
-SHARE = 0.05  # of an estimate: up to here beyond it a step is doubtful, from there on wrong
-SMOOTH = 1e6  # times that deviations of cells must grow to be wrong where no schedule jumps: there are hardly any
-STILL, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05  # of its range by which a step leaves what is no wave astray, on average
-LIMITED = 0.3  # the same of limiters between few cells: they hold by up to so much more (tests/limits/test_ends.py)
+SLACK = 1e-9  # relative excess over the limit that rounding may cause
+SHARE = 0.05  # relative excess over an estimated limit up to which a step is doubtful, and above which it is wrong
+SMOOTH = 1e6  # growth of cells from which numbers are wrong if no schedule jumps: then deviations are small at first
+# Mean error of a state outside cells, relative to its range: no error, doubtful, wrong.
+STILL, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05
+LIMITED = 0.3  # SHARE for limiters between few cells, which are stable up to this excess (tests/limits/test_ends.py)
 
 
 class Room(NamedTuple):
-    """A pipe or a basin: its Courant number, and up to which it holds, both as `numerics.courant` counts."""
+    """Courant number of a pipe or a basin and its limit, both defined as `numerics.courant`."""
 
     place: str
     courant: float
     limit: float
-    scheme: str  # that the limit is of
+    scheme: str  # scheme of the limit
     proved: bool
     where: str
-    share: float = SHARE  # of an estimate, beyond which it is wrong
-    grows: float = math.inf  # times in the run, where that is what makes it wrong
+    share: float = SHARE  # relative excess over an estimate above which the numbers are wrong
+    grows: float = math.inf  # growth factor in the run, where growth decides
 
 
 def step_limits(
-    model, rates: dict[str, float] | None = None, astray: float | None = None, slate: Slate | None = None
+    model, rates: dict[str, float] | None = None, step_error: float | None = None, run_data: Slate | None = None
 ) -> list[Notice]:
-    """A notice for the pipe, for every basin, and for what is no wave, whose step is beyond its limit.
+    """Notices for the worst pipe, for basins, and for modes other than waves, whose step exceeds its limit.
 
-    rates : of basins by name, the greatest in a run so far [1/s]; those of the start by default. astray : share of
-    its range by which steps of a run went astray where they did most (`solve.halves`); None before a run; slate : one
-    to look on, which is blank again. Nothing under error control.
+    rates : greatest wave rate of each basin in the run so far, by name [1/s]; default the initial rates
+    step_error : greatest mean error of a state in the run, relative to its range (`solve.halves`); None before a run
+    run_data : data of a run to evaluate with, reset afterwards
+    Returns no notices under error control.
     """
     numerics = model.case.numerics
     method = method_named(automatic.first_method(numerics.method))
@@ -63,56 +66,58 @@ def step_limits(
     if not method.explicit:
         return lines
     try:
-        rooms = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
-        h = first_step(model, slate)
+        checks = [*pipe_rooms(model, method.name), *basin_rooms(model, method.name, rates or {})]
+        h = first_step(model, run_data)
         modes = lumped_modes(model, method.name, h) if h > 0.0 else []
         growing = swings(model, method.name, h, span(model)) if h > 0.0 else []
-    except FvsolveError:  # a method whose stability function is not to be had
+    except FvsolveError:  # a method without a stability function
         return lines
-    found = [notice(model, room, method.name) for room in rooms if room.courant > room.limit * (1.0 + SLACK)]
+    notices = [notice(model, check, method.name) for check in checks if check.courant > check.limit * (1.0 + SLACK)]
     jumps = any(jump for _, jump in model.breaks)
-    modes = [mode for mode in modes if mode.own or not found]  # of cells those that waves bring with them are known
-    return found + [of_mode(model.case, h, mode, method.name, astray, jumps) for mode in modes] + growing + lines
+    modes = [
+        mode for mode in modes if mode.own or not notices
+    ]  # modes of cells that come with waves have a notice already
+    return notices + [of_mode(model.case, h, mode, method.name, step_error, jumps) for mode in modes] + growing + lines
 
 
-def first_step(model, slate: Slate | None = None) -> float:
-    """The step of a run, by Courant number that of its start; 0 where none is known [s]."""
+def first_step(model, run_data: Slate | None = None) -> float:
+    """Step of a run, under a Courant number its first step; 0 where it is unknown [s]."""
     numerics = model.case.numerics
     if numerics.step is not None:
         return numerics.step
-    if slate is None or model.basins:  # which keep more on a slate than flags
+    if run_data is None or model.basins:  # basins change more of the run data than flags
         rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
     else:
-        rate = float(slate.evaluate(numerics.start, model.start, math.inf)[1][rec.RATE])
-        slate.blank()
+        rate = float(run_data.evaluate(numerics.start, model.start, math.inf)[1][rec.RATE])
+        run_data.blank()
     return numerics.courant / rate if rate > 0.0 else 0.0
 
 
 def given_step(model) -> float:
-    """The step that delay lines go by [s]."""
+    """Step used for delay lines [s]."""
     numerics = model.case.numerics
     return numerics.step if numerics.step is not None else numerics.courant / model.wave_rate
 
 
-def of_mode(case, h: float, mode: Mode, method: str, astray: float | None, jumps: bool) -> Notice:
-    """What is to be said of what is no wave alone: before a run that it grows, after it whether that was seen."""
+def of_mode(case, h: float, mode: Mode, method: str, step_error: float | None, jumps: bool) -> Notice:
+    """Notice for a growing mode; after a run, with the measured error of its steps."""
     numerics = case.numerics
-    seen = astray is None or not mode.own or astray >= WRONG or (mode.followed and astray > STILL)
+    seen = step_error is None or not mode.own or step_error >= WRONG or (mode.followed and step_error > STILL)
     enough = (GROWS if mode.followed else GROWS**2) if mode.own else GROWS**2 if jumps else SMOOTH
     wrong = seen and mode.grows >= enough
-    doubt = "it may be wrong" if seen or astray >= DOUBTFUL else "this run shows none"
+    doubt = "it may be wrong" if seen or step_error >= DOUBTFUL else "this run shows no growth"
     ends = "the numbers are not to be trusted" if wrong else doubt
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
     size = rounded_down(getattr(numerics, key) * mode.limit / h)
     text = (f"{mode.place}: deviations grow {mode.grows:.3g} times in the run with {method} and steps of "
-            f"{case.step_amount(h)}, as the start has it; {case.step_amount(mode.limit)} is the limit (an estimate); "
+            f"{case.step_amount(h)}; the limit is {case.step_amount(mode.limit)} (estimated at the start); "
             f"{ends}; give numerics.{key} = {size:.4g}{unit} or less")  # fmt: skip
     return Notice("step-limit", mode.place, text, key, h, mode.limit, not wrong)
 
 
 def pipe_rooms(model, method: str) -> list[Room]:
-    """The pipe that is farthest beyond its limit, if there are any."""
-    own = model.tables.pipes["delay"] < 0  # whose waves cells carry
+    """Check of the pipe that is farthest beyond its limit; empty without such a pipe."""
+    own = model.tables.pipes["delay"] < 0  # pipes divided into cells
     if not own.any():
         return []
     numerics, waves = model.case.numerics, model.wave_rates
@@ -120,38 +125,40 @@ def pipe_rooms(model, method: str) -> list[Room]:
         courant = numerics.step * waves
     else:
         courant = numerics.courant * waves / (waves * model.tables.pipes["quicker"]).max()
-    cells, one = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
-    long = cells >= (ROOM if one.limited and one.shorter else LONG)  # at whose ends it is of a lower order where rough
+    cells, scheme = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
+    long = cells >= (
+        ROOM if scheme.limited and scheme.shorter else LONG
+    )  # at the ends of short pipes the order of limited schemes is lower
     short = np.flatnonzero(own & ~long)
-    rooms = [room for k in short if (room := short_pipe(model, method, int(k), float(courant[k])))]
-    inner = own & (cells >= ROOM if proved(model) else long)  # what grows between the ends does so in few cells, too
+    checks = [check for k in short if (check := short_pipe(model, method, int(k), float(courant[k])))]
+    inner = own & (cells >= ROOM if proved(model) else long)  # waves of a long pipe grow in few cells, too
     if inner.any():
         k = int(np.argmax(np.where(inner, courant, -1.0)))
-        rooms += long_pipe(model, method, k, float(courant[k]))
-    return sorted(rooms, key=lambda room: (not sound(room), room.courant / max(room.limit, 1e-300)))[-1:]
+        checks += long_pipe(model, method, k, float(courant[k]))
+    return sorted(checks, key=lambda check: (not sound(check), check.courant / max(check.limit, 1e-300)))[-1:]
 
 
 def long_pipe(model, method: str, k: int, courant: float) -> list[Room]:
-    """Pipe k, if a wave grows on a grid without ends."""
+    """Check of pipe k as a grid without ends, if a wave grows on it."""
     scheme = frozen(model.case.numerics.scheme)[0]
     if holds_well(scheme, method, courant):
         return []
-    one = advection_limit(scheme, method)
-    grows = math.inf if one.limit > 0.0 else growth(scheme, method, courant, span(model) * model.wave_rates[k])
-    sure = one.proved and proved(model)
-    found = Room(f"links.{model.pipes[k].name}", courant, one.limit, scheme, sure, "on a long pipe", grows=grows)
-    return [found] if grows >= GROWS else []
+    result = advection_limit(scheme, method)
+    grows = math.inf if result.limit > 0.0 else growth(scheme, method, courant, span(model) * model.wave_rates[k])
+    sure = result.proved and proved(model)
+    check = Room(f"links.{model.pipes[k].name}", courant, result.limit, scheme, sure, "on a long pipe", grows=grows)
+    return [check] if grows >= GROWS else []
 
 
 def proved(model) -> bool:
-    """Whether von Neumann's limit is one of its pipes, by proof: a linear scheme, and waves that no state changes."""
+    """True if von Neumann's limit is exact for the pipes: linear scheme, wave speed independent of the state."""
     return not frozen(model.case.numerics.scheme)[1] and model.case.law.linear
 
 
 def short_pipe(model, method: str, k: int, courant: float) -> Room | None:
-    """Pipe k of few cells, where its ends make its waves grow within the run: surely by what its own ends reflect."""
-    cells, one = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
-    scheme, limited = frozen(one.shorter if one.limited and one.shorter else one.name)
+    """Check of pipe k of few cells, if its waves grow within the run with reflections at its ends."""
+    cells, own_scheme = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
+    scheme, limited = frozen(own_scheme.shorter if own_scheme.limited and own_scheme.shorter else own_scheme.name)
     steps = span(model) * model.wave_rates[k] / courant
     grows = times(pipe_growth(scheme, method, cells, courant), steps)
     if grows < GROWS:
@@ -164,7 +171,10 @@ def short_pipe(model, method: str, k: int, courant: float) -> Room | None:
 
 
 def returned(model, k: int) -> tuple[float, ...]:
-    """Products of what both ends of pipe k reflect of a pressure; with what else joins them unknown, two for each."""
+    """Products of the pressure reflection factors of both ends of pipe k.
+
+    An end with other parts than pipes has two possible factors.
+    """
     row, nodes, valves = model.tables.pipes[k], model.tables.nodes, model.tables.valves
     ends = []
     for i in (row["from_node"], row["to_node"]):
@@ -176,8 +186,8 @@ def returned(model, k: int) -> tuple[float, ...]:
 
 
 def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
-    """All basins, water's Courant numbers by parts of a cell as its steps count them."""
-    numerics, rooms = model.case.numerics, []
+    """Checks of all basins whose waves grow; Courant numbers are those of the parts of a cell that its steps use."""
+    numerics, checks = model.case.numerics, []
     for basin, row in zip(model.basins, model.tables.basins, strict=True):
         rate, share = basin.pace(model.start)
         parts = float(row["unsplit"]) or 1.0
@@ -197,51 +207,51 @@ def basin_rooms(model, method: str, rates: dict[str, float]) -> list[Room]:
         fixed = basin.is_grid and basin.even_paced
         grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, span(model) * rate)
         if grows >= GROWS:
-            rooms.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
+            checks.append(Room(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
                               "in a wide basin", grows=grows))  # fmt: skip
-    return rooms
+    return checks
 
 
 def span(model) -> float:
-    """How long the run is [s]."""
+    """Duration of the run [s]."""
     return model.case.numerics.end - model.case.numerics.start
 
 
 def frozen(scheme: str) -> tuple[str, bool]:
-    """The linear scheme that a scheme is where all is smooth, and whether it is another."""
+    """(linear scheme equal to a scheme in smooth flow, True if the scheme is limited)."""
     return SCHEMES[scheme].smooth.name, SCHEMES[scheme].limited
 
 
-def sound(room: Room) -> bool:
-    """Whether a room beyond its limit is but doubtful: an estimate, hardly passed, or growth that is hardly seen."""
-    return not room.proved and (room.courant <= room.limit * (1.0 + room.share) or room.grows < GROWS**2)
+def sound(check: Room) -> bool:
+    """True if a check beyond its limit is only doubtful: small excess over an estimate, or small growth."""
+    return not check.proved and (check.courant <= check.limit * (1.0 + check.share) or check.grows < GROWS**2)
 
 
-def notice(model, room: Room, method: str) -> Notice:
-    """What is to be said of a room beyond its limit."""
+def notice(model, check: Room, method: str) -> Notice:
+    """Notice for a pipe or a basin beyond its limit."""
     numerics = model.case.numerics
     scheme = model.case.numerics.scheme
-    about = f", where it is {room.scheme}," if room.scheme != scheme else ""
-    known = "proved" if room.proved else "an estimate"
+    about = f", which there equals {check.scheme}," if check.scheme != scheme else ""
+    known = "proved" if check.proved else "an estimate"
     size = numerics.step if numerics.step is not None else numerics.courant
     key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
-    if room.limit > 0.0:
-        limit = f"{room.limit:.6g} is the limit {room.where} ({known})"
-        remedy = f"give numerics.{key} = {rounded_down(size * room.limit / room.courant):.4g}{unit} or less"
+    if check.limit > 0.0:
+        limit = f"the limit is {check.limit:.6g} {check.where} ({known})"
+        remedy = f"give numerics.{key} = {rounded_down(size * check.limit / check.courant):.4g}{unit} or less"
     else:
-        limit = f"there is none that does not grow {room.where} ({known})"
-        remedy = f"{room.scheme} wants another method, ssp-rk3 for example"
-    text = (f"{room.place}: Courant number {room.courant:.6g}: with {scheme}{about} and {method} {limit}; "
-            f"{'it may be wrong' if sound(room) else 'the numbers are not to be trusted'}; {remedy}")  # fmt: skip
-    return Notice("step-limit", room.place, text, key, room.courant, room.limit, sound(room))
+        limit = f"waves grow at every Courant number {check.where} ({known})"
+        remedy = f"{check.scheme} needs another method, for example ssp-rk3"
+    text = (f"{check.place}: Courant number {check.courant:.6g}: with {scheme}{about} and {method} {limit}; "
+            f"{'it may be wrong' if sound(check) else 'the numbers are not to be trusted'}; {remedy}")  # fmt: skip
+    return Notice("step-limit", check.place, text, key, check.courant, check.limit, sound(check))
 
 
 def growth(scheme: str, method: str, courant: float, crossed: float) -> float:
-    """By how much the fastest wave of a uniform grid grows while waves cross so many cells."""
+    """Growth factor of the fastest growing wave of a uniform grid while waves cross `crossed` cells."""
     return times(growth_of(weights_of(scheme), method, courant)[0], crossed / courant)
 
 
 def rounded_down(x: float) -> float:
-    """A number to four digits, never above it."""
+    """Round a number down to four digits."""
     scale = 10.0 ** (3 - math.floor(math.log10(x)))
     return math.floor(x * scale * (1.0 + 1e-12)) / scale

@@ -1,4 +1,4 @@
-"""What a linear scheme makes of a wave on a uniform periodic grid, exactly. Knows face weights; knows no method.
+"""Symbol of a linear scheme: rate of a wave on a uniform periodic grid, in exact arithmetic.
 
 u_t + a u_x = 0 in cells of width dx: du_j/dt = -(a / dx) (F_j - F_j-1), F_j = sum_k w_k u_j+k-2. A wave
 u_j = exp(i j theta) grows by du/dt = (a / dx) z(theta) u. With t = sin^2(theta / 2) both Re z and |z|^2 are
@@ -20,7 +20,7 @@ WEIGHTS: dict[str, Weights] = {name: one.weights for name, one in LINEAR.items()
 
 
 def weights_of(scheme: str) -> Weights:
-    """Weights of cells u-2 .. u+2 in the value at the face after u; raises FvsolveError for a scheme that has none."""
+    """Weights of cells u-2 .. u+2 in the value at the face after u; raises FvsolveError for a nonlinear scheme."""
     if scheme in WEIGHTS:
         return WEIGHTS[scheme]
     linear = ", ".join(WEIGHTS)
@@ -32,7 +32,7 @@ def weights_of(scheme: str) -> Weights:
 
 
 def symbol(weights: Sequence, theta) -> np.ndarray:
-    """z(theta) in floating point, theta a phase a cell [rad] or an array of them."""
+    """z(theta) in floating point; theta : phase per cell [rad], a number or an array."""
     theta = np.asarray(theta, dtype=float)
     return sum(float(a) * np.exp(1j * m * theta) for m, a in _waves(weights).items())
 
@@ -44,27 +44,27 @@ def real_part(weights: Sequence) -> Polynomial:
 
 def square(weights: Sequence) -> Polynomial:
     """|z|^2 as a polynomial in t."""
-    waves, found = _waves(weights), {}
+    waves, product = _waves(weights), {}
     for m, x in waves.items():
         for n, y in waves.items():
-            found[m - n] = found.get(m - n, Fraction(0)) + x * y
-    return _cosines(found)
+            product[m - n] = product.get(m - n, Fraction(0)) + x * y
+    return _cosines(product)
 
 
 def _waves(weights: Sequence) -> dict[int, Fraction]:
     """z = sum_m a_m exp(i m theta)."""
-    found: dict[int, Fraction] = {}
+    amplitudes: dict[int, Fraction] = {}
     for k, w in enumerate(weights, start=-2):
-        found[k] = found.get(k, Fraction(0)) - w
-        found[k - 1] = found.get(k - 1, Fraction(0)) + w
-    return found
+        amplitudes[k] = amplitudes.get(k, Fraction(0)) - w
+        amplitudes[k - 1] = amplitudes.get(k - 1, Fraction(0)) + w
+    return amplitudes
 
 
 def _cosines(waves: dict[int, Fraction]) -> Polynomial:
     """sum_m a_m cos(m theta), cos theta = 1 - 2 t, by T_m+1 = 2 (1 - 2 t) T_m - T_m-1."""
     cosine = Polynomial([1, -2])
-    before, now, found = cosine, Polynomial([1]), Polynomial([])
+    before, now, total = cosine, Polynomial([1]), Polynomial([])
     for m in range(max(abs(m) for m in waves) + 1):
-        found = found + now * (waves.get(m, Fraction(0)) + (waves.get(-m, Fraction(0)) if m else 0))
+        total = total + now * (waves.get(m, Fraction(0)) + (waves.get(-m, Fraction(0)) if m else 0))
         before, now = now, 2 * cosine * now - before
-    return found
+    return total

@@ -1,4 +1,4 @@
-"""Plane meshes: rectangles, and files read through meshio. Knows geometry; knows no physics."""
+"""Plane meshes: rectangles, and files read through meshio."""
 
 from fvsolve.mesh.measures import Quality, quality
 from fvsolve.mesh.mesh import Grid, Mesh

@@ -1,4 +1,4 @@
-"""What can be wrong with the cells and the boundary of a mesh, in words. Knows no files; repairs nothing."""
+"""Faults of the cells and the boundary of a mesh."""
 
 from __future__ import annotations
 
@@ -13,110 +13,113 @@ from fvsolve.mesh.edges import CROWDED, Edges, key_of
 from fvsolve.mesh.mesh import WALL
 from fvsolve.mesh.shapes import corners
 
-FLAT = 1e-8  # of the longest side: sides and heights below it are none
+FLAT = 1e-8  # of the longest side: smaller sides and heights count as zero
 SHOWN = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Sketch:
-    """A mesh as it is being read, in the file's unit."""
+    """A mesh during reading, in the file's unit."""
 
     points: np.ndarray
     cells: np.ndarray
     unit: str
 
     def centre(self, c: int) -> np.ndarray:
-        """The mean of a cell's corners."""
+        """Mean of a cell's corners."""
         return self.points[[p for p in self.cells[c] if p >= 0]].mean(axis=0)
 
     def show(self, c: int) -> str:
-        """'cell 7 at (0.31, 0.52) m'."""
+        """Text like 'cell 7 at (0.31, 0.52) m'."""
         return f"cell {c} at {self.at(self.centre(c))}"
 
     def at(self, point: np.ndarray) -> str:
-        """'(0.31, 0.52) m'."""
+        """Text like '(0.31, 0.52) m'."""
         return f"({point[0]:.6g}, {point[1]:.6g}) {self.unit}"
 
     def face(self, ends: Sequence[int]) -> str:
-        """'the face from (0, 0) m to (0.5, 0) m'."""
+        """Text like 'the face from (0, 0) m to (0.5, 0) m'."""
         return f"the face from {self.at(self.points[ends[0]])} to {self.at(self.points[ends[1]])}"
 
     def list(self, cells: np.ndarray) -> str:
-        """'3 of 40 cells: cell 7 at ..., cell 9 at ..., cell 12 at ...'."""
-        named = [self.show(c) for c in cells[:SHOWN]] + (["..."] if len(cells) > SHOWN else [])
-        return f"{len(cells)} of {len(self.cells)} cells: {', '.join(named)}"
+        """Text like '3 of 40 cells: cell 7 at ..., cell 9 at ..., cell 12 at ...'."""
+        texts = [self.show(c) for c in cells[:SHOWN]] + (["..."] if len(cells) > SHOWN else [])
+        return f"{len(cells)} of {len(self.cells)} cells: {', '.join(texts)}"
 
 
 def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
-    """(faults of single cells, bool[n] which cells are bad, bool[n] which turn right, sound ones clockwise)."""
+    """(faults of single cells, bool[n] bad cells, bool[n] cells with a right turn, which if valid are clockwise)."""
     turn, _, side = corners(sketch.points, sketch.cells)
     long = side.max(axis=1, keepdims=True)
     left, right = turn > FLAT * long**2, turn < -FLAT * long**2
     quad = sketch.cells[:, 3] >= 0
-    kinds = {
-        "have corners in one place; wanted three or four apart: a collapsed quad is a triangle": (
+    tests = {
+        "have coincident corners; expected three or four different corners: a collapsed quad is a triangle": (
             side <= FLAT * long
         ).any(axis=1),
-        "cross themselves; wanted corners in order around the cell": quad & (left.sum(1) == 2) & (right.sum(1) == 2),
-        "are not convex; wanted every corner below 180 degrees: split them into triangles": quad
+        "cross themselves; expected corners in order around the cell": quad & (left.sum(1) == 2) & (right.sum(1) == 2),
+        "are not convex; expected every corner below 180 degrees: split them into triangles": quad
         & left.any(axis=1)
         & right.any(axis=1),
-        "have no area; wanted corners that do not lie on one line": ~left.any(axis=1) & ~right.any(axis=1),
+        "have no area; expected corners that do not lie on one line": ~left.any(axis=1) & ~right.any(axis=1),
     }
     faults, bad = [], np.zeros(len(quad), bool)
-    for words, which in kinds.items():
-        which = np.flatnonzero(which & ~bad)
-        bad[which] = True
-        if which.size:
-            faults.append(Fault("cells", f"{sketch.list(which)} {words}"))
+    for text, failing in tests.items():
+        failing = np.flatnonzero(failing & ~bad)
+        bad[failing] = True
+        if failing.size:
+            faults.append(Fault("cells", f"{sketch.list(failing)} {text}"))
     return faults, bad, right.any(axis=1)
 
 
 def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fault]:
-    """Faces with more than two cells, or with two on one side; number : int64  the numbers of the cells of `edges`."""
+    """Faults of faces with more than two cells, or with two on one side.
+
+    number : int64  numbers of the cells of `edges`
+    """
     crowded = np.flatnonzero(edges.mate == CROWDED)
     faces = np.unique(edges.key[crowded])
     if not faces.size:
         return []
     at = crowded[edges.key[crowded] == faces[0]]
     cells = np.sort(number[edges.cell[at]])
-    which = " and ".join(sketch.show(c) for c in cells[:SHOWN])
-    many = "more than two cells share it" if cells.size > 2 else "both lie on one side of it"
+    cell_texts = " and ".join(sketch.show(c) for c in cells[:SHOWN])
+    reason = "more than two cells share it" if cells.size > 2 else "both lie on one side of it"
     more = f" ({faces.size} such faces)" if faces.size > 1 else ""
     where = sketch.face((edges.start[at[0]], edges.stop[at[0]]))
-    remedy = "wanted one cell on each side; is a surface meshed twice, or in two physical groups?"
-    return [Fault("cells", f"they overlap at {where}{more}: {which}, {many}; {remedy}")]
+    remedy = "expected one cell on each side; is a surface meshed twice, or in two physical groups?"
+    return [Fault("cells", f"they overlap at {where}{more}: {cell_texts}, {reason}; {remedy}")]
 
 
 def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Fault]:
-    """Boundary faces that touch others elsewhere than at their ends; named : bool[outer]  in a group.
+    """Faults of boundary faces with contacts other than at their ends. named : bool[outer]  True for faces in a group
 
-    Two faces in one place are the sides of a thin wall where a group names one of them.
+    Two coincident faces are the sides of a thin wall if a group contains one of them.
     """
     start, stop, cell = edges.start[edges.outer], edges.stop[edges.outer], edges.cell[edges.outer]
-    found, whole = contacts(sketch.points[start], sketch.points[stop], named)
-    words = {
-        "same": "lie in one place and do not hang together: {one} and {other} at {face}; wanted one set of points "
-        "there (Gmsh: Coherence), or a group that names it as a thin wall",
-        "middle": "have the corner of another cell between their ends: {one} and {other} at {face}; "
-        "wanted faces that meet end to end",
-        "cross": "cross each other: {one} and {other} at {face}; wanted a boundary that does not cross itself",
+    contact_pairs, complete = contacts(sketch.points[start], sketch.points[stop], named)
+    texts = {
+        "same": "coincide but are not connected: {cell} and {neighbour} at {face}; expected one set of points "
+        "there (Gmsh: Coherence), or a group that marks it as a thin wall",
+        "middle": "have the corner of another cell between their ends: {cell} and {neighbour} at {face}; "
+        "expected faces that touch at their ends only",
+        "cross": "cross each other: {cell} and {neighbour} at {face}; expected a boundary that does not cross itself",
     }
     faults = []
-    for kind, pairs in found.items():
+    for kind, pairs in contact_pairs.items():
         if len(pairs):
             i, j = pairs[0]
-            said = words[kind].format(
-                one=sketch.show(cell[i]), other=sketch.show(cell[j]), face=sketch.face((start[i], stop[i]))
+            text = texts[kind].format(
+                cell=sketch.show(cell[i]), neighbour=sketch.show(cell[j]), face=sketch.face((start[i], stop[i]))
             )
             number = len(np.unique(pairs[:, 0])) if kind == "middle" else len(pairs)
-            many = f"at {number}{'' if whole else ' or more'} places faces"
-            faults.append(Fault("boundary", f"{many} {said}"))
+            places = f"at {number}{'' if complete else ' or more'} places faces"
+            faults.append(Fault("boundary", f"{places} {text}"))
     return faults
 
 
 def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
-    """A mesh that does not hang together."""
+    """Fault of a mesh that is not connected."""
     piece = edges.pieces(len(sketch.cells))
     size, first = np.bincount(piece), np.unique(piece, return_index=True)[1]
     if size.size == 1:
@@ -127,7 +130,7 @@ def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
         Fault(
             "cells",
             f"they are in {size.size} pieces that share no face: {', '.join(listed)}{more}; "
-            "wanted one piece: give each a file of its own",
+            "expected one piece: write each to its own file",
         )
     ]
 
@@ -135,7 +138,7 @@ def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
 def grouped(
     sketch: Sketch, edges: Edges, lines: np.ndarray, groups: Mapping[str, np.ndarray]
 ) -> tuple[list[Fault], list[str], np.ndarray]:
-    """(faults, patch names, int64[outer] the patch of each outer edge, -1 where no group names it)."""
+    """(faults, patch names, int64[outer] patch of each outer edge, -1 for edges in no group)."""
     names = [*(name for name in groups if name != WALL), WALL]
     keys = edges.key[edges.outer]
     order = np.argsort(keys)
@@ -143,31 +146,31 @@ def grouped(
     for name, members in groups.items():
         place = f"groups.{name}"
         if not members.size:
-            remedy = "wanted lines of the boundary; Gmsh leaves them out under Mesh.SaveAll = 1"
-            faults.append(Fault(place, f"no line in the file is in it; {remedy}"))
+            remedy = "expected lines of the boundary; Gmsh omits them with Mesh.SaveAll = 1"
+            faults.append(Fault(place, f"the group contains no line of the file; {remedy}"))
             continue
-        wanted = key_of(lines[members], len(sketch.points))
-        spot = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), keys.size - 1)]
-        missed = keys[spot] != wanted
-        if missed.any():
-            text = f"{missed.sum()} of {members.size} lines no face of the boundary"
-            how = _beside(sketch, edges, lines[members][missed][0])
-            faults.append(Fault(place, f"{text}: {how}; wanted a curve of the boundary"))
-        spot = spot[~missed]
+        member_keys = key_of(lines[members], len(sketch.points))
+        spot = order[np.minimum(np.searchsorted(keys, member_keys, sorter=order), keys.size - 1)]
+        missing = keys[spot] != member_keys
+        if missing.any():
+            text = f"{missing.sum()} of {members.size} lines are not boundary faces"
+            location = _beside(sketch, edges, lines[members][missing][0])
+            faults.append(Fault(place, f"{text}: {location}; expected a curve of the boundary"))
+        spot = spot[~missing]
         taken = spot[(patch[spot] >= 0) & (patch[spot] != names.index(name))]
         if taken.size:
             others = listing(f'"{names[k]}"' for k in np.unique(patch[taken]))
             first = edges.outer[taken[0]]
             where = sketch.face((edges.start[first], edges.stop[first]))
-            faults.append(Fault(place, f"shares {taken.size} faces with {others}, {where}; wanted each in one group"))
+            faults.append(Fault(place, f"shares {taken.size} faces with {others}, {where}; expected each in one group"))
         patch[spot] = names.index(name)
     return faults, names, patch
 
 
 def _beside(sketch: Sketch, edges: Edges, ends: np.ndarray) -> str:
-    """Where a line lies that is no face of the boundary."""
+    """Position of a line that is not a boundary face."""
     if (ends < 0).any():
-        return "one ends in a point that no cell has"
+        return "a line ends at a point that belongs to no cell"
     where = sketch.face(ends).removeprefix("the face ")
     inside = np.isin(key_of(ends[None], len(sketch.points)), edges.key).any()
-    return f"the one {where} {'lies between two cells' if inside else 'is no side of a cell'}"
+    return f"the line {where} {'lies between two cells' if inside else 'is not a side of a cell'}"

@@ -1,4 +1,4 @@
-"""Faces of a boundary that touch elsewhere than at their ends. Knows line segments; knows no cells and no words."""
+"""Contacts between boundary faces other than at their common ends."""
 
 from __future__ import annotations
 
@@ -7,44 +7,51 @@ from scipy.spatial import cKDTree
 
 from fvsolve.mesh.shapes import cross
 
-NEAR = 1e-6  # of a face's length: how near is a touch
-BLOCK = 1 << 14  # segments looked at before what was found is told
+NEAR = 1e-6  # of a face's length: distance of a contact
+BLOCK = 1 << 14  # number of segments per pass; the search ends after a pass with contacts
 
 
 def contacts(a: np.ndarray, b: np.ndarray, thin: np.ndarray) -> tuple[dict[str, np.ndarray], bool]:
-    """(what pairs of the segments from float64[k, 2] a to b do: int64[m, 2] each; whether that is all).
+    """(pairs of the segments from float64[k, 2] a to b by kind of contact: int64[m, 2] each.
 
-    same : both ends coincide, where neither is `thin`; middle : an end of the second lies within the first;
-    cross : they pass through each other
+    True if all were searched).
+
+    same : both ends coincide, and neither segment is `thin`; middle : an end of the second lies within the first;
+    cross : they intersect
     """
     middle, length = 0.5 * (a + b), np.hypot(*(b - a).T)
     tree = cKDTree(middle)
     for first in range(0, len(a), BLOCK):
-        found = _touching(a, b, *_pairs(tree, middle, length, np.arange(first, min(first + BLOCK, len(a)))))
-        found["same"] = found["same"][~thin[found["same"]].any(axis=1)]
-        if any(map(len, found.values())):
+        pairs = _touching(a, b, *_pairs(tree, middle, length, np.arange(first, min(first + BLOCK, len(a)))))
+        pairs["same"] = pairs["same"][~thin[pairs["same"]].any(axis=1)]
+        if any(map(len, pairs.values())):
             break
-    return found, first + BLOCK >= len(a)
+    return pairs, first + BLOCK >= len(a)
 
 
 def _pairs(tree: cKDTree, middle: np.ndarray, length: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (i, j) of all that could touch, i of the block and longer: their middles are nearer than it is long."""
+    """Numbers (i, j) of all candidates, i of the block and not shorter; the distance of middles is below its length."""
     near = tree.query_ball_point(middle[block], (1.0 + NEAR) * length[block], return_sorted=False)
     i = np.repeat(block, np.fromiter(map(len, near), np.int64, len(near)))
     j = np.concatenate(near).astype(np.int64)
-    keep = (length[j] < length[i]) | ((length[j] == length[i]) & (i < j))
-    return i[keep], j[keep]
+    valid = (length[j] < length[i]) | ((length[j] == length[i]) & (i < j))
+    return i[valid], j[valid]
 
 
 def _touching(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> dict[str, np.ndarray]:
     near = NEAR * np.hypot(*(b[i] - a[i]).T)
     same = (_apart(a[i], b[j]) <= near) & (_apart(b[i], a[j]) <= near)
     same |= (_apart(a[i], a[j]) <= near) & (_apart(b[i], b[j]) <= near)
-    one, other = _within(a, b, i, a[j]) | _within(a, b, i, b[j]), _within(a, b, j, a[i]) | _within(a, b, j, b[i])
+    within_i, within_j = (
+        _within(a, b, i, a[j]) | _within(a, b, i, b[j]),
+        _within(a, b, j, a[i]) | _within(a, b, j, b[i]),
+    )
     through = _astride(a, b, i, j) & _astride(a, b, j, i)
     return {
         "same": np.stack([i[same], j[same]], axis=1),
-        "middle": np.concatenate([np.stack([i[one], j[one]], axis=1), np.stack([j[other], i[other]], axis=1)]),
+        "middle": np.concatenate(
+            [np.stack([i[within_i], j[within_i]], axis=1), np.stack([j[within_j], i[within_j]], axis=1)]
+        ),
         "cross": np.stack([i[through], j[through]], axis=1),
     }
 
@@ -54,7 +61,7 @@ def _apart(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def _within(a: np.ndarray, b: np.ndarray, i: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Whether p lies on segment i, away from its ends."""
+    """True if p lies on segment i, away from its ends."""
     along, to = b[i] - a[i], p - a[i]
     square = np.sum(along * along, axis=1)
     share = np.sum(along * to, axis=1) / square
@@ -62,8 +69,8 @@ def _within(a: np.ndarray, b: np.ndarray, i: np.ndarray, p: np.ndarray) -> np.nd
 
 
 def _astride(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Whether the ends of segment j lie on different sides of the line through i."""
+    """True if the ends of segment j lie on different sides of the line through i."""
     along = b[i] - a[i]
     least = NEAR * np.sum(along * along, axis=1)
-    one, other = cross(along, a[j] - a[i]), cross(along, b[j] - a[i])
-    return ((one > least) & (other < -least)) | ((one < -least) & (other > least))
+    start, stop = cross(along, a[j] - a[i]), cross(along, b[j] - a[i])
+    return ((start > least) & (stop < -least)) | ((start < -least) & (stop > least))

@@ -1,4 +1,4 @@
-"""How cells hang together: their edges, and who lies beyond. Knows numbers of points; knows no places."""
+"""Edges of cells, and the neighbours across them."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
-ALONE, CROWDED = -1, -2  # mates that are none: nobody beyond the edge; more than one, or one on the same side
+ALONE, CROWDED = -1, -2  # no mate: a boundary edge; more than one neighbour, or a neighbour on the same side
 
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """The edges of all cells, by cell and corner, anticlockwise.
+    """Edges of all cells, by cell and corner, anticlockwise.
 
-    cell : int64[e]; start, stop : int64[e]  points; key : int64[e]  the same for both ways round
-    mate : int64[e]  the same edge as the cell beyond has it, ALONE on the boundary, CROWDED where cells overlap
+    cell : int64[e]; start, stop : int64[e]  points; key : int64[e]  equal for both directions
+    mate : int64[e]  index of the same edge in the neighbour, ALONE on the boundary, CROWDED where cells overlap
     """
 
     cell: np.ndarray
@@ -28,7 +28,7 @@ class Edges:
 
     @cached_property
     def inner(self) -> np.ndarray:
-        """Edges with a mate, each pair once, by the cell of the lower number."""
+        """Edges with a mate, one of each pair, that of the cell with the lower number."""
         return np.flatnonzero(np.arange(self.mate.size) < self.mate)
 
     @cached_property
@@ -37,22 +37,22 @@ class Edges:
         return np.flatnonzero(self.mate == ALONE)
 
     def pieces(self, cells: int) -> np.ndarray:
-        """int64[cells]: to which piece a cell belongs, where flow passes through faces only."""
+        """Number of the connected piece of each cell : int64[cells]; cells are connected by faces only."""
         return connected_components(self.graph(cells), directed=False)[1].astype(np.int64)
 
     def order(self, cells: int) -> np.ndarray:
-        """int64[cells]: the cells so that neighbours stand close (reverse Cuthill and McKee)."""
+        """Order of cells with neighbours close together (reverse Cuthill and McKee) : int64[cells]."""
         graph = self.graph(cells)
         return reverse_cuthill_mckee((graph + graph.T).tocsr(), symmetric_mode=True).astype(np.int64)
 
     def graph(self, cells: int) -> coo_array:
-        """int8[cells, cells]: 1 where two cells share a face, the lower number first."""
+        """Adjacency matrix : int8[cells, cells], 1 where two cells share a face, at (lower number, higher number)."""
         pair = self.cell[self.inner], self.cell[self.mate[self.inner]]
         return coo_array((np.ones(self.inner.size, np.int8), pair), shape=(cells, cells))
 
 
 def edges_of(cells: np.ndarray, points: int) -> Edges:
-    """The edges of int64[n, 4] cells over so many points."""
+    """Edges of int64[n, 4] cells over a number of points."""
     stop = np.roll(cells, -1, axis=1)
     triangle = cells[:, 3] < 0
     stop[triangle, 2] = cells[triangle, 0]
@@ -70,13 +70,13 @@ def _mates(key: np.ndarray, start: np.ndarray) -> np.ndarray:
     mate = np.full(key.size, CROWDED)
     mate[order[runs[count == 1]]] = ALONE
     pairs = runs[count == 2]
-    one, other = order[pairs], order[pairs + 1]
-    opposite = start[one] != start[other]
-    one, other = one[opposite], other[opposite]
-    mate[one], mate[other] = other, one
+    first, second = order[pairs], order[pairs + 1]
+    opposite = start[first] != start[second]
+    first, second = first[opposite], second[opposite]
+    mate[first], mate[second] = second, first
     return mate
 
 
 def key_of(ends: np.ndarray, points: int) -> np.ndarray:
-    """The keys of int64[k, 2] pairs of points, as in Edges."""
+    """Keys of int64[k, 2] pairs of points, as in Edges."""
     return ends.min(axis=1) * points + ends.max(axis=1)

@@ -1,4 +1,4 @@
-"""The only door to meshio reading: what a file says of a plane mesh, as arrays. Knows no geometry."""
+"""Contents of a mesh file as arrays, read by meshio (the only module that imports it for reading)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,16 @@ from fvsolve.errors import Fault, MeshError, did_you_mean, listing
 
 PLANE = {"triangle": 3, "quad": 4}
 IGNORED = {"vertex", "line", *PLANE}
-TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # numbers of groups, as formats call them
+TAGS = ("gmsh:physical", "medit:ref", "su2:tag")  # names of group numbers in the formats
 
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """points : float64[p, 3] as the file has them; cells : int64[n, 4], -1 last in a triangle; lines : int64[k, 2];
-    groups : name -> int64 numbers of lines, in the order of the file."""
+    """Contents of a file.
+
+    points : float64[p, 3] as in the file; cells : int64[n, 4], -1 last in a triangle; lines : int64[k, 2]
+    groups : name -> int64 numbers of lines, in the order of the file; notes : remarks for the owner of the file
+    """
 
     points: np.ndarray
     cells: np.ndarray
@@ -33,23 +36,23 @@ class Content:
 
 
 def load(path: Path) -> Content:
-    """The triangles, quadrilaterals and named lines of a file; raises MeshError where it holds no plane mesh."""
-    found, notes = _ask_meshio(path)
+    """Triangles, quadrilaterals and named lines of a file; raises MeshError if it contains no plane mesh."""
+    file_mesh, notes = _ask_meshio(path)
     kinds: dict[str, int] = {}
-    for block in found.cells:
+    for block in file_mesh.cells:
         kinds[block.type] = kinds.get(block.type, 0) + len(block.data)
     faults = _bad_kinds({kind: count for kind, count in kinds.items() if count})
-    points = np.zeros((len(found.points), 3))
-    shape = np.shape(found.points)
+    points = np.zeros((len(file_mesh.points), 3))
+    shape = np.shape(file_mesh.points)
     if len(shape) == 2 and shape[1] in (2, 3):
-        points[:, : shape[1]] = found.points
+        points[:, : shape[1]] = file_mesh.points
     else:
-        faults.append(Fault("points", f"an array of shape {shape}; wanted two or three coordinates per point"))
+        faults.append(Fault("points", f"an array of shape {shape}; expected two or three coordinates per point"))
     if faults:
         raise MeshError(faults, path.name)
-    cells = [_padded(block.data) for block in found.cells if block.type in PLANE]
-    lines = [block.data for block in found.cells if block.type == "line"]
-    groups, unnamed = _groups(found)
+    cells = [_padded(block.data) for block in file_mesh.cells if block.type in PLANE]
+    lines = [block.data for block in file_mesh.cells if block.type == "line"]
+    groups, unnamed = _groups(file_mesh)
     content = Content(
         points,
         np.concatenate(cells).astype(np.int64),
@@ -58,9 +61,11 @@ def load(path: Path) -> Content:
         (*notes, *unnamed),
     )
     beyond = [
-        Fault(place, f"number {int(which[0])} names a point that the file does not hold; it holds {len(points)}")
+        Fault(
+            place, f"number {int(rows[0])} refers to a point that the file does not contain; it contains {len(points)}"
+        )
         for place, table, least in (("cells", content.cells, -1), ("lines", content.lines, 0))
-        if (which := np.flatnonzero(_strange(table, least, len(points)))).size
+        if (rows := np.flatnonzero(_strange(table, least, len(points)))).size
     ]
     if beyond:
         raise MeshError(beyond, path.name)
@@ -68,25 +73,27 @@ def load(path: Path) -> Content:
 
 
 def _ask_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
-    """(meshio's mesh, what it said of the file)."""
+    """(meshio's mesh, its messages)."""
     import meshio
 
     if not path.is_file():
-        near = [one.name for one in path.parent.iterdir()] if path.parent.is_dir() else []
+        near = [file.name for file in path.parent.iterdir()] if path.parent.is_dir() else []
         raise MeshError([Fault("", f"there is no such file{did_you_mean(path.name, near)}")], str(path))
-    said = io.StringIO()
+    printed = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
+        with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = meshio.read(path)
-        return found, tuple(f"meshio: {_plain(line)}" for line in said.getvalue().split("Warning:") if line.strip())
-    except (Exception, SystemExit) as error:  # meshio exits, and raises whatever its parsers stumble over
-        text = said.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
+            file_mesh = meshio.read(path)
+        return file_mesh, tuple(
+            f"meshio: {_plain(line)}" for line in printed.getvalue().split("Warning:") if line.strip()
+        )
+    except (Exception, SystemExit) as error:  # meshio calls exit, or raises errors of any type
+        text = printed.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
     text = _plain(text)
     remedy = "Gmsh: try Mesh.SaveAll = 0, or Mesh.MshFileVersion = 2.2" if path.suffix == ".msh" else ""
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
-        remedy = f"wanted a name that ends in {listing(known, 40)}"
+        remedy = f"expected a name that ends in {listing(known, 40)}"
     raise MeshError([Fault("", "; ".join(filter(None, [f"meshio cannot read it ({text})", remedy])))], path.name)
 
 
@@ -95,18 +102,18 @@ def _plain(text: str) -> str:
 
 
 def _bad_kinds(kinds: dict[str, int]) -> list[Fault]:
-    """Cells of another dimension or order, or none at all."""
-    held = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "none"
+    """Faults of cells of another dimension or order, or of a file without cells."""
+    counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items()) or "none"
     solid = [kind for kind in kinds if re.match("tetra|hexa|wedge|pyramid|polyhedron", kind)]
     other = [kind for kind in kinds if kind not in IGNORED and kind not in solid]
-    wanted = "wanted triangle and quad"
+    expected = "expected triangle and quad"
     if solid:
-        return [Fault("cells", f"they are of three dimensions ({held}); {wanted}: a mesh of one plane surface")]
+        return [Fault("cells", f"they are three-dimensional ({counts}); {expected}: a mesh of one plane surface")]
     if other:
         remedy = "Gmsh: Mesh.ElementOrder = 1" if re.search(r"\d", "".join(other)) else "split them"
-        return [Fault("cells", f"{', '.join(other)} cannot be used ({held}); {wanted}; {remedy}")]
+        return [Fault("cells", f"{', '.join(other)} cannot be used ({counts}); {expected}; {remedy}")]
     if not set(kinds) & set(PLANE):
-        return [Fault("cells", f"there are no cells of two dimensions ({held}); {wanted}; was the surface meshed?")]
+        return [Fault("cells", f"there are no two-dimensional cells ({counts}); {expected}; was the surface meshed?")]
     return []
 
 
@@ -119,37 +126,37 @@ def _strange(table: np.ndarray, least: int, points: int) -> np.ndarray:
     return np.any((table < low) | (table >= points), axis=1)
 
 
-def _groups(found: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """The named groups of lines, and notes on those whose name the file does not tell."""
-    name_of = {int(tag): name for name, (tag, dimension) in _declared(found.field_data)}
+def _groups(file_mesh: Any) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
+    """Groups of lines by name, and notes on groups without a name in the file."""
+    name_of = {int(tag): name for name, (tag, dimension) in _declared(file_mesh.field_data)}
     members: dict[str, list[np.ndarray]] = {name: [] for name in name_of.values()}
     unnamed: set[int] = set()
     first = 0
-    for k, block in enumerate(found.cells):
+    for k, block in enumerate(file_mesh.cells):
         if block.type != "line":
             continue
-        for name, sets in (found.cell_sets or {}).items():
+        for name, sets in (file_mesh.cell_sets or {}).items():
             if not name.startswith("gmsh:") and sets[k] is not None and len(sets[k]):
                 members.setdefault(name, []).append(first + np.asarray(sets[k], np.int64))
-        for tag, which in _tagged(found.cell_data, k):
+        for tag, lines in _tagged(file_mesh.cell_data, k):
             unnamed |= {tag} - set(name_of)
-            members.setdefault(name_of.get(tag, str(tag)), []).append(first + which)
+            members.setdefault(name_of.get(tag, str(tag)), []).append(first + lines)
         first += len(block.data)
-    called = f"groups of lines without a name in the file: their patches are {', '.join(map(str, sorted(unnamed)))}"
-    notes = (called,) if unnamed else ()
+    text = f"groups of lines without a name in the file: their patches are {', '.join(map(str, sorted(unnamed)))}"
+    notes = (text,) if unnamed else ()
     empty = [np.empty(0, np.int64)]
-    return {name: np.unique(np.concatenate(which or empty)) for name, which in members.items()}, notes
+    return {name: np.unique(np.concatenate(lines or empty)) for name, lines in members.items()}, notes
 
 
 def _declared(field_data: Any) -> Iterable[tuple[str, np.ndarray]]:
-    """(name, (number, dimension)) of the groups of lines that the file names."""
+    """(name, (number, dimension)) of the groups of lines with a name in the file."""
     for name, entry in (field_data or {}).items():
         if np.shape(entry) == (2,) and int(entry[1]) == 1:
             yield name, entry
 
 
 def _tagged(cell_data: Any, k: int) -> Iterable[tuple[int, np.ndarray]]:
-    """(number, lines of block k that bear it); 0 is no group."""
+    """(group number, lines of block k with that number); 0 means no group."""
     for key in TAGS:
         if key in cell_data:
             tags = np.asarray(cell_data[key][k]).astype(np.int64)

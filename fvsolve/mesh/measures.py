@@ -1,4 +1,4 @@
-"""How good a mesh is, in four numbers. Knows no scheme, and no opinion on what is good enough."""
+"""Quality measures of a mesh: areas, angles, ratios of neighbours."""
 
 from __future__ import annotations
 
@@ -12,8 +12,12 @@ from fvsolve.mesh.shapes import corners
 
 @dataclass(frozen=True)
 class Quality:
-    """smallest, largest : areas of cells [m2]; angle : the least one in a corner [rad], in cell `sharpest`;
-    ratio : the greatest of the areas of two neighbours, at face `steepest` (1 and -1 where no cell has one)."""
+    """Quality measures of a mesh.
+
+    smallest, largest : areas of cells [m2]
+    angle : least angle at a corner [rad], in cell `sharpest`
+    ratio : greatest ratio of the areas of two neighbours, at face `steepest` (1 and -1 for a mesh without inner faces)
+    """
 
     smallest: float
     largest: float
@@ -24,12 +28,12 @@ class Quality:
 
 
 def quality(mesh: Mesh) -> Quality:
-    """The measures of a mesh."""
+    """Quality measures of a mesh."""
     turn, straight, _ = corners(mesh.points, mesh.cells)
     angle = np.arctan2(turn, -straight).min(axis=1)
     sharpest = int(np.argmin(angle))
-    one, other = mesh.area[mesh.left[: mesh.inner]], mesh.area[mesh.right[: mesh.inner]]
-    ratio = np.maximum(one, other) / np.minimum(one, other)
+    left, right = mesh.area[mesh.left[: mesh.inner]], mesh.area[mesh.right[: mesh.inner]]
+    ratio = np.maximum(left, right) / np.minimum(left, right)
     steepest = int(np.argmax(ratio)) if ratio.size else -1
     return Quality(
         smallest=float(mesh.area.min()),

@@ -1,4 +1,4 @@
-"""What a plane mesh is: cells, faces and named patches, all SI. Knows no files, and not how it came about."""
+"""Data of a plane mesh: cells, faces and named patches, all SI."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-WALL = "wall"  # the patch of every boundary face that no name claims
+WALL = "wall"  # patch of all boundary faces without a name
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """The lines behind a rectangle.
+    """Grid lines of a rectangle.
 
-    nx, ny : columns and rows; x : float64[nx + 1], y : float64[ny + 1]  their edges [m];
-    index : int64[ny, nx]  the number of a cell, -1 in a hole; without holes j nx + i.
+    nx, ny : numbers of columns and rows; x : float64[nx + 1], y : float64[ny + 1]  positions of lines [m];
+    index : int64[ny, nx]  number of a cell, -1 in a hole; without holes j nx + i.
     """
 
     nx: int
@@ -26,7 +26,7 @@ class Grid:
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Cells and the faces between them; inner faces stand first, then the boundary's, patch by patch.
+    """Cells and the faces between them; inner faces come first, then boundary faces, patch by patch.
 
     points : float64[p, 2]  corners [m]
     cells : int64[n, 4]  points of a cell, anticlockwise; -1 in the last column for a triangle
@@ -34,8 +34,8 @@ class Mesh:
     left : int64[f]  cell; right : int64[f]  cell of a higher number, or -1 - k on the boundary, k the patch
     normal : float64[f, 2]  unit, from left to right or outward; length : float64[f]  [m]
     middle : float64[f, 2]  [m]; ends : int64[f, 2]  points, anticlockwise around left
-    patches : their names, the last one always "wall"; grid : of rectangles only
-    notes : what a reader of the file should know
+    patches : their names, the last one always "wall"; grid : for rectangles only
+    notes : remarks for the owner of the file
     """
 
     points: np.ndarray
@@ -54,16 +54,16 @@ class Mesh:
 
     @property
     def inner(self) -> int:
-        """How many faces lie between two cells; the rest is boundary."""
+        """Number of faces between two cells; the remaining faces are the boundary."""
         return int(np.count_nonzero(self.right >= 0))
 
     @property
     def centroid(self) -> np.ndarray:
-        """Of all its cells together : float64[2] [m]."""
+        """Centroid of all cells : float64[2] [m]."""
         return self.area @ self.centre / self.area.sum()
 
     def patch(self, name: str) -> slice:
-        """The faces of a patch; raises ValueError for a name that is none."""
+        """Faces of a patch; raises ValueError for an unknown name."""
         k = self.patches.index(name)
-        first, last = np.searchsorted(-self.right, [k + 1, k + 2])  # inner faces count 0 or less, in any order
+        first, last = np.searchsorted(-self.right, [k + 1, k + 2])  # -right of inner faces is 0 or less, in any order
         return slice(int(first), int(last))

@@ -1,4 +1,4 @@
-"""Where points lie in a plane mesh, and how they are read off its cells. Knows geometry; knows no field."""
+"""Search for points in a plane mesh, and interpolation weights of its cells."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from fvsolve.mesh.mesh import Mesh
 
-NEAR = 1e-9  # of the mesh's extent: what lies so near its outline is inside
-CANDIDATES = 16  # cells by the distance of their centres that are tried before all are
-RINGS = 2  # of neighbours that are tried
-EXACT = 1e-9  # of a cell's size: how far off weights may be that are right
-SUM_FIRST = 1e4  # how much more the sum of the weights counts than their point, where it lies beyond all centres
-LEAST = 1e-300  # of a squared length
-INWARD = 1e-3  # of the way from the outline to the centre of its cell
+NEAR = 1e-9  # of the mesh's extent: points this close to its outline count as inside
+CANDIDATES = 16  # cells with the nearest centres, tried before all cells
+RINGS = 2  # greatest number of rings of neighbours
+EXACT = 1e-9  # of a cell's size: error of exact weights
+SUM_FIRST = 1e4  # weight of the sum of weights over that of their point, for points beyond all centres
+LEAST = 1e-300  # least squared length
+INWARD = 1e-3  # of the distance from the outline to the centre of its cell
 
 
 class MeshPoints:
-    """Finds points in a mesh."""
+    """Search for points in a mesh."""
 
     def __init__(self, mesh: Mesh) -> None:
         from scipy.spatial import cKDTree
@@ -29,9 +29,9 @@ class MeshPoints:
         self.around, self.first = order // 4, first  # cells at a point: around[first[p] : first[p + 1]]
 
     def cell(self, x: float, y: float) -> int:
-        """The number of the cell that a point lies in, on an edge the lowest; -1 outside and in holes."""
+        """Number of the cell that contains a point, on an edge the lowest; -1 outside and in holes."""
         n = len(self.mesh.cells)
-        if not np.all((self.low <= (x, y)) & ((x, y) <= self.high)):  # so far off that distances overflow, or no number
+        if not np.all((self.low <= (x, y)) & ((x, y) <= self.high)):  # far points, whose distances overflow, and NaN
             return -1
         nearest = np.sort(np.ravel(self.tree.query((x, y), min(CANDIDATES, n))[1]))
         for cells in (nearest, np.arange(n)):
@@ -49,7 +49,7 @@ class MeshPoints:
         return (left >= -self.near * np.hypot(along[..., 0], along[..., 1])).all(axis=1)
 
     def nearest(self, x: float, y: float) -> tuple[float, float]:
-        """The point inside that is next to one outside."""
+        """Point inside nearest to a point outside."""
         mesh = self.mesh
         outer = slice(mesh.inner, None)
         a, b = (mesh.points[mesh.ends[outer, k]] for k in (0, 1))
@@ -57,14 +57,15 @@ class MeshPoints:
         share = np.clip(((point - a) * along).sum(1) / np.maximum((along * along).sum(1), LEAST), 0.0, 1.0)
         foot = a + share[:, None] * along
         k = int(np.argmin(np.hypot(*(foot - point).T)))
-        found = foot[k] + INWARD * (mesh.centre[mesh.left[outer][k]] - foot[k])
-        return float(found[0]), float(found[1])
+        inside = foot[k] + INWARD * (mesh.centre[mesh.left[outer][k]] - foot[k])
+        return float(inside[0]), float(inside[1])
 
     def reading(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
-        """Cells int64[k] and their weights float64[k], none negative, sum 1, that give a field at a point inside.
+        """Cells int64[k] and their weights float64[k], not negative, with sum 1, for a field at a point inside.
 
-        Bilinear between centres on full grids; else of the cells that share a corner with the point's own, or with
-        those. Exact for linear fields, but beyond the outermost centres, where the nearest place between them is read.
+        Bilinear between centres on full grids. Else from the cells that share a corner with the cell of the point, or
+        with these cells. Exact for linear fields, except beyond the outermost centres, where the nearest position
+        between them is used.
         """
         grid = self.mesh.grid
         if grid is not None and len(self.mesh.cells) == grid.nx * grid.ny:
@@ -73,26 +74,31 @@ class MeshPoints:
             weights = np.outer(q, p).ravel()
         else:
             cells, weights = self._of_neighbours(self.cell(x, y), x, y)
-        kept = weights > 0.0
-        return cells[kept], weights[kept] / weights[kept].sum()
+        positive = weights > 0.0
+        return cells[positive], weights[positive] / weights[positive].sum()
 
     def _of_neighbours(self, cell: int, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
         from scipy.optimize import nnls
 
-        cells, found = [cell], []
+        cells, attempts = [cell], []
         for _ in range(RINGS):
-            cells += sorted({int(one) for c in cells for p in self.mesh.cells[c] if p >= 0
-                             for one in self.around[self.first[p] : self.first[p + 1]]} - set(cells))  # fmt: skip
+            cells += sorted({int(near) for c in cells for p in self.mesh.cells[c] if p >= 0
+                             for near in self.around[self.first[p] : self.first[p + 1]]} - set(cells))  # fmt: skip
             away = (self.mesh.centre[cells] - (x, y)) / np.sqrt(self.mesh.area[cell])
-            weights, missed = nnls(np.vstack([np.full(len(cells), SUM_FIRST), away.T]), np.array([SUM_FIRST, 0.0, 0.0]))
-            found.append((np.array(cells), weights))
-            if missed < EXACT:
-                return found[-1]
-        return found[0]
+            weights, residual = nnls(
+                np.vstack([np.full(len(cells), SUM_FIRST), away.T]), np.array([SUM_FIRST, 0.0, 0.0])
+            )
+            attempts.append((np.array(cells), weights))
+            if residual < EXACT:
+                return attempts[-1]
+        return attempts[0]
 
 
 def _between(lines: np.ndarray, value: float) -> tuple[np.ndarray, np.ndarray]:
-    """Columns int64[2] whose centres a value lies between, and their weights; beyond the outermost its own alone."""
+    """Two columns int64[2] with a value between their centres, and their weights.
+
+    Beyond the outermost centres, its own only.
+    """
     centres = 0.5 * (lines[1:] + lines[:-1])
     k = int(np.clip(np.searchsorted(centres, value) - 1, 0, max(centres.size - 2, 0)))
     after = min(k + 1, centres.size - 1)

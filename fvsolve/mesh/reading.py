@@ -1,4 +1,4 @@
-"""A mesh from a file, with every check; repairs nothing but the sense of rotation, and says so. Knows no formats."""
+"""Mesh from a file, with all checks; clockwise cells are reversed, with a note."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from fvsolve.mesh.mesh import WALL, Mesh
 from fvsolve.mesh.shapes import assemble
 from fvsolve.units import find
 
-PLANE = 1e-6  # of the extent: how far z may wander
-FAR = 1e100  # beyond it squares of squares overflow
-LARGE, SMALL = 1e4, 1e-3  # extents that speak for another unit [m]
+PLANE = 1e-6  # of the extent: allowed range of z
+FAR = 1e100  # beyond it fourth powers overflow
+LARGE, SMALL = 1e4, 1e-3  # extents that suggest another unit [m]
 
 
 def read(path: str | Path, unit: str = "m") -> Mesh:
-    """The plane mesh of a file that meshio reads, its coordinates in `unit`.
+    """Plane mesh of a file that meshio reads, with coordinates in `unit`.
 
-    Triangles and quadrilaterals are cells, numbered anew so that neighbours lie close; physical groups of lines are
-    patches.
-    Raises MeshError with all faults that can be told apart.
+    Triangles and quadrilaterals are cells, renumbered so that neighbours are close; physical groups of lines are
+    patches. Raises MeshError with all faults that can be distinguished.
     """
     path = Path(path)
     factor = _factor(unit, path)
@@ -32,18 +31,18 @@ def read(path: str | Path, unit: str = "m") -> Mesh:
     faults = _place_faults(content, unit)
     if faults:
         raise MeshError(faults, path.name)
-    used, renumbered = np.unique(np.append(content.cells, -1), return_inverse=True)  # -1 stands first
+    used, renumbered = np.unique(np.append(content.cells, -1), return_inverse=True)  # -1 comes first
     cells = renumbered[:-1].reshape(-1, 4) - 1
     notes = list(content.notes)
     spare = len(content.points) + 1 - used.size
     if spare:
-        notes.append(f"{spare} of {len(content.points)} points in the file belong to no cell: left out")
+        notes.append(f"{spare} of {len(content.points)} points in the file belong to no cell: ignored")
     lines = _renumber(content.lines, used[1:])
     sketch = Sketch(content.points[used[1:], :2], cells, unit)
     faults, bad, clockwise = shape_faults(sketch)
     cells[clockwise] = _turned(cells[clockwise])
     if clockwise.any():
-        notes.append(f"{sketch.list(np.flatnonzero(clockwise))} ran clockwise: turned")
+        notes.append(f"{sketch.list(np.flatnonzero(clockwise))} were clockwise: reversed")
     number = np.flatnonzero(~bad)
     edges = edges_of(cells[number], len(sketch.points))
     faults += overlap_faults(sketch, edges, number)
@@ -71,14 +70,16 @@ def _factor(unit: str, path: Path) -> float:
 
 
 def _place_faults(content: Content, unit: str) -> list[Fault]:
-    """Points that are nowhere, or not in one plane z = constant."""
+    """Faults of points without finite coordinates, or not in one plane z = constant."""
     used = np.unique(content.cells[content.cells >= 0])
     points = content.points[used]
-    lost = used[~(np.abs(points) < FAR).all(axis=1)]  # nan too
-    if lost.size:
+    invalid = used[~(np.abs(points) < FAR).all(axis=1)]  # nan too
+    if invalid.size:
         return [
             Fault(
-                "points", f"{lost.size} of {used.size} are nowhere (not a number, or too large), first point {lost[0]}"
+                "points",
+                f"{invalid.size} of {used.size} have invalid coordinates (not a number, or too large), "
+                f"first point {invalid[0]}",
             )
         ]
     extent = np.ptp(points, axis=0)
@@ -91,11 +92,11 @@ def _place_faults(content: Content, unit: str) -> list[Fault]:
     constant = "".join(
         f"; {axis} is constant: turn the mesh" for axis, e in zip("xy", extent, strict=False) if e <= near
     )
-    return [Fault("points", f"{text}; wanted a mesh in one plane, z = constant{constant}")]
+    return [Fault("points", f"{text}; expected a mesh in one plane, z = constant{constant}")]
 
 
 def _renumber(lines: np.ndarray, used: np.ndarray) -> np.ndarray:
-    """Lines over the used points only; -1 for a point that no cell has."""
+    """Lines with numbers of the used points; -1 for a point that belongs to no cell."""
     spot = np.minimum(np.searchsorted(used, lines), used.size - 1)
     return np.where(used[spot] == lines, spot, -1)
 
@@ -107,15 +108,15 @@ def _turned(cells: np.ndarray) -> np.ndarray:
 
 
 def _notes(sketch: Sketch, factor: float, patch: np.ndarray, grouped: bool) -> list[str]:
-    """What the file leaves unsaid: names of the boundary, and perhaps its unit."""
+    """Notes on missing names of the boundary, and on a probable other unit."""
     notes = []
     unnamed = int((patch < 0).sum())
     if not grouped:
-        notes.append(f'the file names no group of lines: all {unnamed} faces of the boundary are "{WALL}"')
+        notes.append(f'the file contains no named group of lines: all {unnamed} boundary faces are "{WALL}"')
     elif unnamed:
-        notes.append(f'{unnamed} of {patch.size} faces of the boundary are in no group: they are "{WALL}"')
+        notes.append(f'{unnamed} of {patch.size} boundary faces are in no group: they are "{WALL}"')
     extent = factor * np.ptp(sketch.points, axis=0).max()
     if sketch.unit == "m" and not SMALL <= extent <= LARGE:
         guess = 'unit = "mm"' if extent > LARGE else 'unit = "km"'
-        notes.append(f"the mesh is {extent:.6g} m across: is the file in another unit? then say so, perhaps {guess}")
+        notes.append(f"the mesh is {extent:.6g} m across: is the file in another unit? Then state it, perhaps {guess}")
     return notes

@@ -1,4 +1,4 @@
-"""Rectangles of cells, graded, with holes, and patches on their sides. Knows no files."""
+"""Rectangles of cells, graded, with holes, and patches on their sides."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from fvsolve.mesh.edges import Edges, edges_of
 from fvsolve.mesh.mesh import WALL, Grid, Mesh
 from fvsolve.mesh.shapes import assemble
 
-SIDES = {"west": 1, "east": 1, "south": 0, "north": 0}  # the axis along each
-NEAR = 1e-6  # of the size: how near a number must be to the grid line it means
+SIDES = {"west": 1, "east": 1, "south": 0, "north": 0}  # axis along each side
+NEAR = 1e-6  # of the size: greatest distance of a number from its grid line
 
 Side = str | tuple[str, float, float]
 
@@ -26,19 +26,21 @@ def rectangle(
     patches: Mapping[str, Side] | None = None,
     holes: Sequence[Sequence[float]] = (),
 ) -> Mesh:
-    """The rectangle of size [m] from its south-west corner, `origin` [m], numbered row by row.
+    """Rectangle of a size [m] from its south-west corner, `origin` [m]; cells are numbered row by row.
 
     cells : columns and rows; grading : last spacing over first, geometric between them, in x and y
     patches : name -> a side, "west", "east", "south", "north", or (side, from, to) with coordinates along it [m]
-    holes : (x0, y0, x1, y1) on grid lines [m], cut out; what they leave must hang together
+    holes : (x0, y0, x1, y1) on grid lines [m], removed; the remaining cells must be connected by faces
     Raises MeshError with all faults.
     """
     faults = _bad_numbers(size, cells, origin, grading)
     if faults:
         raise MeshError(faults, "rectangle")
-    lines = [_graded(*one) for one in zip(origin, size, cells, grading, strict=True)]
-    if any(np.diff(one).min() <= 0.0 for one in lines):
-        raise MeshError([Fault("grading", f"{_shown(grading)}: the least cells vanish; wanted less")], "rectangle")
+    lines = [_graded(*axis) for axis in zip(origin, size, cells, grading, strict=True)]
+    if any(np.diff(axis).min() <= 0.0 for axis in lines):
+        raise MeshError(
+            [Fault("grading", f"{_shown(grading)}: the smallest cells vanish; expected weaker grading")], "rectangle"
+        )
     solid = np.ones((cells[1], cells[0]), bool)
     for k, hole in enumerate(holes):
         faults += _cut(solid, lines, f"holes[{k}]", hole)
@@ -49,7 +51,7 @@ def rectangle(
     edges = edges_of(corners, len(points))
     pieces = np.bincount(edges.pieces(len(corners)))
     if pieces.size > 1:
-        faults.append(Fault("holes", f"they leave {pieces.size} pieces that share no face; wanted one"))
+        faults.append(Fault("holes", f"they leave {pieces.size} pieces that share no face; expected one"))
     names, patch = _patches(patches or {}, lines, solid, points, edges, faults)
     if faults:
         raise MeshError(faults, "rectangle")
@@ -58,28 +60,28 @@ def rectangle(
 
 
 def _bad_numbers(size: Sequence, cells: Sequence, origin: Sequence, grading: Sequence) -> list[Fault]:
-    def two(given: Sequence) -> bool:
+    def is_pair(given: Sequence) -> bool:
         return not isinstance(given, str) and len(given) == 2
 
-    def whole(n: object) -> bool:
+    def is_count(n: object) -> bool:
         return isinstance(n, (int, np.integer)) and not isinstance(n, bool) and n >= 1
 
-    def positive(v: float) -> bool:
+    def is_positive(v: float) -> bool:
         return math.isfinite(v) and v > 0.0
 
-    wanted = [
-        ("size", size, positive, "two positive lengths [m], along x and y"),
-        ("cells", cells, whole, "two whole numbers of cells, along x and y, at least 1"),
+    checks = [
+        ("size", size, is_positive, "two positive lengths [m], along x and y"),
+        ("cells", cells, is_count, "two whole numbers of cells, along x and y, at least 1"),
         ("origin", origin, math.isfinite, "the two coordinates [m] of the south-west corner"),
-        ("grading", grading, positive, "two positive ratios of last to first spacing, along x and y"),
+        ("grading", grading, is_positive, "two positive ratios of last to first spacing, along x and y"),
     ]
     faults = [
-        Fault(key, f"{_shown(given)}; wanted {words}")
-        for key, given, sound, words in wanted
-        if not (two(given) and all(sound(value) for value in given))
+        Fault(key, f"{_shown(given)}; expected {expected}")
+        for key, given, is_valid, expected in checks
+        if not (is_pair(given) and all(is_valid(value) for value in given))
     ]
     if not faults and any(n == 1 and g != 1.0 for n, g in zip(cells, grading, strict=True)):
-        text = f"{_shown(grading)} with cells {_shown(cells)}; wanted 1 where there is one cell"
+        text = f"{_shown(grading)} with cells {_shown(cells)}; expected 1 along an axis with one cell"
         faults.append(Fault("grading", text))
     return faults
 
@@ -89,7 +91,7 @@ def _shown(given: Sequence) -> str:
 
 
 def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray:
-    """float64[cells + 1] lines whose spacings grow geometrically to `grading` times the first."""
+    """Grid lines whose spacings grow geometrically to `grading` times the first : float64[cells + 1]."""
     share = np.arange(cells + 1) / cells
     if grading != 1.0:
         rate = math.log(grading) / (cells - 1)
@@ -100,38 +102,40 @@ def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray
 
 
 def _line(lines: np.ndarray, value: float) -> int | None:
-    """The number of the line that a value means, None where none is near."""
+    """Number of the grid line at a value, None if there is none near."""
     k = int(np.argmin(np.abs(lines - value)))
     return k if abs(lines[k] - value) <= NEAR * (lines[-1] - lines[0]) else None
 
 
 def _nearest(lines: np.ndarray, value: float) -> str:
-    """'0.25 and 0.5', the lines on both sides of a value."""
+    """Text like '0.25 and 0.5', the lines on both sides of a value."""
     k = int(np.clip(np.searchsorted(lines, value), 1, lines.size - 1))
     around = [lines[0]] if value < lines[0] else [lines[-1]] if value > lines[-1] else lines[k - 1 : k + 1]
     return " and ".join(f"{line:.9g}" for line in around)
 
 
 def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Sequence[float]) -> list[Fault]:
-    """Take a hole out of `solid`; its faults."""
+    """Remove a hole from `solid`; returns its faults."""
     names = ("x0", "y0", "x1", "y1")
     if len(hole) != 4 or not all(math.isfinite(v) for v in hole) or not (hole[0] < hole[2] and hole[1] < hole[3]):
-        return [Fault(place, f"{_shown(hole)}; wanted [x0, y0, x1, y1] [m] with x0 below x1 and y0 below y1")]
-    found = [_line(lines[k % 2], value) for k, value in enumerate(hole)]
+        return [Fault(place, f"{_shown(hole)}; expected [x0, y0, x1, y1] [m] with x0 below x1 and y0 below y1")]
+    indices = [_line(lines[k % 2], value) for k, value in enumerate(hole)]
     faults = [
         Fault(place, f"{name} = {value:.9g} m is on no grid line; nearest {name[0]}: {_nearest(lines[k % 2], value)} m")
         for k, (name, value) in enumerate(zip(names, hole, strict=True))
-        if found[k] is None
+        if indices[k] is None
     ]
-    if not faults and (found[0] == found[2] or found[1] == found[3]):
-        return [Fault(place, f"{_shown(hole)} has no cells; wanted x0 and x1, y0 and y1 on different grid lines")]
+    if not faults and (indices[0] == indices[2] or indices[1] == indices[3]):
+        return [
+            Fault(place, f"{_shown(hole)} contains no cells; expected x0 and x1, y0 and y1 on different grid lines")
+        ]
     if not faults:
-        solid[found[1] : found[3], found[0] : found[2]] = False
+        solid[indices[1] : indices[3], indices[0] : indices[2]] = False
     return faults
 
 
 def _corners(lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(float64[p, 2] points that a cell uses, row by row; int64[n, 4] cells)."""
+    """(float64[p, 2] points of cells, row by row; int64[n, 4] cells)."""
     row, column = np.nonzero(solid)
     wide = lines[0].size
     first = row * wide + column
@@ -152,15 +156,15 @@ def _patches(
 ) -> tuple[list[str], np.ndarray]:
     """(names, int64[outer] patch of each outer edge); faults are added to the list."""
     names = [*(name for name in given if name != WALL), WALL]
-    patch = np.full(edges.outer.size, len(names))  # nobody's yet
+    patch = np.full(edges.outer.size, len(names))  # no patch yet
     a, b = points[edges.start[edges.outer]], points[edges.stop[edges.outer]]
     for name, side in given.items():
         where, *span = (side,) if isinstance(side, str) else side
-        found = _span(f"patches.{name}", where, span, lines, solid)
-        if isinstance(found, Fault):
-            faults.append(found)
+        limits = _span(f"patches.{name}", where, span, lines, solid)
+        if isinstance(limits, Fault):
+            faults.append(limits)
             continue
-        axis, low, high = SIDES[where], *found
+        axis, low, high = SIDES[where], *limits
         edge = lines[1 - axis][0 if where in ("west", "south") else -1]
         middle = 0.5 * (a[:, axis] + b[:, axis])
         on = (a[:, 1 - axis] == edge) & (b[:, 1 - axis] == edge) & (low < middle) & (middle < high)
@@ -168,15 +172,15 @@ def _patches(
         if taken.any():
             other, at = names[patch[taken][0]], middle[taken]
             text = f'overlaps "{other}" on the {where} side, about {at.min():.9g} to {at.max():.9g} m'
-            faults.append(Fault(f"patches.{name}", f"{text}; wanted each face in one patch"))
+            faults.append(Fault(f"patches.{name}", f"{text}; expected each face in one patch"))
         patch[on] = names.index(name)
     return names, np.minimum(patch, len(names) - 1)
 
 
 def _span(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple | Fault:
-    """(from, to) on grid lines [m], or what is wrong with the span."""
+    """(from, to) on grid lines [m], or the fault of the span."""
     if side not in SIDES:
-        return Fault(place, f'"{side}" is no side{did_you_mean(str(side), SIDES)}; sides are {", ".join(SIDES)}')
+        return Fault(place, f'unknown side "{side}"; expected {", ".join(SIDES)}{did_you_mean(str(side), SIDES)}')
     along = lines[SIDES[side]]
     cells = {"west": solid[:, 0], "east": solid[:, -1], "south": solid[0], "north": solid[-1]}[side]
     if not cells.any():
@@ -184,14 +188,14 @@ def _span(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid:
     if not span:
         return along[0], along[-1]
     if len(span) != 2 or not all(math.isfinite(value) for value in span) or not span[0] < span[1]:
-        return Fault(place, f"{_shown(span)}; wanted from below to, coordinates along the {side} side [m]")
+        return Fault(place, f"{_shown(span)}; expected from below to, coordinates along the {side} side [m]")
     first, last = (_line(along, value) for value in span)
     text = f"{span[0]:.9g} to {span[1]:.9g} m"
     if first is None or last is None or first == last:
         i, j = (int(np.argmin(np.abs(along - value))) for value in span)
         i = min(i, along.size - 2)
         near = f"{along[i]:.9g} to {along[max(j, i + 1)]:.9g} m"
-        return Fault(place, f"{text} does not hold whole faces of the {side} side; nearest is {near}")
+        return Fault(place, f"{text} does not consist of whole faces of the {side} side; nearest is {near}")
     if not cells[first:last].all():
         ends = np.flatnonzero(np.diff(cells.astype(int), prepend=0, append=0)).reshape(-1, 2)
         free = " and ".join(f"{along[i]:.9g} to {along[j]:.9g} m" for i, j in ends)

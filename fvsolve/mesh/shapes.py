@@ -1,4 +1,4 @@
-"""Area, centroid, corners and faces of plane cells. Knows places of points; knows no faults."""
+"""Area, centroid, corners and faces of plane cells."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def area_and_centre(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(float64[n] signed areas, float64[n, 2] centroids); to the bit those of a rectangle where a cell is one.
+    """(float64[n] signed areas, float64[n, 2] centroids); exact to the bit for rectangles.
 
     With corners p0 to p3, and a1, a2 the areas on both sides of the diagonal p0 p2, A = a1 + a2:
     centroid = (p0 + p1 + p2 + p3) / 4 - ((p1 + p3) - (p0 + p2)) / 12 - (a1 - a2) (p3 - p1) / (6 A).
@@ -25,25 +25,33 @@ def area_and_centre(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, 
     p0, p1, p2 = (points[cells[:, k]] for k in range(3))
     p3 = points[np.where(cells[:, 3] < 0, cells[:, 0], cells[:, 3])]
     area = 0.5 * cross(p2 - p0, p3 - p1)
-    lean = 0.5 * (cross(p1 - p0, p2 - p0) - cross(p2 - p0, p3 - p0))
-    one, other = p0 + p2, p1 + p3
+    difference = 0.5 * (cross(p1 - p0, p2 - p0) - cross(p2 - p0, p3 - p0))
+    even, odd = p0 + p2, p1 + p3
     safe = np.where(area == 0.0, 1.0, area)
-    return area, 0.25 * (one + other) - (other - one) / 12.0 - (lean / (6.0 * safe))[:, None] * (p3 - p1)
+    return area, 0.25 * (even + odd) - (odd - even) / 12.0 - (difference / (6.0 * safe))[:, None] * (p3 - p1)
 
 
 def corners(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """float64[n, 4] each: at a corner, sides into and out of it, their cross and scalar product; the side out of it.
+    """float64[n, 4] each: at a corner, cross and scalar product of the sides into and out of it.
+
+    Length of the side out of it.
 
     A triangle has its first corner twice.
     """
     out = np.empty((3, len(cells), 4))
-    for kind, count in ((cells[:, 3] < 0, 3), (cells[:, 3] >= 0, 4)):
-        at = points[cells[kind, :count]]
-        leave = np.roll(at, -1, axis=1) - at
-        come = np.roll(leave, 1, axis=1)
-        found = np.stack([cross(come, leave), np.sum(come * leave, axis=2), np.hypot(leave[..., 0], leave[..., 1])])
-        out[:, kind, :count] = found
-        out[:, kind, 3] = found[:, :, 0 if count == 3 else 3]
+    for selected, count in ((cells[:, 3] < 0, 3), (cells[:, 3] >= 0, 4)):
+        at = points[cells[selected, :count]]
+        outgoing = np.roll(at, -1, axis=1) - at
+        incoming = np.roll(outgoing, 1, axis=1)
+        values = np.stack(
+            [
+                cross(incoming, outgoing),
+                np.sum(incoming * outgoing, axis=2),
+                np.hypot(outgoing[..., 0], outgoing[..., 1]),
+            ]
+        )
+        out[:, selected, :count] = values
+        out[:, selected, 3] = values[:, :, 0 if count == 3 else 3]
     return out[0], out[1], out[2]
 
 
@@ -56,7 +64,7 @@ def assemble(
     grid: Grid | None = None,
     notes: Sequence[str] = (),
 ) -> Mesh:
-    """The mesh of sound, anticlockwise cells; patch : int64[outer]  the patch of each outer edge."""
+    """Mesh of valid, anticlockwise cells. patch : int64[outer]  patch of each outer edge"""
     area, centre = area_and_centre(points, cells)
     order = np.argsort(patch, kind="stable")
     chosen = np.concatenate([edges.inner, edges.outer[order]])
@@ -65,7 +73,7 @@ def assemble(
     a, b = points[ends[:, 0]], points[ends[:, 1]]
     along = b - a
     length = np.hypot(along[:, 0], along[:, 1])
-    normal = np.stack([along[:, 1], 0.0 - along[:, 0]], axis=1) / length[:, None]  # 0 - x: no zero is negative
+    normal = np.stack([along[:, 1], 0.0 - along[:, 0]], axis=1) / length[:, None]  # 0 - x avoids negative zeros
     left, middle = edges.cell[chosen], 0.5 * (a + b)
     return Mesh(
         points, cells, area, centre, left, right, normal, length, middle, ends, tuple(patches), grid, tuple(notes)

@@ -1,4 +1,4 @@
-"""What a user may declare, one file per part. Knows units and ranges; does no arithmetic."""
+"""Declarations of all types of parts: keys, units and valid ranges."""
 
 from importlib import import_module
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a formula of x and y may say, read once into steps on arrays of floats. Knows no mesh and no units."""
+"""Formulas of x and y, parsed into steps on arrays of floats."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.units import show
 
 NAMES = ("x", "y", "pi")
-FORMS = (  # of calls; what is open at its end takes any number of arguments
+FORMS = (  # allowed calls; "..." stands for any number of arguments
     "sin(a)", "cos(a)", "tan(a)", "arctan2(a, b)", "exp(a)", "log(a)", "sqrt(a)", "tanh(a)", "abs(a)",
     "min(a, b, ...)", "max(a, b, ...)", "hypot(a, b)", "where(condition, a, b)",
 )  # fmt: skip
@@ -25,7 +25,7 @@ OPERATORS = {
     ast.GtE: np.greater_equal, ast.Eq: np.equal, ast.NotEq: np.not_equal,
 }  # fmt: skip
 WANTED = "operators are + - * / ^ < <= > >= == !="
-REFUSED = {  # operators of other languages: how they are written, and what says the same
+REFUSED = {  # operators of other languages -> (sign, equivalent here)
     ast.MatMult: ("@", ""), ast.Mod: ("%", ""), ast.FloorDiv: ("//", ""), ast.LShift: ("<<", ""),
     ast.RShift: (">>", ""), ast.Invert: ("~", "where(a, 0, 1)"), ast.Not: ("not", "where(a, 0, 1)"),
     ast.BitAnd: ("&", "(a)*(b)"), ast.And: ("and", "(a)*(b)"), ast.BitOr: ("|", "max(a, b)"),
@@ -33,12 +33,12 @@ REFUSED = {  # operators of other languages: how they are written, and what says
 }  # fmt: skip
 NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 LONGEST = 4000  # characters
-NESTED = "it has too many brackets or powers in one another"
-WRONG = ("divides by zero", "is the logarithm of zero", "is no number", "overflows")
+NESTED = "brackets or powers are nested too deep"
+WRONG = ("divides by zero", "is the logarithm of zero", "is not a number", "overflows")
 
 
 class Step(NamedTuple):
-    """A name or number (count 0), or what is done with so many of the values before it, and what the text has there."""
+    """Step of a formula: a name or number (count 0), or a function of the last `count` values; part : its text."""
 
     rule: Callable | str | float
     count: int
@@ -46,25 +46,25 @@ class Step(NamedTuple):
 
 
 class Arithmetic:
-    """Values of a text at points; ValueError, when it is read or taken, says what is wrong with it.
+    """Formula of x and y. Raises ValueError for an invalid text, and where a value is not finite.
 
-    Everything is a float, what is compared 1 or 0. What a `where` does not choose may be anything.
+    All values are floats; comparisons give 1 or 0. Values that `where` does not choose may be invalid.
     """
 
     def __init__(self, text: str, otherwise: str = "") -> None:
-        """otherwise : what is said of a text that is no arithmetic at all."""
+        """otherwise : error message for a text that is not a formula at all."""
         self.text, self.source = text, text.replace("^", "**").strip()
-        about = f"{show(text)} is no formula of x and y"
+        about = f"{show(text)} is not a formula of x and y"
         if len(text) > LONGEST:
             raise ValueError(
-                f'{about}: it has {len(text)} characters; wanted {LONGEST} at most, or {{ file = "NAME.csv" }}'
+                f'{about}: it has {len(text)} characters; expected at most {LONGEST}, or {{ file = "NAME.csv" }}'
             )
         try:
             tree = ast.parse(self.source, mode="eval").body
         except (MemoryError, RecursionError):
             raise ValueError(f"{about}: {NESTED}") from None
         except (SyntaxError, ValueError) as error:
-            if any(sign in text for sign in "*+()"):  # no quantity
+            if any(sign in text for sign in "*+()"):  # not a quantity
                 raise ValueError(f"{about}: {open_bracket(text) or getattr(error, 'msg', error)}") from None
             raise ValueError(otherwise or about) from None
         try:
@@ -75,7 +75,7 @@ class Arithmetic:
             raise ValueError(f"{about}: {error}") from None
 
     def read(self, node: ast.expr) -> Iterator[Step]:
-        """The steps of a branch of the text, last what it comes to."""
+        """Steps of a node of the syntax tree; the last step gives its value."""
         part = self.written(node)
         if isinstance(node, ast.Constant):
             yield Step(number(part), 0, part)
@@ -89,18 +89,18 @@ class Arithmetic:
             yield from self.read(node.operand)
             yield Step(operator(node.op), 1, part)
         elif isinstance(node, ast.BinOp):
-            chain = []  # x + y + z is (x + y) + z: as long as a text may be, and no deeper for that
+            chain = []  # x + y + z is (x + y) + z: a loop, since recursion would limit its length
             while isinstance(node, ast.BinOp):
                 chain.append(node)
                 node = node.left
             yield from self.read(node)
-            for one in reversed(chain):
-                yield from self.read(one.right)
-                yield Step(operator(one.op), 2, self.written(one))
-        elif isinstance(node, ast.Compare):  # 0 < x < 1 where both hold
+            for item in reversed(chain):
+                yield from self.read(item.right)
+                yield Step(operator(item.op), 2, self.written(item))
+        elif isinstance(node, ast.Compare):  # 0 < x < 1 is 1 if both hold
             sides = [node.left, *node.comparators]
-            for one, sign, other in zip(sides, node.ops, sides[1:], strict=False):
-                yield from self.read(one)
+            for item, sign, other in zip(sides, node.ops, sides[1:], strict=False):
+                yield from self.read(item)
                 yield from self.read(other)
                 yield Step(operator(sign), 2, part)
             if len(node.ops) > 1:
@@ -111,27 +111,27 @@ class Arithmetic:
             operator(getattr(node, "op", node))
 
     def call(self, node: ast.Call, part: str) -> Iterator[Step]:
-        """The steps of a call."""
+        """Steps of a call."""
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS:
-            said = self.written(node.func)
-            raise ValueError(f"{said} is unknown{did_you_mean(said, FUNCTIONS)}; known are {listing(FUNCTIONS, 20)}")
+            text = self.written(node.func)
+            raise ValueError(f"{text} is unknown{did_you_mean(text, FUNCTIONS)}; known are {listing(FUNCTIONS, 20)}")
         form, given = FUNCTIONS[name], len(node.args)
-        wanted, endless = form.count(",") + 1 - ("..." in form), "..." in form
-        if node.keywords or given < wanted or (given > wanted and not endless):
+        count, endless = form.count(",") + 1 - ("..." in form), "..." in form
+        if node.keywords or given < count or (given > count and not endless):
             counted = f"{given} argument{'' if given == 1 else 's'}"
-            raise ValueError(f"{name} has {counted}; wanted {form}" if not node.keywords else f"wanted {form}")
-        for one in node.args:
-            yield from self.read(one)
+            raise ValueError(f"{name} has {counted}; expected {form}" if not node.keywords else f"expected {form}")
+        for argument in node.args:
+            yield from self.read(argument)
         yield Step({"min": np.minimum, "max": np.maximum}.get(name) or getattr(np, name), given, part)
 
     def written(self, node: ast.AST) -> str:
-        """How the text has a branch."""
-        said = ast.get_source_segment(self.source, node) or ""
-        return said.replace("**", "^") if "^" in self.text else said
+        """Source text of a node of the syntax tree."""
+        text = ast.get_source_segment(self.source, node) or ""
+        return text.replace("**", "^") if "^" in self.text else text
 
     def __call__(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Values at points : float64[n]; ValueError names the first part that has none, and where."""
+        """Values at points : float64[n]. Raises ValueError with the first invalid part and its point."""
         known, stack = {"x": np.asarray(x, float), "y": np.asarray(y, float), "pi": np.pi}, []
         with np.errstate(all="ignore"):
             for at, step in enumerate(self.steps):
@@ -140,56 +140,59 @@ class Arithmetic:
                     continue
                 values, wrongs = zip(*stack[-step.count :], strict=True)
                 stack[-step.count :] = [applied(at, step.rule, values, wrongs)]
-        found, wrong = (np.broadcast_to(one, known["x"].shape) for one in stack[0])
+        result, wrong = (np.broadcast_to(array, known["x"].shape) for array in stack[0])
         if (wrong >= 0).any():
             k = int(np.argmax(wrong >= 0))
-            at, why = divmod(int(wrong[k]), len(WRONG))
+            at, reason = divmod(int(wrong[k]), len(WRONG))
             part = self.steps[at].part
-            where = f"{WRONG[why]} at x = {x[k]:.6g} m, y = {y[k]:.6g} m"
+            where = f"{WRONG[reason]} at x = {x[k]:.6g} m, y = {y[k]:.6g} m"
             raise ValueError(
                 f"{show(self.text)} {where}" if part == self.text else f"{show(self.text)}: {part} {where}"
             )
-        return np.array(found, dtype=float)
+        return np.array(result, dtype=float)
 
 
 def applied(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[np.ndarray, np.ndarray]:
-    """What a rule makes of values, and what is wrong with it: -1 for nothing, else step and reason in one number."""
+    """Apply a function to values; also return the error codes.
+
+    An error code is -1 for a valid value, else len(WRONG) * step + index in `WRONG`.
+    """
     if rule is np.where:
         condition, a, b = wrongs
         chosen = np.where(np.not_equal(values[0], 0.0), a, b)
         return np.where(np.not_equal(values[0], 0.0), *values[1:]), np.where(condition >= 0, condition, chosen)
-    found = np.asarray(reduce(rule, values) if len(values) > 2 else rule(*values), dtype=float)
-    why = np.where(np.isnan(found), 2, 3)
-    for kind, zero, which in ((0, np.divide, 1), (0, np.power, 0), (1, np.log, 0)):
-        why = np.where(np.equal(values[which], 0.0), kind, why) if rule is zero else why
-    own = np.where(np.isfinite(found), -1, len(WRONG) * at + why)
-    return found, reduce(lambda first, then: np.where(first >= 0, first, then), [*wrongs, own])
+    result = np.asarray(reduce(rule, values) if len(values) > 2 else rule(*values), dtype=float)
+    reason = np.where(np.isnan(result), 2, 3)
+    for kind, zero, argument in ((0, np.divide, 1), (0, np.power, 0), (1, np.log, 0)):
+        reason = np.where(np.equal(values[argument], 0.0), kind, reason) if rule is zero else reason
+    own = np.where(np.isfinite(result), -1, len(WRONG) * at + reason)
+    return result, reduce(lambda first, then: np.where(first >= 0, first, then), [*wrongs, own])
 
 
 def operator(node: ast.AST) -> Callable:
-    """What an operator does; ValueError for one that formulas have not."""
+    """NumPy function of an operator. Raises ValueError for an operator that formulas do not have."""
     if type(node) in OPERATORS:
         return OPERATORS[type(node)]
     sign, instead = REFUSED.get(type(node), ("", ""))
     if not sign:
-        raise ValueError(f"wanted numbers, {listing([*NAMES, *FUNCTIONS], 20)} and arithmetic; {WANTED}")
-    raise ValueError(f"there is no {sign}; " + (f"did you mean {instead}?" if instead else WANTED))
+        raise ValueError(f"expected numbers, {listing([*NAMES, *FUNCTIONS], 20)} and arithmetic; {WANTED}")
+    raise ValueError(f"unknown operator {sign}; " + (f"did you mean {instead}?" if instead else WANTED))
 
 
-def number(said: str) -> float:
-    """A decimal number; ValueError for any other form, and for one that no float holds."""
-    if NUMBER.fullmatch(said) is None:
-        raise ValueError(f"{said} is no decimal number; wanted for example 16, 0.5 or 1e-3")
-    if not np.isfinite(float(said)):
-        raise ValueError(f"{said if len(said) < 30 else 'a number'} is too large")
-    return float(said)
+def number(text: str) -> float:
+    """Value of a decimal number. Raises ValueError for any other form, and for a number too large for a float."""
+    if NUMBER.fullmatch(text) is None:
+        raise ValueError(f"{text} is not a decimal number; expected for example 16, 0.5 or 1e-3")
+    if not np.isfinite(float(text)):
+        raise ValueError(f"{text if len(text) < 30 else 'a number'} is too large")
+    return float(text)
 
 
 def open_bracket(text: str) -> str:
-    """What is wrong with the brackets of a text, "" where nothing is."""
+    """Fault of the brackets of a text; "" if there is none."""
     depth = 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")
         if depth < 0:
-            return "a bracket is closed that was not opened"
-    return "a bracket is left open" if depth else ""
+            return "a closing bracket has no opening bracket"
+    return "a bracket is not closed" if depth else ""

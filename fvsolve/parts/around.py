@@ -1,4 +1,4 @@
-"""What lies around a part in its case, as far as it asks for its faults. Knows no kind of part."""
+"""Context of a part in its case, for checks of the part."""
 
 from __future__ import annotations
 
@@ -6,16 +6,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-Faults = Iterator[tuple[tuple[Any, ...], str]]  # keys below the part, and what is wrong with them
+Faults = Iterator[tuple[tuple[Any, ...], str]]  # (keys below the part, text of the fault)
 
 
 @dataclass(frozen=True)
 class Around:
-    """A case whose parts are read, and what of it is known.
+    """Parts and properties of a case after its parts are read.
 
-    ambient : [Pa]; gravity : [m/s2], None where it is at fault; fluid : its properties, None where they are at fault
-    vacuum : (part's group, its name, key, pressures [Pa]) -> faults of those at which the fluid boils
-    between : (place, place) -> how far the second lies ahead of the first at the start [m], None where that is unknown
+    ambient : ambient pressure [Pa]
+    gravity : [m/s2]; None if faulty
+    fluid : properties of the fluid; None if faulty
+    vacuum : (group, name, key, pressures [Pa]) of a part -> faults of pressures at which the fluid boils
+    between : (place, place) -> distance from the first to the second at the start [m]; None if unknown
     """
 
     nodes: dict[str, Any]
@@ -27,15 +29,15 @@ class Around:
     between: Callable[[str, str], float | None]
 
     def spatial(self, place: str | None) -> bool:
-        """Whether a place is a body, or a point of one or of the world."""
+        """True if a place is a body, or a point of a body or of the world."""
         name, _, point = (place or "").partition(".")
         node = self.nodes.get(name)
         return getattr(node, "domain", "") == "spatial" or bool(point) and point in getattr(node, "points", {})
 
     def ahead(self, link: Any, first: str, second: str) -> float | None:
-        """How far the place at port `second` lies ahead of that at `first` at the start [m]; None unless known.
+        """Distance from the place at port `first` to that at port `second` at the start [m]; None if unknown.
 
-        Of masses on the axis the difference of their positions, of points in space their distance.
+        It is a difference of positions (signed) for masses on the axis, and a distance for points in space.
         """
         ends = [link.ports.get(port) for port in (first, second)]
         return None if None in ends else self.between(*ends)

@@ -1,4 +1,4 @@
-"""How a case says an attitude: in one form or several, held against each other. Knows forms; turns nothing."""
+"""Attitude of a body: keys of its representations, checked against each other."""
 
 from __future__ import annotations
 
@@ -12,41 +12,45 @@ from fvsolve import attitude
 from fvsolve.parts.table import Table
 from fvsolve.parts.value import Matrix, Misfit, Quantity, Rows, Setting, Usual
 
-TURNS = Usual(-6.3, 6.3, "a turn either way")
-TYPED = 1e-6  # what numbers typed with six digits are off by, of 1; beyond it is noted
-LOOSE = 1e-3  # R'R - I of a matrix typed with three digits, and [rad] between forms; beyond it is a fault
-SHORTEST = 1e-100  # of an axis
+TURNS = Usual(-6.3, 6.3, "one turn in either direction")
+TYPED = 1e-6  # rounding of numbers typed with six digits; larger deviations give a notice
+LOOSE = 1e-3  # R'R - I of a matrix typed with three digits, and [rad] between forms; larger deviations are faults
+SHORTEST = 1e-100  # smallest length of an axis
 ANGLES = ("roll", "pitch", "yaw")
 
 
 def Angle(about: str) -> Quantity:
-    """An angle of an attitude."""
+    """Declaration of an angle of an attitude."""
     return Quantity("angle", about=about, usual=TURNS)
 
 
 class Attitude(Table):
-    """How axes b stand in axes a: R^a_b by angles (40), (41), axis and angle (43), Euler parameters (45) or a matrix.
+    """Rotation R^a_b of axes b in axes a: angles (40), (41), axis and angle (43), Euler parameters (45) or a matrix.
 
-    Of several forms all must say the same; the first of them, in this order, is taken.
+    If several forms are given, they must agree; the first form in this order is used.
     """
 
     roll: Annotated[
-        float | None, Quantity("angle", about="about x, the last turn [rad]; 0 if left out", usual=TURNS)
+        float | None, Quantity("angle", about="angle about x, the last rotation [rad]; 0 if left out", usual=TURNS)
     ] = None
     pitch: Annotated[
-        float | None, Quantity("angle", about="about y, the turn between [rad]; 0 if left out", usual=TURNS)
+        float | None, Quantity("angle", about="angle about y, the second rotation [rad]; 0 if left out", usual=TURNS)
     ] = None
     yaw: Annotated[
-        float | None, Quantity("angle", about="about z, the first turn [rad]; 0 if left out", usual=TURNS)
+        float | None, Quantity("angle", about="angle about z, the first rotation [rad]; 0 if left out", usual=TURNS)
     ] = None
     zyz: Annotated[
         tuple[float, ...] | None,
         Rows("angle", length=3, about="[psi, theta, phi], classical Euler angles [rad]", usual=TURNS),
     ] = None
-    axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="that it is turned about by angle")] = None
-    angle: Annotated[float | None, Angle("about axis [rad]")] = None
-    euler_parameters: Annotated[tuple[float, ...] | None, Rows("number", length=4, about="[eta, e1, e2, e3]")] = None
-    matrix: Annotated[tuple | None, Matrix("number", about="its columns are the axes of b as a sees them")] = None
+    axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of the rotation by angle")] = None
+    angle: Annotated[float | None, Angle("angle of the rotation about axis [rad]")] = None
+    euler_parameters: Annotated[
+        tuple[float, ...] | None, Rows("number", length=4, about="Euler parameters [eta, e1, e2, e3]")
+    ] = None
+    matrix: Annotated[
+        tuple | None, Matrix("number", about="rotation matrix; its columns are the axes of b in axes a")
+    ] = None
 
     meant: ClassVar[dict[str, str]] = {
         "rpy": "roll, pitch, yaw", "heel": "roll", "trim": "pitch", "heading": "yaw", "rotation": "matrix",
@@ -62,28 +66,30 @@ class Attitude(Table):
 
     @property
     def rotation(self) -> np.ndarray:
-        """R^a_b : float64[3, 3]; of no form at all the identity."""
+        """R^a_b : float64[3, 3]; the identity if no form is given."""
         return next(iter(self._rotations().values()), np.eye(3))
 
     @property
     def parameters(self) -> np.ndarray:
-        """(eta, eps), eta not negative : float64[4]."""
+        """Euler parameters (eta, eps), eta not negative : float64[4]."""
         return attitude.euler_parameters(self.rotation)
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         pairs = (("axis", "angle"), ("angle", "axis"))
-        alone = [(one, other) for one, other in pairs if one in given and other not in given]
-        return super().key_faults(given) + [((one,), f"wants an {other} beside it") for one, other in alone]
+        alone = [(key, other) for key, other in pairs if key in given and other not in given]
+        return super().key_faults(given) + [((key,), f"needs {other} too") for key, other in alone]
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
-        """The same table; Misfit where a form is no rotation, or another than the first."""
-        said = readable(cls, given, setting)
-        faults = dict([*_no_length(said), *_no_rotation(said)])
-        whole = [keys for keys in cls.forms if all(one in said and one not in faults for one in keys if one in given)]
-        sound = cls.model_construct(**{key: said[key] for keys in whole for key in keys if key in said})
-        faults |= {key: f"{text}; wanted the same rotation" for key, text, apart in sound._apart() if apart > LOOSE}
+        """Return the table unchanged. Raises ValueFault if a form is not a rotation, or differs from the first form."""
+        values = readable(cls, given, setting)
+        faults = dict([*_no_length(values), *_no_rotation(values)])
+        complete = [
+            keys for keys in cls.forms if all(item in values and item not in faults for item in keys if item in given)
+        ]
+        sound = cls.model_construct(**{key: values[key] for keys in complete for key in keys if key in values})
+        faults |= {key: f"{text}; expected the same rotation" for key, text, apart in sound._apart() if apart > LOOSE}
         if faults:
             raise Misfit([((key,), text) for key, text in faults.items()])
         return given
@@ -93,73 +99,76 @@ class Attitude(Table):
         yield from uneven("euler_parameters", self.euler_parameters)
         off = attitude.defect(np.array(self.matrix))[0] if self.matrix else 0.0
         if off > TYPED:
-            yield ("matrix",), off, TYPED, f"R'R is the identity but for {off:.2g}; the nearest rotation is taken"
+            yield ("matrix",), off, TYPED, f"R'R differs from the identity by {off:.2g}; the nearest rotation is used"
         for key, text, apart in self._apart():
             if apart > TYPED:
-                yield (key,), apart, TYPED, f"{text}; the latter is taken"
+                yield (key,), apart, TYPED, f"{text}; the latter is used"
 
     def _rotations(self) -> dict[str, np.ndarray]:
-        """The rotation that each form says that is given, by its first key."""
-        found = {}
+        """Rotation of each given form, by its first key."""
+        result = {}
         for keys, form in self.forms.items():
             values = [getattr(self, key) for key in keys]
             if keys == ANGLES and values != [None] * 3:
-                values = [one or 0.0 for one in values]
+                values = [angle or 0.0 for angle in values]
             if None not in values:
-                found["roll" if keys == ANGLES else keys[0]] = form(*values)
-        return found
+                result["roll" if keys == ANGLES else keys[0]] = form(*values)
+        return result
 
     def _apart(self) -> Iterator[tuple[str, str, float]]:
-        """(key, text, angle [rad]) of every form beside the first."""
+        """(key, text, deviation [rad]) of every form except the first."""
         (first, rotation), *others = self._rotations().items() or [("", None)]
         for key, other in others:
             angle = attitude.axis_angle(attitude.deviation(other, rotation))[1]
             name = "roll, pitch, yaw" if first == "roll" else first
             yield (
                 key,
-                f"is {math.degrees(angle):.3g} deg away from what {name} say{'' if first == 'roll' else 's'}",
+                f"is {math.degrees(angle):.3g} deg away from what {name} give{'' if first == 'roll' else 's'}",
                 angle,
             )
 
 
 def readable(table: type[Table], given: dict[str, Any], setting: Setting) -> dict[str, Any]:
-    """The values of those keys that can be read: of others the table itself says what is wrong."""
-    found = {}
+    """Values of the valid keys; the table itself reports faults of the other keys."""
+    result = {}
     for key, value in table.values().items():
         try:
             if key in given:
-                found[key] = value.read(given[key], setting)
+                result[key] = value.read(given[key], setting)
         except ValueError:
             continue
-    return found
+    return result
 
 
 def uneven(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-    """What is odd of a direction, or of Euler parameters, whose length is not 1: it is divided by it."""
+    """Notice of a direction or Euler parameters of a length other than 1; they are divided by it."""
     length = math.hypot(*given) if given else 1.0
     if abs(length - 1.0) > TYPED:
         yield (key,), length, 1.0, f"its length is {length:.6g}, not 1; it is divided by it"
 
 
 def no_direction(given: tuple[float, ...] | None) -> bool:
-    """Whether a vector is given that points nowhere, or has no square."""
+    """True if a vector is given with zero length, or too short to be squared."""
     return given is not None and math.hypot(*given) < SHORTEST
 
 
-def _no_length(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    for key, wanted in (("axis", "[0, 0, 1]"), ("euler_parameters", "[1, 0, 0, 0], which turns nothing")):
-        if no_direction(said.get(key)):
-            yield key, f"is all zeros; wanted a length of 1, for example {wanted}"
+def _no_length(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    for key, example in (("axis", "[0, 0, 1]"), ("euler_parameters", "[1, 0, 0, 0], the identity")):
+        if no_direction(values.get(key)):
+            yield key, f"has zero length; expected a length of 1, for example {example}"
 
 
-def _no_rotation(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    if "matrix" not in said:
+def _no_rotation(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    if "matrix" not in values:
         return
-    off, determinant = attitude.defect(np.array(said["matrix"]))
+    off, determinant = attitude.defect(np.array(values["matrix"]))
     if off > LOOSE:
         yield (
             "matrix",
-            f"is no rotation: R'R is the identity but for {off:.3g}; wanted columns of length 1 at right angles",
+            f"is not a rotation: R'R differs from the identity by {off:.3g}; expected orthogonal columns of length 1",
         )
     elif determinant < 0.0:
-        yield "matrix", "is no rotation but a mirror: its determinant is -1; wanted +1, right-handed axes"
+        yield (
+            "matrix",
+            "is a reflection: its determinant is -1; expected a rotation, with determinant +1 and right-handed axes",
+        )

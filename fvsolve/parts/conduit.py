@@ -1,4 +1,4 @@
-"""What pipes and rigid columns share: length, bore and fittings. Turns names of sizes into numbers; knows no flow."""
+"""Keys common to pipes and rigid columns: length, bore, friction and fittings."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import show
 
-BORES = Usual(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela are 13.7 m wide
-LENGTH = Quantity("length", positive, "along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"), COUNTED)
+BORES = Usual(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela have 13.7 m
+LENGTH = Quantity("length", positive, "length along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"), COUNTED)
 DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES, COUNTED)
-LOSS = Number(nonnegative, "loss coefficient on its velocity, spread along it")
+LOSS = Number(nonnegative, "loss coefficient on its velocity, distributed along its length")
 
 
 ROUGHEST = 0.05  # relative roughness, Moody 1944
 
 
 class Fittings(Value):
-    """A list of names of fittings; a name may stand there several times."""
+    """List of names of fittings; names may repeat."""
 
-    about = "fittings by name, their loss coefficients are added to minor_loss"
+    about = "names of fittings; their loss coefficients are added to minor_loss"
     takes = "list of names"
     changes = PROFILE
 
     def read(self, given: Any, setting: Setting) -> list[str]:
         if not isinstance(given, (list, tuple)):
-            raise Misfit([((), f'{show(given)} is no list; wanted one such as ["bend-90", "gate-valve"]')])
+            raise Misfit([((), f'{show(given)} is not a list; expected for example ["bend-90", "gate-valve"]')])
         faults = []
         for index, name in enumerate(given):
             if name not in FITTINGS:
@@ -58,7 +58,7 @@ class Fittings(Value):
 
 
 class Conduit(TwoPort):
-    """A pipe of whatever kind; `nominal` and `fittings` are read as `diameter`, `thickness` and `minor_loss`."""
+    """Pipe or rigid column; `nominal` and `fittings` are read as `diameter`, `thickness` and `minor_loss`."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"), ("diameter", "schedule"))
 
@@ -73,21 +73,23 @@ class Conduit(TwoPort):
     )
 
     length: Annotated[float, LENGTH]
-    diameter: Annotated[float, DIAMETER] = None  # nominal stands in for it
-    nominal: Annotated[str | None, Text('"DN100", "NPS 4" or "NPS 1-1/2", in place of diameter', COUNTED)] = None
+    diameter: Annotated[float, DIAMETER] = None  # nominal replaces it
+    nominal: Annotated[str | None, Text('"DN100", "NPS 4" or "NPS 1-1/2", instead of diameter', COUNTED)] = None
     schedule: Annotated[
-        str | None, Text('of the nominal size: "40", "80", "STD", "10S"; "40" if left out', COUNTED)
+        str | None, Text('schedule of the nominal size: "40", "80", "STD", "10S"; "40" if left out', COUNTED)
     ] = None
     friction: Friction = NONE
     minor_loss: Annotated[float, LOSS] = 0.0
     fittings: Annotated[list[str] | None, Fittings()] = None
     initial_flow: Annotated[
-        float | None, Quantity("flow", about="at the start [m3/s]; that of the steady state if left out")
+        float | None, Quantity("flow", about="flow at the start [m3/s]; that of the steady state if left out")
     ] = None
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         if self.diameter > self.length:
-            text = f"{self.diameter:g} m is more than its length of {self.length:g} m, and the flow is not along it"
+            text = (
+                f"{self.diameter:g} m is more than its length of {self.length:g} m, so the flow is not one-dimensional"
+            )
             yield ("diameter",), self.diameter, self.length, text
         rough, most = self.friction.roughness or 0.0, ROUGHEST * self.diameter
         if rough > most:
@@ -97,31 +99,31 @@ class Conduit(TwoPort):
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
-        """Names turned into `diameter`, wall `thickness` and `minor_loss`; Misfit where one means nothing."""
-        found, faults = {**given}, []
+        """Replace names by `diameter`, wall `thickness` and `minor_loss`. Raises ValueFault for unknown names."""
+        result, faults = {**given}, []
         if isinstance(given.get("nominal"), str) and "diameter" not in given:
             try:
-                found["diameter"], thickness = sized(found.pop("nominal"), found.pop("schedule", "40"))
+                result["diameter"], thickness = sized(result.pop("nominal"), result.pop("schedule", "40"))
                 if isinstance(given.get("wall"), dict):
-                    found["wall"] = {"thickness": thickness, **given["wall"]}
+                    result["wall"] = {"thickness": thickness, **given["wall"]}
             except Misfit as error:
                 faults += error.faults
-        if "fittings" in found:
+        if "fittings" in result:
             try:
-                names = Fittings().read(found.pop("fittings"), setting)
-                own = LOSS.read(found.get("minor_loss", 0.0), setting)
-                found["minor_loss"] = own + loss(names, DIAMETER.read(found["diameter"], setting))
+                names = Fittings().read(result.pop("fittings"), setting)
+                own = LOSS.read(result.get("minor_loss", 0.0), setting)
+                result["minor_loss"] = own + loss(names, DIAMETER.read(result["diameter"], setting))
             except Misfit as error:
                 faults += [(("fittings", *keys), text) for keys, text in error.faults]
-            except (KeyError, ValueError):  # a key that is read, and blamed, in its own right
+            except (KeyError, ValueError):  # a key that is missing or faulty: reported by itself
                 pass
         if faults:
             raise Misfit(faults)
-        return found
+        return result
 
 
 def sized(nominal: str, schedule: Any) -> tuple[float, float]:
-    """`bore` of what the file says; Misfit with the key to blame."""
+    """(inner diameter, wall thickness) [m] of a nominal size and schedule. Raises ValueFault with the faulty key."""
     try:
         return bore(nominal, str(schedule))
     except ValueError as error:

@@ -1,7 +1,7 @@
-"""A CSV file as its header and its rows of numbers. Knows bytes, separators and units; knows not what columns are for.
+"""CSV files: header, rows of numbers and units.
 
-Columns are parted by tabs, semicolons or commas, whichever give every row as many cells as the header; a row that is
-longer or shorter is at fault, as what stands in it could be read in more than one way.
+The separator is a tab, a semicolon or a comma: the first that gives every row as many cells as the header. A longer or
+shorter row is a fault, since its meaning would be ambiguous.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from fvsolve import units
 from fvsolve.errors import did_you_mean
 from fvsolve.units import show
 
-COMMAS = "; decimal commas? part columns by ; or tabs then"
+COMMAS = "; with decimal commas, separate columns by ; or tabs"
 MARKS = ("\t", ";", ",")
 NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
 
 
 class Misread(ValueError):
-    """What is wrong with a file, and in which line."""
+    """Fault of a file, with its line."""
 
     def __init__(self, file: str, message: str, line: int | None = None) -> None:
         self.message, self.line = message, line
@@ -33,7 +33,10 @@ class Misread(ValueError):
 
 @dataclass(frozen=True)
 class CsvRows:
-    """header : names with their units; lines : the line of every row; cells : of every row, as many as the header."""
+    """Rows of a CSV file.
+
+    header : names with their units; lines : line number of each row; cells : texts of each row, as many as the header
+    """
 
     file: str
     header: list[str]
@@ -42,75 +45,77 @@ class CsvRows:
 
     @property
     def names(self) -> list[str]:
-        """The header without its units."""
-        return [split(one)[0] for one in self.header]
+        """Names of the columns without units."""
+        return [split(name)[0] for name in self.header]
 
     def column(self, name: str | None, default: int) -> int:
-        """Place of the column of that header, with or without its unit; None is the default."""
+        """Index of a column by its name, with or without unit; `default` if the name is None. Raises ValueError."""
         if name is None:
             if len(self.header) <= default:
-                raise ValueError(f"{self.file} has one column; wanted a time and a value")
+                raise ValueError(f"{self.file} has one column; expected a time and a value")
             return default
         for known in (self.header, self.names):
             if known.count(name) > 1:
-                raise ValueError(f"{self.file} has {known.count(name)} columns {show(name)}; wanted one of that name")
+                raise ValueError(
+                    f"{self.file} has {known.count(name)} columns {show(name)}; expected a single column of that name"
+                )
             if name in known:
                 return known.index(name)
         shown = f"{did_you_mean(name, self.header)}; columns are {', '.join(map(show, self.header))}"
         raise ValueError(f"{self.file} has no column {show(name)}{shown}")
 
     def numbers(self, column: int, dimension: str, ambient: float = 101325.0) -> np.ndarray:
-        """A column in SI by the unit of its header, pressures absolute : float64[n]."""
+        """Values of a column in SI by the unit in its header, pressures absolute : float64[n]."""
         unit = split(self.header[column])[1]
         try:
-            found = units.find(unit, dimension) if unit else None
+            known = units.find(unit, dimension) if unit else None
         except ValueError as error:
             raise ValueError(f"{self.file}, column {show(self.header[column])}: {error}") from None
         values = np.array(self.plain(column))
-        if found is None:
+        if known is None:
             return values
-        return found.si(values) + (ambient if found.gauge and dimension == "pressure" else 0.0)
+        return known.si(values) + (ambient if known.gauge and dimension == "pressure" else 0.0)
 
     def plain(self, column: int) -> list[float]:
-        """The numbers of a column as they stand."""
-        found, points = [], False
+        """Numbers of a column without conversion of units. Raises Misread."""
+        values, points = [], False
         for k, (line, row) in enumerate(zip(self.lines, self.cells, strict=True)):
             text = row[column]
             value = number(text)
             if value is None:
-                message = f"{show(text)} is no number in column {show(self.header[column])}"
-                if k == 0 and all(number(one) is None for one in row):
-                    message += f"; units stand in the header, {self.names[0]} [s] for example"
+                message = f"{show(text)} is not a number in column {show(self.header[column])}"
+                if k == 0 and all(number(cell) is None for cell in row):
+                    message += f"; expected units in the header, for example {self.names[0]} [s]"
                 raise Misread(self.file, message, line)
             points = points or "." in text
             if points and "," in text:
-                raise Misread(self.file, f"{show(text)} has a decimal comma where others have points", line)
-            found.append(value)
-        return found
+                raise Misread(self.file, f"{show(text)} has a decimal comma, but numbers above have points", line)
+            values.append(value)
+        return values
 
 
 def split(header: str) -> tuple[str, str]:
-    """Name and unit of a header, the unit empty where there is none."""
+    """Name and unit of a header; the unit is empty if there is none."""
     match = re.fullmatch(r"(.*?)\s*\[(.*)\]", header)
     return (match[1], match[2]) if match else (header, "")
 
 
 def number(text: str) -> float | None:
-    """The number of a cell, with a decimal point or comma; None where it is none or not finite."""
+    """Number of a cell, with a decimal point or comma; None if it is not a finite number."""
     text = text.replace("\N{MINUS SIGN}", "-")
     value = float(text.replace(",", ".")) if NUMBER.fullmatch(text) else np.inf
     return value if np.isfinite(value) else None
 
 
 def read_rows(path: Path) -> CsvRows:
-    """The header and the rows of a file; ValueError where they are not plain."""
+    """Header and rows of a file. Raises ValueError for rows that do not match the header."""
     lines = [(n, line) for n, line in enumerate(read_text(path).splitlines(), 1) if line.strip() and line[0] != "#"]
     if len(lines) < 2:
-        raise ValueError(f"{path.name} is empty; wanted a header and rows of numbers")
+        raise ValueError(f"{path.name} is empty; expected a header and rows of numbers")
     readings = {mark: parted(path, lines, mark) for mark in MARKS if mark in lines[0][1]} or {",": parted(path, lines)}
-    header, *rows = next((one for one in readings.values() if is_even(one)), next(iter(readings.values())))
+    header, *rows = next((reading for reading in readings.values() if is_even(reading)), next(iter(readings.values())))
     if all(number(name) is not None for name in header):
-        raise ValueError(f'{path.name} has no header; wanted one such as "t [s],opening [-]"')
+        raise ValueError(f'{path.name} has no header; expected for example "t [s],opening [-]"')
     for (line, _), row in zip(lines[1:], rows, strict=True):
         if len(row) != len(header):
             count = f"{len(row)} cell{'' if len(row) == 1 else 's'} under {len(header)} header"
@@ -119,17 +124,17 @@ def read_rows(path: Path) -> CsvRows:
             )
         nameless = next((cell for cell, name in zip(row, header, strict=True) if cell and not name), None)
         if nameless is not None:
-            raise Misread(path.name, f"{show(nameless)} stands under no header{COMMAS}", line)
+            raise Misread(path.name, f"{show(nameless)} has no header{COMMAS}", line)
     return CsvRows(path.name, header, [line for line, _ in lines[1:]], rows)
 
 
 def is_even(rows: list[list[str]]) -> bool:
-    """Whether all rows have as many cells, more than one."""
+    """True if all rows have the same number of cells, more than one."""
     return {len(row) for row in rows} == {len(rows[0])} and len(rows[0]) > 1
 
 
 def parted(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> list[list[str]]:
-    """The cells of every line."""
+    """Cells of each line."""
     try:
         return [[cell.strip() for cell in next(csv.reader([line], delimiter=mark))] for _, line in lines]
     except csv.Error as error:
@@ -137,7 +142,7 @@ def parted(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> list[li
 
 
 def read_text(path: Path) -> str:
-    """The text of a file, UTF-8 or UTF-16 with or without a mark; ValueError where it is none."""
+    """Text of a file in UTF-8 or UTF-16, with or without byte order mark. Raises ValueError."""
     try:
         data = path.read_bytes()
     except OSError as error:

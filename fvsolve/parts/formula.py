@@ -1,4 +1,4 @@
-"""A value over the plane: a number, a formula of x and y, or samples of a file. Knows no mesh."""
+"""Values over the plane: a number, a formula of x and y, or samples of a file."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from fvsolve.parts.series import copy_name, find_file
 from fvsolve.parts.value import PROFILE, Misfit, Quantity, Range, Setting, Value, anything
 from fvsolve.units import show
 
-MANY = 2**16  # points at a time, so that what a formula is made of stays small
+MANY = 2**16  # points per evaluation: limits the memory of intermediate values
 
 
 @dataclass(frozen=True)
 class Formula:
-    """A value at every point, SI: what the file says, and a function of coordinates [m]."""
+    """Value at every point in SI: the text of the file, and a function of coordinates [m]."""
 
     said: Any
     rule: Any
 
     def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Values at points : float64[n]; ValueError where one is none."""
-        found = np.empty(np.shape(x))
-        for first in range(0, found.size, MANY):
+        """Values at points : float64[n]. Raises ValueError if a value is not finite."""
+        values = np.empty(np.shape(x))
+        for first in range(0, values.size, MANY):
             part = slice(first, first + MANY)
-            found[part] = self.rule(x[part], y[part])
-        if not np.isfinite(found).all():
-            k = int(np.argmax(~np.isfinite(found)))
-            raise ValueError(f"{show(self.said)} is no number at x = {x[k]:.6g} m, y = {y[k]:.6g} m")
-        return found
+            values[part] = self.rule(x[part], y[part])
+        if not np.isfinite(values).all():
+            k = int(np.argmax(~np.isfinite(values)))
+            raise ValueError(f"{show(self.said)} is not a number at x = {x[k]:.6g} m, y = {y[k]:.6g} m")
+        return values
 
     def table(self) -> Any:
-        """What the file would say."""
+        """Value as in a case file."""
         return self.said
 
     def __eq__(self, other: object) -> bool:
@@ -47,13 +47,13 @@ class Formula:
 
 
 def even(value: float) -> Formula:
-    """The same value everywhere."""
+    """Formula of a uniform value."""
     return Formula(value, lambda x, y: value)
 
 
 @dataclass(frozen=True)
 class Shaped(Value):
-    """A value over the plane: a quantity, a formula of x and y in SI, or { file } with columns x, y and the value."""
+    """Field over the plane: a quantity, a formula of x and y in SI, or { file } with columns x, y and the value."""
 
     dimension: str
     about: str = ""
@@ -76,7 +76,9 @@ class Shaped(Value):
 
     def _samples(self, given: dict, setting: Setting) -> Formula:
         if set(given) != {"file"} or not isinstance(given["file"], str):
-            raise ValueError(f'{show(given)}; wanted {{ file = "NAME.csv" }}, columns x, y and the value')
+            raise ValueError(
+                f'{show(given)} is not a field; expected {{ file = "NAME.csv" }} with columns x, y and the value'
+            )
         try:
             path = find_file(given["file"], setting)
             columns = read_points(path, self.dimension)
@@ -93,18 +95,18 @@ class Shaped(Value):
 
 
 def read_points(path: Path, dimension: str) -> np.ndarray:
-    """Columns x [m], y [m] and the value [SI] : float64[n, 3]; ValueError names the line at fault."""
+    """Columns x [m], y [m] and the value [SI] : float64[n, 3]. Raises ValueError with the faulty line."""
     rows = read_rows(path)
     if len(rows.header) != 3:
-        raise ValueError(f"{path.name} has {len(rows.header)} columns; wanted x, y and the value")
+        raise ValueError(f"{path.name} has {len(rows.header)} columns; expected x, y and the value")
     if len(rows.lines) < 3:
-        raise ValueError(f"{path.name}: {len(rows.lines)} points; wanted three at least")
-    return np.column_stack([rows.numbers(k, one) for k, one in enumerate(("length", "length", dimension))])
+        raise ValueError(f"{path.name}: {len(rows.lines)} points; expected at least three")
+    return np.column_stack([rows.numbers(k, kind) for k, kind in enumerate(("length", "length", dimension))])
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Linear between scattered points, the nearest one's value beyond them; columns : float64[n, 3]."""
+    """Linear interpolation between scattered points, outside them the nearest value; columns : float64[n, 3]."""
 
     columns: np.ndarray
 
@@ -112,12 +114,12 @@ class Samples:
         from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
         places, values = self.columns[:, :2], self.columns[:, 2]
-        found = LinearNDInterpolator(places, values)(x, y)
-        return np.where(np.isnan(found), NearestNDInterpolator(places, values)(x, y), found)
+        inner = LinearNDInterpolator(places, values)(x, y)
+        return np.where(np.isnan(inner), NearestNDInterpolator(places, values)(x, y), inner)
 
 
 def plain(text: str) -> Any:
-    """A text that is a number alone, a formula too, as that number."""
+    """Number that a text contains, else the text unchanged."""
     try:
         return float(text)
     except ValueError:

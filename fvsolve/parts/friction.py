@@ -1,4 +1,4 @@
-"""How a wall brakes the flow. Knows the models and their numbers; computes nothing."""
+"""Friction models of pipes and their parameters."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MEANT = dict.fromkeys(
     ("colebrook", "colebrook-white", "swamee-jain", "moody", "haaland", "darcy", "darcy-weisbach", "d-w", "dw"),
     DARCY_WEISBACH,
 ) | {"h-w": '"hazen-williams"', "hw": '"hazen-williams"', "manning": '"chezy-manning"', "c-m": '"chezy-manning"'}
-KEYS = {  # of each model; at least one of the Darcy pair, or the coefficient
+KEYS = {  # keys of each model; at least one of the Darcy pair, or the coefficient, is needed
     "none": (),
     "steady": DARCY,
     "quasi-steady": DARCY,
@@ -27,28 +27,31 @@ KEYS = {  # of each model; at least one of the Darcy pair, or the coefficient
 
 
 FACTORS = Usual(0.004, 0.5, "Moody's chart and slow laminar flow")  # the chart spans 0.008 to 0.1
-COEFFICIENTS = {  # of a model: the values that tables of textbooks and EPANET's manual have
-    # plastic has 155, more where an import made a pipe longer
+COEFFICIENTS = {  # usual coefficients by model, from textbooks and the EPANET manual
+    # plastic has 155; more if an import lengthened a pipe
     "hazen-williams": Usual(40.0, 500.0, "C of tuberculated iron to plastic"),
     "chezy-manning": Usual(0.006, 0.06, "n of glass to unlined rock"),
 }
 
 
 class Friction(Table):
-    """none; steady (Darcy factor of the starting flow); quasi-steady (of the present flow); unsteady; two others.
+    """Friction model of a pipe.
 
-    unsteady: quasi-steady, and the past of the flow by a weighting function, a sum of exponentials; each term is a
-    state of every cell and stores energy. Dissipated power: pressure drop times flow [W].
+    steady : Darcy factor of the initial flow; quasi-steady : Darcy factor of the present flow
+    unsteady : quasi-steady, plus the history of the flow by a weighting function, a sum of exponentials; each term is
+    a state of every cell and stores energy
+    Dissipated power: pressure drop times flow [W].
     """
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("roughness", "factor"),)
 
-    model: Annotated[str, Choice("friction model", MODELS, "how the wall brakes the flow", MEANT)]
+    model: Annotated[str, Choice("friction model", MODELS, "model of the wall friction", MEANT)]
     roughness: Annotated[
-        float | None, Quantity("length", nonnegative, "of the wall [m], of steady, quasi-steady and unsteady")
+        float | None, Quantity("length", nonnegative, "roughness of the wall [m], of steady, quasi-steady and unsteady")
     ] = None
     factor: Annotated[
-        float | None, Number(nonnegative, "Darcy's, four times Fanning's, in place of roughness [-]", FACTORS)
+        float | None,
+        Number(nonnegative, "Darcy friction factor, four times Fanning's, instead of roughness [-]", FACTORS),
     ] = None
     coefficient: Annotated[
         float | None, Number(positive, "C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")
@@ -57,12 +60,18 @@ class Friction(Table):
     weighting: Annotated[
         str | None,
         Choice(
-            "weighting function", WEIGHTINGS, "of the past, unsteady; by the Reynolds number of the start if left out"
+            "weighting function",
+            WEIGHTINGS,
+            "weighting function of the flow history, unsteady; by the initial Reynolds number if left out",
         ),
     ] = None
     accuracy: Annotated[
         float | None,
-        Number(between(1e-6, 0.1), "of the sum of exponentials, relative, unsteady; 1e-4 if left out", changes=SHAPE),
+        Number(
+            between(1e-6, 0.1),
+            "relative accuracy of the sum of exponentials, unsteady; 1e-4 if left out",
+            changes=SHAPE,
+        ),
     ] = None
 
     @classmethod
@@ -81,8 +90,8 @@ class Friction(Table):
         if usual is None or usual.least <= c <= usual.greatest:
             return
         text = f"{c:g} is outside {usual.least:g} to {usual.greatest:g}, {usual.practice}"
-        other = next((m for m, one in COEFFICIENTS.items() if one.least <= c <= one.greatest), None)
-        text += f'; model = "{other}" meant?' if other else ""
+        other = next((m for m, span in COEFFICIENTS.items() if span.least <= c <= span.greatest), None)
+        text += f'; did you mean model = "{other}"?' if other else ""
         yield ("coefficient",), c, usual.least if c < usual.least else usual.greatest, text
 
 

@@ -1,4 +1,4 @@
-"""What lies between nodes and carries flow. Knows what every link has; knows no node but by name."""
+"""Links: base of all parts that join nodes and carry flow."""
 
 from __future__ import annotations
 
@@ -14,43 +14,43 @@ from fvsolve.units import show
 
 
 class Link(Table):
-    """A part whose ports join places; flow is positive into it at each port.
+    """Part with ports that join places; flow is positive into the part at each port.
 
-    Potential times flow, summed over the ports, is the power [W] it takes up: pressure and volume flow where the
-    domain is hydraulic, velocity and force where it is translational, angular velocity and torque where rotational.
+    The sum of potential times flow over the ports is the power [W] into the part. Potential and flow are pressure and
+    volume flow (hydraulic domain), velocity and force (translational), or angular velocity and torque (rotational).
     """
 
     kind: ClassVar[str] = ""
     kinds: ClassVar[dict[str, type[Link]]] = {}
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
-    asked: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only where they are asked for
+    asked: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
-    joins: ClassVar[dict[str, str]] = {}  # port -> domain of the place it wants
+    joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
-    no_scalars: ClassVar[str] = ""  # why a case with scalars cannot have it yet
-    own_scalars: ClassVar[str] = ""  # which values of scalars it states: "along" its length; none if empty
-    owns: ClassVar[dict[str, str]] = {}  # place of its own, `LINK.PLACE` to others -> domain
+    no_scalars: ClassVar[str] = ""  # reason why a case with scalars cannot have this part yet
+    own_scalars: ClassVar[str] = ""  # scalars that it states: "along" its length; none if empty
+    owns: ClassVar[dict[str, str]] = {}  # own place, `LINK.PLACE` for other parts -> domain
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
-        """(places, links) that it stands for, by name: itself, and what it owns as `NAME.PLACE`."""
+        """(places, links) of the solved network for this part, by name: itself, and its own places `NAME.PLACE`."""
         return {}, {name: self}
 
     def __init_subclass__(cls, kind: str = "", **rest: Any) -> None:
         super().__init_subclass__(**rest)
         if kind:
             if kind in Link.kinds:
-                raise FvsolveError(f"a link of type {show(kind)} is there already; wanted another name")
+                raise FvsolveError(f"a link of type {show(kind)} exists already; expected another name")
             cls.kind = kind
             Link.kinds[kind] = cls
 
 
 class TwoPort(Link):
-    """A link with the ports `from` and `to`; its own flow [m3/s] is the one at `from`."""
+    """Link with the ports `from` and `to`; its flow [m3/s] is that at `from`."""
 
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic", "to": "hydraulic"}
 
-    from_: Annotated[str, Text("the place it starts from"), Field(alias="from")]
-    to: Annotated[str, Text("the place it leads to")]
+    from_: Annotated[str, Text("place at its start"), Field(alias="from")]
+    to: Annotated[str, Text("place at its end")]
 
     @property
     def ports(self) -> dict[str, str]:
@@ -59,9 +59,10 @@ class TwoPort(Link):
 
 
 class Coupling(TwoPort):
-    """A link between masses on one axis, or points in space; its force [N] pushes `to` forward and `from` back as much.
+    """Link between masses on an axis, or between points in space.
 
-    Between points x_to - x_from is their distance, and forward is away from the other one.
+    Its force [N] acts on `to` in the positive direction and on `from` in the negative direction. Between points,
+    x_to - x_from is their distance, and a positive force pushes them apart.
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "translational or spatial", "to": "translational or spatial"}
@@ -70,15 +71,15 @@ class Coupling(TwoPort):
 
 @dataclass(frozen=True)
 class Ports(Value):
-    """The table `ports` of a link with other ports than `from` and `to`: port name -> place."""
+    """Table `ports` of a link with ports other than `from` and `to`: port name -> place."""
 
     names: tuple[str, ...]
-    about: str = "the place that each port joins"
+    about: str = "place of each port"
 
     def read(self, given: Any, setting: Setting) -> dict[str, str]:
         if not isinstance(given, dict):
             example = ", ".join(f'{name} = "..."' for name in self.names)
-            raise ValueError(f"{show(given)} is no table; wanted {{ {example} }}")
+            raise ValueError(f"{show(given)} is not a table; expected {{ {example} }}")
         return read_keys(given, self.keys(), setting)
 
     def keys(self) -> dict[str, tuple[Value, Any]]:

@@ -1,4 +1,4 @@
-"""Words of the trade for parts that have another name here. Knows names; knows no part."""
+"""Synonyms: engineering terms for parts that have another name here."""
 
 MEANT = {
     "hose": 'a "pipe" with a low wave_speed, or wall = { youngs_modulus, thickness }',
@@ -11,7 +11,7 @@ MEANT = {
     "cooler": 'an "orifice" with loss_coefficient and diameter, or a "pipe"',
     "nozzle": 'an "orifice"',
     "throttle": 'an "orifice" or a "valve"',
-    "pump-turbine": 'a "turbine" whose hill_chart goes round all that it does',
+    "pump-turbine": 'a "turbine" with a hill_chart of all four quadrants',
     "francis": 'a "turbine" with its hill_chart',
     "kaplan": 'a "turbine" with its hill_chart',
     "pelton": 'a "turbine" with its hill_chart',

@@ -1,4 +1,4 @@
-"""What the fluid carries with it: temperature, concentration, tracer. Knows numbers; knows no flow."""
+"""Scalars transported by the fluid: temperature, concentration, tracer."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from fvsolve.units import show
 
 
 class Scalar(Table):
-    """A quantity c per mass that the fluid carries: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient)."""
+    """Quantity c per mass, transported by the fluid: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient)."""
 
-    unit: Annotated[str, Text("a label, for headers", VALUE)] = "-"
-    initial: Annotated[float, Number(about="wherever nothing else is said")] = 0.0
-    diffusivity: Annotated[float, Quantity("diffusivity", nonnegative, "along pipes [m2/s]", changes=VALUE)] = 0.0
-    decay: Annotated[float, Quantity("rate", nonnegative, "at which it falls to ambient [1/s]", changes=VALUE)] = 0.0
-    ambient: Annotated[float, Number(about="what it decays to", changes=VALUE)] = 0.0
+    unit: Annotated[str, Text("unit as a label in headers", VALUE)] = "-"
+    initial: Annotated[float, Number(about="initial value where no part states another")] = 0.0
+    diffusivity: Annotated[
+        float, Quantity("diffusivity", nonnegative, "diffusivity along pipes [m2/s]", changes=VALUE)
+    ] = 0.0
+    decay: Annotated[float, Quantity("rate", nonnegative, "rate of decay to ambient [1/s]", changes=VALUE)] = 0.0
+    ambient: Annotated[float, Number(about="final value of the decay", changes=VALUE)] = 0.0
 
 
 @dataclass(frozen=True)
 class Carried(Value):
-    """Values of scalars by name, each a number or a schedule."""
+    """Values of scalars by name: numbers or schedules."""
 
     about: str = "value of each scalar, by its name"
     value: Value = Scheduled("number")
@@ -31,18 +33,18 @@ class Carried(Value):
 
     def read(self, given: Any, setting: Setting) -> dict[str, Any]:
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table of scalars; wanted {{ NAME = VALUE }}")
-        found, faults = {}, []
-        for name, one in given.items():
+            raise ValueError(f"{show(given)} is not a table of scalars; expected {{ NAME = VALUE }}")
+        values, faults = {}, []
+        for name, item in given.items():
             try:
-                found[name] = self.value.read(one, setting)
+                values[name] = self.value.read(item, setting)
             except Misfit as error:
                 faults += [((name, *below), message) for below, message in error.faults]
             except ValueError as error:
                 faults.append(((name,), str(error)))
         if faults:
             raise Misfit(faults)
-        return found
+        return values
 
     def below(self, key: str) -> Value | None:
         return self.value

@@ -1,4 +1,4 @@
-"""A value that may change with time. Knows its breakpoints; evaluates nothing."""
+"""Schedules: values that may change with time, and the keys that declare them."""
 
 from __future__ import annotations
 
@@ -33,19 +33,19 @@ from fvsolve.parts.value import (
 from fvsolve.units import show
 
 KINDS = ("linear", "step", "smooth")
-AMPLITUDES = {"pressure": "pressure_drop"}  # of what has another zero than its differences
+AMPLITUDES = {"pressure": "pressure_drop"}  # dimension of an amplitude, if the zero point of the dimension matters
 
 
 @dataclass(frozen=True, eq=False)
 class Schedule:
-    """A value over time: held before the first and after the last entry, right-continuous.
+    """Value over time: constant before the first and after the last entry, right-continuous.
 
     kind : constant | linear | step | smooth (monotone cubic) | ramp | harmonic
-    time, value : float64[n]  breakpoints [s] and values there [SI, pressures absolute]; a constant has one, and one
-    that is harmonic its least and its greatest, at no time
-    exponent : of a ramp, value = v1 + (v0 - v1) (1 - s)^exponent with s from 0 to 1 between its two times
-    wave : mean, amplitude, period [s] and phase of one that is harmonic, mean + amplitude sin(2 pi t / period + phase)
-    origin : the table the file would say, in SI
+    time, value : float64[n]  breakpoints [s] and values there [SI, pressures absolute]; a constant has one; a harmonic
+    schedule has its minimum and maximum, at infinite times
+    exponent : for a ramp, value = v1 + (v0 - v1) (1 - s)^exponent with s from 0 to 1 between its two times
+    wave : mean, amplitude, period [s] and phase if harmonic, value = mean + amplitude sin(2 pi t / period + phase)
+    origin : table as in a case file, in SI
     """
 
     kind: str
@@ -72,27 +72,27 @@ class Schedule:
 
     @property
     def first(self) -> float:
-        """The value before the first entry [SI]."""
+        """Value before the first entry [SI]."""
         return float(self.value[0])
 
     @property
     def constant(self) -> bool:
-        """Whether it never changes."""
+        """True if the value never changes."""
         return self.kind == "constant"
 
     def table(self) -> Any:
-        """What the file would say: a number or a table, in SI."""
+        """Number or table as in a case file, in SI."""
         return self.first if self.origin is None else self.origin
 
 
 def constant(value: float) -> Schedule:
-    """The schedule that is always `value` [SI]."""
+    """Schedule of a constant value [SI]."""
     return Schedule("constant", np.zeros(1), np.array([value]))
 
 
 @dataclass(frozen=True)
 class Scheduled(Value):
-    """A schedule of a quantity: a number or text, a table, a file, a ramp, a wave, or a signal."""
+    """Schedule of a quantity: a number or text, a table, a file, a ramp, a wave, or a signal."""
 
     dimension: str
     range: Range = anything
@@ -117,7 +117,7 @@ class Scheduled(Value):
 
     @cached_property
     def forms(self) -> dict[str, dict[str, tuple[Value, Any]]]:
-        """The forms a table may have: per key its value and default."""
+        """Forms of a schedule table: value and default of each key."""
         item, kind = (self.dimension, self.range), (Choice("kind of schedule", KINDS), "linear")
         return {
             "table": {"time": (Rows("time"), NEEDED), "value": (Rows(*item), NEEDED), "kind": kind},
@@ -145,10 +145,10 @@ class Scheduled(Value):
         return {"anyOf": [Quantity(self.dimension).json(), *map(keys_json, self.forms.values())]}
 
     def _read_table(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        found = read_keys(given, self.forms["table"], setting)
-        t, v, kind = found["time"], found["value"], found["kind"]
+        values = read_keys(given, self.forms["table"], setting)
+        t, v, kind = values["time"], values["value"], values["kind"]
         if len(t) != len(v):
-            raise Misfit([(("value",), f"{len(v)} values for {len(t)} times; wanted as many of both")])
+            raise Misfit([(("value",), f"{len(v)} values for {len(t)} times; expected the same number")])
         try:
             check_rising(t, given["time"], "times")
         except ValueError as error:
@@ -158,33 +158,33 @@ class Scheduled(Value):
         return Schedule(kind, t, v, origin={"time": list(t), "value": list(v), "kind": kind})
 
     def _read_ramp(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        found = read_keys(given, self.forms["ramp"], setting)
-        start, duration, v, exponent = (found[key] for key in ("start", "duration", "value", "exponent"))
-        origin = {**found, "value": list(v)}
-        if start + duration == start:  # no duration: a jump
+        values = read_keys(given, self.forms["ramp"], setting)
+        start, duration, v, exponent = (values[key] for key in ("start", "duration", "value", "exponent"))
+        origin = {**values, "value": list(v)}
+        if start + duration == start:  # zero duration: a jump
             return Schedule("step", (start - 1.0 - abs(start), start), v, origin=origin)
         return Schedule("ramp", (start, start + duration), v, exponent, origin)
 
     def _read_wave(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        found = read_keys(given, self.forms["wave"], setting)
-        mean, amplitude, period, phase = (found[key] for key in ("mean", "amplitude", "period", "phase"))
+        values = read_keys(given, self.forms["wave"], setting)
+        mean, amplitude, period, phase = (values[key] for key in ("mean", "amplitude", "period", "phase"))
         reach = mean - abs(amplitude), mean + abs(amplitude)
         try:
-            for one in reach:
-                self.range.check(one, one)
+            for bound in reach:
+                self.range.check(bound, bound)
         except ValueError as error:
-            raise Misfit([(("amplitude",), f"takes it from {reach[0]:g} to {reach[1]:g}: {error}")]) from None
-        return Schedule("harmonic", (-np.inf, np.inf), reach, 1.0, found, (mean, amplitude, period, phase))
+            raise Misfit([(("amplitude",), f"gives values from {reach[0]:g} to {reach[1]:g}: {error}")]) from None
+        return Schedule("harmonic", (-np.inf, np.inf), reach, 1.0, values, (mean, amplitude, period, phase))
 
     def _read_file(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        found = read_keys(given, self.forms["file"], setting)
-        kind = found["kind"]
+        values = read_keys(given, self.forms["file"], setting)
+        kind = values["kind"]
         try:
-            path = find_file(found["file"], setting)
-            t, v, *headers = read_columns(path, found["time"], found["value"], self.dimension, setting)
+            path = find_file(values["file"], setting)
+            t, v, *headers = read_columns(path, values["time"], values["value"], self.dimension, setting)
             check_rising(t, t.tolist(), f"{path.name}: times")
-            for one in v.tolist():
-                self.range.check(one, one)
+            for x in v.tolist():
+                self.range.check(x, x)
         except ValueError as error:
             raise Misfit([(("file",), str(error))]) from None
         origin = {"file": copy_name(path, setting), "time": headers[0], "value": headers[1], "kind": kind}
@@ -198,12 +198,14 @@ class Scheduled(Value):
             raise Misfit([(("signal",), f"no signal named {show(name)}{near}; signals are {names}")])
         shared = setting.signals[name]
         if isinstance(shared, dict) and "signal" in shared:
-            raise Misfit([(("signal",), f"signal {show(name)} names another signal; give it values")])
+            raise Misfit([(("signal",), f"signal {show(name)} refers to another signal; expected values")])
         try:
-            made = self.read(shared, setting)
+            schedule = self.read(shared, setting)
         except Misfit as error:
             raise Misfit([((ROOT, "signals", name, *below), text) for below, text in error.faults]) from None
         except ValueError as error:
             raise Misfit([((ROOT, "signals", name), str(error))]) from None
-        setting.used[name] = made.table()
-        return Schedule(made.kind, made.time, made.value, made.exponent, {"signal": name}, made.wave)
+        setting.used[name] = schedule.table()
+        return Schedule(
+            schedule.kind, schedule.time, schedule.value, schedule.exponent, {"signal": name}, schedule.wave
+        )

@@ -1,4 +1,4 @@
-"""Series of values over time in CSV files. Knows where files are and which columns are meant."""
+"""Time series in CSV files of a case."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fvsolve.units import show
 
 
 def find_file(name: str, setting: Setting) -> Path:
-    """The file `name`, relative to the case, noted in the setting's files. ValueError where there is none."""
+    """Path of a file named relative to the case; it is added to the files of the context. Raises ValueError."""
     setting.asked += 1
     path = Path(name)
     if not path.is_absolute():
@@ -21,8 +21,8 @@ def find_file(name: str, setting: Setting) -> Path:
     try:
         if not path.is_file():
             near = did_you_mean(path.name, _neighbours(path))
-            what = "is a directory" if path.is_dir() else "there is no such file"
-            raise ValueError(f"{show(name)}: {what}{near}; a path is relative to the case file")
+            state = "is a directory" if path.is_dir() else "there is no such file"
+            raise ValueError(f"{show(name)}: {state}{near}; a path is relative to the case file")
     except OSError as error:
         raise ValueError(f"{show(name)}: {error.strerror}") from None
     setting.files.setdefault(copy_name(path, setting), path)
@@ -30,7 +30,7 @@ def find_file(name: str, setting: Setting) -> Path:
 
 
 def copy_name(path: Path, setting: Setting) -> str:
-    """The name under which a file is kept beside the resolved case: its own, numbered if another has it."""
+    """Name of the copy of a file beside the resolved case: its own name, numbered if another file has it."""
     name, number = path.name, 2
     while setting.files.get(name, path) != path:
         name, number = f"{path.stem}-{number}{path.suffix}", number + 1
@@ -42,8 +42,8 @@ def read_columns(
 ) -> tuple[np.ndarray, np.ndarray, str, str]:
     """Time [s] and value [SI, pressures absolute] : float64[n] and their headers.
 
-    `time` and `value` name columns by header, with or without the unit; None is the first and the second.
-    Raises ValueError with the line of the file where one is at fault.
+    time, value : headers of the columns, with or without unit; None for the first and the second column
+    Raises ValueError with the faulty line of the file.
     """
     rows = read_rows(path)
     time_column, value_column = rows.column(time, 0), rows.column(value, 1)

@@ -1,4 +1,4 @@
-"""Nominal pipe sizes and fittings by name, as the package `fluids` tabulates them. Knows names; knows no part.
+"""Nominal pipe sizes and fittings by name, from the tables of the package `fluids`.
 
 Fittings are those of Crane TP-410: K = (L / D) f_T, f_T the friction factor of clean commercial steel in fully
 turbulent flow.
@@ -13,7 +13,7 @@ from typing import Any
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.units import show
 
-# NPS of the DN below 100; from there on a DN is 25 NPS (ASME B36.10M).
+# NPS of each DN below 100; from DN 100 on, DN = 25 NPS (ASME B36.10M).
 DN_NPS = {
     6: 0.125,
     8: 0.25,
@@ -54,24 +54,24 @@ WHOLE, MIXED = r"\d+(?:\.\d+)?", r"(?:\d+(?:\s+|\s*-\s*))?[1-9]\d*\s*/\s*[1-9]\d
 
 
 def inches(text: str) -> float:
-    """ "1.5", "1/2", "1-1/2" or "1 1/2" as a number."""
+    """Number of a text such as "1.5", "1/2", "1-1/2" or "1 1/2"."""
     *whole, last = re.split(r"\s*-\s*|(?<!/)(?<!/ )\s+(?!/)", text)
     top, _, bottom = last.partition("/")
     return sum(map(float, whole)) + float(top) / float(bottom or 1)
 
 
 def bore(nominal: str, schedule: str) -> tuple[float, float]:
-    """(inner diameter, wall thickness) [m] of "DN100" or "NPS 4" in a schedule; ValueError for what is not made."""
+    """(inner diameter, wall thickness) [m] of "DN100" or "NPS 4" in a schedule. Raises ValueError for unknown sizes."""
     from fluids.piping import nearest_pipe, schedule_lookup
 
-    found = re.fullmatch(rf"(DN|NPS)\s*({WHOLE}|{MIXED})", nominal.strip(), re.IGNORECASE)
-    if found is None:
-        raise ValueError(f'{show(nominal)} is no nominal size; wanted for example "DN100", "NPS 4" or "NPS 1-1/2"')
+    match = re.fullmatch(rf"(DN|NPS)\s*({WHOLE}|{MIXED})", nominal.strip(), re.IGNORECASE)
+    if match is None:
+        raise ValueError(f'{show(nominal)} is not a nominal size; expected for example "DN100", "NPS 4" or "NPS 1-1/2"')
     if schedule not in schedule_lookup:
         near = did_you_mean(schedule, schedule_lookup) or f"; schedules are {listing(schedule_lookup)}"
         raise ValueError(f"no schedule named {show(schedule)}{near}")
-    number = inches(found[2])
-    if found[1].upper() == "DN":
+    number = inches(match[2])
+    if match[1].upper() == "DN":
         number = DN_NPS.get(number, number / 25.0)
     sizes = schedule_lookup[schedule][0]
     if number not in sizes:
@@ -82,7 +82,7 @@ def bore(nominal: str, schedule: str) -> tuple[float, float]:
 
 
 def loss(names: list[str], diameter: float) -> float:
-    """Sum of the loss coefficients of fittings in a pipe of that inner diameter [m]."""
+    """Sum of the loss coefficients of fittings in a pipe; diameter : inner [m]."""
     from fluids import fittings
     from fluids.friction import ft_Crane
 

@@ -1,4 +1,4 @@
-"""One value of a case file: what it may be and what it becomes. Knows ranges and wording; knows no part."""
+"""Declarations of values of a case file: types, units, ranges."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from fvsolve import units
 from fvsolve.errors import did_you_mean
 from fvsolve.units import show
 
-ROOT = object()  # in the keys of a fault: what follows counts from the top of the case
-NEEDED = object()  # in place of a default: the key must be given
+ROOT = object()  # in the key path of a fault: the following keys start at the top of the case
+NEEDED = object()  # instead of a default: the key is required
 
-# What moving a key from one number to another asks of a model that is there
-VALUE = "value"  # its tables alone: the run starts from where it did
-PROFILE = "profile"  # another start too, in tables of the same sizes, names and whole numbers
-COUNTED = "cells"  # the same, but `shape` where pipes state no cells: those are counted by travel time
-SHAPE = "shape"  # another model: cells, parts, methods
+# Effect of a changed value on an existing model
+VALUE = "value"  # only numbers in its tables change; the initial state stays
+PROFILE = "profile"  # the initial state changes too; sizes, names and whole numbers of the tables stay
+COUNTED = "cells"  # as `profile`, but `shape` if a pipe states no cells: their number follows from travel times
+SHAPE = "shape"  # a new model: cells, parts, methods
 
 
 class Misfit(ValueError):
-    """What does not fit in a value: pairs of the keys below it and a message; what may stand in for the value."""
+    """Faults of a value: (keys below it, message); instead : values to continue with, so that more faults are found."""
 
     def __init__(self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None):
         self.faults, self.instead = faults, instead
@@ -35,37 +35,37 @@ class Misfit(ValueError):
 
 @dataclass
 class Setting:
-    """What a value may need of the case around it: ambient pressure [Pa], folder, signals, files read."""
+    """Context for reading a value: ambient pressure [Pa], folder, signals and files of the case."""
 
     ambient: float = 101325.0
     folder: Path | None = None
     signals: dict[str, Any] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
-    used: dict[str, Any] = field(default_factory=dict)  # signals that parts name, in SI
-    asked: int = 0  # times that a file or a signal was asked for
+    used: dict[str, Any] = field(default_factory=dict)  # signals that parts refer to, in SI
+    asked: int = 0  # number of uses of files and signals
 
 
 def setting_of(info: Any) -> Setting:
-    """The setting a validator was called with."""
+    """Context that a pydantic validator was called with."""
     return info.context if info is not None and info.context is not None else Setting()
 
 
 @dataclass(frozen=True)
 class Range:
-    """The values a number may have, ends excluded where `open`."""
+    """Range of valid numbers; open : the lower bound is excluded."""
 
     least: float = -math.inf
     greatest: float = math.inf
     open: bool = False
 
     def check(self, value: float, given: Any) -> None:
-        """ValueError where `value` lies outside; `given` is how the file says it."""
+        """Raise ValueError if `value` lies outside; given : value as written in the file."""
         if value < self.least or value > self.greatest or (self.open and value == self.least):
-            raise ValueError(f"{show(given)} is out of range; wanted a value {self}")
+            raise ValueError(f"{show(given)} is out of range; expected a value {self}")
 
     @property
     def bounds(self) -> str:
-        """', above 0', as it stands behind a unit; nothing of all numbers."""
+        """Text such as ", above 0" to append to a unit; "" if all numbers are valid."""
         return "" if self == Range() else f", {self}".replace("of at least", "at least")
 
     def __str__(self) -> str:
@@ -77,11 +77,11 @@ class Range:
 
 
 class Usual(NamedTuple):
-    """The values that practice knows, SI, both ends among them; outside a number is legal, but noted. 0 is none."""
+    """Usual range in practice, SI, bounds included; other values are valid, but give a notice. 0 gives no notice."""
 
     least: float
     greatest: float
-    practice: str  # whose, or what it spans
+    practice: str  # source or meaning of the range
 
 
 anything = Range()
@@ -90,14 +90,14 @@ nonnegative = Range(0)
 
 
 def between(least: float, greatest: float, open: bool = False) -> Range:
-    """The range from `least` (excluded where `open`) to `greatest`."""
+    """Range from `least` (excluded if `open`) to `greatest`."""
     return Range(least, greatest, open)
 
 
 class Value:
-    """Base of the annotations of fields: `read` turns what the file says into what the part holds.
+    """Base of the declarations of fields: `read` converts a value of the file to that of the part.
 
-    about : words; "..., WHAT if left out" says what then holds in place of a default
+    about : description; "...; TEXT if left out" describes the default
     changes : one of VALUE, PROFILE, COUNTED, SHAPE
     """
 
@@ -105,20 +105,20 @@ class Value:
     changes: str = SHAPE
 
     def read(self, given: Any, setting: Setting) -> Any:
-        """The value, or ValueError (Misfit where the fault lies below a key)."""
+        """Read a value. Raises ValueError (`ValueFault` if the fault is at a key below it)."""
         raise NotImplementedError(type(self).__name__)
 
     def below(self, key: str) -> Value | None:
-        """What a key of a table may be, KeyError where there is none such; None where this value says all."""
+        """Declaration of a key below this value; None if it has no keys. Raises KeyError for unknown keys."""
         return None
 
     def json(self) -> dict[str, Any]:
-        """The JSON schema of what the file may say."""
+        """JSON schema of the value in the file."""
         return {}
 
     @property
     def takes(self) -> str:
-        """What it may be, in Markdown: unit, range, words."""
+        """Valid values in Markdown: unit, range, words."""
         return ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -129,7 +129,7 @@ class Value:
 
 
 class Anything(Value):
-    """Whatever stands there: what it means is not known, as what it belongs to is at fault."""
+    """Any value: its type is unknown, since another key is faulty."""
 
     def read(self, given: Any, setting: Setting) -> Any:
         return given
@@ -137,7 +137,7 @@ class Anything(Value):
 
 @dataclass(frozen=True)
 class Quantity(Value):
-    """A number in SI or text with a unit, in a range; a pressure comes out absolute."""
+    """Number in SI, or text with a unit, in a range; pressures become absolute."""
 
     dimension: str
     range: Range = anything
@@ -171,13 +171,13 @@ class Quantity(Value):
 
 
 def Number(range: Range = anything, about: str = "", usual: Usual | None = None, changes: str = PROFILE) -> Quantity:
-    """A number without a unit."""
+    """Declaration of a number without a unit."""
     return Quantity("number", range, about, usual, changes)
 
 
 @dataclass(frozen=True)
 class Whole(Value):
-    """A whole number in a range."""
+    """Whole number in a range."""
 
     range: Range = anything
     about: str = ""
@@ -185,7 +185,7 @@ class Whole(Value):
 
     def read(self, given: Any, setting: Setting) -> int:
         if isinstance(given, bool) or not isinstance(given, int):
-            raise ValueError(f"{show(given)} is no whole number; wanted one {self.range}")
+            raise ValueError(f"{show(given)} is not a whole number; expected a whole number {self.range}")
         self.range.check(given, given)
         return given
 
@@ -199,23 +199,23 @@ class Whole(Value):
 
 @dataclass(frozen=True)
 class Choice(Value):
-    """One of several words."""
+    """Choice of a word; what : noun for messages."""
 
     what: str
     words: Collection[str]
     about: str = ""
-    meant: Mapping[str, str] = field(default_factory=dict)  # words of others -> what says it here
+    meant: Mapping[str, str] = field(default_factory=dict)  # words of other programs -> equivalent here
     changes: str = SHAPE
 
     def read(self, given: Any, setting: Setting) -> str:
         if not isinstance(given, str):
-            raise ValueError(f"{show(given)} is no text; wanted one of {', '.join(self.words)}")
+            raise ValueError(f"{show(given)} is not text; expected one of {', '.join(self.words)}")
         if given not in self.words:
-            said = self.meant.get(given.casefold().replace("_", "-"))
+            synonym = self.meant.get(given.casefold().replace("_", "-"))
             hint = (
-                f"; say {said}"
-                if said
-                else did_you_mean(given, self.words) or f"; wanted one of {', '.join(self.words)}"
+                f"; use {synonym}"
+                if synonym
+                else did_you_mean(given, self.words) or f"; expected one of {', '.join(self.words)}"
             )
             raise ValueError(f"no {self.what} named {show(given)}{hint}")
         return given
@@ -258,7 +258,7 @@ class Text(Value):
 
     def read(self, given: Any, setting: Setting) -> str:
         if not isinstance(given, str):
-            raise ValueError(f"{show(given)} is no text")
+            raise ValueError(f"{show(given)} is not text")
         return given
 
     @property
@@ -271,7 +271,7 @@ class Text(Value):
 
 @dataclass(frozen=True)
 class Rows(Value):
-    """A list of quantities, rising where asked."""
+    """List of quantities; rising : True if the values must increase."""
 
     dimension: str
     range: Range = anything
@@ -283,14 +283,14 @@ class Rows(Value):
 
     def read(self, given: Any, setting: Setting) -> tuple[float, ...]:
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f"{show(given)} is no list; wanted a list of values")
+            raise ValueError(f"{show(given)} is not a list; expected a list of values")
         if self.length is not None and len(given) != self.length:
-            raise ValueError(f"{show(given)} has {len(given)} values; wanted {self.length}")
+            raise ValueError(f"{show(given)} has {len(given)} values; expected {self.length}")
         item = Quantity(self.dimension, self.range)
         values, faults = [], []
-        for index, one in enumerate(given):
+        for index, entry in enumerate(given):
             try:
-                values.append(item.read(one, setting))
+                values.append(item.read(entry, setting))
             except ValueError as error:
                 faults.append(((index,), str(error)))
         if faults:
@@ -312,7 +312,7 @@ class Rows(Value):
 
 @dataclass(frozen=True)
 class Matrix(Value):
-    """A matrix of quantities, three rows of three."""
+    """Matrix of quantities, three rows of three."""
 
     dimension: str
     about: str = ""
@@ -320,7 +320,7 @@ class Matrix(Value):
 
     def read(self, given: Any, setting: Setting) -> tuple[tuple[float, ...], ...]:
         if not isinstance(given, (list, tuple)) or len(given) != 3:
-            raise ValueError(f"{show(given)} is no matrix; wanted three rows of three")
+            raise ValueError(f"{show(given)} is not a matrix; expected three rows of three")
         rows, faults = [], []
         for index, row in enumerate(given):
             try:
@@ -341,8 +341,8 @@ class Matrix(Value):
         return {"type": "array", "items": Rows(self.dimension, length=3).json(), "minItems": 3}
 
 
-def check_rising(values: Any, given: Any, what: str = "values") -> None:
-    """ValueError naming the first pair that does not rise."""
+def check_rising(values: Any, given: Any, noun: str = "values") -> None:
+    """Raise ValueError with the first pair that does not increase."""
     for before, after, text_before, text_after in zip(values, values[1:], given, given[1:], strict=False):
         if not after > before:
-            raise ValueError(f"{what} out of order: {show(text_after)} comes after {show(text_before)}")
+            raise ValueError(f"{noun} out of order: {show(text_after)} comes after {show(text_before)}")

@@ -1,4 +1,4 @@
-"""A model in, a summary out: segments between events, rows and frames to a sink."""
+"""Runs of a model: from a model and a state to a summary, with rows and frames written to a sink."""
 
 from fvsolve.solve.advance import advance
 from fvsolve.solve.solve import initial_state, solve

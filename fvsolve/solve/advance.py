@@ -1,4 +1,4 @@
-"""One stretch of time for controllers and co-simulation: state in, state out. Knows no sink."""
+"""Advance a state over an interval of time, for controllers and co-simulation."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from fvsolve.units import show
 
 
 def advance(model: Model, state: State, until: float, inputs: dict[str, float] | None = None) -> State:
-    """The state at `until` [s]; `inputs` hold named schedules at a value meanwhile.
+    """Advance `state` to the time `until` [s], with named schedules held at constant values.
 
-    inputs : {"valve.opening": 0.3, "spool.position": -0.1, "lake.head": 12.0, "gate.demand": 0.1}, SI. Raises
-    FvsolveError for an input that names nothing or is out of range, a time before the state's, and a run that
-    cannot go on.
+    inputs : {"valve.opening": 0.3, "spool.position": -0.1, "lake.head": 12.0, "gate.demand": 0.1}, SI
+    Raises FvsolveError for an unknown input or a value out of range, a time before that of the state, and a run that
+    cannot continue.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
         raise FvsolveError(f"advance takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
     if inputs is not None and not isinstance(inputs, Mapping):
-        raise FvsolveError(f"inputs = {show(inputs)} is no table; wanted names with a number each")
+        raise FvsolveError(f"inputs = {show(inputs)} is not a table. Expected a number for each name")
     if isinstance(until, bool) or not isinstance(until, Real):
-        raise FvsolveError(f"until = {show(until)} is no time; wanted a finite number of seconds")
+        raise FvsolveError(f"until = {show(until)} is not a time. Expected a finite number of seconds")
     if not math.isfinite(until):
-        raise FvsolveError(f"until = {until} is no time; wanted a finite number of seconds")
+        raise FvsolveError(f"until = {until} is not a time. Expected a finite number of seconds")
     if not until >= state.t:
-        raise FvsolveError(f"until = {until:g} s lies before the state's time, {state.t:g} s")
+        raise FvsolveError(f"until = {until:g} s is before the time of the state, {state.t:g} s")
     model.given(state.t, state.y)
     held = hold(model, inputs or {})
-    loop = Loop(held, lambda: model.structure)  # which does not depend on what is held
+    loop = Loop(held, lambda: model.structure)  # the structure does not depend on the held inputs
     loop.now[:] = state.y
     loop.memory[slots.T] = state.t
     loop.armed[:] = flags_of(state, model)
@@ -65,7 +65,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
 
 
 def hold(model: Model, inputs: dict[str, float]) -> Model:
-    """The same model with schedules held at constant values."""
+    """Copy of a model with some schedules held at constant values."""
     if not inputs:
         return model
     tables = model.tables
@@ -77,40 +77,40 @@ def hold(model: Model, inputs: dict[str, float]) -> Model:
     for name, value in inputs.items():
         if name not in known:
             near = nearest(str(name), known)
-            hint = f'; did you mean "{near}"?' if near else f"; inputs are {', '.join(known)}"
+            hint = f'; did you mean "{near}"?' if near else f"; expected one of {', '.join(known)}"
             raise FvsolveError(f"no input named {show(name)}{hint}")
-        one = known[name]
-        found = checked(name, value, one)
-        if one.node >= 0 and not linear:  # what is linear in it is made one of pressure, else it stays a head
-            nodes["head_given"][one.node] = one.sort is HEAD
+        target = known[name]
+        converted = checked(name, value, target)
+        if target.node >= 0 and not linear:  # under the linear law a head becomes a pressure, else it stays a head
+            nodes["head_given"][target.node] = target.sort is HEAD
         else:
-            found = one.scale * found + one.offset
-        parts = [(one.schedule, found)]
-        if one.other >= 0:
-            parts = [(one.schedule, max(found, 0.0)), (one.other, max(-found, 0.0))]
+            converted = target.scale * converted + target.offset
+        parts = [(target.schedule, converted)]
+        if target.other >= 0:
+            parts = [(target.schedule, max(converted, 0.0)), (target.other, max(-converted, 0.0))]
         for schedule, part in parts:
             schedules[schedule] = (len(pieces) + len(rows), 1)
             rows.append([-np.inf, 0.0, 0.0, part, 0.0, 0.0, 0.0])
-        if one.scalar >= 0:  # which no value may leave
-            bounds = scalars[one.scalar]
-            bounds["least"], bounds["greatest"] = min(bounds["least"], found), max(bounds["greatest"], found)
+        if target.scalar >= 0:  # values of a scalar are limited to its bounds
+            bounds = scalars[target.scalar]
+            bounds["least"], bounds["greatest"] = min(bounds["least"], converted), max(bounds["greatest"], converted)
     pieces = np.vstack([pieces, rows])
     return replace(model, tables=tables._replace(schedules=schedules, nodes=nodes, scalars=scalars, pieces=pieces))
 
 
-def checked(name: str, value: float, one: Input) -> float:
-    """The value of an input [SI]; FvsolveError where it is no number or none that the part can have."""
+def checked(name: str, value: float, target: Input) -> float:
+    """Value of an input [SI]; raises FvsolveError where it is not a number or not possible for the part."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise FvsolveError(f"{name} = {show(value)} is no number; wanted {one.sort.wanted}")
-    found = float(value)
-    if not math.isfinite(found):
-        raise FvsolveError(f"{name} = {found} is not finite; wanted {one.sort.wanted}")
-    if not one.sort.least <= found <= one.sort.greatest:
-        raise FvsolveError(f"{name} = {found:g} is out of range; wanted {one.sort.wanted}")
-    pressure = one.scale * found + one.offset
-    if one.node >= 0 and not pressure > 0.0:
-        said = f"{name} = {found:g}" + (f" is {pressure:.4g} Pa absolute" if one.sort is HEAD else " is a vacuum")
-        raise FvsolveError(f"{said}; wanted {one.sort.wanted}")
-    return found
+        raise FvsolveError(f"{name} = {show(value)} is not a number. Expected {target.sort.wanted}")
+    number = float(value)
+    if not math.isfinite(number):
+        raise FvsolveError(f"{name} = {number} is not finite. Expected {target.sort.wanted}")
+    if not target.sort.least <= number <= target.sort.greatest:
+        raise FvsolveError(f"{name} = {number:g} is out of range. Expected {target.sort.wanted}")
+    pressure = target.scale * number + target.offset
+    if target.node >= 0 and not pressure > 0.0:
+        text = f"{name} = {number:g}" + (f" is {pressure:.4g} Pa absolute" if target.sort is HEAD else " is a vacuum")
+        raise FvsolveError(f"{text}. Expected {target.sort.wanted}")
+    return number

@@ -1,7 +1,7 @@
-"""How the state of a model is cut into bands of rows, a thread each, and what these need of each other. Knows tables.
+"""Partition of the state of a model into bands of rows, a band for each thread, and the data that bands exchange.
 
-A band steps its own rows of every basin that can be cut, and beside these all else, as every other band does; what its
-own rows hang on beyond them it takes from whose rows these are.
+A band steps its own rows of every basin that can be divided. All other states are stepped by every band. Values of
+neighbouring rows come from the band that owns them.
 """
 
 from __future__ import annotations
@@ -20,9 +20,10 @@ from fvsolve.steppers.tableau import method_named
 
 @dataclass(frozen=True)
 class Cut:
-    """A model's basins cut into `many` bands.
+    """Basins of a model divided into `many` bands.
 
-    basins : numbers of those that are cut; firsts : int64[basins, many + 1]  first rows of bands, and how many rows
+    basins : numbers of the divided basins
+    firsts : int64[basins, many + 1]  first row of each band, then the number of rows
     """
 
     model: Model
@@ -32,57 +33,57 @@ class Cut:
 
     @property
     def sums(self) -> int:
-        """How many sums all bands make together."""
+        """Number of partial sums of all bands together."""
         rows = self.model.tables.basins["ny"][[*self.basins]] * [quantities(self.model, b) for b in self.basins]
         return len(self.alike()) + int(sum(rows))
 
     def alike(self) -> list[tuple[int, int]]:
-        """Where states lie that all bands step."""
-        found, at = [], 0
+        """(first, one beyond the last) of each run of states that all bands step."""
+        runs, start = [], 0
         for b in sorted(self.basins, key=lambda b: self.model.tables.basins[b]["y"]):
             row = self.model.tables.basins[b]
-            found.append((at, int(row["y"])))
-            at = int(row["y"] + quantities(self.model, b) * row["n"])
-        found.append((at, self.model.y_size))
-        return [one for one in found if one[1] > one[0]] or [(0, 0)]
+            runs.append((start, int(row["y"])))
+            start = int(row["y"] + quantities(self.model, b) * row["n"])
+        runs.append((start, self.model.y_size))
+        return [run for run in runs if run[1] > run[0]] or [(0, 0)]
 
     def spans(self, k: int) -> np.ndarray:
-        """What band k steps, as `steppers.step` has it, those that are alike first : int64[q, 4]."""
+        """Table `row_blocks` of `steppers.step` for band k, states that all bands step first : int64[q, 4]."""
         alike = self.alike()
-        found, first = [(*one, m, 1) for m, one in enumerate(alike)], len(alike)
+        blocks, first = [(*run, m, 1) for m, run in enumerate(alike)], len(alike)
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
             n, nx, ny, y = (int(basin[key]) for key in ("n", "nx", "ny", "y"))
             for q in range(quantities(self.model, b)):
                 begin, stop = (y + q * n + nx * int(row) for row in rows[k : k + 2])
-                found.append((begin, stop, first + int(rows[k]), int(rows[k + 1] - rows[k])))
+                blocks.append((begin, stop, first + int(rows[k]), int(rows[k + 1] - rows[k])))
                 first += ny
-        return np.array(found, dtype=np.int64)
+        return np.array(blocks, dtype=np.int64)
 
     def bands(self, k: int) -> np.ndarray:
-        """Rows of all basins that band k steps, as `Slate` has them : int64[2 basins]."""
+        """(first, one beyond the last) row of every basin in band k, flat : int64[2 basins]."""
         table = self.model.tables.basins
-        found = np.zeros((len(table), 2), dtype=np.int64)
-        found[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
+        rows_of = np.zeros((len(table), 2), dtype=np.int64)
+        rows_of[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
         for rows, b in zip(self.firsts, self.basins, strict=True):
-            found[b] = rows[k : k + 2]
-        return found.ravel()
+            rows_of[b] = rows[k : k + 2]
+        return rows_of.ravel()
 
     def states(self, k: int) -> np.ndarray:
-        """Runs of states that band k takes from others, (owner, first, beyond the last) : int64[r, 3]."""
-        found = []
+        """Runs of states that band k reads from other bands, (owner, first, one beyond the last) : int64[r, 3]."""
+        parts = []
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
             nx, ny = int(basin["nx"]), int(basin["ny"])
             near = np.arange(max(rows[k] - REACH, 0), min(rows[k + 1] + REACH, ny))
             cells = [(nx * near[:, None] + np.arange(nx)).ravel(), *looked_at(self.model, b)]
             for q in range(quantities(self.model, b)):
-                found.append(runs(np.concatenate(cells), nx, rows, k, int(basin["y"] + q * basin["n"])))
-        return np.concatenate(found)
+                parts.append(runs(np.concatenate(cells), nx, rows, k, int(basin["y"] + q * basin["n"])))
+        return np.concatenate(parts)
 
     def flows(self, k: int) -> np.ndarray:
-        """Likewise of flows through open boundaries, which lie in `work`."""
-        found = [np.zeros((0, 3), dtype=np.int64)]
+        """Runs of flows through open boundaries, in `work`, that band k reads from other bands : int64[r, 3]."""
+        parts = [np.zeros((0, 3), dtype=np.int64)]
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
             nx, ny, at = int(basin["nx"]), int(basin["ny"]), int(basin["through"])
@@ -90,12 +91,12 @@ class Cut:
                 continue
             row = np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
             owner = np.searchsorted(rows, row, "right") - 1
-            found.append(joined(np.arange(row.size), owner, k, at))
-        return np.concatenate(found)
+            parts.append(joined(np.arange(row.size), owner, k, at))
+        return np.concatenate(parts)
 
     @property
     def together(self) -> bool:
-        """Whether something passes a boundary that several bands have."""
+        """True if a divided basin has an open boundary."""
         return bool((self.model.tables.basins["through"][[*self.basins]] >= 0).any())
 
 
@@ -105,7 +106,7 @@ def quantities(model: Model, b: int) -> int:
 
 
 def looked_at(model: Model, b: int):
-    """Cells of a basin that all bands look at: behind its patches, and where probes are."""
+    """Cells of a basin that all bands read: behind its patches, and at probes."""
     integers = model.tables.integers
     for patch in model.tables.patches[model.tables.patches["basin"] == b]:
         yield integers[patch["first"] : patch["first"] + patch["count"]]
@@ -115,13 +116,13 @@ def looked_at(model: Model, b: int):
 
 
 def runs(cells: np.ndarray, nx: int, rows: np.ndarray, k: int, at: int) -> np.ndarray:
-    """Runs of cells that are not of band k, with whose they are; at : where cell 0 lies."""
+    """Runs of cells outside band k, with their owners, as `joined`; at : state of cell 0."""
     cells = np.unique(cells)
     return joined(cells, np.searchsorted(rows, cells // nx, "right") - 1, k, at)
 
 
 def joined(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.ndarray:
-    """Runs of neighbours of one owner, but k : int64[r, 3]."""
+    """Runs of adjacent places of the same owner, except owner k : int64[r, 3] (owner, first, one beyond the last)."""
     places, owner = places[owner != k], owner[owner != k]
     if not places.size:
         return np.zeros((0, 3), dtype=np.int64)
@@ -130,47 +131,47 @@ def joined(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.ndarray
     return np.column_stack([owner[np.append(0, new)], at + first, at + last + 1]).astype(np.int64)
 
 
-def cut(model: Model, many: int) -> Cut:
-    """A model's basins that can be cut, in so many bands of as many rows each."""
-    which = tuple(b for b, basin in enumerate(model.basins) if not basin.whole)
-    rows = model.tables.basins["ny"][[*which]] if which else np.zeros(0, dtype=np.int64)
-    return Cut(model, many, which, np.arange(many + 1) * rows[:, None] // many)
+def cut(model: Model, count: int) -> Cut:
+    """Partition of the divisible basins of a model into `count` bands of about equal numbers of rows."""
+    basins = tuple(b for b, basin in enumerate(model.basins) if not basin.whole)
+    rows = model.tables.basins["ny"][[*basins]] if basins else np.zeros(0, dtype=np.int64)
+    return Cut(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
 
 
 def alone(model: Model) -> str:
-    """Why a model is stepped by one thread, "" where several can."""
+    """Reason why a model is stepped by a single thread; "" if several threads are possible."""
     method = model.case.numerics.method
     if method == automatic.AUTO or not method_named(automatic.first_method(method)).explicit:
-        return f"{method} solves for all states at once; explicit methods can be shared out"
+        return f"{method} solves for all states at once; only explicit methods can be distributed over threads"
     if not model.basins:
-        return "there is no basin; what is shared out is rows of basins"
+        return "there is no basin; only rows of basins are distributed over threads"
     return "" if not all(basin.whole for basin in model.basins) else said_whole(model)
 
 
 def said_whole(model: Model) -> str:
-    """Basins of which each thread steps all, and why."""
+    """Basins that every thread steps completely, with the reasons."""
     return "; ".join(f"{basin.name}: {basin.whole}" for basin in model.basins if basin.whole)
 
 
 def shared(model: Model) -> dict:
-    """What threads can share out: rows of basins, at most so many threads, and why not of others; for `check`."""
-    why = alone(model)
-    rows = {} if why else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.whole}
-    kept = {basin.name: basin.whole for basin in model.basins if basin.whole}
-    return {"rows": rows, "whole": kept, "most": min(rows.values(), default=1), "why": why}
+    """Divisible rows of basins, undivided basins with reasons, greatest number of threads; for `check`."""
+    reason = alone(model)
+    rows = {} if reason else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.whole}
+    undivided = {basin.name: basin.whole for basin in model.basins if basin.whole}
+    return {"rows": rows, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
 
 
 def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
-    """How many threads step a model that is given so many, and what is to be known; FvsolveError where too many."""
+    """(number of threads that step a model, notices); raises FvsolveError for more threads than rows."""
     if threads == 1:
         return 1, []
-    found = shared(model)
-    if why := found["why"]:
-        return 1, [Notice("threads", "numerics", f"one thread steps it, not {threads}: {why}", "threads")]
-    few = [f"{name} has {rows} rows" for name, rows in found["rows"].items() if rows < threads]
+    divisible = shared(model)
+    if reason := divisible["why"]:
+        return 1, [Notice("threads", "numerics", f"one thread steps it, not {threads}: {reason}", "threads")]
+    few = [f"{name} has {rows} rows" for name, rows in divisible["rows"].items() if rows < threads]
     if few:
         raise FvsolveError(
-            f"threads = {threads}: {listing(few)}, and each thread needs one; wanted {found['most']} at most"
+            f"threads = {threads}: {listing(few)}, and each thread needs a row. Expected {divisible['most']} at most"
         )
     text = f"each thread steps the whole of {said_whole(model)}"
-    return threads, [Notice("threads", "numerics", text, "threads")] if found["whole"] else []
+    return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []

@@ -1,4 +1,4 @@
-"""Which sums of stages are formed beside the rates of a model, and which steps form themselves. Knows tables."""
+"""Stage sums in cache blocks: sums that the rates of a model form, and sums that steps form themselves."""
 
 from __future__ import annotations
 
@@ -8,42 +8,44 @@ from fvsolve.basins.bands import REACH
 from fvsolve.kernels import sums
 from fvsolve.solve.bands import Cut, looked_at, quantities
 
-BLOCK = 4096  # cells at a time: their arrays and what rates work in fit a second-level cache
-FEWEST = 2**17  # states of a basin that all passes of a step find in the second-level cache anyway
+BLOCK = 4096  # cells of a block: their arrays and the work arrays of the rates fit into a second-level cache
+FEWEST = 2**17  # least number of states of a basin: smaller basins stay in the second-level cache during a step
 
 
 def formed(cut: Cut, k: int) -> np.ndarray:
-    """`sums` of band k, see `kernels.sums`; empty where nothing is formed so : int64[...]."""
+    """Table `sums` of band k, see `kernels.sums`; empty if no stages are formed in blocks : int64[...]."""
     model = cut.model
-    found = [b for b in cut.basins if model.basins[b].sums_rows and quantities(model, b) * model.basins[b].n >= FEWEST]
-    if not found:
+    blocked_basins = [
+        b for b in cut.basins if model.basins[b].sums_rows and quantities(model, b) * model.basins[b].n >= FEWEST
+    ]
+    if not blocked_basins:
         return np.zeros(0, dtype=np.int64)
-    others, looked, edges = list(cut.alike()), [], []
+    others, common_cells, edges = list(cut.alike()), [], []
     for rows, b in zip(cut.firsts, cut.basins, strict=True):
         first, stop = (int(row) for row in rows[k : k + 2])
         for q in range(quantities(model, b)):
-            if b not in found:
+            if b not in blocked_basins:
                 others.append(rows_at(model, b, q, first, stop))
                 continue
             edges.append(rows_at(model, b, q, first, min(first + REACH, stop)))
             edges.append(rows_at(model, b, q, max(stop - REACH, first), stop))
-            looked += cells_at(model, b, q, first, stop)
+            common_cells += cells_at(model, b, q, first, stop)
     head = np.zeros(sums.HEAD + len(model.basins), dtype=np.int64)
-    head[[sums.OTHERS, sums.LOOKED, sums.EDGES]] = len(others), len(looked), len(edges)
+    head[[sums.OTHERS, sums.LOOKED, sums.EDGES]] = len(others), len(common_cells), len(edges)
     head[sums.BASINS], head[sums.CELLS] = len(model.basins), BLOCK
-    head[[sums.HEAD + b for b in found]] = 1
-    return np.concatenate([head, np.array([*others, *looked, *edges], dtype=np.int64).ravel()])
+    head[[sums.HEAD + b for b in blocked_basins]] = 1
+    return np.concatenate([head, np.array([*others, *common_cells, *edges], dtype=np.int64).ravel()])
 
 
 def rows_at(model, b: int, q: int, first: int, stop: int) -> tuple[int, int]:
-    """Where rows of a quantity of a basin lie."""
+    """(first, one beyond the last) state of rows of a quantity of a basin."""
     basin = model.tables.basins[b]
     at, nx = int(basin["y"] + q * basin["n"]), int(basin["nx"])
     return at + nx * first, at + nx * stop
 
 
 def cells_at(model, b: int, q: int, first: int, stop: int) -> list[tuple[int, int]]:
-    """Where a quantity of cells lies that all look at, of these rows."""
+    """Runs of states, within these rows, of cells that all bands read."""
     begin, end = rows_at(model, b, q, first, stop)
     at = begin - int(model.tables.basins[b]["nx"]) * first
     cells = at + np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *looked_at(model, b)]))
@@ -51,4 +53,4 @@ def cells_at(model, b: int, q: int, first: int, stop: int) -> list[tuple[int, in
     if not cells.size:
         return []
     new = np.flatnonzero(np.diff(cells) != 1) + 1
-    return [(int(one[0]), int(one[-1]) + 1) for one in np.split(cells, new)]
+    return [(int(cell_run[0]), int(cell_run[-1]) + 1) for cell_run in np.split(cells, new)]

@@ -1,9 +1,9 @@
-"""A given step of a run taken again as two halves, now and then: what its errors amount to. Knows no kind of method.
+"""Step doubling: occasional repetition of a given step as two half steps, to estimate the error of the run.
 
-A step that is too long need not grow: a valve bends what swings about its drop, so that vessels go to and fro between
-two wrong pressures for ever, and implicit methods bear any step. Seen from where it was, such a step does not end where
-two halves of it do, by e. What e of n steps amount to hangs on how much of an error a step leaves, r: of a vessel that
-drains r is near one, and all remain; where r is small each step makes its own, e (1 - r^n) / (1 - r).
+A step that is too long need not be unstable: the nonlinear law of a valve bounds the growth, so that vessels oscillate
+between two wrong pressures, and implicit methods are stable at any step. The end of such a step differs from that of
+two half steps by e. The sum of the errors of n steps depends on the fraction r of an error that a step leaves,
+e (1 - r^n) / (1 - r). For a draining vessel r is near 1 and all errors remain; with a small r only the last remain.
 """
 
 from __future__ import annotations
@@ -18,30 +18,31 @@ from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.stepper import Stepper
 from fvsolve.steppers.tableau import method_named
 
-LOOKS, DEAR = 32, 16  # in a run of explicit steps, of implicit ones; of explicit ones
-SELDOM, FEWEST = 50.0, 8  # no look sooner than after so many, which costs a twentieth, but in short runs
-LEAST = 0.1  # of what counts as small: a range that is less is none
-WHOLE = 0.99  # of a step: what an event or a kink has cut says nothing
-ROUNDING = 1e-10  # of ranges: an error that is less does not show what a step leaves of it
+LOOKS, DEAR = 32, 16  # number of checks in a run of explicit steps, of implicit steps
+# Least number of explicit steps between two checks, which costs a twentieth; least number of checks in short runs.
+SELDOM, FEWEST = 50.0, 8
+LEAST = 0.1  # least range of a state, in units of its small deviation
+WHOLE = 0.99  # fraction of a full step: steps that an event or a kink has shortened are not checked
+ROUNDING = 1e-10  # relative to ranges: a smaller error is too small to measure r
 
 
 class Halves:
-    """States looked at over a run of given steps: all of implicit methods, of explicit ones what no cell holds.
+    """Error check of a run of given steps: of all states for implicit methods, of states outside cells for explicit.
 
-    Nothing where there is none or no such step. Of cells a Courant number says how long an explicit step may be.
+    It is switched off without such states or without a given step. For cells the Courant limit bounds explicit steps.
 
-    kept : float64[4 + 5 k]  looks, the step count from which on the next is due, that of the last, what a step leaves
-    of an error; of each state the error of the last step seen, what all amount to, the sum of that over the looks,
-    its least and its greatest: what a resumed run needs
+    kept : float64[4 + 5 k]  data of a resumed run: number of checks, step count of the next check, step count of the
+    last check, r; for each state the error of the last checked step, the accumulated error, the sum of that over the
+    checks, its least and its greatest value
     """
 
-    def __init__(self, slate) -> None:
-        model, self.step = slate.model, float(slate.clock["step"])
+    def __init__(self, run_data) -> None:
+        model, self.step = run_data.model, float(run_data.clock["step"])
         numerics = model.case.numerics
         method = method_named(automatic.first_method(numerics.method))
-        lines = model.tables.pipes["y"][model.tables.pipes["delay"] >= 0]  # what they hold moves nothing
-        which = lumped(model) if method.explicit else np.setdiff1d(np.arange(model.y_size), lines)
-        self.model, self.which = model, which[: None if self.step > 0.0 else 0]
+        lines = model.tables.pipes["y"][model.tables.pipes["delay"] >= 0]  # their states do not affect other states
+        states = lumped(model) if method.explicit else np.setdiff1d(np.arange(model.y_size), lines)
+        self.model, self.which = model, states[: None if self.step > 0.0 else 0]
         self.kept = np.zeros(4 + 5 * self.which.size)
         self.error, self.astray, self.sums, self.least, self.greatest = self.kept[4:].reshape(5, -1)
         self.least[:] = self.greatest[:] = model.start[self.which]
@@ -54,55 +55,58 @@ class Halves:
             self.kept[1], self.small = self.every, spreads(model, LEAST)[self.which]
 
     def begin(self, steps: float) -> None:
-        """Look at the first step of a segment, within which a store may fill: implicit methods pass it anyway."""
+        """Check the first step of a segment under implicit methods, which stay stable even if a store fills in it."""
         if self.which.size and self.dear:
             self.kept[1] = steps + 1.0
 
     def room(self, steps: float) -> float:
-        """Steps that may be taken before the next look."""
+        """Number of steps that may be taken before the next check."""
         return max(1.0, self.kept[1] - steps) if self.which.size else np.inf
 
     def look(self, loop) -> None:
-        """At an accepted state, if it is time: take the last step again."""
+        """Repeat the last step as two half steps if a check is due; called at an accepted state."""
         memory = loop.memory
         steps, h = memory[slots.STEPS], memory[slots.LAST]
         if not self.which.size or steps < self.kept[1]:
             return
-        self.kept[1] = steps + 1.0  # the next one, if this says nothing
+        self.kept[1] = steps + 1.0  # check the next step if this step cannot be checked
         end = loop.orders[slots.END]
-        whole = self.step if loop.t < end else min(self.step, end - memory[slots.T_MARK])
-        if h < WHOLE * whole or mended(loop):
+        full_step = self.step if loop.t < end else min(self.step, end - memory[slots.T_MARK])
+        if h < WHOLE * full_step or mended(loop):
             return
         before, now = loop.before[self.which], loop.now[self.which]
         t = loop.t - h
-        middle = self.stepped(loop, t, loop.before, 0.5 * h, fresh=True)
-        halves = self.stepped(loop, t + 0.5 * h, middle, 0.5 * h)
-        if not np.all(np.isfinite(halves)):  # such a step is not to be had
+        middle = self.stepped(loop, t, loop.before, 0.5 * h, first=True)
+        half_steps = self.stepped(loop, t + 0.5 * h, middle, 0.5 * h)
+        if not np.all(np.isfinite(half_steps)):  # the half steps cannot be computed
             return
         for state in (before, now):
             np.fmin(self.least, state, out=self.least)
             np.fmax(self.greatest, state, out=self.greatest)
-        with np.errstate(over="ignore", invalid="ignore"):  # of what grows beyond all numbers
-            self.gather(loop, h, steps - self.kept[2], halves - loop.now)
+        with np.errstate(over="ignore", invalid="ignore"):  # states that grow may overflow
+            self.gather(loop, h, steps - self.kept[2], half_steps - loop.now)
         self.kept[:3] = self.kept[0] + 1.0, steps + self.every, steps
 
     def gather(self, loop, h: float, steps: float, error: np.ndarray) -> None:
-        """Add what so many steps have done, the last of them by `error`, those before by no more than the last seen."""
+        """Add the errors of `steps` steps: `error` for the last; for the others at most that of the previous check."""
         widths, own = self.widths(), np.abs(error[self.which])
         size = float(np.linalg.norm(own / widths))
         if size > ROUNDING:
             moved = self.stepped(loop, loop.t - h, loop.before + error, h) - loop.now
-            left = float(np.linalg.norm(moved[self.which] / widths)) / size
-            self.kept[3] = left if left < 1.0 else 1.0
-        left = self.kept[3]
-        after = left ** (steps - 1.0)
-        many = steps - 1.0 if left > 1.0 - ROUNDING else (1.0 - after) / (1.0 - left)
-        self.astray[:] = left * (after * self.astray + many * np.fmin(own, self.error)) + own
+            remaining = float(np.linalg.norm(moved[self.which] / widths)) / size
+            self.kept[3] = remaining if remaining < 1.0 else 1.0
+        remaining = self.kept[3]
+        power = remaining ** (steps - 1.0)
+        sum_of_powers = steps - 1.0 if remaining > 1.0 - ROUNDING else (1.0 - power) / (1.0 - remaining)
+        self.astray[:] = remaining * (power * self.astray + sum_of_powers * np.fmin(own, self.error)) + own
         self.error[:] = own
         self.sums += self.astray
 
-    def stepped(self, loop, t: float, y: np.ndarray, h: float, fresh=False) -> np.ndarray:
-        """One step of the run's method from a state, as devices stand now; `fresh` for the first at a place."""
+    def stepped(self, loop, t: float, y: np.ndarray, h: float, first=False) -> np.ndarray:
+        """State after a single step of the run's method, with the present device states.
+
+        first : discard the stored Jacobian, for the first step from a new state
+        """
         if self.stepper is None:
             model = self.model
             self.stepper = Stepper(
@@ -114,17 +118,17 @@ class Halves:
                 model.damped,
             )
             self.stepper.out = model.new_out()
-        if fresh:
+        if first:
             self.stepper.forget()
         self.stepper.orders[:] = loop.orders
         return self.stepper.once(loop.rhs, loop.slate.handle, int(self.model.layout["supply"]), t, h, y)
 
     def widths(self) -> np.ndarray:
-        """Ranges of the states so far."""
+        """Ranges of the states so far, at least the small range of each state."""
         return np.maximum(self.greatest - self.least, self.small)
 
     def worst(self) -> tuple[str, float]:
-        """(place, share of its range by which it is astray on average), of the state that is most."""
+        """(place, mean error as a fraction of the range) of the state with the greatest error."""
         if not self.kept[0]:
             return "", 0.0
         share = self.sums / self.kept[0] / self.widths()
@@ -133,20 +137,20 @@ class Halves:
         return self.model.state_names[self.which[at]].partition("[")[0], float(share[at])
 
     def notice(self) -> Notice | None:
-        """What is to be said of a run that ended."""
+        """Notice of a finished run, if the error is too large."""
         place, share = self.worst()
-        if not DOUBTFUL <= share < np.inf:  # what is not finite has stopped the run
+        if not DOUBTFUL <= share < np.inf:  # a state that is not finite has stopped the run
             return None
         ok = share < WRONG
-        said = "it may be wrong" if ok else "the numbers are not to be trusted"
+        verdict = "it may be wrong" if ok else "the numbers are not to be trusted"
         steps = self.model.case.step_amount(self.step)
-        text = (f"{place}: steps of {steps} leave it about {100 * share:.2g} % of its range astray, on "
-                f"average, by where two halves of them end; {said}; halve the step")  # fmt: skip
+        text = (f"{place}: steps of {steps} give a mean error of about {100 * share:.2g} % of its range, by "
+                f"comparison with two half steps; {verdict}; halve the step")  # fmt: skip
         key = "step" if self.model.case.numerics.step is not None else "courant"
         return Notice("step-error", place, text, key, share, WRONG, ok)
 
 
 def mended(loop) -> bool:
-    """Whether a store was given what a jump had brought within the last step, as halves of it are not."""
+    """True if a delay line corrected a store for a jump within the last step; half steps have no such correction."""
     past = loop.slate.past
     return past.size > 0 and past[MENDED] == loop.t

@@ -1,4 +1,4 @@
-"""One run of the time loop on a model: its functions, its ledgers, the step that the case asks for. Knows no sink."""
+"""Time loop of a run of a model: its functions, its ledgers, its step settings, its events."""
 
 from __future__ import annotations
 
@@ -24,14 +24,16 @@ from fvsolve.steppers.tableau import Method, method_named
 
 ROW_CAPACITY = 512
 NO_LIMIT = 1e308
-MOST_AT_ONCE = 20  # events at one time: more is chatter
-MOST_IN_A_SPAN, SPAN = 2000, 1e-6  # events within this share of the run, or within one given step: so is this
+MOST_AT_ONCE = 20  # events at the same time; more is chattering
+MOST_IN_A_SPAN, SPAN = 2000, 1e-6  # events within this fraction of the run, or within a given step; more is chattering
 
 
 class Loop:
-    """Buffers of one run of a model by one method; `run` steps on until there is something to do."""
+    """Arrays of a run of a model; `run` steps until an output, an event or the end needs attention.
 
-    # threads or comm, MPI's, of all ranks: who steps it beside this one
+    structure() : structure of the Jacobian, default that of the model
+    threads : number of threads; comm : MPI communicator of all ranks, in place of threads
+    """
 
     def __init__(self, model: Model, structure: Callable[[], Structure] | None = None, threads=1, comm=None) -> None:
         numerics = model.case.numerics
@@ -39,13 +41,13 @@ class Loop:
         method = method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
-        self.crowd: deque[float] = deque(maxlen=MOST_IN_A_SPAN + 4 * self.armed.size)  # their last times
+        self.crowd: deque[float] = deque(maxlen=MOST_IN_A_SPAN + 4 * self.armed.size)  # times of the last events
         self.span = SPAN * (numerics.end - numerics.start)
         self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
         call = model.functions
         self.rhs, self.observe, self.record, self.events = call.rhs, call.observe, call.record, call.events
-        leaps = leap_allowed(model, method)
-        self.leap = leap_function(leaps)
+        fused_allowed = leap_allowed(model, method)
+        self.leap = leap_function(fused_allowed)
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
         sums = [
@@ -69,23 +71,25 @@ class Loop:
         self.orders[slots.STEP_MAX] = (
             min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT
         )
-        self.orders[slots.STOP_AT], self.orders[slots.LEAPS] = NO_LIMIT, leaps
+        self.orders[slots.STOP_AT], self.orders[slots.LEAPS] = NO_LIMIT, fused_allowed
         for control, key in ((slots.COURANT, "courant"), (slots.FIXED_STEP, "step"), (slots.TOLERANCE, "rtol")):
             if getattr(numerics, key) is not None:
                 self.orders[slots.CONTROL], self.orders[slots.SIZE] = control, getattr(numerics, key)
         if numerics.method == automatic.AUTO:
             automatic.watch(stepper, structure())
-        if numerics.courant is not None and not method.explicit:  # waves alone: implicit steps cope with the rest
+        if (
+            numerics.courant is not None and not method.explicit
+        ):  # of waves only: implicit steps are stable for the rest
             self.orders[slots.CONTROL] = slots.FIXED_STEP
             self.orders[slots.SIZE] = numerics.courant / model.wave_rate
         given = self.orders[slots.CONTROL] == slots.FIXED_STEP
         self.slate.clock["step"] = self.orders[slots.SIZE] if given else 0.0
-        self.team, one = None, cut(model, 1)
+        self.team, single_band = None, cut(model, 1)
         if method.explicit and numerics.method != automatic.AUTO:
-            stepper.shape = formed(one, 0)
+            stepper.shape = formed(single_band, 0)
             self.slate.written = self.slate.written._replace(sums=stepper.shape)
         if numerics.rtol is not None:  # errors are summed by rows
-            stepper.spans, stepper.sums = one.spans(0), np.zeros(one.sums)
+            stepper.spans, stepper.sums = single_band.spans(0), np.zeros(single_band.sums)
         if comm is not None:
             from fvsolve.solve.ranks import Ranks
 
@@ -97,44 +101,44 @@ class Loop:
 
     @property
     def now(self) -> np.ndarray:
-        """The present state y (a view)."""
+        """Present state y (a view)."""
         return self.stepper.y[self.flags[slots.NOW]]
 
     @property
     def before(self) -> np.ndarray:
-        """The state before the last step (a view)."""
+        """State before the last step (a view)."""
         if self.team is not None:
             self.team.whole(self.flags[slots.OLD])
         return self.stepper.y[self.flags[slots.OLD]]
 
     @property
     def t(self) -> float:
-        """The present time [s]."""
+        """Present time [s]."""
         return float(self.memory[slots.T])
 
     def begin(self, end: float, stop_at: float) -> None:
-        """Start a segment that ends at `end` [s]: no step is remembered across a kink."""
+        """Start a segment that ends at `end` [s]; the step history before the kink is discarded."""
         self.stepper.forget()
         self.resume(end, stop_at)
 
     def resume(self, end: float, stop_at: float) -> None:
-        """Go on in a segment that ends at `end` [s]; rows due from `stop_at` on are not written by the loop."""
+        """Continue a segment that ends at `end` [s]; rows due from `stop_at` on are not written by the loop."""
         self.orders[slots.END], self.orders[slots.STOP_AT] = end, stop_at
         self.flags[slots.PHASE], self.flags[slots.BEHIND] = slots.FRESH, 0
         self.settle()
         self.slate.clock["limit"] = end
 
     def run(self, budget: float) -> int:
-        """Take at most `budget` steps; returns one of the codes of `steppers.orders`."""
-        while (room := self.slate.room()) < budget:
-            code = self.steps(room)
-            left, budget = self.orders[slots.BUDGET], budget - room
+        """Take at most `budget` steps; returns a code of `steppers.slots`, from DONE to CHATTERS."""
+        while (capacity := self.slate.room()) < budget:
+            code = self.steps(capacity)
+            left, budget = self.orders[slots.BUDGET], budget - capacity
             if code != slots.CHUNK or left != 0.0 or automatic.wants_change(self.stepper):
                 return code
         return self.steps(budget)
 
     def steps(self, budget: float) -> int:
-        """`run`, while what delay lines remember has room for as many."""
+        """`run` for as many steps as the history of delay lines has space for."""
         self.orders[slots.BUDGET] = budget
         code = slots.SWITCHED
         while code == slots.SWITCHED:
@@ -151,28 +155,28 @@ class Loop:
 
     @property
     def functions(self) -> tuple:
-        """What the stepper calls, and where rates of the ledger begin."""
+        """(functions that the time loop calls, offset of the ledger rates in `out`)."""
         return (self.leap, self.observe, self.record, self.events, self.rhs), int(self.model.layout["supply"])
 
     def close(self) -> None:
-        """Let threads and ranks end."""
+        """End the threads or ranks."""
         if self.team is not None:
             self.team.close()
 
     @property
     def armed(self) -> np.ndarray:
-        """Which events have happened and still hold (a view)."""
+        """Flags of the events that have occurred and still hold (a view)."""
         return self.slate.armed
 
     def note(self, before: np.ndarray) -> None:
-        """List the events that have happened since the flags were `before`, and do what they do at once."""
-        first, many = limits.EVENTS * self.tanks.size, len(self.model.events)
-        now = self.armed[first : first + many] > before[first : first + many]
+        """Record the events since the flags were `before`, and apply their immediate effects."""
+        first, count = limits.EVENTS * self.tanks.size, len(self.model.events)
+        now = self.armed[first : first + count] > before[first : first + count]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
         self.settle()
 
     def settle(self) -> None:
-        """Have tanks and devices do what their events do at once."""
+        """Apply the immediate effects of events on tanks and devices."""
         for i in self.tanks:
             node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(SUMS, -1)
             part = limits.overshot(node, self.armed, float(node["mass"] + self.now[node["y"]]))
@@ -182,7 +186,7 @@ class Loop:
             device.settle(self.slate, row, self.t, self.now, self.stepper.scale)
 
     def switch(self, before: np.ndarray) -> bool:
-        """Note the events that have just happened; False where they go to and fro at one time, or crowd."""
+        """Record the last events; returns False where they chatter: too many at the same time or in a short span."""
         self.note(before)
         self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
         self.last_switch = self.t
@@ -192,20 +196,20 @@ class Loop:
         return self.at_once <= MOST_AT_ONCE + 4 * self.armed.size and not crowded
 
     def evaluate(self, limit: float) -> np.ndarray:
-        """`out` now, with schedules' left limit from `limit` on; events that a jump has brought are listed."""
+        """Evaluate `out` now, with left limits of schedules from `limit` on; records events that a jump has caused."""
         before = self.armed.copy()
         out = self.slate.evaluate(self.t, self.now, limit)[1]
         self.note(before)
         return out
 
     def stop_columns(self, limit: float) -> list[tuple[int, float]]:
-        """Give rigid columns that stand, or meet where nothing else flows, the flows that they have from now on.
+        """Set the flows of rigid columns that stop, or collide at a node without other flow.
 
-        Returns (number, flow [kg/s] that it has lost) of those that had another.
+        Returns (number of the column, lost flow [kg/s]) of the columns whose flow changes.
         """
-        if not len(self.model.tables.columns) and not self.armed.size:  # nor is there an event to be noted
+        if not len(self.model.tables.columns) and not self.armed.size:  # no columns and no events to record
             return []
-        found, out, layout = [], self.evaluate(limit), self.model.layout
+        stopped, out, layout = [], self.evaluate(limit), self.model.layout
         while (event := let_go(self.slate, self.t, self.now, out)) is not None:
             before = self.armed.copy()
             self.armed[event], self.armed[event + 1] = 1.0, 0.0
@@ -214,22 +218,22 @@ class Loop:
         places = shut_places(self.model, out)
         for k, row in enumerate(self.model.tables.columns):
             flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
-            meets = out[layout["led"] + k] == 0.0 and (row["from_node"] in places or row["to_node"] in places)
-            if flow != new and (meets or new == 0.0):
+            collides = out[layout["led"] + k] == 0.0 and (row["from_node"] in places or row["to_node"] in places)
+            if flow != new and (collides or new == 0.0):
                 self.now[row["y"]] = new - row["flow"]
-                found.append((k, flow - new))
-        return found
+                stopped.append((k, flow - new))
+        return stopped
 
     def take_rows(self) -> np.ndarray:
-        """Rows written since the last call, as a copy."""
+        """Copy of the rows written since the last call."""
         count = int(self.flags[slots.ROWS])
         self.flags[slots.ROWS] = 0
         return self.stepper.rows[:count].copy()
 
     def step_back(self) -> None:
-        """Return to the state before the last step, unless that step is in the ledgers: then its end was sound."""
+        """Return to the state before the last step, unless the ledgers include it: then its end state was valid."""
         if self.flags[slots.BEHIND] == 1 and self.memory[slots.UNBOOKED] > 0.0:
-            self.before  # noqa: B018  which brings it here
+            self.before  # noqa: B018  (copies that state from the other threads or ranks)
             self.memory[slots.T] -= self.memory[slots.LAST]
             self.memory[slots.UNBOOKED] = 0.0
             self.flags[slots.NOW], self.flags[slots.OLD] = self.flags[slots.OLD], self.flags[slots.NOW]
@@ -237,15 +241,15 @@ class Loop:
 
 
 def longest_step(model: Model) -> float:
-    """Step that delay lines are cut for [s]."""
-    asked = model.tables.pipes["delay"] >= 0
-    return float(1.0 / model.wave_rates[asked].max()) if asked.any() else np.inf
+    """Greatest step for which delay lines are divided [s]; infinity without delay lines."""
+    delay_lines = model.tables.pipes["delay"] >= 0
+    return float(1.0 / model.wave_rates[delay_lines].max()) if delay_lines.any() else np.inf
 
 
 def leap_allowed(model: Model, method: Method) -> bool:
-    """Whether steps can be taken whole: upwind and Euler, pipes alone, no events, no friction or a given factor.
+    """True if fused steps are possible: upwind and Euler, only pipes, no events, no friction or a constant factor.
 
-    Nor may pipes ride: a body drives their cells beside their waves.
+    Pipes on moving bodies are excluded: the body accelerates their cells in addition to the waves.
     """
     settings, numerics = model.tables.settings[0], model.case.numerics
     laws = model.tables.pipes["friction"]

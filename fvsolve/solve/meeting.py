@@ -1,4 +1,4 @@
-"""What happens at once where rigid columns alone meet: an impulse of pressure, or air. Knows flows; takes no step."""
+"""Collision and separation of rigid columns at nodes without other flow: pressure impulses, admission of air."""
 
 from __future__ import annotations
 
@@ -7,26 +7,26 @@ import numpy as np
 from fvsolve.kernels.rigid import gate_inflow
 from fvsolve.model import Model, Slate
 
-NONE = 1e-9  # of a small flow: columns that part no quicker are rounding
+NONE = 1e-9  # relative to a small flow: columns that separate more slowly separate by rounding
 
 
 def shut_places(model: Model, out: np.ndarray) -> list[int]:
-    """Places where rigid columns, one or more, meet nothing but shut valves."""
-    found, nodes, at = [], model.tables.nodes, model.layout["conductance"]
+    """Nodes that join rigid columns and otherwise only shut valves."""
+    places, nodes, at = [], model.tables.nodes, model.layout["conductance"]
     for i in np.flatnonzero(nodes["gates"] >= 0):
         if not out[at + gates_of(model, i)].any():
-            found.append(int(i))
-    return found
+            places.append(int(i))
+    return places
 
 
 def gates_of(model: Model, i: int) -> np.ndarray:
-    """Valves at such a place."""
+    """Valves at such a node."""
     row = model.tables.nodes[i]
     return model.tables.integers[row["gates"] : row["gates"] + row["gate_count"]]
 
 
 def air_valve_of(model: Model, i: int) -> int | None:
-    """The first event function of the air valve at a place: that it opens; None where there is none."""
+    """Number of the first event function, opening, of the air valve at a node; None without an air valve."""
     valves, devices = model.tables.valves, model.tables.devices
     for device in valves["device"][gates_of(model, i)]:
         if device >= 0 and devices[device]["row"] >= 0:
@@ -34,23 +34,24 @@ def air_valve_of(model: Model, i: int) -> int | None:
     return None
 
 
-def brought(slate: Slate, t: float, y: np.ndarray) -> np.ndarray:
-    """What columns have carried up to t more than in the profile [kg/s]; at the start, their states."""
-    model = slate.model
+def brought(run_data: Slate, t: float, y: np.ndarray) -> np.ndarray:
+    """Flow of the columns just before t, less the flow of the profile [kg/s]; at the start, their states."""
+    model = run_data.model
     before, columns = model.new_out(), model.tables.columns
     if t <= model.case.numerics.start:
         return y[columns["y"]]
-    limit, slate.clock["limit"] = float(slate.clock["limit"]), t
-    model.functions.rhs(t, y, np.zeros(0), before, slate.handle)
-    slate.clock["limit"] = limit
+    limit, run_data.clock["limit"] = float(run_data.clock["limit"]), t
+    model.functions.rhs(t, y, np.zeros(0), before, run_data.handle)
+    run_data.clock["limit"] = limit
     return before[model.layout["column"] :][: len(columns)] - columns["flow"]
 
 
 def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[int]) -> np.ndarray:
-    """Flow [kg/s] that an impulse of pressure at each place stops there; below zero where columns part.
+    """Flow [kg/s] that a pressure impulse J stops at each node; negative where columns separate.
 
-    sum of A / L (J - J_far) = sum of the flows that columns bring: momentum is kept, and columns that their valves
-    still lead keep their flow. carried : as of `brought`.
+    sum of A / L (J - J_far) = sum of the inflows of the columns: momentum is conserved. Columns that are controlled by
+    their valves keep their flow.
+    carried : float64[columns]  result of `flow_before`
     """
     sums = np.array([model.tables.nodes["inflow"][i] - gate_inflow(model.tables, i) for i in places])
     matrix = np.zeros((len(places), len(places)))
@@ -58,25 +59,29 @@ def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[in
     for k, column in enumerate(model.tables.columns):
         ends = [(row.get(int(column["from_node"]), -1), -1.0), (row.get(int(column["to_node"]), -1), 1.0)]
         at = model.layout["column"] + k
-        kept = out[model.layout["led"] + k] != 0.0 and out[at] != 0.0
-        change = out[at] - column["flow"] if kept else carried[k]
+        valve_controlled = out[model.layout["led"] + k] != 0.0 and out[at] != 0.0
+        change = out[at] - column["flow"] if valve_controlled else carried[k]
         for r, sign in ends:
             if r >= 0:
                 sums[r] += sign * change
-            for other, turned in ends if r >= 0 and not kept else ():
+            for other, other_sign in ends if r >= 0 and not valve_controlled else ():
                 if other >= 0:
-                    matrix[r, other] += sign * turned * column["area"] / column["length"]
+                    matrix[r, other] += sign * other_sign * column["area"] / column["length"]
     return np.diag(matrix) * np.linalg.lstsq(matrix, sums)[0]
 
 
-def let_go(slate: Slate, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
-    """The event of the air valve where columns part the most, which air lets go on; None where none part."""
-    model = slate.model
+def let_go(run_data: Slate, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
+    """Opening event of the air valve where columns separate fastest; None where no columns separate."""
+    model = run_data.model
     places = shut_places(model, out)
     events = [air_valve_of(model, i) for i in places]
     if all(event is None for event in events):
         return None
     small = NONE * model.scale[model.tables.columns["y"]].max()
-    pushes = impulses(model, brought(slate, t, y), out, places)
-    apart = [(push, event) for push, event in zip(pushes, events, strict=True) if event is not None and push < -small]
-    return min(apart)[1] if apart else None
+    all_impulses = impulses(model, brought(run_data, t, y), out, places)
+    separating = [
+        (impulse, event)
+        for impulse, event in zip(all_impulses, events, strict=True)
+        if event is not None and impulse < -small
+    ]
+    return min(separating)[1] if separating else None

@@ -1,7 +1,7 @@
-"""Processes that step bands of one state together, by messages of MPI. Knows arrays; knows no physics.
+"""MPI processes that step bands of a state in parallel.
 
-Rank 0 runs; the others follow: each takes what Python may have changed there, marches when rank 0 does, and sends its
-rows when both are back. So what a clock or a signal decides is decided in one place.
+Rank 0 runs the case; the other ranks follow. Each receives what Python may have changed on rank 0, runs the time loop
+together with rank 0, and sends its rows afterwards. So decisions by clock or signal are made only on rank 0.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from fvsolve.solve.team import SMALL, WRITTEN, Member, banded, undisturbed, yiel
 from fvsolve.steppers import slots
 
 TOLD = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
-MARCH, WHOLE, CLOSE = range(3)  # what rank 0 asks for
+MARCH, WHOLE, CLOSE = range(3)  # requests of rank 0: run the time loop, send states, end
 FAREWELL = CLOSE, None
 
 
 class Exchange:
-    """Places of an array that ranks take from each other, and what they are sent in."""
+    """Exchange of array entries between ranks, with buffers for them."""
 
     def __init__(self, comm, runs: list[np.ndarray]) -> None:
         me, self.comm = comm.rank, comm
@@ -33,47 +33,47 @@ class Exchange:
         self.rooms = {k: np.zeros(at.size) for k, at in self.takes.items()}
 
     def __call__(self, values: np.ndarray) -> None:
-        """Bring what others have into place."""
+        """Exchange the entries; received entries are written into `values`."""
         from mpi4py import MPI
 
-        asked = [self.comm.Irecv(self.rooms[k], k) for k, at in self.takes.items() if at.size]
-        asked += [self.comm.Isend(values[at], k) for k, at in self.gives.items() if at.size]
-        MPI.Request.Waitall(asked)
+        requests = [self.comm.Irecv(self.rooms[k], k) for k, at in self.takes.items() if at.size]
+        requests += [self.comm.Isend(values[at], k) for k, at in self.gives.items() if at.size]
+        MPI.Request.Waitall(requests)
         for k, at in self.takes.items():
             values[at] = self.rooms[k]
 
 
 def places(runs: np.ndarray, owner: int) -> np.ndarray:
-    """All places of the runs that are an owner's : int64[n]."""
+    """All places in the runs of an owner : int64[n]."""
     mine = runs[runs[:, 0] == owner]
     return np.concatenate([np.zeros(0, dtype=np.int64), *(np.arange(begin, stop) for _, begin, stop in mine)])
 
 
 class Ranks:
-    """The bands of all ranks, as seen by one of them: rank 0's loop calls, the others `serve`."""
+    """Bands of all ranks, on a single rank: the loop of rank 0 calls, the other ranks `serve`."""
 
     def __init__(self, loop, cut: Cut, comm) -> None:
         self.loop, self.cut, self.comm, self.seconds = loop, cut, comm, 0.0
         self.functions, self.join = banded(cut)
-        self.told = TOLD(self.tell_others)  # which lives as long as its address is known
+        self.told = TOLD(self.tell_others)  # kept as long as compiled code has its address
         self.tell, self.yielding = ctypes.cast(self.told, ctypes.c_void_p).value, yielding()
         self.board = self.room = np.zeros(0)
         self.member = Member(self, comm.rank, loop.slate, loop.stepper)
         ranks = range(comm.size)
         self.exchanges = Exchange(comm, [cut.states(k) for k in ranks]), Exchange(comm, [cut.flows(k) for k in ranks])
         self.others = np.ones(cut.sums, dtype=bool)
-        for _, _, first, many in self.member.stepper.spans[len(cut.alike()) if comm.rank > 0 else 0 :]:
-            self.others[first : first + many] = False
-        self.rows = [[slice(*one[:2]) for one in cut.spans(k)[len(cut.alike()) :].tolist()] for k in ranks]
+        for _, _, first, count in self.member.stepper.spans[len(cut.alike()) if comm.rank > 0 else 0 :]:
+            self.others[first : first + count] = False
+        self.rows = [[slice(*block[:2]) for block in cut.spans(k)[len(cut.alike()) :].tolist()] for k in ranks]
         self.stale = True
 
-    def tell_others(self, what: int, address: int, size: int) -> None:
-        """What compiled code calls in the middle of a step; all ranks do, or none goes on."""
+    def tell_others(self, request: int, address: int, size: int) -> None:
+        """Exchange values of the given kind within a step; compiled code on all ranks must call it."""
         try:
             values = np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
-            if what in (joint.OF_STATES, joint.OF_FLOWS):
-                self.exchanges[what](values)
-            elif what == joint.OF_RATES:
+            if request in (joint.OF_STATES, joint.OF_FLOWS):
+                self.exchanges[request](values)
+            elif request == joint.OF_RATES:
                 values[0] = self.greatest(values[0])
             else:
                 values[self.others] = 0.0
@@ -85,74 +85,74 @@ class Ranks:
             self.comm.Abort(1)
 
     def greatest(self, rate: float) -> float:
-        """Of all ranks; infinite where one has no number."""
+        """Greatest rate of all ranks; infinite if a rank has NaN."""
         from mpi4py import MPI
 
         return self.comm.allreduce(math.inf if math.isnan(rate) else float(rate), MPI.MAX)
 
     def call(self, functions: tuple, where: int) -> int:
-        """March on with all ranks; returns one of the codes of `steppers.slots`."""
+        """Run the time loop on all ranks; returns a code of `steppers.slots`."""
         loop = self.loop
         now = loop.flags[slots.NOW]
-        whole = [(0, loop.model.y_size)] if self.stale else self.cut.alike()
+        runs = [(0, loop.model.y_size)] if self.stale else self.cut.alike()
         small = {name: getattr(loop.stepper, name) for name in SMALL}
         written = {name: getattr(loop.slate.written, name) for name in WRITTEN}
-        states = [loop.stepper.y[now, begin:stop] for begin, stop in whole]
+        states = [loop.stepper.y[now, begin:stop] for begin, stop in runs]
         self.stale = False
         with undisturbed():
-            self.comm.bcast((MARCH, (small, written, whole, states)))
+            self.comm.bcast((MARCH, (small, written, runs, states)))
             code = self.member.march(functions, where)
             self.gather("y", loop.flags[slots.NOW])
             if code == slots.FIELD:
                 self.gather("y_out", ...)
-            self.seconds += sum(self.comm.gather(0.0))  # beside its own
+            self.seconds += sum(self.comm.gather(0.0))  # CPU time of the other ranks
         return code
 
     def gather(self, name: str, at) -> None:
-        """Bring the rows of all ranks to rank 0."""
+        """Send the rows of all ranks to rank 0."""
         values = getattr(self.loop.stepper, name)[at]
         if self.comm.rank > 0:
-            for one in self.rows[self.comm.rank]:
-                self.comm.Send(values[one], 0)
+            for rows in self.rows[self.comm.rank]:
+                self.comm.Send(values[rows], 0)
             return
         for k in range(1, self.comm.size):
-            for one in self.rows[k]:
-                self.comm.Recv(values[one], k)
+            for rows in self.rows[k]:
+                self.comm.Recv(values[rows], k)
 
     def whole(self, at: int) -> None:
-        """Bring row `at` of the states of all ranks to rank 0."""
+        """Send row `at` of the states of all ranks to rank 0."""
         with undisturbed():
             self.comm.bcast((WHOLE, int(at)))
             self.gather("y", at)
 
     def close(self) -> None:
-        """Let the other ranks go."""
+        """End the other ranks."""
         with undisturbed():
             self.comm.bcast(FAREWELL)
 
     def serve(self, functions: tuple, where: int) -> None:
-        """Follow rank 0 until it has no more to ask."""
+        """Execute the requests of rank 0 until it ends the run."""
         stepper = self.loop.stepper
         while True:
-            asked, given = self.comm.bcast(None)
-            if callable(asked):  # by whom rank 0 writes to
-                asked(self.comm, self.loop.model, *given)
+            request, argument = self.comm.bcast(None)
+            if callable(request):  # a sink of rank 0 that writes on all ranks
+                request(self.comm, self.loop.model, *argument)
                 continue
-            if asked == CLOSE:
+            if request == CLOSE:
                 return
-            if asked == WHOLE:
-                self.gather("y", given)
+            if request == WHOLE:
+                self.gather("y", argument)
                 continue
-            small, others, whole, states = given
+            small, written, runs, states = argument
             for name, array in small.items():
                 getattr(stepper, name)[...] = array
-            for name, array in others.items():
+            for name, array in written.items():
                 self.member.take(name, array)
-            for (begin, stop), values in zip(whole, states, strict=True):
+            for (begin, stop), values in zip(runs, states, strict=True):
                 stepper.y[stepper.flags[slots.NOW], begin:stop] = values
-            before = time.thread_time()
+            start_time = time.thread_time()
             code = self.member.march(functions, where)
             self.gather("y", stepper.flags[slots.NOW])
             if code == slots.FIELD:
                 self.gather("y_out", ...)
-            self.comm.gather(time.thread_time() - before)
+            self.comm.gather(time.thread_time() - start_time)

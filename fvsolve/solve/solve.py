@@ -1,4 +1,4 @@
-"""Carry a state from the start of a case to its end, segment by segment. Knows no files and no pictures."""
+"""Run of a case from its start to its end, segment by segment between jumps and kinks of schedules."""
 
 from __future__ import annotations
 
@@ -36,41 +36,44 @@ from fvsolve.units import show
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
-FEW = slots.CHECKED  # steps at a time where `Soundness.look` is needed as often
+FEW = slots.CHECKED  # steps between two checks by `RunChecks.look` where it is needed often
 PERSISTENT = ("extremes", "envelope", "marks", "armed")
 
 
 class MemoryMisfit(RunError):
-    """What a state remembers is not what such a run would."""
+    """The memory of a state does not match the run."""
 
 
 def initial_state(model: Model) -> State:
-    """The state a model starts from: no deviation from its profile, but where a dam breaks."""
+    """Initial state of a model: no deviation from its profile, except for a dam break."""
     if not isinstance(model, Model):
-        raise FvsolveError(f"initial_state takes a Model, not {type(model).__name__}; wanted what build() gives")
+        raise FvsolveError(f"initial_state takes a Model, not {type(model).__name__}. Expected the result of build()")
     return State(model.case.numerics.start, model.start.copy())
 
 
 def solve(model: Model, state: State, sink, progress=None, threads: int = 1, comm=None) -> Summary:
-    """Step from `state` to the case's end, with rows, fields and checkpoints to `sink`.
+    """Run a model from `state` to the end of its case, with rows, fields and checkpoints written to `sink`.
 
-    progress(t, seconds, steps) is called about ten times a second. A state with memory is resumed bit for bit, by any
-    number of threads; comm : MPI's, of ranks that follow this one in place of threads.
+    progress(t, seconds, steps) : called about ten times a second
+    threads : number of threads; comm : MPI communicator, whose other ranks follow this rank, in place of threads
+    A state with memory is resumed to the bit, with any number of threads.
     """
     if not isinstance(model, Model) or not isinstance(state, State):
         raise FvsolveError(f"solve takes a Model and a State, not {type(model).__name__} and {type(state).__name__}")
     if progress is not None and not callable(progress):
-        raise FvsolveError(f"progress = {progress!r} cannot be called; wanted progress(t, seconds, steps)")
+        raise FvsolveError(f"progress = {progress!r} cannot be called. Expected progress(t, seconds, steps)")
     if isinstance(threads, bool) or not isinstance(threads, (int, np.integer)) or threads < 1:
-        raise FvsolveError(f"threads = {show(threads)} is no number of threads; wanted a whole number, 1 or more")
+        raise FvsolveError(f"threads = {show(threads)} is not a number of threads. Expected an integer of 1 or more")
     if comm is not None and not callable(getattr(comm, "bcast", None)):
-        raise FvsolveError(f"comm = {show(comm)} is none of MPI's; wanted mpi4py's MPI.COMM_WORLD, or None")
-    lacks = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
+        raise FvsolveError(
+            f"comm = {show(comm)} is not an MPI communicator. Expected MPI.COMM_WORLD of mpi4py, or None"
+        )
+    missing = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
     try:
         model.given(state.t, state.y)
         run = Run(model, state, sink, progress, threads, comm)
-        if lacks:
-            raise FvsolveError(f"sink = {show(sink)} is none: it has no {listing(lacks)}()")
+        if missing:
+            raise FvsolveError(f"sink = {show(sink)} is not a sink: it has no {listing(missing)}()")
     except BaseException:
         if comm is not None:
             comm.bcast(FAREWELL)
@@ -79,7 +82,7 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
 
 
 class Run:
-    """One run while it lasts."""
+    """State and actions of a run in progress."""
 
     loop_type = Loop
 
@@ -101,49 +104,50 @@ class Run:
         orders[slots.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
         orders[slots.FIELD_COUNT] = output.fields
         self.segment, self.fresh = 0, state.memory.size == 0
-        self.changes: list[tuple[float, float, float]] = []  # of method, under `auto`
+        self.changes: list[tuple[float, float, float]] = []  # changes of the method under `auto`
         self.loop.now[:] = state.y
         self.loop.memory[slots.T] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
-        self.watches = [one for basin in model.basins for one in basin.watches(basin.of(model.start))]
+        self.watches = [watch for basin in model.basins for watch in basin.watches(basin.of(model.start))]
         self.soundness = Soundness(self.slate)
         self.loop.stepper.largest = self.soundness.watched
         if self.soundness.close:
             self.budget = FEW
-        self.processor = 0.0  # seconds of CPU time of the steps of this process
-        self.invalid_from = np.inf  # s, once it has blown up
-        self.left, self.paused = self.budget, self.saved  # of a chunk, which rows, frames and new segments do not end
+        self.processor = 0.0  # CPU time of the steps of this process [s]
+        self.invalid_from = np.inf  # time from which results are invalid, because states have grown [s]
+        # steps left in a chunk, time of the last pause: rows, frames and new segments do not end a chunk
+        self.left, self.paused = self.budget, self.saved
         if not self.fresh:
             try:
                 self.remember(state.memory)
-            except (ValueError, IndexError, OverflowError):  # of a damaged checkpoint, or of another solver's
+            except (ValueError, IndexError, OverflowError):  # damaged checkpoint, or from another solver
                 if comm is None:
                     self.loop.close()
-                raise MemoryMisfit(f"a memory of {state.memory.size} numbers is not of such a run; start it again with "
-                                   "--force, or with a State without memory") from None  # fmt: skip
+                raise MemoryMisfit(f"the checkpoint does not match this run (a memory of {state.memory.size} numbers); "
+                                   "start again with --force, or with a State without memory") from None  # fmt: skip
         self.setup = time.perf_counter() - self.began
 
     # memory -------------------------------------------------------------------------------------------------
 
     def memory(self) -> np.ndarray:
-        """Everything that a resumed run needs beside t and y, flat."""
-        kept = [getattr(self.slate, name).ravel() for name in PERSISTENT]
+        """All data that a resumed run needs in addition to t and y, flat."""
+        arrays = [getattr(self.slate, name).ravel() for name in PERSISTENT]
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
         crowd = self.loop.crowd
         own += [float(len(switched)), *switched, float(len(crowd)), *crowd, self.loop.last_switch, self.loop.at_once]
-        own += [x for one in self.watches for x in one.kept]
-        own += [self.soundness.rates.get(one.name, 0.0) for one in self.soundness.moving]
+        own += [x for watch in self.watches for x in watch.kept]
+        own += [self.soundness.rates.get(watch.name, 0.0) for watch in self.soundness.moving]
         views = (view.ravel() for view in self.loop.stepper.memories())
         own += self.soundness.unfelt.kept.ravel().tolist()
         past = self.slate.past
-        return np.concatenate([own, *views, *kept, self.soundness.halves.kept, past, [float(past.size)]])
+        return np.concatenate([own, *views, *arrays, self.soundness.halves.kept, past, [float(past.size)]])
 
     def remember(self, memory: np.ndarray) -> None:
         memory, past = without_past(memory)
         if (past.size == 0) != (self.slate.past.size == 0):
-            raise ValueError("no such past")
+            raise ValueError("history of delay lines does not match")
         self.slate.past = past.copy()
         self.segment, self.seconds, self.processor, changes = int(memory[0]), *map(float, memory[1:3]), int(memory[3])
         if not (0 <= self.segment < len(self.bounds) and changes >= 0 and memory[4 + 3 * changes] >= 0):
@@ -157,22 +161,25 @@ class Run:
         crowd, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
         self.loop.crowd.extend(crowd.tolist())
         self.loop.last_switch, self.loop.at_once, memory = float(memory[0]), int(memory[1]), memory[2:]
-        for one in self.watches:
-            one.kept[:], memory = memory[: one.kept.size], memory[one.kept.size :]
+        for watch in self.watches:
+            watch.kept[:], memory = memory[: watch.kept.size], memory[watch.kept.size :]
         for basin in self.soundness.moving:
             self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
-        risen = self.soundness.unfelt.kept.ravel()
-        risen[:], memory = memory[: risen.size], memory[risen.size :]
-        seen = self.soundness.halves.kept
-        known = [getattr(self.slate, name) for name in PERSISTENT] + [*self.loop.stepper.memories(), seen]
-        if memory.size != sum(array.size for array in known):
-            raise ValueError("as many numbers as there is nothing for")
+        sloshing_data = self.soundness.unfelt.kept.ravel()
+        sloshing_data[:], memory = memory[: sloshing_data.size], memory[sloshing_data.size :]
+        step_doubling_data = self.soundness.halves.kept
+        arrays = [getattr(self.slate, name) for name in PERSISTENT] + [
+            *self.loop.stepper.memories(),
+            step_doubling_data,
+        ]
+        if memory.size != sum(array.size for array in arrays):
+            raise ValueError("wrong number of values")
         memory = self.loop.stepper.remember(memory)
         for name in PERSISTENT:
             array = getattr(self.slate, name).ravel()
             array[:] = memory[: array.size]
             memory = memory[array.size :]
-        seen[:] = memory
+        step_doubling_data[:] = memory
 
     def state(self) -> State:
         return State(self.loop.t, self.loop.now.copy(), self.memory())
@@ -180,7 +187,7 @@ class Run:
     # rows and frames ----------------------------------------------------------------------------------------
 
     def row(self, t: float, limit: float) -> np.ndarray:
-        """Write the row of the present state at t, with schedules' left limit from `limit` on; returns out."""
+        """Write the row of the present state at t, with left limits of schedules from `limit` on; returns `out`."""
         out = self.loop.evaluate(limit)
         self.loop.record(t, self.loop.now, out, self.slate.handle, self.loop.stepper.values)
         self.sink.rows(np.array([t]), self.loop.stepper.values[None, : len(self.model.probes)].copy())
@@ -193,22 +200,22 @@ class Run:
             self.widen(rows)
 
     def widen(self, rows: np.ndarray) -> None:
-        """Extremes by rows as well, for what lies between steps is as accurate: no row is beyond what is printed."""
+        """Update the extremes by rows between steps, which are as accurate as steps; so no row exceeds the extremes."""
         least, t_least, greatest, t_greatest = self.slate.extremes
         t, values = rows[:, 0], rows[:, 1:]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
-        lower = (found := values[at, each]) < least
+        lower = (extreme := values[at, each]) < least
         if lower.any():
-            least[lower], t_least[lower] = found[lower], t[at][lower]
+            least[lower], t_least[lower] = extreme[lower], t[at][lower]
         at = values.argmax(axis=0)
-        higher = (found := values[at, each]) > greatest
+        higher = (extreme := values[at, each]) > greatest
         if higher.any():
-            greatest[higher], t_greatest[higher] = found[higher], t[at][higher]
+            greatest[higher], t_greatest[higher] = extreme[higher], t[at][higher]
 
     def look(self, t: float, y: np.ndarray) -> None:
-        """Let what watches basins see a state."""
-        for one in self.watches:
-            one.look(t, y)
+        """Pass a state to the checks of basins."""
+        for watch in self.watches:
+            watch.look(t, y)
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.look(t, y)
@@ -216,7 +223,7 @@ class Run:
             self.sink.field(t, self.slate.fields(t, y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
-        """Count the rows and frames that are due at a jump or at the end, which are written apart."""
+        """Count the rows and frames due at a jump or at the end, which are written separately."""
         memory, orders = self.loop.memory, self.loop.orders
         near = 1e-12 * max(abs(t), abs(self.end))
         if orders[slots.EVERY] > 0:
@@ -244,14 +251,14 @@ class Run:
 
     def open(self) -> None:
         out = self.row(self.start, self.start)
-        self.loop.switched.clear()  # as what it starts is no event
+        self.loop.switched.clear()  # initial device states are not events
         if self.loop.orders[slots.FIELD_EVERY] > 0:
             self.frame(self.start, self.loop.now, out)
         self.loop.memory[slots.NEXT_OUTPUT] = self.loop.memory[slots.NEXT_FIELD] = 1.0
         self.begin_segment(self.starts_with_jump)
 
     def stop_columns(self) -> None:
-        """Take the flow out of rigid columns that stand from now on; a mark where there was some."""
+        """Stop rigid columns that can no longer flow; set a mark if their flow was more than 1e-3 of its scale."""
         model, t = self.model, self.loop.t
         for k, flow in self.loop.stop_columns(self.bounds[self.segment][0]):
             at, scale = (
@@ -270,7 +277,7 @@ class Run:
         self.loop.begin(end, end if jump else NO_LIMIT)
 
     def segments(self) -> str:
-        """Step through the remaining segments; returns why the run ended."""
+        """Step through the remaining segments; returns the reason for the end of the run."""
         if not self.fresh:
             end, jump = self.bounds[self.segment]
             self.loop.resume(end, end if jump else NO_LIMIT)
@@ -290,7 +297,7 @@ class Run:
             self.begin_segment(jump)
 
     def steps(self) -> str:
-        """Step to the end of the segment; returns a reason where the run cannot go on."""
+        """Step to the end of the segment; returns "", or the reason where the run cannot continue."""
         while True:
             before, steps, busy = time.perf_counter(), self.loop.memory[slots.STEPS], self.busy
             code = self.loop.run(min(self.left, self.soundness.halves.room(steps)))
@@ -300,7 +307,7 @@ class Run:
             self.flush()
             self.soundness.halves.look(self.loop)
             grown = self.soundness.look(self.loop.t, self.loop.now)
-            if grown and code != slots.CHATTERS:  # which names the parts
+            if grown and code != slots.CHATTERS:  # the message about chattering names the parts
                 self.invalid_from = self.soundness.sound
                 return grown
             if code == slots.FIELD:
@@ -319,11 +326,11 @@ class Run:
 
     @property
     def busy(self) -> float:
-        """CPU time of all threads that step it [s]."""
+        """CPU time of all threads that step the run [s]."""
         return time.thread_time() + (0.0 if self.loop.team is None else self.loop.team.seconds)
 
     def pause(self) -> None:
-        """Between chunks: report, save, and aim at a tenth of a second for the next."""
+        """Between chunks: report progress, save a checkpoint, set the next chunk to about a tenth of a second."""
         spent = time.perf_counter() - self.paused
         factor = CHUNK_SECONDS / spent if spent > 0 else 4.0
         most = FEW if self.soundness.close else 1e9
@@ -338,12 +345,12 @@ class Run:
         self.saved = time.perf_counter()
 
     def failure(self, code: int) -> str:
-        """Where, when and what to try."""
+        """Reason for the stop of a run: failure, place, time and remedy, with the advice of the density law."""
         numbers = code in (slots.BAD_VALUE, slots.NEWTON_STUCK, slots.TINY_STEP)
         return self.what_failed(code) + (self.model.case.law.advice if numbers else "")
 
     def what_failed(self, code: int) -> str:
-        """What, where and when, and what to try."""
+        """Failure, place, time and remedy for a code of the time loop."""
         model, loop = self.model, self.loop
         place = ""
         if code == slots.BAD_VALUE:
@@ -354,43 +361,46 @@ class Run:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
         when = f"t = {model.case.amount(loop.t, 'time', 6)}"
         if code == slots.CHATTERS:
-            first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at one time, or crowded over a span
+            first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at the same time, or within a short span
             names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})
-            found = {device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names}
-            who = listing(names) if names else "a leak, or a demand that follows the pressure,"
-            remedy = ", or ".join(found) or "give its place the volume of a chamber"
-            return f"stopped: {who} opens and shuts without end at {when}; {remedy}"
+            remedies = {
+                device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
+            }
+            parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
+            remedy = ", or ".join(remedies) or "put a chamber at its place"
+            return f"stopped: {parts_text} opens and shuts without end at {when}; {remedy}"
         if code == slots.STOPPED:
-            what = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
-            return f"stopped: {what} at {when}, as below_vapor asks"
+            event = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
+            return f"stopped: {event} at {when}, as below_vapor requires"
         if code in (slots.BAD_VALUE, slots.BAD_STATUS):
             loop.step_back()
         if code == slots.NEWTON_STUCK:
             worst = model.state_names[int(loop.memory[slots.WORST])]
-            return (f"stopped: Newton did not converge at {when}, however short the step, worst in {worst}; look for a "
-                    "jump in what acts there, or try an explicit method")  # fmt: skip
+            return (f"stopped: Newton did not converge at {when}, however short the step, worst in {worst}; check the "
+                    "parts there for jumps, or try an explicit method")  # fmt: skip
         if code == slots.TINY_STEP:
-            return f"stopped: the step shrank to nothing at {when}; try a larger rtol, or courant in place of it"
+            return f"stopped: the step became too small at {when}; try a larger rtol, or courant in its place"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
-            return f"stopped: no flow can meet what is asked{place} at {when}; every way to it is shut"
+            return f"stopped: the demand{place} cannot be supplied at {when}; all connections to it are shut"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
-            return f"stopped: the piston has left no volume{place} at {when}; give it an end-stop"
+            return f"stopped: the chamber volume{place} is zero at {when}; give the piston an end-stop"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_ROOM:
-            return f"stopped: the wall has left no room{place} at {when}; give its mass an end-stop, or a wider zone"
+            return f"stopped: the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WEIGHT:
-            which = int(loop.out[rec.WHERE])
+            index = int(loop.out[rec.WHERE])
             names = [*(basin.name for basin in model.basins), *model.node_names]
-            name = names[which].removesuffix(".inside")
-            return f"stopped: the water in {name} has no weight left at {when}; wanted a body that falls less fast"
+            name = names[index].removesuffix(".inside")
+            return (f"stopped: the water in {name} has no weight left at {when}; reduce the downward acceleration of "
+                    "its body")  # fmt: skip
         if code == slots.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
-        return f"stopped: a value is not finite{place} at {when}; the step is beyond the method's limit: halve it"
+        return f"stopped: a value is not finite{place} at {when}; the step is beyond the limit of the method: halve it"
 
     def methods(self) -> list[dict]:
-        """Which method stepped from when on, and why."""
+        """Methods of the run with start time and reason."""
         name = self.model.case.numerics.method
         if name != automatic.AUTO:
-            return [{"time": self.start, "method": name, "why": "as numerics.method says"}]
+            return [{"time": self.start, "method": name, "why": "given by numerics.method"}]
         return automatic.account(self.start, self.changes, *self.loop.orders[[slots.PRICE, slots.SIZE]])
 
     def close(self, reason: str, saved: bool = True) -> Summary:
@@ -402,12 +412,12 @@ class Run:
         ledger = loop.stepper.ledger.reshape(SUMS, -1)[:2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
-        told = [notice for one in self.watches for notice in one.notices()]
-        warnings = [*self.told, *told, *self.soundness.warnings(ledgers), *run_downs(self.slate),
+        basin_notices = [notice for entry in self.watches for notice in entry.notices()]
+        warnings = [*self.told, *basin_notices, *self.soundness.warnings(ledgers), *run_downs(self.slate),
                     *spills(self.slate)]  # fmt: skip
         warnings += drifts(model, loop.now)
         warnings += parted(model.case.numerics, loop.stepper.counts())
-        ok = reason == "finished" and all(one.ok for one in warnings)
+        ok = reason == "finished" and all(entry.ok for entry in warnings)
         summary = Summary(
             reason, ok, loop.t, find_marks(self.slate), ledgers, find_extremes(self.slate),
             find_envelope(self.slate), find_points(self.slate), find_watched(self.slate),

@@ -1,4 +1,4 @@
-"""Whether a run's numbers may be right: steps beyond a limit, growth, ledgers that do not close. Knows no files."""
+"""Checks of a run: steps beyond their limit, growth of states, ledgers that do not close."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from fvsolve.model.past import crowded
 from fvsolve.solve.halves import Halves
 from fvsolve.solve.unfelt import Unfelt
 
-MOST = 1e6  # times what drives a scene: what is beyond has grown by itself
-SURE = 10.0  # times the same, which waves that add up may come to: up to there a state is no sign of growth
-OPEN = 1e-8  # of the largest term of a ledger: what does not close to that is wrong
+MOST = 1e6  # largest state, in units of its forcing range: beyond it the state has grown by instability
+SURE = 10.0  # in the same units: waves that add up may reach it, so a smaller state is no sign of growth
+OPEN = 1e-8  # greatest remainder of a ledger, relative to its largest term
 
 
 class Soundness:
-    """What is watched while a model runs: the pace of its basins, the size of its waves, the rise of water in modes.
+    """Checks during a run: wave rates of basins, size of the states, height of sloshing modes.
 
-    largest : float64[n]  what no state may exceed: MOST times the largest of the spread of the start, the range of what
-    is given over time, and the jump that stopping the start's flows makes (Joukowsky)
-    sound : time of the last state looked at that showed no growth [s]
+    largest : float64[n]  largest allowed states: MOST times the largest of the range of initial values, the range of
+    the schedules, and the Joukowsky jump of stopping the initial flows
+    sound : time of the last checked state without growth [s]
     """
 
-    def __init__(self, slate) -> None:
-        self.slate, self.model = slate, slate.model
+    def __init__(self, run_data) -> None:
+        self.slate, self.model = run_data, run_data.model
         model = self.model
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
-        self.predicted = step_limits(model, slate=slate)
-        self.halves = Halves(slate)
+        self.predicted = step_limits(model, run_data=run_data)
+        self.halves = Halves(run_data)
         self.unfelt = Unfelt(model)
         self.largest = MOST * drives(model)
         self.grown: Notice | None = None
@@ -38,16 +38,16 @@ class Soundness:
 
     @property
     def close(self) -> bool:
-        """True if `look` has to be called every few steps: for more than growth, which the time loop looks for."""
+        """True if `look` must be called every few steps: for more than growth, which the time loop checks itself."""
         return bool(self.unfelt.tanks or (self.predicted and self.moving))
 
     @property
     def watched(self) -> np.ndarray:
-        """`largest` where a limit is near, for the time loop; else nothing."""
+        """`largest` for the time loop if a step limit is exceeded; else an empty array."""
         return np.array(np.broadcast_to(self.largest, self.model.y_size)) if self.predicted else np.zeros(0)
 
     def look(self, t: float, y: np.ndarray) -> str:
-        """At a state: keep the pace of basins; why the run has to stop, or nothing."""
+        """Check a state and update the wave rates of basins; returns the reason to stop the run, or ""."""
         for basin in self.moving:
             self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.pace(y)[0])
         if stops := self.unfelt.look(t, y):
@@ -57,45 +57,48 @@ class Soundness:
             self.sound = t
         if not np.any(ratio > 1.0):
             return ""
-        at = int(np.argmax(ratio))
-        name, times = self.model.state_names[at], MOST * float(ratio[at])
-        text = (f"{name} has grown to {times:.3g} times what drives it at t = "
-                f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the method's limit: halve it")  # fmt: skip
+        worst = int(np.argmax(ratio))
+        name, times = self.model.state_names[worst], MOST * float(ratio[worst])
+        text = (f"{name} has grown to {times:.3g} times the range of its forcing at t = "
+                f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
+                "halve it")  # fmt: skip
         self.grown = Notice(
-            "growth", name.partition("[")[0], text, None, float(abs(y[at])), float(self.largest[at]), False
+            "growth", name.partition("[")[0], text, None, float(abs(y[worst])), float(self.largest[worst]), False
         )
         return f"stopped: {text}"
 
     def warnings(self, ledgers: dict) -> list[Notice]:
-        """All notices of a run that ended."""
-        found = list(self.predicted)
-        if self.model.case.numerics.step is not None and (found or self.moving):  # now with what the run has shown
-            found = step_limits(self.model, self.rates, np.inf if self.grown else self.halves.worst()[1])
-        astray = self.halves.notice()
-        found += [] if astray is None else [astray]
-        found += crowded(self.slate.past)
-        found += self.unfelt.notices()
-        found += [] if self.grown is None else [self.grown]
-        return found + [one for name, ledger in ledgers.items() for one in unclosed(name, ledger)]
+        """All notices of a finished run."""
+        notices = list(self.predicted)
+        # repeat the prediction with the wave rates and step errors of the run
+        if self.model.case.numerics.step is not None and (notices or self.moving):
+            notices = step_limits(self.model, self.rates, np.inf if self.grown else self.halves.worst()[1])
+        step_error = self.halves.notice()
+        notices += [] if step_error is None else [step_error]
+        notices += crowded(self.slate.past)
+        notices += self.unfelt.notices()
+        notices += [] if self.grown is None else [self.grown]
+        return notices + [notice for name, ledger in ledgers.items() for notice in unclosed(name, ledger)]
 
 
 def parted(numerics, counts: dict[str, int]) -> list[Notice]:
-    """A notice where steps of the length that was asked for were taken in parts."""
+    """Notice if steps of the given length were taken in parts."""
     if not counts.get("parted"):
         return []
     key = "step" if numerics.step is not None else "courant"
     text = (f"{counts['parted']} of {counts['steps']} steps were too long, for Newton or for a disc that shuts on a "
-            "rigid column, and were taken in parts, which end where the whole would have; give a smaller "
-            f"numerics.{key}, or rtol in place of it")  # fmt: skip
+            "rigid column, and were taken in parts, which end where the full step would have ended; give a smaller "
+            f"numerics.{key}, or rtol in its place")  # fmt: skip
     return [Notice("step-limit", "numerics", text, key, float(counts["parted"]), 0.0, True)]
 
 
 def unclosed(name: str, ledger: dict) -> list[Notice]:
-    """A notice where a ledger's remainder is beyond round-off."""
+    """Notice if the remainder of a ledger is larger than rounding."""
     relative = ledger.get("relative", 0.0)
-    if relative <= OPEN:  # one that is not a number is not closed
+    if relative <= OPEN:  # False for NaN: such a ledger does not close
         return []
     text = (
-        f"{name} ledger: {ledger['remainder']:.6g} remain, {relative:.3g} of its largest term; wanted {OPEN:g} at most"
+        f"{name} ledger: the remainder is {ledger['remainder']:.6g}, {relative:.3g} of its largest term; expected "
+        f"{OPEN:g} at most"
     )
     return [Notice("ledger", name, text, "remainder", float(relative), OPEN, False)]

@@ -1,8 +1,8 @@
-"""Threads that step bands of one state together, all by the same compiled loop. Knows arrays; knows no physics.
+"""Threads that step bands of a state in parallel, all by the same compiled loop.
 
-Every member has arrays of its own, of the size of all, of which only what it looks at is ever touched. Python works on
-those of the loop, which are the first member's; before members go on they take from there what Python may have changed,
-and when they come back each brings its rows.
+Every worker has its own arrays, of full size, and uses only the parts that its band reads. Python works on the arrays
+of the loop, which are those of the first worker. Before the workers continue, they copy from there what Python may have
+changed; afterwards each copies its rows back.
 """
 
 from __future__ import annotations
@@ -33,21 +33,21 @@ WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes"
 
 
 def yielding() -> int:
-    """Address of the system's function that lets other threads run."""
+    """Address of the system function that lets other threads run."""
     name = "SwitchToThread" if os.name == "nt" else "sched_yield"
     library = ctypes.windll.kernel32 if os.name == "nt" else ctypes.CDLL(None)
     return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
 
 
 class Member:
-    """One band: its arrays, and the handle that opens them.
+    """Worker of a band: its arrays, and the handle through which compiled code reads them.
 
-    team : a `Team` of threads or `Ranks`: board, room, yielding and tell are what `kernels.joint` is to know of it
+    team : a `ThreadTeam` or `Ranks`, with the addresses and arrays for the exchange in `kernels.joint`
     """
 
-    def __init__(self, team, k: int, slate: Slate, stepper: Stepper) -> None:
+    def __init__(self, team, k: int, run_data: Slate, stepper: Stepper) -> None:
         cut, loop = team.cut, team.loop
-        self.loop, self.number, self.slate, self.stepper = loop, k, slate, stepper
+        self.loop, self.number, self.slate, self.stepper = loop, k, run_data, stepper
         self.stepper.join, self.stepper.spans = team.join, cut.spans(k)
         self.stepper.sums = np.zeros(cut.sums)
         self.own = [slice(begin, stop) for begin, stop, *_ in self.stepper.spans[len(cut.alike()) :].tolist()]
@@ -61,26 +61,26 @@ class Member:
         self.mine = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.shape}
         self.called = team.functions.calls, team.functions.hooks
         self.open()
-        at, by = loop.stepper.within
-        mine = np.zeros(loop.model.y_size, dtype=bool)
+        at, bounds = loop.stepper.within
+        own_states = np.zeros(loop.model.y_size, dtype=bool)
         for begin, stop, *_ in self.stepper.spans.tolist():
-            mine[begin:stop] = True
-        kept = mine[at[::3]]
-        self.within = np.ascontiguousarray(at.reshape(-1, 3)[kept]).ravel(), by[kept]
+            own_states[begin:stop] = True
+        owned = own_states[at[::3]]
+        self.within = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
 
     def open(self) -> None:
-        """What is written here, and the handle that opens it: anew where a past of delay lines has more room."""
+        """Collect the written arrays and make their handle; repeated when the history of delay lines has grown."""
         self.written = self.slate.written._replace(**self.mine)
         self.handle = self.slate.linked(self.written, self.called)
 
     def take(self, name: str, values: np.ndarray) -> None:
-        """Take over one of `WRITTEN`."""
+        """Copy values into an array of `WRITTEN`."""
         if name == "past" and values.size != self.slate.past.size:
             self.slate.past = values.copy()
         getattr(self.slate.written, name)[...] = values
 
     def follow(self, states: list[slice]) -> None:
-        """Take over what Python may have changed in the arrays of the loop, and these states."""
+        """Copy from the loop the arrays that Python may have changed, and these states."""
         if self.number == 0:
             return
         for name in SMALL:
@@ -89,11 +89,11 @@ class Member:
             self.take(name, getattr(self.loop.slate.written, name))
         self.stepper.times, self.stepper.largest = self.loop.stepper.times, self.loop.stepper.largest
         now = self.loop.flags[slots.NOW]
-        for one in states:
-            self.stepper.y[now, one] = self.loop.stepper.y[now, one]
+        for rows in states:
+            self.stepper.y[now, rows] = self.loop.stepper.y[now, rows]
 
     def march(self, functions: tuple, where: int) -> int:
-        """Go on until there is something to do, and bring what the loop has not."""
+        """Run the time loop on this band; returns its code."""
         stepper = self.stepper
         if self.slate.past is not self.written.past:
             self.open()
@@ -105,29 +105,29 @@ class Member:
     def bring(self, name: str, at) -> None:
         """Copy the rows of this band to the arrays of the loop."""
         if self.number > 0:
-            mine, whole = getattr(self.stepper, name)[at], getattr(self.loop.stepper, name)[at]
-            for one in self.own:
-                whole[one] = mine[one]
+            source, target = getattr(self.stepper, name)[at], getattr(self.loop.stepper, name)[at]
+            for rows in self.own:
+                target[rows] = source[rows]
 
 
 def twin(stepper: Stepper) -> Stepper:
-    """Another of the same method, with arrays of its own but for what steps only read."""
-    found = Stepper(stepper.method, stepper.scale.size, stepper.supply.shape[1], stepper.structure, stepper.scale,
+    """Copy of an integrator, with its own arrays except those that steps only read."""
+    copy = Stepper(stepper.method, stepper.scale.size, stepper.supply.shape[1], stepper.structure, stepper.scale,
                     stepper.damped)  # fmt: skip
-    found.stored, found.carry, found.within = stepper.stored, stepper.carry.copy(), stepper.within
+    copy.stored, copy.carry, copy.within = stepper.stored, stepper.carry.copy(), stepper.within
     for name in ("out", "out_row", "values", "g", "g_new", "rows"):
-        setattr(found, name, getattr(stepper, name).copy())
-    return found
+        setattr(copy, name, getattr(stepper, name).copy())
+    return copy
 
 
 def banded(cut: Cut) -> tuple:
-    """Functions of a model whose bands tell each other, and by what they bring sums together."""
-    cast = replace(cut.model.functions.cast, bands=True, together=cut.together)
-    return functions(cast), compiled_as(joint.share, JOIN)
+    """(functions of a model with exchange between bands, compiled function that combines partial sums)."""
+    features = replace(cut.model.functions.cast, bands=True, together=cut.together)
+    return functions(features), compiled_as(joint.share, JOIN)
 
 
 class Team:
-    """All members of a loop, each but none of them in the thread that asks."""
+    """Workers of a loop, each in its own thread; the calling thread waits for them."""
 
     def __init__(self, loop, cut: Cut) -> None:
         self.loop, self.cut, self.yielding, self.tell, self.seconds = loop, cut, yielding(), 0, 0.0
@@ -136,36 +136,36 @@ class Team:
         self.room = lined(2 * cut.sums)
         self.members = [Member(self, 0, loop.slate, loop.stepper)]
         self.members += [Member(self, k, Slate(loop.model), twin(loop.stepper)) for k in range(1, cut.many)]
-        self.stale = True  # whether rows of the loop are not those of the members
+        self.stale = True  # True where the workers do not have the present rows of the loop
         self.asked = [SimpleQueue() for _ in self.members]
         self.answers: SimpleQueue = SimpleQueue()
         tasks = zip(self.members, self.asked, strict=True)
-        self.threads = [threading.Thread(target=self.serve, args=one, daemon=True, name="band") for one in tasks]
+        self.threads = [threading.Thread(target=self.serve, args=task, daemon=True, name="band") for task in tasks]
         for thread in self.threads:
             thread.start()
 
-    def serve(self, member: Member, asked: SimpleQueue) -> None:
-        """What a thread does: march when it is asked to."""
-        while (task := asked.get()) is not None:
-            before = time.thread_time()
+    def serve(self, member: Member, requests: SimpleQueue) -> None:
+        """Serve the requests of a thread: run the time loop for each, until the request is None."""
+        while (task := requests.get()) is not None:
+            start = time.thread_time()
             try:
                 answer = member.march(*task)
                 member.bring("y", member.stepper.flags[slots.NOW])
                 if answer == slots.FIELD:
                     member.bring("y_out", ...)
-            except BaseException as error:  # for whoever asked
+            except BaseException as error:  # raised again in the calling thread
                 answer = error
-            self.answers.put((answer, time.thread_time() - before))
+            self.answers.put((answer, time.thread_time() - start))
 
     def call(self, functions: tuple, where: int) -> int:
-        """March on with all members; returns one of the codes of `steppers.slots`."""
+        """Run the time loop on all bands; returns a code of `steppers.slots`."""
         for member in self.members:
-            alike = [slice(*one) for one in self.cut.alike()]
+            alike = [slice(*block) for block in self.cut.alike()]
             member.follow(alike + (member.own if self.stale else []))
         self.stale = False
         with undisturbed():
-            for asked in self.asked:
-                asked.put((functions, where))
+            for requests in self.asked:
+                requests.put((functions, where))
             answers = [self.answers.get() for _ in self.members]
         self.seconds += sum(seconds for _, seconds in answers)
         for answer, _ in answers:
@@ -174,29 +174,29 @@ class Team:
         return answers[0][0]
 
     def whole(self, at: int) -> None:
-        """Bring row `at` of the states of all members to the loop."""
+        """Copy row `at` of the states of all workers to the loop."""
         for member in self.members:
             member.bring("y", at)
 
     def close(self) -> None:
-        """Let the threads end."""
-        for asked in self.asked:
-            asked.put(None)
+        """End the threads."""
+        for requests in self.asked:
+            requests.put(None)
         for thread in self.threads:
             thread.join()
 
 
 @contextmanager
 def undisturbed():
-    """Put off Ctrl-C until all members are back, who wait for each other."""
+    """Postpone Ctrl-C until all workers have returned, because they wait for each other."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    heard, before = [], signal.getsignal(signal.SIGINT)
-    signal.signal(signal.SIGINT, lambda *given: heard.append(given))
+    signals, before = [], signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, lambda *arguments: signals.append(arguments))
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, before)
-    if heard and callable(before):
-        before(*heard[0])
+    if signals and callable(before):
+        before(*signals[0])

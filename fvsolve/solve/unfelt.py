@@ -1,4 +1,4 @@
-"""What waves of water that rides do not feel: that they rise high, or that a body falls. Knows tanks; no steps."""
+"""Validity of the sloshing model: wave height of linear modes, and vertical acceleration of the carrying body."""
 
 from __future__ import annotations
 
@@ -8,18 +8,20 @@ from fvsolve.case import sloshing
 from fvsolve.case.riding import free_joints
 from fvsolve.errors import Notice
 
-SMALL = 0.2  # share of the depth up to which a wave is small
-LIGHT = 0.1  # share of its weight that water may gain or lose by its body's motion, unfelt by its waves
-WEIGHTLESS = "the water in {name} has no weight left at t = {when}; wanted a body that falls less fast"
-NONE = 1e-6  # share of its weight that is rounding
+SMALL = 0.2  # wave height up to which a wave is small, as a fraction of the depth
+LIGHT = 0.1  # change of the water's weight by the motion of its body that may be neglected in its waves, as a fraction
+WEIGHTLESS = "the water in {name} has no weight left at t = {when}; reduce the downward acceleration of its body"
+NONE = 1e-6  # fraction of the weight that counts as rounding
 RISE, LOSS = slice(0, 2), slice(2, 4)
 
 
 class Unfelt:
-    """How high water in modes rises, and by how much bodies that forces move take the weight of water away.
+    """Record of the wave height of sloshing modes and of the change of the water's weight by moving bodies.
 
-    Modes swing under gravity, cells under what driven joints make of it; what a free body adds is in no wave.
-    kept : float64[tanks, 4]  greatest rise as a share of the depth and when, greatest share of weight and when
+    Modes oscillate under gravity, cells under gravity and the motion of driven joints; the acceleration of a free body
+    is not in the waves.
+    kept : float64[tanks, 4]  greatest rise as a fraction of the depth and its time [s], greatest change of weight as a
+    fraction and its time [s]
     """
 
     def __init__(self, model) -> None:
@@ -36,23 +38,23 @@ class Unfelt:
         self.kept = np.zeros((len(self.tanks), 4))
 
     def look(self, t: float, y: np.ndarray) -> str:
-        """At a state; why the run has to stop, or nothing."""
+        """Check a state; returns the reason to stop the run, or ""."""
         if not self.tanks:
             return ""
         out = self.model.evaluate(t, y)[1]
-        for (name, modal, about, *lifting), kept in zip(self.tanks, self.kept, strict=True):
+        for (name, modal, about, *lifting), record in zip(self.tanks, self.kept, strict=True):
             if modal:
-                keep(kept[RISE], rise(y, *lifting), t)
-            felt, meant = self.weight(out, *about, modal)
-            if felt <= NONE * meant:
+                keep(record[RISE], rise(y, *lifting), t)
+            weight, reference = self.weight(out, *about, modal)
+            if weight <= NONE * reference:
                 return f"stopped: {WEIGHTLESS.format(name=name, when=self.model.case.amount(t, 'time', 6))}"
-            keep(kept[LOSS], abs(felt / meant - 1.0), t)
+            keep(record[LOSS], abs(weight / reference - 1.0), t)
         return ""
 
     def weight(
         self, out: np.ndarray, i: int, place: np.ndarray, normal: np.ndarray, modal: bool
     ) -> tuple[float, float]:
-        """What water weighs along the normal of its bed, and what its waves swing by [m/s2]."""
+        """(effective gravity along the normal of the bed, gravity that the waves use) [m/s2]."""
         from fvsolve.kernels.mechanism import room
         from fvsolve.kernels.records import BODY_OUT
 
@@ -60,46 +62,46 @@ class Unfelt:
         turn, gravity = row[room.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
         spin, arm, up = row[room.SPIN :][:3], turn @ place, turn @ normal
         down = np.cross(spin, np.cross(spin, arm)) + (0.0, 0.0, gravity)
-        felt, held = (
+        weight, reference = (
             up @ (row[a:][:3] + np.cross(row[b:][:3], arm) + down)
             for a, b in ((room.ACCELERATION, room.TURNING), (room.BIAS, room.SPIN_BIAS))
         )
-        return float(felt), gravity if modal else float(held)
+        return float(weight), gravity if modal else float(reference)
 
     def notices(self) -> list[Notice]:
-        """Waves that were not small, and weight that they did not feel."""
-        found, told = [], self.model.case.amount
-        for (name, *_), (high, when, lost, then) in zip(self.tanks, self.kept.tolist(), strict=True):
-            if high > SMALL:
-                text = f"{name}: at {told(when, 'time')} its water rises by {high:.2g} of its depth, and modes are "
-                text += 'linear; sloshing = "cells" knows great waves where water is shallow'
-                found.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", high, SMALL))
-            if lost > LIGHT:
-                text = f"{name}: at {told(then, 'time')} its body's rise or fall changes what its "
-                text += f"water weighs by {lost:.2g} of that, which its waves do not feel: they swing as if it did not"
-                found.append(Notice("weight", f"nodes.{name}", text, None, lost, LIGHT))
-        return found
+        """Notices for waves that were not small, and for changes of weight that the waves neglect."""
+        notices, amount = [], self.model.case.amount
+        for (name, *_), (height, rise_time, change, change_time) in zip(self.tanks, self.kept.tolist(), strict=True):
+            if height > SMALL:
+                text = f"{name}: at {amount(rise_time, 'time')} its water rises by {height:.2g} of its depth, but "
+                text += 'modes are linear; sloshing = "cells" computes high waves of shallow water'
+                notices.append(Notice("sloshing", f"nodes.{name}", text, "sloshing", height, SMALL))
+            if change > LIGHT:
+                text = f"{name}: at {amount(change_time, 'time')} the vertical acceleration of its body changes the "
+                text += f"weight of its water by a fraction of {change:.2g}, which its waves do not include"
+                notices.append(Notice("weight", f"nodes.{name}", text, None, change, LIGHT))
+        return notices
 
 
 def rises(model, name: str) -> tuple:
-    """Of water in modes: its states, their values at the start, by what share of the depth each lifts it, its shape."""
+    """(states of the sloshing modes, initial values, rise of each in units of the depth, True for a round tank)."""
     case = model.case
     basin, mesh = case.nodes[name], case.lumped[name]
-    every = sloshing.made(basin, mesh, case.properties.density, case.gravity)
-    rows = [model.tables.bodies[model.body_names.index(sloshing.slider(name, one))] for one in every]
-    lifts = np.zeros((2, len(every)))
-    lifts[[one.along for one in every], range(len(every))] = [one.rise for one in every]
+    modes = sloshing.made(basin, mesh, case.properties.density, case.gravity)
+    rows = [model.tables.bodies[model.body_names.index(sloshing.slider(name, mode))] for mode in modes]
+    lifts = np.zeros((2, len(modes)))
+    lifts[[mode.along for mode in modes], range(len(modes))] = [mode.rise for mode in modes]
     at, start = [int(row["y"]) for row in rows], np.array([row["start"][0] for row in rows])
     return np.array(at), start, lifts / sloshing.depth_of(basin, mesh), sloshing.outline_of(mesh).is_round
 
 
 def rise(y: np.ndarray, at: np.ndarray, start: np.ndarray, lifts: np.ndarray, is_round: bool) -> float:
-    """How far water rises at most, as a share of its depth."""
+    """Greatest rise of the water, as a fraction of its depth."""
     along, across = np.abs(lifts @ (start + y[at]))
     return float(np.hypot(along, across)) if is_round else float(along + across)
 
 
-def keep(kept: np.ndarray, value: float, t: float) -> None:
-    """Note what is greater than before."""
-    if value > kept[0]:
-        kept[:] = value, t
+def keep(record: np.ndarray, value: float, t: float) -> None:
+    """Store a value and its time if the value is greater than before."""
+    if value > record[0]:
+        record[:] = value, t

@@ -1,4 +1,4 @@
-"""Runge-Kutta methods as data, what is known of them, the loops that step them. Knows arrays and time; no physics."""
+"""Runge-Kutta methods as data, their properties, and the compiled time loop that steps them."""
 
 from fvsolve.names import offer
 from fvsolve.steppers import methods  # noqa: F401  (declares them)

@@ -1,7 +1,4 @@
-"""`auto`: explicit steps while the spectrum allows them, implicit ones where stiffness makes those cheaper.
-
-Knows which two methods, what their steps cost and how to say why one gave way to the other.
-"""
+"""Method `auto`: explicit steps while stability allows them, implicit steps where stiffness makes those cheaper."""
 
 from __future__ import annotations
 
@@ -12,56 +9,60 @@ from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import method_named
 
 EXPLICIT, IMPLICIT, TIGHT = "dormand-prince", "rodas-5p", "radau-iia-5"
-TIGHT_BELOW = 1e-6  # rtol from which on TIGHT costs less: `benchmarks/stiff.py auto`
-DENSE, SPARSE = 0.05, 40.0  # factors and solves of a step in calls of rhs: per state squared; whatever the size
+TIGHT_BELOW = 1e-6  # rtol below which TIGHT costs less: `benchmarks/stiff.py auto`
+# Cost of factorisation and solves of a step, in rhs calls: DENSE times the number of states squared; SPARSE in total.
+DENSE, SPARSE = 0.05, 40.0
 
 
 def first_method(name: str) -> str:
-    """The method that a run by `name` begins with."""
+    """Name of the method with which a run by method `name` begins."""
     return EXPLICIT if name == AUTO else name
 
 
 def implicit_method(rtol: float) -> str:
-    """Name of the implicit method of a run: near zero drop a linearised step goes to and fro, Newton does not."""
+    """Name of the implicit method for a tolerance.
+
+    Near zero pressure drop linearly implicit steps oscillate; Newton iterations do not.
+    """
     return IMPLICIT if rtol >= TIGHT_BELOW else TIGHT
 
 
 def price(structure: Structure) -> float:
-    """What an implicit step costs in explicit ones: Jacobian, stages, factor and solves, counted in calls of rhs."""
+    """Cost of an implicit step in explicit steps: Jacobian, stages, factorisation and solves, counted in rhs calls."""
     implicit, explicit = method_named(IMPLICIT), method_named(EXPLICIT)
     algebra = DENSE * structure.n**2 if structure.kind == "dense" else SPARSE
     return (structure.color_count + implicit.stages + 1 + algebra) / (explicit.stages - 1)
 
 
 def watch(stepper: Stepper, structure: Structure) -> None:
-    """Have the loop watch stiffness."""
+    """Switch on the stiffness test of the time loop."""
     stepper.orders[slots.WATCH], stepper.orders[slots.PRICE] = 1.0, price(structure)
 
 
 def wants_change(stepper: Stepper) -> bool:
-    """Whether the loop came back because the other kind of step would be cheaper."""
+    """True if the loop returned because the other kind of method would be cheaper."""
     return stepper.memory[slots.CASES] < 0.0
 
 
 def change(stepper: Stepper) -> tuple[float, float, float]:
-    """Go on by the other method; returns when, with which spectral radius [1/s] and after which step [s]."""
-    memory = stepper.memory
+    """Switch to the other method; returns time [s], spectral radius [1/s] and last step [s] at the switch."""
+    loop_state = stepper.memory
     implicit = implicit_method(stepper.orders[slots.SIZE])
     stepper.use(method_named(implicit if stepper.method.explicit else EXPLICIT))
-    memory[slots.SWITCHES] += 1.0
-    memory[slots.CASES] = 0.0
-    return float(memory[slots.T]), float(memory[slots.RADIUS]), float(memory[slots.LAST])
+    loop_state[slots.SWITCHES] += 1.0
+    loop_state[slots.CASES] = 0.0
+    return float(loop_state[slots.T]), float(loop_state[slots.RADIUS]), float(loop_state[slots.LAST])
 
 
 def account(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:
-    """Which method from when on, and why."""
-    found = [{"time": start, "method": EXPLICIT, "why": "until the spectrum forbids it"}]
+    """List the methods used: start time, method, reason."""
+    entries = [{"time": start, "method": EXPLICIT, "why": "until stability limits the explicit steps"}]
     for k, (t, radius, h) in enumerate(changes):
         if k % 2 == 0:
-            why = (f"stability held explicit steps to {h:.3g} s"
+            reason = (f"stability limited explicit steps to {h:.3g} s"
                    + (f", at rates of about {radius:.3g} 1/s" if radius > 0 else "")
-                   + f"; an implicit step costs about {price:.2g} of them")  # fmt: skip
+                   + f"; an implicit step costs about {price:.2g} explicit steps")  # fmt: skip
         else:
-            why = f"rates of about {radius:.3g} 1/s allow explicit steps near {h:.3g} s again"
-        found.append({"time": t, "method": EXPLICIT if k % 2 else implicit_method(rtol), "why": why})
-    return found
+            reason = f"rates of about {radius:.3g} 1/s allow explicit steps near {h:.3g} s again"
+        entries.append({"time": t, "method": EXPLICIT if k % 2 else implicit_method(rtol), "why": reason})
+    return entries

@@ -1,7 +1,8 @@
-"""A method's Butcher array as the compiled steps read it: one flat array. Knows no time loop.
+"""Butcher array of a method as one flat array that the compiled steps read.
 
-[A (s x s), b, c, error] and, for implicit methods, what their Newton iterations need (`newton.py`, `irk.py`).
-An implicit method gets the derivative at the start of the step as a first stage of weight zero, where it has none.
+[A (s x s), b, c, error] and, for implicit methods, the data of their Newton iterations (`newton.py`, `irk.py`).
+An implicit method whose first stage is not f at the start of the step gets that derivative as an extra first stage of
+weight zero.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from fvsolve.steppers.transform import transformed
 
 @functools.cache
 def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.ndarray, int]:
-    """(flat coefficients, dense output : float64[s, d], stages s), the start as an explicit stage included.
+    """(flat coefficients, dense output : float64[s, d], number of stages s), including the start as an explicit stage.
 
-    damped : for `semi_implicit`, which keeps rates at the start beside those of its first stage
+    damped : for `semi_implicit`, which stores the rates at the start in addition to those of its first stage
+    Raises FvsolveError where A, without an explicit first stage, is singular or has no basis of eigenvectors.
     """
     if method.kind == "linear":
         return method.coefficients
@@ -35,18 +37,20 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
         try:
             flat.append(transformed(a[1:, 1:], c[1:], a[1:, 0]))
         except (np.linalg.LinAlgError, ValueError):
-            raise FvsolveError(f"{method.name} cannot be stepped: A, less an explicit first stage, has no inverse with "
-                               "a basis of eigenvectors; diagonally implicit arrays need none") from None  # fmt: skip
+            raise FvsolveError(
+                f"{method.name} cannot be used for steps: A without its explicit first stage is singular or has no "
+                "basis of eigenvectors. Expected an invertible, diagonalisable A, or a diagonally implicit array"
+            ) from None
     flat.append(bent(method))
     flat.append([flat[-1].size])
     return np.concatenate(flat), np.ascontiguousarray(dense), len(b)
 
 
 def bent(method: Method) -> np.ndarray:
-    """[weights of the stages in p'(0), psi] of a collocation polynomial p that ends in a stage; empty for others.
+    """[weights of stages in p'(0), psi] of a collocation polynomial p whose last node is the step's end; else empty.
 
-    p + h psi(theta) (f - p'(0)), psi = int prod (x - c_i) / prod (-c_i), has the slope f at the start, of which p says
-    nothing, the same slopes at the stages, and, as psi(1) = 0 from two stages on, the same end: one order more.
+    p + h psi(theta) (f - p'(0)), psi = int prod (x - c_i) / prod (-c_i), has the slope f at the start, which p does not
+    match. Slopes at the stages are unchanged, and as psi(1) = 0 from two stages on, so is the end: one order more.
     """
     c, dense = method.c, method.dense
     if method.kind != "full" or not dense.size or not method.stiffly_accurate or c[0] == 0.0:
@@ -57,7 +61,7 @@ def bent(method: Method) -> np.ndarray:
 
 @njit(inline="always")
 def bend_of(coefficients, s):
-    """What `bent` gives."""
+    """Read the result of `start_slope_correction` from the flat coefficients."""
     last = coefficients.size - 1
     return coefficients[last - int(coefficients[last]) : last]
 
@@ -70,17 +74,17 @@ def row_of(coefficients, s, i):
 
 @njit(inline="always")
 def weights_of(coefficients, s):
-    """b."""
+    """Weights b."""
     return coefficients[s * s : s * s + s]
 
 
 @njit(inline="always")
 def nodes_of(coefficients, s):
-    """c."""
+    """Nodes c."""
     return coefficients[s * s + s : s * s + 2 * s]
 
 
 @njit(inline="always")
 def error_of(coefficients, s):
-    """Weights of the error estimate; zeros where there is none."""
+    """Weights of the error estimate; zeros for a method without one."""
     return coefficients[s * s + 2 * s : s * s + 3 * s]

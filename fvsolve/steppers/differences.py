@@ -1,28 +1,30 @@
-"""A Jacobian by differences, a colour at a time, and its product with a vector. Knows a pattern; knows no physics."""
+"""Jacobian by finite differences, one colour of columns at a time, and its product with a vector."""
 
 from fvsolve.jit import njit
 from fvsolve.steppers.structure import COLOR_COLUMNS, COLOR_STARTS, COLORS, FINE, LEDGERS, ROWS, SIZE, STARTS
 
-ROOT = 2.0**-26  # the root of the rounding of a float64
-LEAST = 2.0**-34  # of |y| where laws bend over few pascals: 1e-3 Pa of 150 bar, whose rounding is 2e-9
+ROOT = 2.0**-26  # square root of the rounding error of a float64
+# Relative increment of states whose laws are curved over few pascals: 1e-3 Pa at 150 bar, whose rounding is 2e-9 Pa.
+LEAST = 2.0**-34
 
 
 @njit(forceinline=True)
-def differences(rhs, handle, shape, where, t, y, f, supply0, scale, y_work, f_work, out, jacobian):
-    """jacobian <- d(f, supply)/dy by one-sided differences; returns the number of calls of rhs.
+def differences(rhs, handle, structure, ledger_offset, t, y, f, rates0, scale, y_work, f_work, out, jacobian):
+    """jacobian <- d(f, ledger rates)/dy by one-sided differences; returns the number of rhs calls.
 
-    f, supply0 : float64[n], float64[m]  f(t, y) and out[where : where + m] at y, fresh: not a stage's derivative
-    scale : float64[n]  what counts as a small deviation is measured against; the increment is 2^-26 max(|y|, scale),
-    with 2^-34 |y| where the structure says fine
+    f, rates0 : float64[n], float64[m]  f(t, y) and out[ledger_offset : ledger_offset + m] at y, freshly evaluated, not
+    a stage derivative
+    scale : float64[n]  magnitude of a small deviation; the increment is 2^-26 max(|y|, scale), with 2^-34 |y| for
+    states marked fine in the structure
     jacobian : float64[nnz]  in the order of the pattern, column by column
     """
-    n = shape[SIZE]
-    starts, rows = shape[shape[STARTS] :], shape[shape[ROWS] :]
-    color_starts, columns = shape[shape[COLOR_STARTS] :], shape[shape[COLOR_COLUMNS] :]
-    fine = shape[shape[FINE] :]
+    n = structure[SIZE]
+    starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
+    color_starts, columns = structure[structure[COLOR_STARTS] :], structure[structure[COLOR_COLUMNS] :]
+    fine = structure[structure[FINE] :]
     for j in range(n):
         y_work[j] = y[j]
-    for color in range(shape[COLORS]):
+    for color in range(structure[COLORS]):
         for e in range(color_starts[color], color_starts[color + 1]):
             j = columns[e]
             if scale[j] < 0.0:
@@ -32,21 +34,21 @@ def differences(rhs, handle, shape, where, t, y, f, supply0, scale, y_work, f_wo
         rhs(t, y_work, f_work, out, handle)
         for e in range(color_starts[color], color_starts[color + 1]):
             j = columns[e]
-            per = 1.0 / (y_work[j] - y[j])  # what the sum has kept of the increment
+            per = 1.0 / (y_work[j] - y[j])  # the increment as rounded in the sum
             for p in range(starts[j], starts[j + 1]):
                 i = rows[p]
-                change = f_work[i] - f[i] if i < n else out[where + i - n] - supply0[i - n]
+                change = f_work[i] - f[i] if i < n else out[ledger_offset + i - n] - rates0[i - n]
                 jacobian[p] = change * per
             y_work[j] = y[j]
-    return shape[COLORS]
+    return structure[COLORS]
 
 
 @njit
-def multiply(shape, jacobian, x, product):
-    """product <- J x : float64[n + m], states then ledger rows."""
-    n = shape[SIZE]
-    starts, rows = shape[shape[STARTS] :], shape[shape[ROWS] :]
-    for i in range(n + shape[LEDGERS]):
+def multiply(structure, jacobian, x, product):
+    """product <- J x : float64[n + m], rows of states, then ledger rows."""
+    n = structure[SIZE]
+    starts, rows = structure[structure[STARTS] :], structure[structure[ROWS] :]
+    for i in range(n + structure[LEDGERS]):
         product[i] = 0.0
     for j in range(n):
         for p in range(starts[j], starts[j + 1]):

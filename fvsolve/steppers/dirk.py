@@ -1,4 +1,4 @@
-"""One diagonally implicit Runge-Kutta step, its stages solved in turn by simplified Newton. Knows arrays."""
+"""One diagonally implicit Runge-Kutta step; simplified Newton solves one stage after another."""
 
 from __future__ import annotations
 
@@ -48,9 +48,10 @@ from fvsolve.steppers.structure import STARTS
 
 @inner
 def predict(b, c, x, first, vectors, k):
-    """k <- slope at x last steps beyond the last one's end, by the parabola through its ends and the slope at its end.
+    """k <- predicted slope at x last steps beyond the end of the last step.
 
-    That slope is the last stage's where it lies there, else f: a stiff f magnifies what Newton left.
+    The prediction is a parabola through both ends of the last step with the slope at its end. That slope is the slope
+    of the last stage if c_s = 1, else f: re-evaluating a stiff f would amplify the Newton residual.
     """
     s, n = b.size, k.size
     slopes = vectors[s - 1] if c[s - 1] == 1.0 else first
@@ -65,113 +66,115 @@ def predict(b, c, x, first, vectors, k):
 
 @inner
 def solve_stage(
-    rhs, solve, handle, shape, t, h_gamma, i, k, y_stage, supply, where, out, orders, memory, nnz, work, vectors, store
+    rhs, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, controls, loop_state,
+    nnz, work, vectors, factors
 ):  # fmt: skip
-    """k[i] = f(t, base + h gamma k[i]) by Newton; returns CONVERGED or FAILED.
+    """Solve k[i] = f(t, base + h gamma k[i]) by Newton; returns CONVERGED or FAILED.
 
-    With its last increment d the stage is f + J d, to the bit: what is conserved by f and J is conserved.
+    The stored stage is f + J d with the last increment d, to the bit: quantities that f and J conserve are conserved.
     """
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
-    before, why, shift, ki = 0.0, FAILED, 1.0 / h_gamma, k[i]
+    before, status, shift, ki = 0.0, FAILED, 1.0 / h_gamma, k[i]
     for turn in range(MOST):
-        evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
-        solve(shape, store, d)
+        evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, d)
+        solve(structure, factors, d)
         for j in range(n):
             ki[j] += shift * d[j]
         size = sqrt(size_of(d, weights) / max(n, 1))
-        done, why = verdict(turn, size, before, orders, work)
+        done, status = verdict(turn, size, before, controls, work)
         before = size
         if done:
             break
-    if why == FAILED:
-        find_worst(d, f, weights, memory)
-    elif supply.shape[1] > 0:
-        for m in range(supply.shape[1]):
-            supply[i, m] = out[where + m]
-        book_increment(shape, nnz, d, supply, i, work)
-    return why
+    if status == FAILED:
+        find_worst(d, f, weights, loop_state)
+    elif ledger_rates.shape[1] > 0:
+        for m in range(ledger_rates.shape[1]):
+            ledger_rates[i, m] = out[ledger_offset + m]
+        book_increment(structure, nnz, d, ledger_rates, i, work)
+    return status
 
 
 @inner
 def try_stages(
-    rhs, factor, solve, handle, coefficients, shape, t, h, y, y_stage, k, supply, where, out, scale, orders, memory,
-    nnz, work, vectors, store,
+    rhs, factor, solve, handle, coefficients, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out, scale,
+    controls, loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
-    """All stages in turn with the Jacobian at hand, damped where it is fresh; returns CONVERGED or FAILED."""
-    s, fresh = k.shape[0], work[MADE] == memory[STEPS]
+    """Solve all stages with the current Jacobian, with damping where it is fresh; returns CONVERGED or FAILED."""
+    s, fresh = k.shape[0], work[MADE] == loop_state[STEPS]
     c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
     for i in range(1, s):
         row = row_of(coefficients, s, i)
         combine(0, y.size, y, h, row, i, k, base)
         if row[i] == 0.0:
             rhs(t + c[i] * h, base, k[i], out, handle)
-            memory[CALLS] += 1.0
-            for m in range(supply.shape[1]):
-                supply[i, m] = out[where + m]
+            loop_state[CALLS] += 1.0
+            for m in range(ledger_rates.shape[1]):
+                ledger_rates[i, m] = out[ledger_offset + m]
             continue
         shift = 1.0 / (h * row[i])
         if work[SHIFT] != shift:
-            memory[FACTORS] += 0.0 if work[SHIFT] == -shift else 1.0
+            loop_state[FACTORS] += 0.0 if work[SHIFT] == -shift else 1.0
             work[SHIFT] = 0.0
-            if factor(shape, work[HEADER:], shift, store) != 0:
+            if factor(structure, work[HEADER:], shift, factors) != 0:
                 return FAILED
             work[SHIFT] = shift
         if work[KNOWN] > 0.0:
-            predict(b, c, c[i] * h / memory[LAST], k[0], vectors, k[i])
+            predict(b, c, c[i] * h / loop_state[LAST], k[0], vectors, k[i])
         else:
             for j in range(y.size):
                 k[i, j] = k[i - 1, j]
-        why = solve_stage(
-            rhs, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y_stage, supply, where, out, orders, memory,
-            nnz, work, vectors, store,
+        status = solve_stage(
+            rhs, solve, handle, structure, t + c[i] * h, h * row[i], i, k, y_stage, ledger_rates, ledger_offset, out,
+            controls, loop_state, nnz, work, vectors, factors,
         )  # fmt: skip
-        if why == FAILED and fresh:
-            if orders[CONTROL] == TOLERANCE:
+        if status == FAILED and fresh:
+            if controls[CONTROL] == TOLERANCE:
                 for j in range(y.size):
                     k[i, j] = shift * (y[j] - base[j])
-            why = reach(
-                rhs, factor, solve, handle, shape, t + c[i] * h, h * row[i], i, k, y, y_stage, supply, where, out,
-                scale, orders, memory, nnz, work, vectors, store,
+            status = reach(
+                rhs, factor, solve, handle, structure, t + c[i] * h, h * row[i], i, k, y, y_stage, ledger_rates,
+                ledger_offset, out, scale, controls, loop_state, nnz, work, vectors, factors,
             )  # fmt: skip
-        if why == FAILED:
+        if status == FAILED:
             return FAILED
     return CONVERGED
 
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
-    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
+    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
+    """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    Of the linear algebra the real part is used. Returns NEWTON_FAILED where a fresh Jacobian does not help.
+    Uses the real part of the linear algebra. Returns NEWTON_FAILED where a fresh Jacobian does not help.
     """
     s = k.shape[0]
-    nnz = shape[shape[STARTS] + shape[STATES]]
-    begin(k, y[now], scale, orders, memory, work, vectors)
+    nnz = structure[structure[STARTS] + structure[STATES]]
+    begin(k, y[now], scale, controls, loop_state, work, vectors)
     while True:
         if work[HAS] == 0.0:
             renew(
-                rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
-                vectors[s + RATE],
+                rhs, handle, structure, ledger_offset, t, y[now], k[0], ledger_rates[0], scale, out, loop_state, work,
+                vectors[s + MOVED], vectors[s + RATE],
             )  # fmt: skip
-        why = try_stages(
-            rhs, factor, solve, handle, coefficients, shape, t, h, y[now], y[3], k, supply, where, out, scale, orders,
-            memory, nnz, work, vectors, store,
+        status = try_stages(
+            rhs, factor, solve, handle, coefficients, structure, t, h, y[now], y[3], k, ledger_rates, ledger_offset,
+            out, scale, controls, loop_state, nnz, work, vectors, factors,
         )  # fmt: skip
-        if why == CONVERGED:
+        if status == CONVERGED:
             break
-        if work[MADE] == memory[STEPS]:
+        if work[MADE] == loop_state[STEPS]:
             return NEWTON_FAILED
         work[HAS] = 0.0
     combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
-    if orders[CONTROL] != TOLERANCE:
+    if controls[CONTROL] != TOLERANCE:
         return 0.0
-    if work[DAMPED] == memory[STEPS]:
+    if work[DAMPED] == loop_state[STEPS]:
         return smoothed_error(
-            rhs, factor, solve, handle, shape, where, t, h, y[now], y[new], k, supply, error_of(coefficients, s),
-            1.0 / (h * row_of(coefficients, s, s - 1)[s - 1]), scale, out, orders, memory, work, vectors, store,
+            rhs, factor, solve, handle, structure, ledger_offset, t, h, y[now], y[new], k, ledger_rates,
+            error_of(coefficients, s), 1.0 / (h * row_of(coefficients, s, s - 1)[s - 1]), scale, out, controls,
+            loop_state, work, vectors, factors,
         )  # fmt: skip
-    return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])
+    return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, controls[SIZE])

@@ -1,4 +1,4 @@
-"""One explicit Runge-Kutta step (14). Knows arrays; controls nothing."""
+"""One explicit Runge-Kutta step (14)."""
 
 from math import sqrt
 
@@ -22,40 +22,43 @@ def quotient(f_new, f, y_new, y, scale):
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
-    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
+    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
+    """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    supply[i] keeps the ledger rates of stage i. shape : what is formed beside rates, see `kernels.sums`; what else
-    implicit methods need is not looked at.
+    ledger_rates[i] receives the ledger rates of stage i.
+    structure : stage sums that rhs forms in blocks, see `kernels.sums`; empty where it forms none
+    The other arguments of implicit steps are not used.
     """
     s, b = k.shape[0], weights_of(coefficients, k.shape[0])
-    c, last_is_new, formed = nodes_of(coefficients, s), orders[FSAL] == 1.0, shape.size > 0
+    c, last_is_new, blocked = nodes_of(coefficients, s), controls[FSAL] == 1.0, structure.size > 0
     for i in range(1, s):
         last, row = i == s - 1, row_of(coefficients, s, i)
-        target = y[new] if last and (last_is_new or formed) else y[3]
-        if formed:
-            sum_runs(shape, 0, shape[OTHERS] + shape[LOOKED] + shape[EDGES], y[now], h, row, i, k, target)
-            ask(shape, BOTH if last and not last_is_new else AHEAD, y[now], h, row, i, k, target, b)
+        target = y[new] if last and (last_is_new or blocked) else y[3]
+        if blocked:
+            sum_runs(
+                structure, 0, structure[OTHERS] + structure[LOOKED] + structure[EDGES], y[now], h, row, i, k, target
+            )
+            ask(structure, BOTH if last and not last_is_new else AHEAD, y[now], h, row, i, k, target, b)
         else:
-            for m in range(spans.shape[0]):
-                combine(spans[m, BEGIN], spans[m, STOP], y[now], h, row, i, k, target)
+            for m in range(row_blocks.shape[0]):
+                combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, row, i, k, target)
         rhs(t + c[i] * h, target, k[i], out, handle)
-        if formed:
-            shape[MODE] = OFF
-        for m in range(supply.shape[1]):
-            supply[i, m] = out[where + m]
-    if formed and s > 1 and not last_is_new:
-        sum_runs(shape, 0, shape[OTHERS] + shape[LOOKED], y[now], h, b, s, k, y[new])
+        if blocked:
+            structure[MODE] = OFF
+        for m in range(ledger_rates.shape[1]):
+            ledger_rates[i, m] = out[ledger_offset + m]
+    if blocked and s > 1 and not last_is_new:
+        sum_runs(structure, 0, structure[OTHERS] + structure[LOOKED], y[now], h, b, s, k, y[new])
     elif not last_is_new:
-        for m in range(spans.shape[0]):
-            combine(spans[m, BEGIN], spans[m, STOP], y[now], h, b, s, k, y[new])
-    memory[CALLS] += s - 1.0
-    if orders[WATCH] != 0.0:
-        memory[RADIUS] = quotient(k[s - 1], k[s - 2], y[new], y[3], scale)
-    if orders[CONTROL] != TOLERANCE:
+        for m in range(row_blocks.shape[0]):
+            combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, b, s, k, y[new])
+    loop_state[CALLS] += s - 1.0
+    if controls[WATCH] != 0.0:
+        loop_state[RADIUS] = quotient(k[s - 1], k[s - 2], y[new], y[3], scale)
+    if controls[CONTROL] != TOLERANCE:
         return 0.0
     return error_of_bands(
-        join, handle, spans, sums, h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE]
+        join, handle, row_blocks, sums, h, error_of(coefficients, s), k, y[now], y[new], scale, controls[SIZE]
     )

@@ -1,17 +1,17 @@
-"""Events: functions that fall through zero, and the step that ends there. Knows no model."""
+"""Event functions that fall through zero, and the search for the step that ends at an event."""
 
 from fvsolve.jit import njit
 from fvsolve.steppers.slots import CONTROL, KIND, NEWTON_FAILED, NEWTON_SOLVED, STEP, TOLERANCE, T
 
 EVENT_TOLERANCE = 1e-13
-JUMP = 1e-6  # share of an event function, and of a given step: what is less is no jump, and not looked at
+JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
 
 
 @njit(forceinline=True)
 def arm(g, armed):
-    """Note which event functions are at or below zero, where the rhs follows another rule.
+    """Set the flag of every event function at or below zero, where the rhs is in its switched state.
 
-    Only accepted states are asked, so no step, not even its stages beyond an event, meets the change of rule.
+    Only accepted states set flags, so the rhs does not switch within a step, not even in stages beyond an event.
     """
     for i in range(g.size):
         armed[i] = 1.0 if g[i] <= 0.0 else 0.0
@@ -19,7 +19,7 @@ def arm(g, armed):
 
 @njit(forceinline=True)
 def turned(g, armed):
-    """Whether an event function has crossed zero since it was armed."""
+    """True if an event function has crossed zero since its flag was set."""
     for i in range(g.size):
         if (g[i] <= 0.0) != (armed[i] > 0.0):
             return True
@@ -28,7 +28,7 @@ def turned(g, armed):
 
 @njit(forceinline=True)
 def fallen(g, g_new):
-    """Whether an event function went from above to zero or below."""
+    """True if an event function went from above zero to zero or below."""
     for i in range(g.size):
         if g[i] > 0.0 and g_new[i] <= 0.0:
             return True
@@ -37,7 +37,7 @@ def fallen(g, g_new):
 
 @njit(forceinline=True)
 def nearness(g, g_new):
-    """Least share of its value that an event function has kept over the step: 1 at its start, 0 at an event."""
+    """Least ratio of new to old value of the event functions: 1 at the start of the step, 0 at an event."""
     share = 1.0
     for i in range(g.size):
         if g[i] > 0.0:
@@ -47,15 +47,17 @@ def nearness(g, g_new):
 
 @njit
 def locate(
-    attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle, coefficients, shape, spans, sums,
-    h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex, g, g_new, e,
+    attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle, coefficients, structure,
+    row_blocks, sums, h, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
+    factors, complex_factors, g, g_new, e,
 ):  # fmt: skip
-    """(length, error) of the step that ends just past the first event, by the Illinois rule; y[new] belongs to it.
+    """(length, error) of the step that ends just past the first event, by the Illinois rule; y[new] is its end.
 
-    h, e : those of the step that passes it. The error is NEWTON_FAILED where a stage on the way could not be solved, or
-    the end of a given step jumps across the event: its stages have several solutions, those of a shorter step one.
+    h, e : length and error of the step that passes the event
+    The error is NEWTON_FAILED where a stage could not be solved, or where a given step jumps across the event: then its
+    stages have several solutions, those of a shorter step only one.
     """
-    t, low, high, at_low, past = memory[T], 0.0, h, 1.0, nearness(g, g_new)
+    t, low, high, at_low, past = loop_state[T], 0.0, h, 1.0, nearness(g, g_new)
     guess, at_high, side = h, past, 0
     for turn in range(101):
         done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
@@ -68,8 +70,9 @@ def locate(
         if done:
             guess = high
         e = attempt(
-            rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, guess,
-            y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+            rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums,
+            t, guess, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
+            factors, complex_factors,
         )  # fmt: skip
         if e == NEWTON_FAILED:
             break
@@ -83,7 +86,7 @@ def locate(
         else:
             low, at_low = guess, here
             at_high, side = 0.5 * at_high if side < 0 else at_high, -1
-    given = orders[KIND] == NEWTON_SOLVED and orders[CONTROL] != TOLERANCE
-    if given and past < -JUMP and high > JUMP * memory[STEP]:
+    fixed = controls[KIND] == NEWTON_SOLVED and controls[CONTROL] != TOLERANCE
+    if fixed and past < -JUMP and high > JUMP * loop_state[STEP]:
         e = NEWTON_FAILED
     return high, e

@@ -1,4 +1,4 @@
-"""Explicit Runge-Kutta methods, each as its source prints it. Knows no time loop."""
+"""Tableaux of explicit Runge-Kutta methods, each as printed in its source."""
 
 from fvsolve.steppers.tableau import declare
 

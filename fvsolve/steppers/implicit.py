@@ -1,4 +1,4 @@
-"""Implicit Runge-Kutta methods, each as its source prints it. Knows no time loop."""
+"""Tableaux of implicit Runge-Kutta methods, each as printed in its source."""
 
 from fvsolve.steppers.tableau import declare
 
@@ -155,7 +155,7 @@ declare(
     start_weight="0.2748888295956773677478286035994147792946",
 )
 
-# In 40 digits from the roots of Radau's polynomial; the weight of f(t, y) is the real eigenvalue of A.
+# Computed to 40 digits from the roots of Radau's polynomial; the weight of f(t, y) is the real eigenvalue of A.
 declare(
     "radau-iia-9",
     source="Ehle 1969; Hairer and Wanner 1999; to 40 digits",
@@ -280,7 +280,7 @@ declare(
 """,
 )
 
-# Kennedy and Carpenter print fractions that hold to 25 digits and more; a_i1 = a_i2.
+# Kennedy and Carpenter print fractions accurate to 25 digits or more; a_i1 = a_i2.
 declare(
     "esdirk-5",
     source="Kennedy and Carpenter 2019, ESDIRK5(4)7L[2]SA2",

@@ -1,10 +1,10 @@
-"""One fully implicit Runge-Kutta step, all stages at once by simplified Newton. Knows arrays; controls nothing.
+"""One fully implicit Runge-Kutta step; simplified Newton solves all stages together.
 
 Z are the increments of the q stages and K = (h A)^-1 (Z - h a_0 k_0) their slopes, with a_0 the weights of an explicit
 first stage. A^-1 = T L T^-1, L block diagonal with a real shift for every real eigenvalue and a complex one for every
 pair (Butcher 1976; Hairer and Wanner 1996, IV.8). With W = T^-1 Z Newton solves
 (L / h x I - I x J) dW = T^-1 (F - K), block by block.
-Where one Jacobian does not do for all stages, `sweeps.py` solves them in turn.
+Where a single Jacobian is not sufficient for all stages, `stage_sweeps.py` solves the stages one after another.
 """
 
 from __future__ import annotations
@@ -63,28 +63,29 @@ from fvsolve.steppers.tableau import Method
 
 # Matrices q x q behind the Butcher array (`coefficients.py`), and last T^-1 A^-1 a_0 and A^-1 a_0.
 T, BACK, BLOCKS, SLOPES, AHEAD, LOWER, START = range(7)
-# Rows of `vectors` for all stages, from STAGES on, q at a time: W, F, residuals and what solves them.
+# Rows of `vectors` for all stages, from STAGES on, q rows each: W, F, and the residuals, replaced by the solution dW.
 W, F, R = range(3)
-NEAR = (-0.1, -1e-2, -1e-3, -1e-4)  # where before a kink, in shares of the step to it, a step is looked at once more
-PLAIN = 1e-2  # of a defect there counts: what Newton leaves and the method errs is below a hundred tolerances
+NEAR = (-0.1, -1e-2, -1e-3, -1e-4)  # points before a kink, in steps from it, where the defect is checked
+# Weight of that defect in the error: Newton residual and method error contribute less than a hundred tolerances.
+PLAIN = 1e-2
 
 
 @functools.cache
 def pairs_of(method: Method) -> int:
-    """Number of complex pairs among the eigenvalues of A^-1."""
+    """Number of complex conjugate pairs among the eigenvalues of A^-1."""
     a = method.a[1:, 1:] if not method.a[0].any() else method.a
     return int(np.count_nonzero(np.linalg.eigvals(a).imag > 0))
 
 
 @njit(inline="always")
-def matrix(coefficients, s, which):
-    """One of the matrices of `transformed`, flat, and what follows it."""
-    return coefficients[s * s + 3 * s + which * (s - 1) * (s - 1) :]
+def matrix(coefficients, s, index):
+    """Read a matrix of `newton_transform`, flat, with everything stored behind it."""
+    return coefficients[s * s + 3 * s + index * (s - 1) * (s - 1) :]
 
 
 @njit
-def blend(keep, base, m, at, q, first, vectors, target):
-    """target = keep base + sum of m[at + j] vectors[first + j] over j < q; three terms a pass."""
+def blend(base_weight, base, m, at, q, first, vectors, target):
+    """target = base_weight base + sum of m[at + j] vectors[first + j] over j < q, three terms a pass."""
     n = target.size
     for j in range(0, q, 3):
         v0, v1, v2 = vectors[first + j], vectors[first + min(j + 1, q - 1)], vectors[first + min(j + 2, q - 1)]
@@ -94,16 +95,16 @@ def blend(keep, base, m, at, q, first, vectors, target):
                 target[e] += c0 * v0[e] + (c1 * v1[e] + c2 * v2[e])
         else:
             for e in range(n):
-                target[e] = keep * base[e] + (c0 * v0[e] + (c1 * v1[e] + c2 * v2[e]))
+                target[e] = base_weight * base[e] + (c0 * v0[e] + (c1 * v1[e] + c2 * v2[e]))
 
 
 @inner
-def predict(coefficients, h, h_last, s, room, vectors):
-    """W <- T^-1 of the increments that the last step's slopes promise for this step's stages; room : float64[q q]."""
+def predict(coefficients, h, h_last, s, buffer, vectors):
+    """W <- T^-1 of the stage increments extrapolated from the slopes of the last step; buffer : float64[q q]."""
     q, c = s - 1, nodes_of(coefficients, s)
     back, ahead = matrix(coefficients, s, BACK), matrix(coefficients, s, AHEAD)
     for e in range(q * q):
-        room[e] = 0.0
+        buffer[e] = 0.0
     for k in range(q):
         x = c[k + 1] * h / h_last
         for j in range(q):
@@ -111,69 +112,72 @@ def predict(coefficients, h, h_last, s, room, vectors):
             for d in range(q - 1, -1, -1):
                 w = (w + ahead[j * q + d]) * x
             for i in range(q):
-                room[i * q + j] += back[i * q + k] * w * h_last
+                buffer[i * q + j] += back[i * q + k] * w * h_last
     for i in range(q):
-        blend(0.0, vectors[s + WEIGHTS], room, i * q, q, 1, vectors, vectors[s + STAGES + i])
+        blend(0.0, vectors[s + WEIGHTS], buffer, i * q, q, 1, vectors, vectors[s + STAGES + i])
 
 
 @inner
-def factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n):
-    """Factors for every block of L / h behind one another; how many they are, or 0 without a pivot."""
-    q, blocks, b, real, pair, made = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
+def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, factors, complex_factors, n):
+    """Factor every block of L / h and store the factors one after another; returns their number, 0 if a pivot fails."""
+    q, blocks, b, real, pair, count = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
     jacobian, size = work[HEADER:], int(work[STORE])
     while b < q:
         shift = blocks[b * q + b] / h
         if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
-            if factor_complex(shape, jacobian, complex(shift, blocks[(b + 1) * q + b] / h), store_complex[pair:]) != 0:
+            if (
+                factor_complex(structure, jacobian, complex(shift, blocks[(b + 1) * q + b] / h), complex_factors[pair:])
+                != 0
+            ):
                 return 0
             b, pair = b + 2, pair + size
         else:
-            if factor(shape, jacobian, shift, store[real:]) != 0:
+            if factor(structure, jacobian, shift, factors[real:]) != 0:
                 return 0
             b, real = b + 1, real + size
-        made += 1
-    return made
+        count += 1
+    return count
 
 
 @inner
-def solve_blocks(solve, solve_complex, shape, coefficients, s, size, store, store_complex, vectors):
-    """(L / h x I - I x J) dW = R, in place of R."""
+def solve_blocks(solve, solve_complex, structure, coefficients, s, size, factors, complex_factors, vectors):
+    """Solve (L / h x I - I x J) dW = R in place of R."""
     q, blocks, b, real, n = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, vectors.shape[1]
-    first, pair, both = s + STAGES + R * q, n, store_complex[:n]
+    first, pair, both = s + STAGES + R * q, n, complex_factors[:n]
     while b < q:
         if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
             u, v = vectors[first + b], vectors[first + b + 1]
             for e in range(n):
                 both[e] = complex(u[e], v[e])
-            solve_complex(shape, store_complex[pair:], both)
+            solve_complex(structure, complex_factors[pair:], both)
             for e in range(n):
                 u[e], v[e] = both[e].real, both[e].imag
             b, pair = b + 2, pair + size
         else:
-            solve(shape, store[real:], vectors[first + b])
+            solve(structure, factors[real:], vectors[first + b])
             b, real = b + 1, real + size
 
 
 @inner
 def iterate(
-    rhs, solve, solve_complex, handle, coefficients, shape, t, h, y, y_stage, k0, supply, where, out, orders, memory,
-    work, vectors, store, store_complex,
+    rhs, solve, solve_complex, handle, coefficients, structure, t, h, y, y_stage, k0, ledger_rates, ledger_offset, out,
+    controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """Newton on W; returns CONVERGED or FAILED."""
-    s, n = supply.shape[0], y.size
+    """Newton iterations for W; returns CONVERGED or FAILED."""
+    s, n = ledger_rates.shape[0], y.size
     q, c, weights = s - 1, nodes_of(coefficients, s), vectors[s + WEIGHTS]
     t_matrix, back, blocks = matrix(coefficients, s, T), matrix(coefficients, s, BACK), matrix(coefficients, s, BLOCKS)
     start = matrix(coefficients, s, START)
     w_at, f_at, r_at = s + STAGES + W * q, s + STAGES + F * q, s + STAGES + R * q
-    before, why = 0.0, FAILED
+    before, status = 0.0, FAILED
     for turn in range(MOST):
         for i in range(q):
             blend(1.0, y, t_matrix, i * q, q, w_at, vectors, y_stage)
             rhs(t + c[i + 1] * h, y_stage, vectors[f_at + i], out, handle)
-            for m in range(supply.shape[1]):
-                supply[i + 1, m] = out[where + m]
-        memory[CALLS] += q
-        memory[NEWTON] += 1.0
+            for m in range(ledger_rates.shape[1]):
+                ledger_rates[i + 1, m] = out[ledger_offset + m]
+        loop_state[CALLS] += q
+        loop_state[NEWTON] += 1.0
         for i in range(q):
             blend(start[i], k0, back, i * q, q, f_at, vectors, vectors[r_at + i])
             j = i
@@ -185,7 +189,9 @@ def iterate(
             r, wi, wj = vectors[r_at + i], vectors[w_at + i], vectors[w_at + j]
             for e in range(n):
                 r[e] += own * wi[e] + other * wj[e]
-        solve_blocks(solve, solve_complex, shape, coefficients, s, int(work[STORE]), store, store_complex, vectors)
+        solve_blocks(
+            solve, solve_complex, structure, coefficients, s, int(work[STORE]), factors, complex_factors, vectors
+        )
         total = 0.0
         for e in range(n):
             per, part = weights[e], 0.0
@@ -195,177 +201,218 @@ def iterate(
                 part += r * r
             total += per * per * part
         size = sqrt(total / max(q * n, 1))
-        done, why = verdict(turn, size, before, orders, work)
+        done, status = verdict(turn, size, before, controls, work)
         before = size
         if done:
             break
-    if why == FAILED:
+    if status == FAILED:
         f = vectors[s + RATE]
         copy(vectors[f_at], f)
         for i in range(1, q):
             for e in range(n):
                 f[e] += vectors[f_at + i, e]
-        find_worst(vectors[r_at], f, weights, memory)
-    return why
+        find_worst(vectors[r_at], f, weights, loop_state)
+    return status
 
 
 @inner
-def finish(coefficients, shape, nnz, h, k, supply, work, vectors):
-    """Slopes k of the stages from W; ledger rates of the stages from those of the last f and its last increment."""
+def finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors):
+    """Compute the slopes k of the stages from W, and add the last Newton increment to their ledger rates."""
     s = k.shape[0]
     q, d = s - 1, vectors[s + INCREMENT]
-    slopes, start, room = matrix(coefficients, s, SLOPES), matrix(coefficients, s, START), work[work.size - q * q :]
+    slopes, start, buffer = matrix(coefficients, s, SLOPES), matrix(coefficients, s, START), work[work.size - q * q :]
     for e in range(q * q):
-        room[e] = slopes[e] / h
+        buffer[e] = slopes[e] / h
     for i in range(q):
-        blend(-start[q + i], k[0], room, i * q, q, s + STAGES + W * q, vectors, k[i + 1])
-        if supply.shape[1] > 0:
+        blend(-start[q + i], k[0], buffer, i * q, q, s + STAGES + W * q, vectors, k[i + 1])
+        if ledger_rates.shape[1] > 0:
             blend(0.0, k[0], matrix(coefficients, s, T), i * q, q, s + STAGES + R * q, vectors, d)
-            book_increment(shape, nnz, d, supply, i + 1, work)
+            book_increment(structure, nnz, d, ledger_rates, i + 1, work)
 
 
 @inner
 def filtered_error(
-    rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store, doubt
+    rhs,
+    solve,
+    handle,
+    structure,
+    coefficients,
+    t,
+    h,
+    y,
+    now,
+    new,
+    k,
+    out,
+    scale,
+    controls,
+    loop_state,
+    vectors,
+    factors,
+    retry,
 ):
-    """The embedded solution's difference, smoothed by the first factor; where in doubt, once more from there.
+    """Norm of the embedded error estimate, smoothed by the first factor; repeated from the filtered state if retry.
 
     e = (I - h g J)^-1 h (e_0 f(t, y) + sum of e_i k_i), 1 / g the real eigenvalue of A^-1 (Hairer and Wanner IV.8).
+    retry : the step is a repetition or the first after a kink; then an error of 1 or more is estimated once more with
+    f(t, y + e)
     """
     s, n = k.shape
     error, d, f = error_of(coefficients, s), vectors[s + INCREMENT], vectors[s + RATE]
-    shift, found = matrix(coefficients, s, BLOCKS)[0], 0.0
+    shift, norm = matrix(coefficients, s, BLOCKS)[0], 0.0
     for turn in range(2):
         for e in range(n):
             total = error[0] * (f[e] if turn == 1 else k[0, e])
             for j in range(1, s):
                 total += error[j] * k[j, e]
             d[e] = total * shift
-        solve(shape, store, d)
-        found = 0.0
+        solve(structure, factors, d)
+        norm = 0.0
         for e in range(n):
-            w = d[e] / (orders[SIZE] * small(scale[e], max(abs(y[now, e]), abs(y[new, e]))))
-            found += w * w
-        found = sqrt(found / max(n, 1))
-        if found < 1.0 or turn == 1 or not doubt:
+            w = d[e] / (controls[SIZE] * small(scale[e], max(abs(y[now, e]), abs(y[new, e]))))
+            norm += w * w
+        norm = sqrt(norm / max(n, 1))
+        if norm < 1.0 or turn == 1 or not retry:
             break
         for e in range(n):
             y[3, e] = y[now, e] + d[e]
         rhs(t, y[3], f, out, handle)
-        memory[CALLS] += 1.0
-    return found
+        loop_state[CALLS] += 1.0
+    return norm
 
 
 @inner
-def unseen(rhs, solve, handle, shape, coefficients, t, h, y, new, k, out, scale, orders, memory, work, vectors, store):
-    """Greatest defect of the collocation polynomial p shortly before the end of a step, in units of the tolerance.
+def unseen(
+    rhs,
+    solve,
+    handle,
+    structure,
+    coefficients,
+    t,
+    h,
+    y,
+    new,
+    k,
+    out,
+    scale,
+    controls,
+    loop_state,
+    work,
+    vectors,
+    factors,
+):
+    """Greatest defect of the collocation polynomial p just before the end of a step, in units of the tolerance.
 
-    Where an opening shuts there, what was stiff gets free, and no stage sees it: e = h g (p' - f(p + d)), with
-    d = (I - h g J)^-1 h g (p' - f(p)). Small as d is where J holds there, all of the defect where it does not.
+    Where an opening closes at the end, a stiff state becomes free between the stages: e = h g (p' - f(p + d)), with
+    d = (I - h g J)^-1 h g (p' - f(p)). e is as small as d where J is valid there, else it is the full defect.
     """
     s, n = k.shape
-    q, ahead, room = s - 1, matrix(coefficients, s, AHEAD), work[work.size - (s - 1) * (s - 1) :]
+    q, ahead, buffer = s - 1, matrix(coefficients, s, AHEAD), work[work.size - (s - 1) * (s - 1) :]
     d, f, step, greatest = vectors[s + INCREMENT], vectors[s + RATE], h / matrix(coefficients, s, BLOCKS)[0], 0.0
     for x in NEAR:
         for j in range(q):
-            room[j], room[q + j] = 0.0, 0.0
+            buffer[j], buffer[q + j] = 0.0, 0.0
             for m in range(q - 1, -1, -1):
-                room[j] = (room[j] + ahead[j * q + m]) * x
-                room[q + j] = room[q + j] * x + (m + 1) * ahead[j * q + m]
+                buffer[j] = (buffer[j] + ahead[j * q + m]) * x
+                buffer[q + j] = buffer[q + j] * x + (m + 1) * ahead[j * q + m]
         for e in range(n):
             y[3, e] = y[new, e]
             for j in range(q):
-                y[3, e] += h * room[j] * k[j + 1, e]
-        found = 0.0
+                y[3, e] += h * buffer[j] * k[j + 1, e]
+        total = 0.0
         for turn in range(2):
             rhs(t + (1.0 + x) * h, y[3], f, out, handle)
-            memory[CALLS] += 1.0
+            loop_state[CALLS] += 1.0
             for e in range(n):
                 d[e] = -f[e]
                 for j in range(q):
-                    d[e] += room[q + j] * k[j + 1, e]
-                w = step * d[e] / (orders[SIZE] * small(scale[e], abs(y[new, e])))
-                found = found + w * w if turn == 1 else 0.0
+                    d[e] += buffer[q + j] * k[j + 1, e]
+                w = step * d[e] / (controls[SIZE] * small(scale[e], abs(y[new, e])))
+                total = total + w * w if turn == 1 else 0.0
             if turn == 0:
-                solve(shape, store, d)
+                solve(structure, factors, d)
                 for e in range(n):
                     y[3, e] += d[e]
-        greatest = max(greatest, sqrt(found / max(n, 1)))
+        greatest = max(greatest, sqrt(total / max(n, 1)))
     return greatest
 
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
-    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
+    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
+    """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
     Returns NEWTON_FAILED where a fresh Jacobian does not help.
     """
     s, n = k.shape
-    nnz = shape[shape[STARTS] + shape[STATES]]
+    nnz = structure[structure[STARTS] + structure[STATES]]
     q, error = s - 1, error_of(coefficients, s)
-    doubt = work[SEEN] == memory[STEPS] or work[SEEN] < 0.0  # tried again, or the first after a kink
-    begin(k, y[now], scale, orders, memory, work, vectors)
+    retry = work[SEEN] == loop_state[STEPS] or work[SEEN] < 0.0  # a repeated step, or the first after a kink
+    begin(k, y[now], scale, controls, loop_state, work, vectors)
     while True:
         if work[HAS] == 0.0:
             renew(
-                rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
-                vectors[s + RATE],
+                rhs, handle, structure, ledger_offset, t, y[now], k[0], ledger_rates[0], scale, out, loop_state, work,
+                vectors[s + MOVED], vectors[s + RATE],
             )  # fmt: skip
-            if orders[WATCH] != 0.0:
-                memory[RADIUS] = spectral_radius(shape, work, nnz, scale, vectors[s + INCREMENT])
-        why = FAILED
+            if controls[WATCH] != 0.0:
+                loop_state[RADIUS] = spectral_radius(structure, work, nnz, scale, vectors[s + INCREMENT])
+        status = FAILED
         if work[SHIFT] != 1.0 / h:
             known, work[SHIFT] = work[SHIFT] == -1.0 / h, 0.0
-            made = factor_blocks(factor, factor_complex, shape, coefficients, s, h, work, store, store_complex, n)
-            memory[FACTORS] += 0.0 if known else made
-            if made > 0:
+            count = factor_blocks(
+                factor, factor_complex, structure, coefficients, s, h, work, factors, complex_factors, n
+            )
+            loop_state[FACTORS] += 0.0 if known else count
+            if count > 0:
                 work[SHIFT] = 1.0 / h
         if work[SHIFT] != 0.0:
-            if work[KNOWN] > 0.0 and (q < 5 or h <= 2.0 * memory[LAST]):  # high powers of a long step mislead
-                predict(coefficients, h, memory[LAST], s, work[work.size - q * q :], vectors)
+            # high powers of h / h_last extrapolate badly
+            if work[KNOWN] > 0.0 and (q < 5 or h <= 2.0 * loop_state[LAST]):
+                predict(coefficients, h, loop_state[LAST], s, work[work.size - q * q :], vectors)
             else:
                 for i in range(q):
                     for e in range(n):
                         vectors[s + STAGES + i, e] = 0.0
-            why = iterate(
-                rhs, solve, solve_complex, handle, coefficients, shape, t, h, y[now], y[3], k[0], supply, where, out,
-                orders, memory, work, vectors, store, store_complex,
+            status = iterate(
+                rhs, solve, solve_complex, handle, coefficients, structure, t, h, y[now], y[3], k[0], ledger_rates,
+                ledger_offset, out, controls, loop_state, work, vectors, factors, complex_factors,
             )  # fmt: skip
-        if why == CONVERGED:
-            finish(coefficients, shape, nnz, h, k, supply, work, vectors)
+        if status == CONVERGED:
+            finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors)
             break
-        if work[MADE] == memory[STEPS]:
-            low, room = matrix(coefficients, s, LOWER), s + STAGES + W * q
-            why = sweep(
-                rhs, factor, solve, handle, coefficients, low, shape, t, h, y[now], y[3], k, supply, where, out, scale,
-                orders, memory, nnz, room, work, vectors, store,
+        if work[MADE] == loop_state[STEPS]:
+            low, first_row = matrix(coefficients, s, LOWER), s + STAGES + W * q
+            status = sweep(
+                rhs, factor, solve, handle, coefficients, low, structure, t, h, y[now], y[3], k, ledger_rates,
+                ledger_offset, out, scale, controls, loop_state, nnz, first_row, work, vectors, factors,
             )  # fmt: skip
             work[SHIFT] = 0.0  # the factors are those of a stage
-            if why == FAILED:
+            if status == FAILED:
                 return NEWTON_FAILED
             break
         work[HAS] = 0.0
     combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
-    if orders[CONTROL] != TOLERANCE:
+    if controls[CONTROL] != TOLERANCE:
         return 0.0
     collocates = error[0] != 0.0 and matrix(coefficients, s, START)[0] == 0.0
-    if work[DAMPED] == memory[STEPS]:
-        found = smoothed_error(
-            rhs, factor, solve, handle, shape, where, t, h, y[now], y[new], k, supply, error,
-            matrix(coefficients, s, BLOCKS)[0] / h, scale, out, orders, memory, work, vectors, store,
+    if work[DAMPED] == loop_state[STEPS]:
+        error_size = smoothed_error(
+            rhs, factor, solve, handle, structure, ledger_offset, t, h, y[now], y[new], k, ledger_rates, error,
+            matrix(coefficients, s, BLOCKS)[0] / h, scale, out, controls, loop_state, work, vectors, factors,
         )  # fmt: skip
     elif collocates:
-        found = filtered_error(
-            rhs, solve, handle, shape, coefficients, t, h, y, now, new, k, out, scale, orders, memory, vectors, store,
-            doubt,
+        error_size = filtered_error(
+            rhs, solve, handle, structure, coefficients, t, h, y, now, new, k, out, scale, controls, loop_state,
+            vectors, factors, retry,
         )  # fmt: skip
     else:
-        found = error_norm(h, error, k, y[now], y[new], scale, orders[SIZE])
-    if collocates and 0.0 <= found <= 1.0 and h >= (orders[END] - t) * (1.0 - 1e-9):
-        found = max(found, PLAIN * unseen(
-            rhs, solve, handle, shape, coefficients, t, h, y, new, k, out, scale, orders, memory, work, vectors, store,
+        error_size = error_norm(h, error, k, y[now], y[new], scale, controls[SIZE])
+    if collocates and 0.0 <= error_size <= 1.0 and h >= (controls[END] - t) * (1.0 - 1e-9):
+        error_size = max(error_size, PLAIN * unseen(
+            rhs, solve, handle, structure, coefficients, t, h, y, new, k, out, scale, controls, loop_state, work,
+            vectors, factors,
         ))  # fmt: skip
-    return found
+    return error_size

@@ -1,26 +1,30 @@
-"""What came in and what went out, each a sum of its own, by the step's own weights. Knows rates; knows no names.
+"""Time integrals of inflows and outflows (ledger), accumulated separately with the weights of the method.
 
-ledger : float64[5 m]  of m rates: sums of what was above zero [0:m] and below it [m:2m], their carries [2m:4m], and the
-rates at the last stage of the step before [4m:5m].
-A step in which a rate changes sign counts on both sides: it is divided where its dense output turns, which for the
-amounts is what it is for states.
+ledger : float64[5 m]  of m rates: sums of positive [0:m] and negative parts [m:2m], their rounding carries [2m:4m],
+and the rates at the last stage of the last step [4m:5m]
+A step in which a rate changes sign adds to both sums: it is divided where the dense output of the amount turns, as
+the state's own dense output gives it.
 """
 
 from fvsolve.jit import njit
 from fvsolve.steppers.step import add_up
 
 SUMS = 5
-NOISE = 1e-12  # of all that a rate has brought: what a step has less of on one side is rounding
-STRAY = 1e-6  # of the other side, where neither end of a step has any: a negative weight, or what Newton left
-NEAR = 1e-5  # share of a step within which its turn is found; the amount feels the square of that
+# The smaller of the two sides of a step counts as rounding below this fraction of the gross amount so far.
+NOISE = 1e-12
+# Likewise below this fraction of the sum of the larger side, where the rates at both ends have the same sign: a
+# negative weight or the Newton residual causes it.
+STRAY = 1e-6
+NEAR = 1e-5  # tolerance of the time of zero rate, in steps; the error of the amount goes with its square
 TURNS = 40
-SHARE = 0.03  # of the tolerance of a step, in all that has passed: the sum over steps is then within it
-LEAST = 1e-3  # amount that counts as none [kg]
+# Fraction of the step's tolerance, relative to all amounts so far: then the sum over all steps is within tolerance.
+SHARE = 0.03
+LEAST = 1e-3  # amount added to the reference amount, so that it is never zero [kg]
 
 
 @njit(forceinline=True)
 def weight(theta, dense, j):
-    """(weight, its slope) of stage j in the dense output at theta: sum of dense[j, m] theta^(m + 1)."""
+    """(weight of stage j, its slope) in the dense output at theta: sum of dense[j, m] theta^(m + 1)."""
     w, slope = 0.0, 0.0
     for m in range(dense.shape[1] - 1, -1, -1):
         w, slope = (w + dense[j, m]) * theta, slope * theta + (m + 1) * dense[j, m]
@@ -28,33 +32,36 @@ def weight(theta, dense, j):
 
 
 @njit
-def brought(theta, whole, r0, r1, m, supply, dense):
-    """(amount of rate m up to theta, rate there) over h: by the method's polynomial, else the cubic through both ends.
+def brought(theta, total, r0, r1, m, ledger_rates, dense):
+    """(amount of rate m up to theta, rate at theta) over h: the method's polynomial, else the cubic through both ends.
 
-    whole : amount of the step over h; r0, r1 : rates at its ends
+    total : amount of the step over h; r0, r1 : rates at its ends
     """
     if dense.shape[0] == 0:
         s, r = theta, 1.0 - theta
-        amount = s * s * (1.0 + 2.0 * r) * whole + s * r * (r * r0 - s * r1)
-        return amount, 6.0 * s * r * whole + r * (1.0 - 3.0 * s) * r0 - s * (2.0 - 3.0 * s) * r1
+        amount = s * s * (1.0 + 2.0 * r) * total + s * r * (r * r0 - s * r1)
+        return amount, 6.0 * s * r * total + r * (1.0 - 3.0 * s) * r0 - s * (2.0 - 3.0 * s) * r1
     amount, rate = 0.0, 0.0
     for j in range(dense.shape[0]):
         w, slope = weight(theta, dense, j)
-        amount += w * supply[j, m]
-        rate += slope * supply[j, m]
+        amount += w * ledger_rates[j, m]
+        rate += slope * ledger_rates[j, m]
     return amount, rate
 
 
 @njit
-def lesser(whole, r0, r1, m, supply, dense):
-    """Size of what a step whose rate m goes from r0 to r1, of other sign, has on the side where it has less, over h."""
+def lesser(total, r0, r1, m, ledger_rates, dense):
+    """Size, over h, of the smaller of the positive and negative parts of a step; its rate m changes sign, r0 to r1."""
     low, high = 0.0, 1.0
-    at_low, at_high = brought(0.0, whole, r0, r1, m, supply, dense)[1], brought(1.0, whole, r0, r1, m, supply, dense)[1]
+    at_low, at_high = (
+        brought(0.0, total, r0, r1, m, ledger_rates, dense)[1],
+        brought(1.0, total, r0, r1, m, ledger_rates, dense)[1],
+    )
     if at_low * at_high >= 0.0:
         return 0.0
     for _ in range(TURNS):
         middle = high - at_high * (high - low) / (at_high - at_low)
-        rate, before = brought(middle, whole, r0, r1, m, supply, dense)[1], high
+        rate, before = brought(middle, total, r0, r1, m, ledger_rates, dense)[1], high
         if rate * at_high < 0.0:
             low, at_low = high, at_high
         else:
@@ -62,28 +69,29 @@ def lesser(whole, r0, r1, m, supply, dense):
         high, at_high = middle, rate
         if abs(high - before) <= NEAR or abs(high - low) <= NEAR:
             break
-    first = brought(high, whole, r0, r1, m, supply, dense)[0]
-    return max(0.0, min(abs(first), abs(whole - first)))
+    first = brought(high, total, r0, r1, m, ledger_rates, dense)[0]
+    return max(0.0, min(abs(first), abs(total - first)))
 
 
 @njit
-def book_error(h, error, k, stored, supply, tolerance, ledger):
-    """Greatest error of a step's amounts over the tolerance of all that has passed.
+def book_error(h, error, k, stored, ledger_rates, tolerance, ledger):
+    """Greatest error of the amounts of a step, over the tolerance of all amounts so far.
 
-    What goes into states that store it errs as they do, and their errors are judged already: what passes them by, or
-    comes where they are held, is not. stored : int64[q]  where those are in k : float64[s, n]
+    Amounts that enter stored states have the errors of those states, which the state error covers already. Amounts that
+    bypass stored states, or enter at fixed values, are not covered.
+    stored : int64[q]  columns of those states in k : float64[s, n]
     """
-    s, count = supply.shape
-    worst, passed, judged = 0.0, LEAST, 0.0
+    s, count = ledger_rates.shape
+    worst, reference, covered = 0.0, LEAST, 0.0
     for i in stored:
-        judged += abs(combined(error, k, i))
+        covered += abs(combined(error, k, i))
     for m in range(count):
-        moved = 0.0
+        peak = 0.0
         for i in range(s):
-            moved = max(moved, abs(supply[i, m]))
-        worst = max(worst, abs(combined(error, supply, m)))
-        passed += ledger[m] - ledger[count + m] + h * moved
-    return h * max(0.0, worst - judged) / (SHARE * tolerance * passed)
+            peak = max(peak, abs(ledger_rates[i, m]))
+        worst = max(worst, abs(combined(error, ledger_rates, m)))
+        reference += ledger[m] - ledger[count + m] + h * peak
+    return h * max(0.0, worst - covered) / (SHARE * tolerance * reference)
 
 
 @njit(forceinline=True)
@@ -97,37 +105,38 @@ def combined(weights, rates, m):
 
 @njit(forceinline=True)
 def add(ledger, m, at, part):
-    """Add to sum `at` of rate m."""
+    """Add `part` to sum `at` (0 positive, 1 negative) of rate m with compensated rounding."""
     count = ledger.size // SUMS
     ledger[at * count + m], ledger[(2 + at) * count + m] = add_up(ledger[at * count + m], part,
                                                                   ledger[(2 + at) * count + m])  # fmt: skip
 
 
 @njit
-def book(h, b, supply, dense, steep, known, end, ledger):
-    """Add a step of length h to the ledger; only once its end is known to be sound.
+def book(h, b, ledger_rates, dense, use_stage_rates, known, end, ledger):
+    """Add an accepted step of length h to the ledger, after its end state is known to be valid.
 
-    end : rates at its end; steep : those of the last stage count there, and `known` those at its start, for rates
-    magnify what Newton left
+    end : rates at the end of the step
+    use_stage_rates : use the rates of the last stage at the end, and at the start too if `known`, because f amplifies
+    the Newton residual
     """
-    s, count = supply.shape
+    s, count = ledger_rates.shape
     for m in range(count):
-        whole = combined(b, supply, m)
-        r0, r1, part, gross = supply[0, m], end[m], 0.0, ledger[m] - ledger[count + m]
-        side, trace, toward = 0 if whole > 0.0 else 1, NOISE * gross, r0 + r1
-        if toward == 0.0:
-            toward = ledger[m] + ledger[count + m]
-        if r0 * r1 >= 0.0 and toward != 0.0:
-            side = 0 if toward > 0.0 else 1
-            trace = max(trace, STRAY * abs(ledger[side * count + m]))
-        if steep:
-            r0, r1 = ledger[4 * count + m] if known else r0, supply[s - 1, m]
-        ledger[4 * count + m] = supply[s - 1, m]
+        total = combined(b, ledger_rates, m)
+        r0, r1, part, gross = ledger_rates[0, m], end[m], 0.0, ledger[m] - ledger[count + m]
+        side, threshold, direction = 0 if total > 0.0 else 1, NOISE * gross, r0 + r1
+        if direction == 0.0:
+            direction = ledger[m] + ledger[count + m]
+        if r0 * r1 >= 0.0 and direction != 0.0:
+            side = 0 if direction > 0.0 else 1
+            threshold = max(threshold, STRAY * abs(ledger[side * count + m]))
+        if use_stage_rates:
+            r0, r1 = ledger[4 * count + m] if known else r0, ledger_rates[s - 1, m]
+        ledger[4 * count + m] = ledger_rates[s - 1, m]
         if r0 * r1 < 0.0:
-            part = lesser(whole, r0, r1, m, supply, dense)
-        up, down = part + max(whole, 0.0), part - min(whole, 0.0)
-        if h * (down if side == 0 else up) <= trace:
-            add(ledger, m, side, h * whole)
+            part = lesser(total, r0, r1, m, ledger_rates, dense)
+        up, down = part + max(total, 0.0), part - min(total, 0.0)
+        if h * (down if side == 0 else up) <= threshold:
+            add(ledger, m, side, h * total)
         else:
             add(ledger, m, 0, h * up)
             add(ledger, m, 1, -h * down)

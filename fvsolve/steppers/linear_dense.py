@@ -1,6 +1,6 @@
-"""Dense factors of shift I - J, row by row, with partial pivoting. Knows arrays; for some dozen states.
+"""Dense LU factors of shift I - J with partial pivoting, row by row, for a few dozen states at most.
 
-The store holds the rows of L and U, 1 / U_ii on the diagonal, and behind them the row that each pivot came from.
+The array `factors` holds the rows of L and U, with 1 / U_ii on the diagonal, then the original row of each pivot.
 """
 
 import numpy as np
@@ -10,18 +10,18 @@ from fvsolve.steppers.structure import ROWS, SIZE, STARTS
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(nothing that the functions need beyond the pattern, length of the store)."""
+    """(no data beyond the pattern, length of the factors)."""
     n = pattern.shape[1]
     return np.zeros(0, dtype=np.int64), n * n + n
 
 
-def factor(shape, jacobian, shift, store):
-    """store <- L U of shift I - J, rows exchanged; returns 0, or 1 + the column without a pivot."""
-    n = shape[SIZE]
-    starts, rows, came = shape[shape[STARTS] :], shape[shape[ROWS] :], store[n * n :]
-    a = store[: n * n].reshape((n, n))
+def factor(structure, jacobian, shift, factors):
+    """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the column without a pivot."""
+    n = structure[SIZE]
+    starts, rows, pivots = structure[structure[STARTS] :], structure[structure[ROWS] :], factors[n * n :]
+    a = factors[: n * n].reshape((n, n))
     for e in range(n * n):
-        store[e] = 0.0
+        factors[e] = 0.0
     for j in range(n):
         for p in range(starts[j], starts[j + 1]):
             if rows[p] < n:
@@ -30,12 +30,12 @@ def factor(shape, jacobian, shift, store):
     for k in range(n):
         best, pivot = size_of(a[k, k]), k
         for i in range(k + 1, n):
-            here = size_of(a[i, k])
-            if here > best:
-                best, pivot = here, i
+            size = size_of(a[i, k])
+            if size > best:
+                best, pivot = size, i
         if not LEAST < best < 1.0 / LEAST:
             return k + 1
-        came[k] = pivot
+        pivots[k] = pivot
         if pivot != k:
             for j in range(n):
                 a[k, j], a[pivot, j] = a[pivot, j], a[k, j]
@@ -49,20 +49,20 @@ def factor(shape, jacobian, shift, store):
     return 0
 
 
-def solve(shape, store, x):
+def solve(structure, factors, x):
     """x <- (shift I - J)^-1 x."""
-    n = shape[SIZE]
-    came = store[n * n :]
+    n = structure[SIZE]
+    pivots = factors[n * n :]
     for k in range(n):
-        i = int(came[k].real)
+        i = int(pivots[k].real)
         x[k], x[i] = x[i], x[k]
     for i in range(1, n):
-        row, total = store[i * n : i * n + n], x[i]
+        row, total = factors[i * n : i * n + n], x[i]
         for j in range(i):
             total -= row[j] * x[j]
         x[i] = total
     for i in range(n - 1, -1, -1):
-        row, total = store[i * n : i * n + n], x[i]
+        row, total = factors[i * n : i * n + n], x[i]
         for j in range(i + 1, n):
             total -= row[j] * x[j]
         x[i] = total * row[i]

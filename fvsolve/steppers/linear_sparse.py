@@ -1,8 +1,8 @@
-"""Factors of shift I - J on a fixed pattern of 2 x 2 blocks, pivots on the diagonal. Knows lists; searches for nothing.
+"""Sparse LU factors of shift I - J on a fixed pattern of 2 x 2 blocks, with pivots on the diagonal.
 
-States go in pairs, pairs in an order that keeps the factors sparse, and where these can differ from zero is found
-once. The store holds the blocks of L and U by rows, the inverses of the diagonal blocks, and a row to work in; a block
-is four numbers, row by row.
+States are grouped in pairs, pairs in an order that keeps the factors sparse; the pattern of the factors is computed
+once. The array `factors` holds the blocks of L and U by rows, the inverses of the diagonal blocks, and a work row; a
+block is four numbers, row by row.
 """
 
 import numpy as np
@@ -12,17 +12,17 @@ from fvsolve.steppers.pairs import pairs
 from fvsolve.steppers.pivots import LEAST, bad_row, size_of
 from fvsolve.steppers.structure import OWN
 
-# The kind's own part: how many blocks, then offsets from its start. Of each new row its two states; L and U by rows;
-# the entries of J by rows: their places in the working row, and in the Jacobian.
+# Data of this solver in the structure: number of blocks, then offsets from its start to these lists: the two states of
+# each reordered row; L and U by rows; the entries of J by rows: their places in the work row, and in the Jacobian.
 BLOCKS, ORDER, L_STARTS, L_COLUMNS, U_STARTS, U_COLUMNS, J_STARTS, J_PLACES, J_ENTRIES = range(9)
 PARTS = 9
-LOST = 1e-13  # share of the determinant of a diagonal block that must be left of it
+LOST = 1e-13  # least determinant of a diagonal block, relative to its value before elimination and to its two terms
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
-    """(order of the states, patterns of L, U and J by rows, all behind their offsets; length of the store)."""
-    two, rows, columns, inside = blocks(pattern)
-    count = len(two)
+    """(order of the states, patterns of L, U and J by rows, all behind their offsets; length of the factors)."""
+    members, rows, columns, places = blocks(pattern)
+    count = len(members)
     order = minimum_degree(pattern_of(rows, columns, count))
     new = np.argsort(order)
     i, j = new[rows // 2], new[columns // 2]
@@ -31,37 +31,38 @@ def prepare(pattern) -> tuple[np.ndarray, int]:
     by_rows = np.argsort(i, kind="stable")
     j_starts = np.concatenate(([0], np.cumsum(np.bincount(i, minlength=count))))
     j_places = (4 * j + 2 * (rows % 2) + columns % 2)[by_rows]
-    parts = (two[order].ravel(), l_starts, l_columns, u_starts, u_columns, j_starts, j_places, inside[by_rows])
+    parts = (members[order].ravel(), l_starts, l_columns, u_starts, u_columns, j_starts, j_places, places[by_rows])
     offsets = PARTS + np.cumsum([0] + [part.size for part in parts[:-1]])
     own = np.concatenate([np.asarray(part, dtype=np.int64) for part in ([count], offsets, *parts)])
     return own, 4 * (l_columns.size + u_columns.size + 2 * count)
 
 
 def blocks(pattern) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(pairs of states; of the entries among states: row and column as 2 pair + member, place in the Jacobian)."""
+    """(pairs of states; row and column of each state entry as 2 pair + member, its place in the Jacobian)."""
     n = pattern.shape[1]
-    two = pairs(pattern[:n])
+    members = pairs(pattern[:n])
     member = np.empty(n, dtype=np.int64)
-    member[two[:, 1]] = 2 * np.arange(len(two)) + 1
-    member[two[:, 0]] = 2 * np.arange(len(two))
-    inside = np.flatnonzero(pattern.indices < n)
+    member[members[:, 1]] = 2 * np.arange(len(members)) + 1
+    member[members[:, 0]] = 2 * np.arange(len(members))
+    places = np.flatnonzero(pattern.indices < n)
     columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
-    return two, member[pattern.indices[inside]], member[columns[inside]], inside
+    return members, member[pattern.indices[places]], member[columns[places]], places
 
 
 def pattern_of(rows, columns, count: int):
-    """Which of count x count blocks have an entry, sparse by columns."""
+    """Pattern of the blocks with an entry, count x count, sparse by columns."""
     from scipy.sparse import coo_array, csc_array
 
-    found = csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows // 2, columns // 2)), shape=(count, count)))
-    found.sum_duplicates()
-    return found
+    pattern = csc_array(coo_array((np.ones(rows.size, dtype=bool), (rows // 2, columns // 2)), shape=(count, count)))
+    pattern.sum_duplicates()
+    return pattern
 
 
 def minimum_degree(pattern) -> np.ndarray:
-    """int64[n]: rows in an order of few neighbours first, multiple minimum degree on A + A^T (Liu 1985).
+    """int64[n]: rows ordered by few neighbours first, multiple minimum degree on A + A^T (Liu 1985).
 
-    SuperLU finds it while it factors a diagonally dominant matrix of this pattern, whose pivots stay put.
+    SuperLU computes the order while it factors a diagonally dominant matrix of this pattern, whose pivots stay in
+    place.
     """
     from scipy.sparse import csc_array, diags_array
     from scipy.sparse.linalg import splu
@@ -76,21 +77,21 @@ def minimum_degree(pattern) -> np.ndarray:
 def fill(n: int, starts, columns) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(starts and columns of L, starts and columns of U) by rows, for pivots on the diagonal."""
     starts, columns = np.asarray(starts, dtype=np.int64), np.asarray(columns, dtype=np.int64)
-    room = 4 * columns.size + 16
+    capacity = 4 * columns.size + 16
     while True:
         l_starts, u_starts, chain = (np.zeros(n + 1, dtype=np.int64) for _ in range(3))
-        l_columns, u_columns = np.empty(room, dtype=np.int64), np.empty(room, dtype=np.int64)
+        l_columns, u_columns = np.empty(capacity, dtype=np.int64), np.empty(capacity, dtype=np.int64)
         if eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
             return l_starts, l_columns[: l_starts[n]].copy(), u_starts, u_columns[: u_starts[n]].copy()
-        room *= 2
+        capacity *= 2
 
 
 @njit
 def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
-    """Patterns of L and U; False where there is no room for them.
+    """Compute the patterns of L and U; returns False where the arrays are too short.
 
-    A row of U holds what its row of J does, and the rows of U that L calls for. chain : int64[n + 1]  the columns
-    of the row, each with the next one; chain[n] holds the first, n ends it.
+    A row of U contains the entries of its row of J and of the rows of U that its row of L refers to.
+    chain : int64[n + 1]  linked list of the columns of the row; chain[n] holds the first, n ends it
     """
     n = chain.size - 1
     for i in range(n):
@@ -125,31 +126,31 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
 
 
 @njit(forceinline=True)
-def place(shape, which):
-    """Where one of the kind's own lists begins."""
-    return shape[OWN] + shape[shape[OWN] + which]
+def place(structure, index):
+    """Offset of a list of this solver in the structure."""
+    return structure[OWN] + structure[structure[OWN] + index]
 
 
 @njit(forceinline=True)
 def clear(block):
-    """Four zeros."""
+    """Set a block to zero."""
     block[0] = block[1] = block[2] = block[3] = 0.0
 
 
-def factor(shape, jacobian, shift, store):
-    """store <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
+def factor(structure, jacobian, shift, factors):
+    """factors <- L, U and inverse diagonal blocks of shift I - J; returns 0, or 1 + a state without a good pivot.
 
-    A diagonal block is good whose determinant keeps 1e-13 of what it was at first and of its two terms: a measure
-    that does not depend on the units of states.
+    The pivot of a diagonal block is good if its determinant is at least 1e-13 of its value before elimination and of
+    its two terms: a measure that does not depend on the units of states.
     """
-    count, order = shape[shape[OWN]], shape[place(shape, ORDER) :]
-    l_starts, l_columns = shape[place(shape, L_STARTS) :], shape[place(shape, L_COLUMNS) :]
-    u_starts, u_columns = shape[place(shape, U_STARTS) :], shape[place(shape, U_COLUMNS) :]
-    starts, places = shape[place(shape, J_STARTS) :], shape[place(shape, J_PLACES) :]
-    entries = shape[place(shape, J_ENTRIES) :]
-    lower, upper = store, store[4 * l_starts[count] :]
+    count, order = structure[structure[OWN]], structure[place(structure, ORDER) :]
+    l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
+    u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
+    starts, places = structure[place(structure, J_STARTS) :], structure[place(structure, J_PLACES) :]
+    entries = structure[place(structure, J_ENTRIES) :]
+    lower, upper = factors, factors[4 * l_starts[count] :]
     inverse, row = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
-    bad = bad_row(shape, jacobian)
+    bad = bad_row(structure, jacobian)
     if bad > 0:
         return bad
     for e in range(4 * count):
@@ -175,10 +176,10 @@ def factor(shape, jacobian, shift, store):
                 y[0], y[1], y[2], y[3] = y0, y1, y2, y3
         a, b, c, d = own[0], own[1], own[2], own[3]
         clear(own)
-        one, other = a * d, b * c
-        det = one - other
-        left = size_of(det)
-        if not (LEAST < left < 1.0 / LEAST and left > LOST * max(first, size_of(one) + size_of(other))):
+        diagonal, cross = a * d, b * c
+        det = diagonal - cross
+        remaining = size_of(det)
+        if not (LEAST < remaining < 1.0 / LEAST and remaining > LOST * max(first, size_of(diagonal) + size_of(cross))):
             return order[2 * i] + 1
         per = det.conjugate() / (det.real * det.real + det.imag * det.imag)
         y = inverse[4 * i : 4 * i + 4]
@@ -190,12 +191,12 @@ def factor(shape, jacobian, shift, store):
     return 0
 
 
-def solve(shape, store, x):
+def solve(structure, factors, x):
     """x <- (shift I - J)^-1 x."""
-    count, order = shape[shape[OWN]], shape[place(shape, ORDER) :]
-    l_starts, l_columns = shape[place(shape, L_STARTS) :], shape[place(shape, L_COLUMNS) :]
-    u_starts, u_columns = shape[place(shape, U_STARTS) :], shape[place(shape, U_COLUMNS) :]
-    lower, upper = store, store[4 * l_starts[count] :]
+    count, order = structure[structure[OWN]], structure[place(structure, ORDER) :]
+    l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
+    u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
+    lower, upper = factors, factors[4 * l_starts[count] :]
     inverse, work = upper[4 * u_starts[count] :], upper[4 * (u_starts[count] + count) :]
     for i in range(count):
         a, b = x[order[2 * i]], x[order[2 * i + 1]]
@@ -213,5 +214,5 @@ def solve(shape, store, x):
         d = inverse[4 * i : 4 * i + 4]
         first, second = d[0] * a + d[1] * b, d[2] * a + d[3] * b
         work[2 * i], work[2 * i + 1] = first, second
-        x[order[2 * i + 1]] = second  # a state without a partner is written over by its own
+        x[order[2 * i + 1]] = second  # a single state overwrites its dummy
         x[order[2 * i]] = first

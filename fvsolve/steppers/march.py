@@ -1,7 +1,7 @@
-"""The time loop: steps of any method with dense output, step control and event location. Knows no physics.
+"""Time loop: steps of any method with dense output, step control and event location.
 
-One compiled loop serves every method (a step is a function of declared type, Butcher arrays are data) and every
-model (functions of declared type).
+A single compiled loop is used for every method (a step is a function of declared type, Butcher arrays are data) and
+every model (functions of declared type).
 """
 
 from math import isfinite
@@ -116,276 +116,298 @@ if COMPILING:
 
 
 @njit(forceinline=True)
-def may_leap(orders, memory, times, h):
-    """Whether a step of h ends before the segment does, and before anything is due to be written."""
-    if orders[LEAPS] == 0.0 or too_short(orders, memory, h) or h >= (orders[END] - memory[T]) * (1.0 - 1e-9):
+def may_leap(controls, loop_state, times, h):
+    """True if fused steps are allowed and a step of h ends before the segment and before the next row or field."""
+    if (
+        controls[LEAPS] == 0.0
+        or too_short(controls, loop_state, h)
+        or h >= (controls[END] - loop_state[T]) * (1.0 - 1e-9)
+    ):
         return False
-    return next_due(orders, memory, times) > memory[T_MARK] + (memory[N_MARK] + 1.0) * h
+    return next_due(controls, loop_state, times) > loop_state[T_MARK] + (loop_state[N_MARK] + 1.0) * h
 
 
 @njit(forceinline=True)
-def judged(h, e, coefficients, k, stored, supply, orders, ledger):
-    """The error of a step in units of the tolerance: the greater of its states' and of its amounts'."""
-    if orders[CONTROL] != TOLERANCE:
+def judged(h, e, coefficients, k, stored, ledger_rates, controls, ledger):
+    """Error of a step in units of the tolerance: the greater of the errors of its states and of its ledger amounts."""
+    if controls[CONTROL] != TOLERANCE:
         return e
-    return max(e, book_error(h, error_of(coefficients, k.shape[0]), k, stored, supply, orders[SIZE], ledger))
+    return max(e, book_error(h, error_of(coefficients, k.shape[0]), k, stored, ledger_rates, controls[SIZE], ledger))
 
 
 @njit(forceinline=True)
-def bearable(e, passing):
-    """Whether a step of error e is taken; `passing` on to a kink, before which round-off rules, any but no number."""
-    return e <= 1.0 or (e == e and passing)
+def bearable(e, near_kink):
+    """True if a step of error e is accepted.
+
+    near_kink : the segment ends so soon that rounding dominates; then every error except NaN is accepted
+    """
+    return e <= 1.0 or (e == e and near_kink)
 
 
 @njit
 def march(
-    attempt, leap, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, join, handle,
-    coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where, ledger, scale,
-    out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work, vectors, store,
-    store_complex, spare, spare_supply, spare_flat, spare_complex, largest,
+    attempt, fused_step, observe, record, events, rhs, factor, solve, factor_complex, solve_complex, join, handle,
+    coefficients, structure, row_blocks, sums, dense, controls, loop_state, times, progress, y, k, f_old, ledger_rates,
+    ledger_offset, ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, bounded_states,
+    bounds, work, vectors, factors, complex_factors, spare, spare_ledger_rates, spare_flat, spare_complex, largest,
 ):  # fmt: skip
-    """Step from memory[T] to orders[END]; returns why it came back, to be called again with the same arrays.
+    """Step from loop_state[T] to controls[END]; returns the reason, to be called again with the same arrays.
 
-    rhs(t, y, dydt, out, handle) with an empty dydt computes `out` alone, which is all that a row wants;
-    leap(t, h, y, y_new, out, handle, values), where orders[LEAPS] allows it, is a whole step to t of a method of one
-    stage, with the `out` and the record of its end: taken wherever no row is due;
-    join(sums, spans, handle) : fills in what other bands of the state, which step it beside this one, have;
-    spans, sums : the states of this band, and room for a number of each row of all, see `step`;
-    y : float64[4, n], the present, the last and the next state and a stage; k : float64[s, n];
-    ledger : float64[5 m], sums of out[where:] (`ledger.py`); stored : int64[q],
-    states that are summed with a carry too; rows : float64[cap, 1 + probes]; times : of rows, where given one by one;
-    within_at, within_by : what rows are held to, see `rows.keep_within`; work, vectors, store, store_complex : what an
-    implicit step keeps; spare, spare_supply, spare_flat, spare_complex : room for `rows.step_apart`;
-    largest : float64[n], what no state may exceed, looked at every CHECKED steps, or empty.
+    rhs(t, y, dydt, out, handle) : with an empty dydt it computes only `out`, which is enough for a row
+    fused_step(t, h, y, y_new, out, handle, values) : where controls[ALLOW_FUSED] allows it, a full step to t of a
+    one-stage method, with `out` and the record of its end; used where no row is due
+    join(sums, row_blocks, handle) : adds the values of the other bands, which are stepped in parallel
+    row_blocks, sums : states of this band, and an array with a number for each row of all bands, see `step_operations`
+    y : float64[4, n]  present, last and next state, and a stage; k : float64[s, n]  stages
+    ledger : float64[5 m]  integrals of out[ledger_offset:] (`ledger.py`)
+    stored : int64[q]  states with compensated sums
+    rows : float64[cap, 1 + probes]; times : times of rows, if given as a list
+    bounded_states, bounds : limits of interpolated rows, see `limit_to_bounds`
+    work, vectors, factors, complex_factors : data that implicit steps keep
+    spare, spare_ledger_rates, spare_flat, spare_complex : arrays for `separate_step`
+    largest : float64[n]  largest allowed states, checked every GROWTH_CHECK_STEPS steps, or empty
     """
-    s, reuse, met, t_new = k.shape[0], False, False, 0.0  # met: g_new is of the end of the step behind
-    formed = orders[KIND] == EXPLICIT and shape.size > 0
-    b, bend = weights_of(coefficients, s), bend_of(coefficients, s)
-    steep = orders[KIND] == NEWTON_SOLVED and dense.shape[0] == 0  # slopes at ends: f magnifies what Newton left,
-    for j in range(s):  # the last stage does not, where it is the end
-        steep = steep and row_of(coefficients, s, s - 1)[j] == b[j]
+    # event_known: g_new belongs to the end of the last step
+    s, reuse, event_known, t_new = k.shape[0], False, False, 0.0
+    blocked = controls[KIND] == EXPLICIT and structure.size > 0
+    b, start_slope = weights_of(coefficients, s), bend_of(coefficients, s)
+    # Where the last stage is the step's end, use its slope there: re-evaluating f would amplify the Newton residual.
+    use_stage_slope = controls[KIND] == NEWTON_SOLVED and dense.shape[0] == 0
+    for j in range(s):
+        use_stage_slope = use_stage_slope and row_of(coefficients, s, s - 1)[j] == b[j]
     for _ in range(1 << 62):
-        now, old = flags[NOW], flags[OLD]
+        now, old = progress[NOW], progress[OLD]
         new = 3 - now - old
-        if flags[PHASE] == FRESH:
-            if met:
+        if progress[PHASE] == FRESH:
+            if event_known:
                 copy(g_new, g)
             elif g.size > 0:
-                events(memory[T], y[now], handle, g)
-            met = False
+                events(loop_state[T], y[now], handle, g)
+            event_known = False
             if turned(g, armed):
-                flags[BENT] = flags[BEHIND]  # what is due before its end goes by the rule of the step behind
-                if flags[BENT] == 0:
+                progress[BENT] = progress[BEHIND]  # rows due before the switch still use the previous rhs
+                if progress[BENT] == 0:
                     arm(g, armed)
                     return SWITCHED
             if reuse:
-                for m in range(spans.shape[0]):
-                    begin, end = spans[m, BEGIN], spans[m, STOP]
+                for m in range(row_blocks.shape[0]):
+                    begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
                     copy(k[s - 1, begin:end], k[0, begin:end])
             else:
-                if formed:
-                    shape[MODE], shape[BAD] = LOOK, 0
-                rhs(memory[T], y[now], k[0], out, handle)
-                if formed:
-                    shape[MODE] = OFF
-                memory[CALLS] += 1.0
-            looked, reuse = formed and not reuse, False
-            flags[PHASE] = EMIT
-            record(memory[T], y[now], out, handle, values)
+                if blocked:
+                    structure[MODE], structure[BAD] = LOOK, 0
+                rhs(loop_state[T], y[now], k[0], out, handle)
+                if blocked:
+                    structure[MODE] = OFF
+                loop_state[CALLS] += 1.0
+            checked, reuse = blocked and not reuse, False
+            progress[PHASE] = EMIT
+            record(loop_state[T], y[now], out, handle, values)
             if out[STATUS] == AMENDED:
-                rhs(memory[T], y[now], k[0], out, handle)
-                memory[CALLS] += 1.0
-                record(memory[T], y[now], out, handle, values)
-            if not all_finite(join, handle, spans, sums, y[now], shape, looked):
+                rhs(loop_state[T], y[now], k[0], out, handle)
+                loop_state[CALLS] += 1.0
+                record(loop_state[T], y[now], out, handle, values)
+            if not all_finite(join, handle, row_blocks, sums, y[now], structure, checked):
                 out[STATUS] = NOT_FINITE
-        if flags[PHASE] <= EMIT:
+        if progress[PHASE] <= EMIT:
             if out[STATUS] == NOT_FINITE or not isfinite(out[RATE]):
                 return BAD_VALUE
             if out[STATUS] != 0.0:
                 return BAD_STATUS
-            if memory[UNBOOKED] > 0.0:
-                known = steep and work[KNOWN] > 0.0
-                book(memory[UNBOOKED], b, supply, dense, steep, known, out[where:], ledger)
-                memory[UNBOOKED] = 0.0
-        if flags[PHASE] == EMIT:
-            if flags[BEHIND] == 1 and next_due(orders, memory, times) <= memory[T]:
-                f_end = k[s - 1] if steep else k[0]
-                why = emit(
+            if loop_state[UNBOOKED] > 0.0:
+                known = use_stage_slope and work[KNOWN] > 0.0
+                book(loop_state[UNBOOKED], b, ledger_rates, dense, use_stage_slope, known, out[ledger_offset:], ledger)
+                loop_state[UNBOOKED] = 0.0
+        if progress[PHASE] == EMIT:
+            if progress[BEHIND] == 1 and next_due(controls, loop_state, times) <= loop_state[T]:
+                f_end = k[s - 1] if use_stage_slope else k[0]
+                status = emit(
                     attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients,
-                    shape, spans, sums, orders, memory, times, flags, memory[T] - memory[LAST], y, now, old, f_old,
-                    f_end, k, where, dense, bend, scale, out_row, y_out, rows, within_at, within_by, work,
-                    spare, spare_supply, spare_flat, spare_complex,
+                    structure, row_blocks, sums, controls, loop_state, times, progress,
+                    loop_state[T] - loop_state[LAST], y, now, old, f_old, f_end, k, ledger_offset, dense, start_slope,
+                    scale, out_row, y_out, rows, bounded_states, bounds, work, spare, spare_ledger_rates, spare_flat,
+                    spare_complex,
                 )  # fmt: skip
-                if why != DONE:
-                    return why
-            if flags[BENT] == 1:  # now the other rule holds, and nothing learnt under the old one
+                if status != DONE:
+                    return status
+            if progress[BENT] == 1:  # the rhs has switched: discard the step size and the Jacobian
                 arm(g, armed)
-                flags[BENT], flags[PHASE] = 0, FRESH
-                if orders[CONTROL] == TOLERANCE:
-                    memory[STEP] = 0.0
-                if orders[KIND] != EXPLICIT:
+                progress[BENT], progress[PHASE] = 0, FRESH
+                if controls[CONTROL] == TOLERANCE:
+                    loop_state[STEP] = 0.0
+                if controls[KIND] != EXPLICIT:
                     work[HAS], work[SEEN] = 0.0, -1.0
                 return SWITCHED
-            if out[ARRIVES] == memory[T]:  # a jump is here: what is noted next lies behind it, and events act before
+            # a jump arrives now, after events have acted: the next record is of the state after it
+            if out[ARRIVES] == loop_state[T]:
                 out[STATUS] = ARRIVED
-                record(memory[T], y[now], out, handle, values)
-                flags[BEHIND], flags[PHASE] = 0, FRESH
-                if orders[KIND] != EXPLICIT:
+                record(loop_state[T], y[now], out, handle, values)
+                progress[BEHIND], progress[PHASE] = 0, FRESH
+                if controls[KIND] != EXPLICIT:
                     work[HAS], work[SEEN] = 0.0, -1.0
                 continue
-            flags[PHASE] = READY
-        for m in range(supply.shape[1]):
-            supply[0, m] = out[where + m]
-        if too_short(orders, memory, orders[END] - memory[T]):  # what is left of the segment is rounding
-            memory[T] = orders[END]
+            progress[PHASE] = READY
+        for m in range(ledger_rates.shape[1]):
+            ledger_rates[0, m] = out[ledger_offset + m]
+        if too_short(controls, loop_state, controls[END] - loop_state[T]):  # the rest of the segment is rounding
+            loop_state[T] = controls[END]
             return DONE
         if out[WHERE] == STOP_HERE:
             return STOPPED
-        if orders[BUDGET] <= 0.0:
+        if controls[BUDGET] <= 0.0:
             return CHUNK
-        h = memory[LEFT] if memory[LEFT] > 0.0 else next_step(orders, memory, out[RATE], k, scale)
-        if orders[CONTROL] != TOLERANCE:
-            h = closing_step(memory, out[CLOSING], h, shortest(orders, memory))
-        whole, h = h, arriving_step(orders, memory, out[ARRIVES], h)
-        leaping, last = may_leap(orders, memory, times, h), False
-        if leaping:
-            memory[CALLS] += 1.0
-            leap(memory[T_MARK] + (memory[N_MARK] + 1.0) * h, h, y[now], y[new], out, handle, values)
-        elif flags[PHASE] == LEAPT:  # now the rates are wanted too
-            flags[PHASE] = FRESH
-            memory[CALLS] -= 1.0
+        h = loop_state[LEFT] if loop_state[LEFT] > 0.0 else next_step(controls, loop_state, out[RATE], k, scale)
+        if controls[CONTROL] != TOLERANCE:
+            h = closing_step(loop_state, out[CLOSING], h, shortest(controls, loop_state))
+        full_h, h = h, arriving_step(controls, loop_state, out[ARRIVES], h)
+        fused, last = may_leap(controls, loop_state, times, h), False
+        if fused:
+            loop_state[CALLS] += 1.0
+            fused_step(loop_state[T_MARK] + (loop_state[N_MARK] + 1.0) * h, h, y[now], y[new], out, handle, values)
+        elif progress[PHASE] == LEAPT:  # fused steps do not compute k[0], which the next step needs
+            progress[PHASE] = FRESH
+            loop_state[CALLS] -= 1.0
             continue
-        failed, rate = TINY_STEP, out[RATE]
-        due = HUGE if leaping else landing(orders, memory, row_due(orders, memory, times), h)
-        h = min(h, due - memory[T])
-        while not leaping:
-            rest = orders[END] - memory[T]
+        failure, rate = TINY_STEP, out[RATE]
+        due = HUGE if fused else landing(controls, loop_state, row_due(controls, loop_state, times), h)
+        h = min(h, due - loop_state[T])
+        while not fused:
+            rest = controls[END] - loop_state[T]
             last = h >= rest * (1.0 - 1e-9)
-            if last and approaches(orders, memory, rest):
+            if last and approaches(controls, loop_state, rest):
                 h, last = APPROACH * rest, False
             elif last:
                 h = rest
-            if too_short(orders, memory, h) and (not last or failed == NEWTON_STUCK):
-                return failed
+            if too_short(controls, loop_state, h) and (not last or failure == NEWTON_STUCK):
+                return failure
             e = attempt(
-                rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums,
-                memory[T], h, y, now, new, k, supply, where, out, scale, orders, memory, work, vectors, store,
-                store_complex,
+                rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks,
+                sums, loop_state[T], h, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state,
+                work, vectors, factors, complex_factors,
             )  # fmt: skip
-            passing = rest <= 1e3 * shortest(orders, memory)
+            near_kink = rest <= 1e3 * shortest(controls, loop_state)
             if e != NEWTON_FAILED:
-                e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
-                if bearable(e, passing):
-                    t_new, met = end_of(orders, memory, h, last, due), True
-                    rounded = add_stored(h, b, k, y[now], y[new], stored, carry)
+                e = judged(h, e, coefficients, k, stored, ledger_rates, controls, ledger)
+                if bearable(e, near_kink):
+                    t_new, event_known = end_of(controls, loop_state, h, last, due), True
+                    changed = add_stored(h, b, k, y[now], y[new], stored, carry)
                     if g.size > 0:
                         events(t_new, y[new], handle, g_new)
                     if fallen(g, g_new):
-                        met = False
+                        event_known = False
                         length, e = locate(
                             attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle,
-                            coefficients, shape, spans, sums, h, y, now, new, k, supply, where, out, scale, orders,
-                            memory, work, vectors, store, store_complex, g, g_new, e,
+                            coefficients, structure, row_blocks, sums, h, y, now, new, k, ledger_rates, ledger_offset,
+                            out, scale, controls, loop_state, work, vectors, factors, complex_factors, g, g_new, e,
                         )  # fmt: skip
                         if e != NEWTON_FAILED:
-                            h, memory[STEP], memory[LEFT] = length, 0.0, 0.0
-                            last = last and memory[T] + h >= orders[END]
-                            e = judged(h, e, coefficients, k, stored, supply, orders, ledger)
+                            h, loop_state[STEP], loop_state[LEFT] = length, 0.0, 0.0
+                            last = last and loop_state[T] + h >= controls[END]
+                            e = judged(h, e, coefficients, k, stored, ledger_rates, controls, ledger)
             if e == NEWTON_FAILED:
-                failed = NEWTON_STUCK
-                memory[NEWTON_FAILURES] += 1.0
-                if orders[CONTROL] != TOLERANCE and memory[LEFT] == 0.0:  # in parts that end where it would have
-                    memory[LEFT] = h
-                    memory[PARTED] += 1.0
-                h = whole = 0.25 * h
-                if orders[CONTROL] == TOLERANCE:
-                    memory[STEP] = h
+                failure = NEWTON_STUCK
+                loop_state[NEWTON_FAILURES] += 1.0
+                # a given step is taken in parts that end together where it would have ended
+                if controls[CONTROL] != TOLERANCE and loop_state[LEFT] == 0.0:
+                    loop_state[LEFT] = h
+                    loop_state[PARTED] += 1.0
+                h = full_h = 0.25 * h
+                if controls[CONTROL] == TOLERANCE:
+                    loop_state[STEP] = h
                 continue
-            if bearable(e, passing):
-                if orders[CONTROL] != TOLERANCE:
+            if bearable(e, near_kink):
+                if controls[CONTROL] != TOLERANCE:
                     break
-                grow = grown(orders, memory, h, e)
-                if failed == NEWTON_STUCK:
+                grow = grown(controls, loop_state, h, e)
+                if failure == NEWTON_STUCK:
                     grow = min(grow, 1.0)
-                cut = last or h == due - memory[T] or h < whole
-                if (not cut or grow < 1.0) and not kept(orders, grow):
-                    memory[STEP] = h * grow
-                memory[ERROR_OLD] = e
-                if orders[WATCH] != 0.0 and watch(orders, memory, h, e, rate):
-                    memory[CASES], orders[BUDGET] = -1.0, 1.0  # come back after this step, for another kind
+                shortened = last or h == due - loop_state[T] or h < full_h
+                if (not shortened or grow < 1.0) and not kept(controls, grow):
+                    loop_state[STEP] = h * grow
+                loop_state[ERROR_OLD] = e
+                if controls[WATCH] != 0.0 and watch(controls, loop_state, h, e, rate):
+                    loop_state[CASES], controls[BUDGET] = -1.0, 1.0  # return after this step, to change the method
                 break
-            memory[REJECTIONS] += 1.0
-            h = whole = h * reduced(orders, e)
-            memory[STEP] = h
-        if not met:
-            t_new, rounded = end_of(orders, memory, h, last, due), add_stored(h, b, k, y[now], y[new], stored, carry)
+            loop_state[REJECTIONS] += 1.0
+            h = full_h = h * reduced(controls, e)
+            loop_state[STEP] = h
+        if not event_known:
+            t_new, changed = (
+                end_of(controls, loop_state, h, last, due),
+                add_stored(h, b, k, y[now], y[new], stored, carry),
+            )
         keep_carry(h, b, k, y[now], stored, carry)
-        memory[UNBOOKED] = h
-        t_old = memory[T]
-        part = memory[LEFT] > h
-        memory[LEFT] = memory[LEFT] - h if part else 0.0
-        memory[N_MARK] += 0.0 if part else 1.0
-        memory[T] = t_new
-        memory[LAST] = memory[T] - t_old
-        memory[STEPS] += 1.0
-        orders[BUDGET] -= 1.0
-        if largest.size > 0 and memory[STEPS] % CHECKED == 0.0 and exceeded(join, handle, spans, sums, y[new], largest):
-            orders[BUDGET] = EXCEEDED
-        if next_due(orders, memory, times) <= memory[T]:
-            known = orders[KIND] == NEWTON_SOLVED and work[KNOWN] > 0.0
-            for m in range(spans.shape[0]):
-                begin, end = spans[m, BEGIN], spans[m, STOP]
-                if bend.size > 0:
-                    bend_at_start(begin, end, bend, k, vectors[s - 1], known, f_old)
-                elif steep and known:
+        loop_state[UNBOOKED] = h
+        t_old = loop_state[T]
+        is_part = loop_state[LEFT] > h
+        loop_state[LEFT] = loop_state[LEFT] - h if is_part else 0.0
+        loop_state[N_MARK] += 0.0 if is_part else 1.0
+        loop_state[T] = t_new
+        loop_state[LAST] = loop_state[T] - t_old
+        loop_state[STEPS] += 1.0
+        controls[BUDGET] -= 1.0
+        if (
+            largest.size > 0
+            and loop_state[STEPS] % CHECKED == 0.0
+            and exceeded(join, handle, row_blocks, sums, y[new], largest)
+        ):
+            controls[BUDGET] = EXCEEDED
+        if next_due(controls, loop_state, times) <= loop_state[T]:
+            known = controls[KIND] == NEWTON_SOLVED and work[KNOWN] > 0.0
+            for m in range(row_blocks.shape[0]):
+                begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
+                if start_slope.size > 0:
+                    bend_at_start(begin, end, start_slope, k, vectors[s - 1], known, f_old)
+                elif use_stage_slope and known:
                     copy(vectors[s - 1, begin:end], f_old[begin:end])
                 else:
                     copy(k[0, begin:end], f_old[begin:end])
-        reuse = orders[FSAL] == 1.0 and orders[CONTROL] == TOLERANCE and not last and not rounded
-        flags[OLD], flags[NOW], flags[BEHIND], flags[PHASE] = now, new, 1, LEAPT if leaping else FRESH
+        reuse = controls[FSAL] == 1.0 and controls[CONTROL] == TOLERANCE and not last and not changed
+        progress[OLD], progress[NOW], progress[BEHIND], progress[PHASE] = now, new, 1, LEAPT if fused else FRESH
     return DONE
 
 
 @njit
 def march_at(
-    calls, handle, coefficients, shape, spans, sums, dense, orders, memory, times, flags, y, k, f_old, supply, where,
-    ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows, within_at, within_by, work,
-    vectors, store, store_complex, spare, spare_supply, spare_flat, spare_complex, largest,
+    calls, handle, coefficients, structure, row_blocks, sums, dense, controls, loop_state, times, progress, y, k, f_old,
+    ledger_rates, ledger_offset, ledger, scale, out, out_row, values, g, g_new, armed, stored, carry, y_out, rows,
+    bounded_states, bounds, work, vectors, factors, complex_factors, spare, spare_ledger_rates, spare_flat,
+    spare_complex, largest,
 ):  # fmt: skip
-    """`march` with the functions at these addresses, in its order."""
+    """`run_steps` with the functions at these addresses, in the order of its arguments."""
     return march(
         attempt_at(calls[0]), leap_at(calls[1]), observe_at(calls[2]), record_at(calls[3]), events_at(calls[4]),
         rhs_at(calls[5]), factor_at(calls[6]), solve_at(calls[7]), factor_complex_at(calls[8]),
-        solve_complex_at(calls[9]), join_at(calls[10]), handle, coefficients, shape, spans, sums, dense, orders,
-        memory, times, flags, y, k, f_old, supply, where, ledger, scale, out, out_row, values, g, g_new, armed,
-        stored, carry, y_out, rows, within_at, within_by, work, vectors, store, store_complex,
-        spare, spare_supply, spare_flat, spare_complex, largest,
+        solve_complex_at(calls[9]), join_at(calls[10]), handle, coefficients, structure, row_blocks, sums, dense,
+        controls, loop_state, times, progress, y, k, f_old, ledger_rates, ledger_offset, ledger, scale, out, out_row,
+        values, g, g_new, armed, stored, carry, y_out, rows, bounded_states, bounds, work, vectors, factors,
+        complex_factors, spare, spare_ledger_rates, spare_flat, spare_complex, largest,
     )  # fmt: skip
 
 
 @njit
 def attempt_with(
-    calls, handle, coefficients, shape, spans, sums, t, h, y, now, new, k, supply, where, out, scale, orders, memory,
-    work, vectors, store, store_complex,
+    calls, handle, coefficients, structure, row_blocks, sums, t, h, y, now, new, k, ledger_rates, ledger_offset, out,
+    scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """One step with the functions at these addresses: the method's, rhs, linear algebra, the joint."""
+    """One step with the functions at these addresses: step of the method, rhs, linear algebra, exchange."""
     attempt = attempt_at(calls[0])
     return attempt(
         rhs_at(calls[1]), factor_at(calls[2]), solve_at(calls[3]), factor_complex_at(calls[4]),
-        solve_complex_at(calls[5]), join_at(calls[6]), handle, coefficients, shape, spans, sums, t, h, y, now, new, k,
-        supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+        solve_complex_at(calls[5]), join_at(calls[6]), handle, coefficients, structure, row_blocks, sums, t, h, y, now,
+        new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
     )  # fmt: skip
 
 
 def compiled():
-    """The loop as Python calls it: its functions as `addresses` gives them, then all else that `march` takes."""
+    """Time loop to be called from Python: functions from `addresses`, then the other arguments of `run_steps`."""
     if not COMPILING:
         return lambda functions, *others: march(*functions, *others)
     return compiled_as(march_at, "hhvhsvwvvvhwwvwivvvvvvvvhvvwhwvwvzwwvzv")
 
 
 def compiled_attempt():
-    """One step as Python calls it, likewise."""
+    """Single step to be called from Python: functions from `addresses`, then the other arguments of `attempt_with`."""
     if not COMPILING:
         return lambda functions, *others: functions[0](*functions[1:], *others)
     return compiled_as(attempt_with, "h" + ATTEMPT)

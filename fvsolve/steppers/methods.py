@@ -1,8 +1,8 @@
-"""The package's own methods by name, explicit, implicit and linearly implicit. Knows no time loop."""
+"""Built-in methods by name: explicit, implicit and linearly implicit."""
 
 from fvsolve.steppers import explicit, implicit, rosenbrock  # noqa: F401  (declare them)
 from fvsolve.steppers.tableau import METHODS
 
-AUTO = "auto"  # in place of a method: `automatic.py` chooses
+AUTO = "auto"  # in place of a method name: `automatic.py` chooses the method
 
 __all__ = ["AUTO", "METHODS"]

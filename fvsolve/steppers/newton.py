@@ -1,11 +1,12 @@
-"""What implicit steps share: Jacobian and factors and when to renew them, stopping of Newton. Knows no tableau.
+"""Newton iterations of implicit steps: renewal of the Jacobian and its factors, stopping tests, damping.
 
-Newton is simplified, with the Jacobian of the step's start, as long as that converges. Where the slope of f changes by
-orders within a step, as a valve's does about zero drop, it goes to and fro: then it is damped, with the Jacobian of
-every iterate.
+Simplified Newton with the Jacobian at the start of the step is used as long as it converges. Where the slope of f
+changes by orders of magnitude within a step, as the slope of a valve does near zero pressure drop, the iterates
+oscillate. Then Newton is damped, with a new Jacobian for every iterate.
 
-Kept between steps: `work`, a header and the Jacobian; in `vectors` f at the last step's start; its stages. A restart
-stores them (`Stepper.memories`) and factors anew: factors follow from the Jacobian and the shift to the last bit.
+These data are kept between steps: `work` with a header and the Jacobian; in `vectors` f at the start of the last step;
+the stages of the last step. A restart stores them (`Integrator.restart_arrays`) and factors again: the Jacobian and
+the shift determine the factors to the bit.
 """
 
 from __future__ import annotations
@@ -41,72 +42,74 @@ from fvsolve.steppers.slots import (
 )
 from fvsolve.steppers.step import copy, small
 
-# Rows of `vectors` behind the s stages of the last step: f at its start, an increment, weights, two for differences,
-# what a stage starts from (Rosenbrock: df/dt), a slope to fall back on; then, for fully implicit methods, transformed
+# Rows of `vectors` after the s stages of the last step: f at its start, an increment, weights, two rows for
+# differences, base of a stage (Rosenbrock: df/dt), fallback slope; then, for fully implicit methods, transformed
 # increments, f and residuals of all stages.
 FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, REACHED, STAGES = range(8)
 
-MOST = 10  # iterations
-# Accuracy aimed at where the step is given, relative; what may be left by rounding; and what must be reached.
+MOST = 10  # greatest number of iterations
+# For given steps, relative: target accuracy, error that counts as rounding, and greatest error accepted.
 FIXED, ROUNDED, FLOOR = 1e-13, 1e-10, 1e-7
-ENOUGH = 0.05  # of the tolerance
-STALE = 0.03  # a Jacobian that gains less than this in an iteration is made anew for the next step
+ENOUGH = 0.05  # fraction of the tolerance at which Newton stops
+STALE = 0.03  # ratio of successive increments above which the Jacobian is renewed for the next step
 CONVERGED, FAILED = 0, 1
-MOST_DAMPED, LEAST_PART = 40, 1e-4  # iterations, and what part of an increment is tried
-LEAST_WAY = 1 / 64  # what part of a step's length a stage is followed by
+MOST_DAMPED, LEAST_PART = 40, 1e-4  # greatest number of damped iterations, least damping factor
+LEAST_WAY = 1 / 64  # least fraction of a step over which `solve_stage_from_start` continues a stage
 
 
 def forget(work: np.ndarray) -> None:
-    """Keep nothing over a kink: no Jacobian, no stages to go on from."""
+    """Discard the Jacobian and the earlier stages at a kink."""
     work[:STORE] = 0.0
     work[SEEN] = work[DAMPED] = -1.0
     work[SURE] = 1.0
 
 
 @inner
-def begin(k, y, scale, orders, memory, work, vectors):
-    """At the first try of a step: keep the last stages to go on from; judge the Jacobian by their iterations."""
+def begin(k, y, scale, controls, loop_state, work, vectors):
+    """Prepare the first attempt of a step: store the last stages for prediction, discard a slow Jacobian."""
     s, n = k.shape
-    if work[SEEN] == memory[STEPS]:
+    if work[SEEN] == loop_state[STEPS]:
         return
-    tolerance = orders[SIZE] if orders[CONTROL] == TOLERANCE else FIXED
+    tolerance = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
     weights, first, last = vectors[s + WEIGHTS], vectors[s + FIRST], vectors[0]
     for i in range(n):
         weights[i] = 1.0 / (tolerance * small(scale[i], y[i]))
         last[i], first[i] = first[i], k[0, i]
     for j in range(1, s):
         copy(k[j], vectors[j])
-    goes_on = work[SEEN] == memory[STEPS] - 1.0 and memory[LAST] > 0.0
-    work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if goes_on else 0.0
+    follows = work[SEEN] == loop_state[STEPS] - 1.0 and loop_state[LAST] > 0.0
+    work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if follows else 0.0
     if work[RATIO] > STALE:
         work[HAS] = 0.0
-    work[SEEN], work[RATIO] = memory[STEPS], 0.0
+    work[SEEN], work[RATIO] = loop_state[STEPS], 0.0
 
 
 @inner
-def renew(rhs, handle, shape, where, t, y, f, supply, scale, out, memory, work, moved, rate):
-    """The Jacobian at y, from the fresh f and ledger rates there; moved, rate : room for a state and its rates."""
-    calls = differences(rhs, handle, shape, where, t, y, f, supply, scale, moved, rate, out, work[HEADER:])
-    memory[CALLS] += calls
-    memory[JACOBIANS] += 1.0
-    work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, memory[STEPS], 0.0, 0.0
+def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, out, loop_state, work, moved, rate):
+    """Compute the Jacobian at y from f and ledger rates evaluated there; moved, rate : work rows for a state and f."""
+    calls = differences(
+        rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, moved, rate, out, work[HEADER:]
+    )
+    loop_state[CALLS] += calls
+    loop_state[JACOBIANS] += 1.0
+    work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, loop_state[STEPS], 0.0, 0.0
 
 
 @inner
-def spectral_radius(shape, work, nnz, scale, v):
-    """Largest |eigenvalue| of the Jacobian, about, by five turns of the power method."""
+def spectral_radius(structure, work, nnz, scale, v):
+    """Approximate largest |eigenvalue| of the Jacobian, by five iterations of the power method."""
     n, product, before, now = v.size, work[HEADER + nnz :], 0.0, 0.0
     for e in range(n):
         v[e] = scale[e] if e % 2 == 0 else -scale[e]
     for _ in range(5):
-        multiply(shape, work[HEADER : HEADER + nnz], v, product)
+        multiply(structure, work[HEADER : HEADER + nnz], v, product)
         total = 0.0
         for e in range(n):
             total += (product[e] / scale[e]) * (product[e] / scale[e])
         before, now = now, sqrt(total)
         for e in range(n):
             v[e] = product[e] / now if now > 0.0 else 0.0
-    return sqrt(before * now)  # of a pair, whose single quotients swing
+    return sqrt(before * now)  # for a complex pair the single quotients oscillate
 
 
 @inner
@@ -120,7 +123,7 @@ def size_of(d, weights):
 
 @inner
 def along(d, other, weights):
-    """(<d, other> / <d, d>, |other|^2 / |d|^2): how far along d the next increment goes, and how long it is."""
+    """(<d, other> / <d, d>, |other|^2 / |d|^2): component along d and squared length of the next increment."""
     square = dot = size = 0.0
     for i in range(weights.size):
         w = weights[i] * weights[i]
@@ -132,54 +135,55 @@ def along(d, other, weights):
 
 @inner
 def shortened(part, ahead, size):
-    """What part of an increment to take, having tried `part`: the same where the next one is shorter or goes on.
+    """Damping factor of an increment after a trial with `part`; `part` itself if the trial is accepted.
 
-    The next one, by the same factors, is `ahead` along this one and of squared length `size`, both relative. Where it
-    turns back, the secant says where it would not (natural monotonicity: Deuflhard 2004, 3.3).
+    ahead, size : component along the increment and squared length of the next increment with the same factors, relative
+    The trial is accepted if the next increment is shorter or 0 <= ahead <= 1. A reversed increment is reduced by the
+    secant rule (natural monotonicity: Deuflhard 2004, 3.3).
     """
     if not size < np.inf:
         return 0.25 * part
     if 0.0 <= ahead <= 1.0 or size <= (1.0 - 0.25 * part) ** 2:
         return part
-    if ahead > 1.0:  # it has grown: to where the parabola through both ends is least
+    if ahead > 1.0:  # the increment has grown: go to the minimum of the parabola through both ends
         return part * min(0.5, max(0.1, 0.5 * part / (ahead - 1.0 + part)))
     return part * min(0.7, max(0.1, 1.0 / (1.0 - ahead)))
 
 
 @inner
-def goal(orders):
-    """(increment at which Newton may stop, and at which what is left is rounding), in units of the tolerance."""
-    if orders[CONTROL] == TOLERANCE:
-        enough = max(1e-15 / orders[SIZE], ENOUGH)
+def goal(controls):
+    """(increment at which Newton may stop, increment that counts as rounding), in units of the tolerance."""
+    if controls[CONTROL] == TOLERANCE:
+        enough = max(1e-15 / controls[SIZE], ENOUGH)
         return enough, enough
     return 1.0, ROUNDED / FIXED
 
 
 @inner
-def tight(orders):
-    """The same where Newton is damped, and what it must reach where nothing gains any more.
+def tight(controls):
+    """(increment to stop at, increment that counts as rounding, greatest increment accepted) of damped Newton.
 
-    As accurate as where the step is given, for f magnifies what is left.
+    In units of the tolerance. The accuracy is that of given steps, because f amplifies the Newton residual.
     """
-    unit = orders[SIZE] if orders[CONTROL] == TOLERANCE else FIXED
-    floor = goal(orders)[1] if orders[CONTROL] == TOLERANCE else FLOOR / unit
+    unit = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
+    floor = goal(controls)[1] if controls[CONTROL] == TOLERANCE else FLOOR / unit
     return FIXED / unit, min(ROUNDED / unit, floor), floor
 
 
 @inner
-def find_worst(d, f, weights, memory):
-    """Note the component whose rate is no number, else the one that moves most against its tolerance."""
+def find_worst(d, f, weights, loop_state):
+    """Store in loop_state[WORST] a component whose rate is not finite, else that of the greatest weighted increment."""
     worst = -1.0
     for i in range(weights.size):
         e = abs(d[i] * weights[i]) if abs(f[i]) < np.inf else np.inf
-        if e > worst:  # a rate that is no number makes increments of others none too
-            worst, memory[WORST] = e, i
+        if e > worst:  # a rate that is not a number makes other increments NaN as well
+            worst, loop_state[WORST] = e, i
 
 
 @inner
-def verdict(turn, size, before, orders, work):
-    """(whether to stop, why) after iteration `turn` with an increment of `size`, the one before it of `before`."""
-    enough, rounded = goal(orders)
+def verdict(turn, size, before, controls, work):
+    """(True to stop, CONVERGED or FAILED) after iteration `turn`; size, before : norms of this and last increment."""
+    enough, rounded = goal(controls)
     if not size < np.inf:
         return True, FAILED
     if turn > 0:
@@ -200,141 +204,175 @@ def verdict(turn, size, before, orders, work):
 
 
 @inner
-def book_increment(shape, nnz, d, supply, i, work):
-    """Add to the ledger rates of stage i what the last increment d of its state changes in them, by that Jacobian."""
+def book_increment(structure, nnz, d, ledger_rates, i, work):
+    """Add to the ledger rates of stage i their change J d by the last increment d of its state."""
     n, product = d.size, work[HEADER + nnz :]
-    multiply(shape, work[HEADER : HEADER + nnz], d, product)
-    for m in range(supply.shape[1]):
-        supply[i, m] += product[n + m]
+    multiply(structure, work[HEADER : HEADER + nnz], d, product)
+    for m in range(ledger_rates.shape[1]):
+        ledger_rates[i, m] += product[n + m]
 
 
 @inner
-def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, residual):
-    """f at the stage whose slope is ki, and f - ki."""
+def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, residual):
+    """Compute f at the stage with slope ki, and the residual f - ki."""
     for j in range(ki.size):
         y_stage[j] = base[j] + h_gamma * ki[j]
     rhs(t, y_stage, f, out, handle)
-    memory[CALLS] += 1.0
-    memory[NEWTON] += 1.0
+    loop_state[CALLS] += 1.0
+    loop_state[NEWTON] += 1.0
     for j in range(ki.size):
         residual[j] = f[j] - ki[j]
 
 
 @inner
 def damp(
-    rhs, factor, solve, handle, shape, t, h_gamma, i, k, y_stage, supply, where, out, scale, orders, memory, nnz, work,
-    vectors, store,
+    rhs, factor, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, scale, controls,
+    loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
-    """k[i] = f(t, base + h gamma k[i]) by damped Newton, a Jacobian for every iterate; returns CONVERGED or FAILED."""
+    """Solve k[i] = f(t, base + h gamma k[i]) by damped Newton, with a Jacobian for every iterate.
+
+    Returns CONVERGED or FAILED.
+    """
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
     other, shift, ki = vectors[s + MOVED], 1.0 / h_gamma, k[i]
-    enough, rounded, floor = tight(orders)
+    enough, rounded, floor = tight(controls)
     before = np.inf
-    evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, d)
+    evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, d)
     for turn in range(MOST_DAMPED):
-        for m in range(supply.shape[1]):
-            supply[i, m] = out[where + m]
-        renew(rhs, handle, shape, where, t, y_stage, f, supply[i], scale, out, memory, work, other, d)
-        memory[FACTORS] += 1.0
-        if factor(shape, work[HEADER:], shift, store) != 0:
+        for m in range(ledger_rates.shape[1]):
+            ledger_rates[i, m] = out[ledger_offset + m]
+        renew(
+            rhs,
+            handle,
+            structure,
+            ledger_offset,
+            t,
+            y_stage,
+            f,
+            ledger_rates[i],
+            scale,
+            out,
+            loop_state,
+            work,
+            other,
+            d,
+        )
+        loop_state[FACTORS] += 1.0
+        if factor(structure, work[HEADER:], shift, factors) != 0:
             break
         work[SHIFT] = shift
         for j in range(n):
             d[j] = f[j] - ki[j]
-        solve(shape, store, d)
+        solve(structure, factors, d)
         size = sqrt(size_of(d, weights) / max(n, 1))
         done = size <= enough or size <= rounded and size >= 0.5 * before or size <= floor and turn == MOST_DAMPED - 1
         part, tried, length, before = 1.0, 0.0, 0.0, size
         while not done and part != tried and part > LEAST_PART:
             for j in range(n):
                 ki[j] += shift * (part - tried) * d[j]
-            evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, memory, other)
-            if size <= rounded:  # which way the next increment goes says nothing
+            evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, other)
+            if size <= rounded:  # the direction of the next increment is rounding
                 tried = part
                 break
-            solve(shape, store, other)
+            solve(structure, factors, other)
             ahead, length = along(d, other, weights)
             tried, part = part, shortened(part, ahead, length)
-        if part != tried and size <= floor and length < np.inf:  # rounding, or a kink that no iterate sees through
+        if part != tried and size <= floor and length < np.inf:  # rounding, or a kink between the iterates
             done = True
         if done:
             for j in range(n):
                 ki[j] += shift * (1.0 - tried) * d[j]
-            book_increment(shape, nnz, d, supply, i, work)
-            work[DAMPED], work[RATIO], work[SURE] = memory[STEPS], 1.0, 1.0
+            book_increment(structure, nnz, d, ledger_rates, i, work)
+            work[DAMPED], work[RATIO], work[SURE] = loop_state[STEPS], 1.0, 1.0
             return CONVERGED
         if part != tried or not size < np.inf:
             break
-    find_worst(d, f, weights, memory)
+    find_worst(d, f, weights, loop_state)
     work[HAS] = 0.0
     return FAILED
 
 
 @inner
 def reach(
-    rhs, factor, solve, handle, shape, t, h_gamma, i, k, y, y_stage, supply, where, out, scale, orders, memory, nnz,
-    work, vectors, store,
+    rhs, factor, solve, handle, structure, t, h_gamma, i, k, y, y_stage, ledger_rates, ledger_offset, out, scale,
+    controls, loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
-    """The same by `damp`; where that fails and the step is given from the stage y, and last along h gamma.
+    """Solve a stage by `damped_newton`; for a given step with further starting values. Returns CONVERGED or FAILED.
 
-    There the slope of a step of no length is followed as it grows. Under a tolerance a shorter step is cheaper.
+    Where the first try of a given step fails, the iteration starts from the state y, and then by continuation in
+    h gamma from a step of zero length. Under error control a shorter step is cheaper.
     """
-    base, known, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + REACHED], k[i]
-    done, part, turn, worst = 0.0, 1.0, 0, memory[WORST]  # as plain Newton left it
+    base, reached, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + REACHED], k[i]
+    done, part, turn, worst = 0.0, 1.0, 0, loop_state[WORST]  # WORST keeps the result of simplified Newton
     while part >= LEAST_WAY:
         if turn == 1:
             for j in range(ki.size):
                 ki[j] = (y[j] - base[j]) / h_gamma
         elif turn > 1:
-            copy(known, ki)
-        why = damp(
-            rhs, factor, solve, handle, shape, t, h_gamma * (done + part), i, k, y_stage, supply, where, out, scale,
-            orders, memory, nnz, work, vectors, store,
+            copy(reached, ki)
+        status = damp(
+            rhs, factor, solve, handle, structure, t, h_gamma * (done + part), i, k, y_stage, ledger_rates,
+            ledger_offset, out, scale, controls, loop_state, nnz, work, vectors, factors,
         )  # fmt: skip
-        if why == CONVERGED:
+        if status == CONVERGED:
             done += part
             if done == 1.0:
                 return CONVERGED
-            copy(ki, known)
-        elif orders[CONTROL] == TOLERANCE:
+            copy(ki, reached)
+        elif controls[CONTROL] == TOLERANCE:
             return FAILED
         elif turn == 0:
             for j in range(ki.size):
-                known[j] = 0.0
+                reached[j] = 0.0
         else:
             part *= 0.5
-        memory[WORST] = worst
+        loop_state[WORST] = worst
         turn += 1
     return FAILED
 
 
 @inner
 def smoothed_error(
-    rhs, factor, solve, handle, shape, where, t, h, y, y_new, k, supply, error, shift, scale, out, orders, memory,
-    work, vectors, store,
+    rhs, factor, solve, handle, structure, ledger_offset, t, h, y, y_new, k, ledger_rates, error, shift, scale, out,
+    controls, loop_state, work, vectors, factors,
 ):  # fmt: skip
     """Error of a damped step, (I - J / shift)^-1 h sum e_j k_j with J from its start, in units of the tolerance.
 
-    A stiff f counts for what it moves within the step (Hosea and Shampine 1996). Where a jump makes J turn the error
-    round, it counts as it is.
+    The filter reduces the error of stiff components (Hosea and Shampine 1996). Where a jump in J reverses the error,
+    the unfiltered error is used. Returns NEWTON_FAILED where the matrix is singular.
     """
     s, n = k.shape
-    d, f, whole, dot, smooth = vectors[s + INCREMENT], vectors[s + RATE], 0.0, 0.0, 0.0
-    renew(rhs, handle, shape, where, t, y, k[0], supply[0], scale, out, memory, work, vectors[s + MOVED], f)
-    memory[FACTORS] += 1.0
+    d, f, plain, dot, smooth = vectors[s + INCREMENT], vectors[s + RATE], 0.0, 0.0, 0.0
+    renew(
+        rhs,
+        handle,
+        structure,
+        ledger_offset,
+        t,
+        y,
+        k[0],
+        ledger_rates[0],
+        scale,
+        out,
+        loop_state,
+        work,
+        vectors[s + MOVED],
+        f,
+    )
+    loop_state[FACTORS] += 1.0
     work[RATIO] = 1.0
-    if factor(shape, work[HEADER:], shift, store) != 0:
+    if factor(structure, work[HEADER:], shift, factors) != 0:
         return NEWTON_FAILED
     for i in range(n):
         f[i] = 0.0
         for j in range(s):
             f[i] += h * error[j] * k[j, i]
         d[i] = shift * f[i]
-    solve(shape, store, d)
+    solve(structure, factors, d)
     for i in range(n):
-        w = 1.0 / (orders[SIZE] * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
-        whole += (w * f[i]) * (w * f[i])
+        w = 1.0 / (controls[SIZE] * (scale[i] + max(abs(y[i]), abs(y_new[i]))))
+        plain += (w * f[i]) * (w * f[i])
         dot += (w * f[i]) * (w * d[i])
         smooth += (w * d[i]) * (w * d[i])
-    return sqrt((smooth if dot > 0.0 else whole) / max(n, 1))
+    return sqrt((smooth if dot > 0.0 else plain) / max(n, 1))

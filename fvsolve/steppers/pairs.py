@@ -1,4 +1,4 @@
-"""States taken two at a time: those whose neighbours are most alike. Knows patterns; knows no values."""
+"""Pairing of states for 2 x 2 block factors: each state with the state whose neighbours are most alike."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import numpy as np
 
 
 def pairs(pattern) -> np.ndarray:
-    """int64[blocks, 2]: every state once, with a partner; one that finds none is its own.
+    """int64[blocks, 2]: every state once, with its partner; a state without a partner is paired with itself.
 
-    The two waves of a cell make a pair, though nothing says so: of all couplings, theirs closes the most walks of
-    three steps. Couplings are taken greedily, strongest first (heavy edge matching; Karypis and Kumar 1998).
+    The weight of a coupling is the number of walks of three steps that it closes. It is greatest between the two waves
+    of a cell, so these are paired. Couplings are taken greedily, strongest first (heavy edge matching; Karypis and
+    Kumar 1998).
     """
     from scipy.sparse import coo_array, csr_array
 
@@ -23,5 +24,5 @@ def pairs(pattern) -> np.ndarray:
     for a, b in zip(i[strongest].tolist(), j[strongest].tolist(), strict=True):
         if partner[a] == a and partner[b] == b:
             partner[a], partner[b] = b, a
-    found = np.column_stack((np.arange(n), partner))
-    return found[found[:, 0] <= found[:, 1]].astype(np.int64)
+    matches = np.column_stack((np.arange(n), partner))
+    return matches[matches[:, 0] <= matches[:, 1]].astype(np.int64)

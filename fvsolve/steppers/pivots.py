@@ -1,28 +1,28 @@
-"""What makes a pivot good, for real and for complex numbers. Knows numbers; knows no structure."""
+"""Size of pivots and check of Jacobian entries, for real and complex numbers."""
 
 from fvsolve.jit import njit
 from fvsolve.steppers.structure import ROWS, SIZE, STARTS
 
-LEAST = 1e-150  # of a pivot: its square is still a number, and so is that of its reciprocal
+LEAST = 1e-150  # least size of a pivot: its square and the square of its reciprocal are still in range
 
 
 @njit(forceinline=True)
 def size_of(x):
-    """|Re x| + |Im x|, quicker than the modulus."""
+    """|Re x| + |Im x|, which is quicker to compute than the modulus."""
     return abs(x.real) + abs(x.imag)
 
 
 @njit(forceinline=True)
 def reciprocal(x):
-    """1 / x of a number whose square neither overflows nor vanishes."""
+    """1 / x of a number whose square neither overflows nor underflows."""
     return x.conjugate() / (x.real * x.real + x.imag * x.imag)
 
 
 @njit
-def bad_row(shape, jacobian):
-    """0, or 1 + the state of the first row with an entry that is not finite (or beyond all use)."""
-    n = shape[SIZE]
-    last, rows, good = shape[shape[STARTS] + n], shape[shape[ROWS] :], True
+def bad_row(structure, jacobian):
+    """1 + the state of the first entry that is not finite or is 1e150 or more; 0 if all state entries are valid."""
+    n = structure[SIZE]
+    last, rows, good = structure[structure[STARTS] + n], structure[structure[ROWS] :], True
     for p in range(last):
         good &= abs(jacobian[p]) < 1.0 / LEAST
     if not good:

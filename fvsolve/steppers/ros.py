@@ -1,7 +1,7 @@
-"""One step of a Rosenbrock method: every stage is one linear solve with the Jacobian at its start. Knows arrays.
+"""One step of a Rosenbrock method: every stage is a linear solve with the Jacobian at the start of the step.
 
 (I / (h g) - J) u_i = f(t + c_i h, y + sum a_ij u_j) + sum C_ij u_j / h + d_i h f_t, y+ = y + sum m_i u_i
-(Hairer and Wanner 1996, (IV.7.25)). Stages are kept as k_i = u_i / h.
+(Hairer and Wanner 1996, (IV.7.25)). Stages are stored as k_i = u_i / h.
 """
 
 from __future__ import annotations
@@ -32,72 +32,72 @@ from fvsolve.steppers.step import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 
-SLOPE = BASE  # the row of `vectors`, behind the stages, that keeps df/dt: no stage here starts from a base of its own
+SLOPE = BASE  # row of `vectors`, after the stages, for df/dt: Rosenbrock stages do not use the row BASE
 
 
 @inner
-def slope_in_time(rhs, handle, t, h, y, k, supply, where, out, memory, work, vectors):
-    """df/dt and, last in `work`, that of the ledger rates, by a difference that stays within the step."""
+def slope_in_time(rhs, handle, t, h, y, k, ledger_rates, ledger_offset, out, loop_state, work, vectors):
+    """Compute df/dt and, at the end of `work`, the time slopes of the ledger rates, by a difference within the step."""
     s, n = k.shape
-    slope, ledgers = vectors[s + SLOPE], supply.shape[1]
+    slope, ledgers = vectors[s + SLOPE], ledger_rates.shape[1]
     step = min((2.2e-16 * max(1e-5, abs(t))) ** 0.5, 1e-3 * h)
     later = t + step
     rhs(later, y, slope, out, handle)
-    memory[CALLS] += 1.0
-    per = 1.0 / (later - t) if later > t else 0.0  # in a step of so few roundings it counts for nothing
+    loop_state[CALLS] += 1.0
+    per = 1.0 / (later - t) if later > t else 0.0  # the time difference is lost in rounding: df/dt is negligible
     for e in range(n):
         slope[e] = (slope[e] - k[0, e]) * per
     for m in range(ledgers):
-        work[work.size - ledgers + m] = (out[where + m] - supply[0, m]) * per
+        work[work.size - ledgers + m] = (out[ledger_offset + m] - ledger_rates[0, m]) * per
 
 
 @inner
-def book_stage(shape, nnz, i, gamma, late, row, d, supply, where, out, work):
-    """Ledger rates of stage i as of any state: g (rates + J d + late slope + sum of C_ij supply_j), d = u_i.
+def book_stage(structure, nnz, i, gamma, time_weight, row, d, ledger_rates, ledger_offset, out, work):
+    """Ledger rates of stage i: gamma (rates + J d + time_weight slope + sum of C_ij ledger_rates_j), d = u_i.
 
-    row : C_i, float64[s]; `out` holds the rates that came with f, the end of `work` their slopes in time.
+    row : float64[s]  C_i; `out` holds the rates computed with f, the end of `work` their time slopes
     """
-    n, ledgers, product = d.size, supply.shape[1], work[HEADER + nnz :]
-    multiply(shape, work[HEADER : HEADER + nnz], d, product)
+    n, ledgers, product = d.size, ledger_rates.shape[1], work[HEADER + nnz :]
+    multiply(structure, work[HEADER : HEADER + nnz], d, product)
     for m in range(ledgers):
-        total = out[where + m] + product[n + m] + late * work[work.size - ledgers + m]
+        total = out[ledger_offset + m] + product[n + m] + time_weight * work[work.size - ledgers + m]
         for j in range(1, i):
-            total += row[j] * supply[j, m]
-        supply[i, m] = gamma * total
+            total += row[j] * ledger_rates[j, m]
+        ledger_rates[i, m] = gamma * total
 
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
-    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
+    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
+    """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]); returns the error in units of the tolerance.
 
-    Of the linear algebra the real part is used. Returns NEWTON_FAILED where the matrix is singular.
+    Uses the real part of the linear algebra. Returns NEWTON_FAILED where the matrix is singular.
     """
     s, n = k.shape
-    ledgers, nnz = supply.shape[1], shape[shape[STARTS] + shape[STATES]]
-    c, beyond = nodes_of(coefficients, s), coefficients[s * s + 3 * s :]  # C, d, g
-    gamma, slope, d, f = beyond[s * s + s], vectors[s + SLOPE], vectors[s + INCREMENT], vectors[s + RATE]
-    if work[HAS] == 0.0 or work[SEEN] != memory[STEPS]:
+    ledgers, nnz = ledger_rates.shape[1], structure[structure[STARTS] + structure[STATES]]
+    c, extra = nodes_of(coefficients, s), coefficients[s * s + 3 * s :]  # C, d, g
+    gamma, slope, d, f = extra[s * s + s], vectors[s + SLOPE], vectors[s + INCREMENT], vectors[s + RATE]
+    if work[HAS] == 0.0 or work[SEEN] != loop_state[STEPS]:
         renew(
-            rhs, handle, shape, where, t, y[now], k[0], supply[0], scale, out, memory, work, vectors[s + MOVED],
-            vectors[s + RATE],
+            rhs, handle, structure, ledger_offset, t, y[now], k[0], ledger_rates[0], scale, out, loop_state, work,
+            vectors[s + MOVED], vectors[s + RATE],
         )  # fmt: skip
-        slope_in_time(rhs, handle, t, h, y[now], k, supply, where, out, memory, work, vectors)
-        if work[SEEN] != memory[STEPS]:
-            goes_on = work[SEEN] == memory[STEPS] - 1.0 and memory[LAST] > 0.0
-            work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if goes_on else 0.0
-        work[SEEN] = memory[STEPS]
-        if orders[WATCH] != 0.0:
-            memory[RADIUS] = spectral_radius(shape, work, nnz, scale, vectors[s + INCREMENT])
+        slope_in_time(rhs, handle, t, h, y[now], k, ledger_rates, ledger_offset, out, loop_state, work, vectors)
+        if work[SEEN] != loop_state[STEPS]:
+            follows = work[SEEN] == loop_state[STEPS] - 1.0 and loop_state[LAST] > 0.0
+            work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if follows else 0.0
+        work[SEEN] = loop_state[STEPS]
+        if controls[WATCH] != 0.0:
+            loop_state[RADIUS] = spectral_radius(structure, work, nnz, scale, vectors[s + INCREMENT])
     shift = 1.0 / (h * gamma)
     if work[SHIFT] != shift:
-        memory[FACTORS] += 0.0 if work[SHIFT] == -shift else 1.0
+        loop_state[FACTORS] += 0.0 if work[SHIFT] == -shift else 1.0
         work[SHIFT] = 0.0
-        why = factor(shape, work[HEADER:], shift, store)
-        if why != 0:
-            memory[WORST] = why - 1.0
+        bad_pivot = factor(structure, work[HEADER:], shift, factors)
+        if bad_pivot != 0:
+            loop_state[WORST] = bad_pivot - 1.0
             return NEWTON_FAILED
         work[SHIFT] = shift
     per = 1.0 / h
@@ -105,25 +105,25 @@ def attempt(
         if i == 1:
             f = k[0]
             for m in range(ledgers):
-                out[where + m] = supply[0, m]
+                out[ledger_offset + m] = ledger_rates[0, m]
         else:
             f = vectors[s + RATE]
             combine(0, y[now].size, y[now], h, row_of(coefficients, s, i), i, k, y[3])
             rhs(t + c[i] * h, y[3], f, out, handle)
-        late, u, row = beyond[s * s + i] * h, k[i], beyond[i * s : (i + 1) * s]
-        if late != 0.0:
+        time_weight, u, row = extra[s * s + i] * h, k[i], extra[i * s : (i + 1) * s]
+        if time_weight != 0.0:
             for e in range(n):
-                d[e] = f[e] + late * slope[e]
+                d[e] = f[e] + time_weight * slope[e]
             f = d
         combine(0, n, f, 1.0, row, i, k, u)
-        solve(shape, store, u)
+        solve(structure, factors, u)
         if ledgers > 0:
             copy(u, d)
-            book_stage(shape, nnz, i, gamma, late, row, d, supply, where, out, work)
+            book_stage(structure, nnz, i, gamma, time_weight, row, d, ledger_rates, ledger_offset, out, work)
         for e in range(n):
             u[e] *= per
-    memory[CALLS] += s - 2.0
+    loop_state[CALLS] += s - 2.0
     combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
-    if orders[CONTROL] != TOLERANCE:
+    if controls[CONTROL] != TOLERANCE:
         return 0.0
-    return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, orders[SIZE])
+    return error_norm(h, error_of(coefficients, s), k, y[now], y[new], scale, controls[SIZE])

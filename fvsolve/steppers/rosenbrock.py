@@ -1,4 +1,4 @@
-"""Rosenbrock methods as their codes print them, and what follows from that. Knows no time loop.
+"""Rosenbrock methods as printed in their codes, and their properties.
 
 k_i h = h f(y + sum alpha_ij h k_j) + h J sum gamma_ij h k_j; the codes avoid the product with J by u = Gamma h k:
 A = alpha Gamma^-1, C = diag(1 / gamma) - Gamma^-1, m = b Gamma^-1 (Hairer and Wanner 1996, IV.7).
@@ -15,15 +15,15 @@ import numpy as np
 from fvsolve.steppers.analysis.trees import Conditions
 from fvsolve.steppers.tableau import METHODS, OWN, Array, Method
 
-DIGITS = 14  # that are left of the printed ones once Gamma has been inverted
+DIGITS = 14  # accurate digits of the printed numbers after the inversion of Gamma
 
 
 @dataclass(frozen=True, eq=False)
 class Rosenbrock(Method):
-    """One linear solve a stage; of stiffly accurate kind: y+ = y_s + u_s, and u_s estimates the error.
+    """Stiffly accurate Rosenbrock method with a linear solve for each stage: y+ = y_s + u_s, u_s estimates the error.
 
     text : rows `c_i d_i | a_i1 a_i2 ...`, c and d the sums of rows of alpha and Gamma; ruled lines before C and before
-    the polynomials of its dense output, y(theta) = y + theta (y+ - y) + theta (1 - theta) sum_k theta^k (H u)_k.
+    the polynomials of its dense output, y(theta) = y + theta (y+ - y) + theta (1 - theta) sum_k theta^k (H u)_k
     """
 
     gamma: str = field(default="", repr=False)
@@ -44,7 +44,7 @@ class Rosenbrock(Method):
                 sums.append([Fraction(word) for word in left.split()])
         s = len(sums)
         a, c, h = ([row + [Fraction(0)] * (s - len(row)) for row in block] for block in blocks)
-        return [one[0] for one in sums], [one[1] for one in sums], a, c, h
+        return [pair[0] for pair in sums], [pair[1] for pair in sums], a, c, h
 
     @functools.cached_property
     def forms(self) -> tuple:
@@ -63,7 +63,7 @@ class Rosenbrock(Method):
 
     @functools.cached_property
     def exact(self) -> Array:
-        """beta = alpha + Gamma in place of A: on y' = lambda y a Rosenbrock method is that diagonally implicit one."""
+        """Array with beta = alpha + Gamma as A: on y' = lambda y the method equals that diagonally implicit method."""
         alpha, gamma, b, embedded = self.forms
         beta = tuple(tuple(x + y for x, y in zip(*rows, strict=True)) for rows in zip(alpha, gamma, strict=True))
         return Array(beta, tuple(b), tuple(sum(row) for row in beta), tuple(embedded), Fraction(0), ())
@@ -78,12 +78,12 @@ class Rosenbrock(Method):
 
     @property
     def diagonally_implicit(self) -> bool:
-        """No stage is solved by Newton."""
+        """False, as no stage is solved by Newton."""
         return False
 
     @property
     def kind(self) -> str:
-        """A stage at a time, by one linear solve."""
+        """Kind "linear": each stage by a linear solve."""
         return "linear"
 
     @functools.cached_property
@@ -92,30 +92,39 @@ class Rosenbrock(Method):
         c, d, a, big_c, h = self.printed
         s = len(c)
 
-        def framed(rows):
-            found = np.zeros((s + 1, s + 1))
-            found[1:, 1:] = [[float(x) for x in row] for row in rows]
-            return found
+        def padded_matrix(rows):
+            padded = np.zeros((s + 1, s + 1))
+            padded[1:, 1:] = [[float(x) for x in row] for row in rows]
+            return padded
 
-        def led(values):
+        def padded_row(values):
             return np.array([0.0, *map(float, values)])
 
-        m, error = led([*a[-1][:-1], 1]), led([0] * (s - 1) + [1])
-        flat = [framed(a).ravel(), m, led(c), error, framed(big_c).ravel(), led(d), [float(Fraction(self.gamma))], [0]]
-        h = np.vstack([led(row) for row in h])
+        m, error = padded_row([*a[-1][:-1], 1]), padded_row([0] * (s - 1) + [1])
+        flat = [
+            padded_matrix(a).ravel(),
+            m,
+            padded_row(c),
+            error,
+            padded_matrix(big_c).ravel(),
+            padded_row(d),
+            [float(Fraction(self.gamma))],
+            [0],
+        ]
+        h = np.vstack([padded_row(row) for row in h])
         dense = np.column_stack([m + h[0], *(h[i + 1] - h[i] for i in range(len(h) - 1)), -h[-1]])
         return np.concatenate(flat), np.ascontiguousarray(dense), s + 1
 
 
 def _inverse(lower):
-    """Of a lower triangular matrix of fractions."""
+    """Inverse of a lower triangular matrix of fractions."""
     s = len(lower)
-    found = [[Fraction(0)] * s for _ in range(s)]
+    inverse = [[Fraction(0)] * s for _ in range(s)]
     for j in range(s):
         for i in range(j, s):
-            total = Fraction(int(i == j)) - sum(lower[i][k] * found[k][j] for k in range(j, i))
-            found[i][j] = total / lower[i][i]
-    return found
+            total = Fraction(int(i == j)) - sum(lower[i][k] * inverse[k][j] for k in range(j, i))
+            inverse[i][j] = total / lower[i][i]
+    return inverse
 
 
 def _product(x, y):

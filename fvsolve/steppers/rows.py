@@ -1,4 +1,4 @@
-"""Rows and fields: when the next is due, and what is written of those a step has passed. Knows no model."""
+"""Output rows and fields: time of the next one, and their values from dense output or separate steps."""
 
 from fvsolve.jit import njit
 from fvsolve.steppers.slots import (
@@ -33,139 +33,141 @@ from fvsolve.steppers.slots import (
 from fvsolve.steppers.step import BEGIN, HUGE, STOP, copy, interpolate
 
 BASE, GAIN, LEAST, MOST = range(4)
-AT_END = 1e-9  # of a step: a row so near its end is read there
-LITTLE = 1e-9  # of what there are shares of, too little to tell them by
+AT_END = 1e-9  # in steps: a row closer to the step's end takes the state there
+LITTLE = 1e-9  # reference amount below which shares of it are not computed
 
 
 @njit(forceinline=True)
-def output_due(orders, memory, count_at, every, limit):
+def output_due(controls, loop_state, count_at, every, limit):
     """Time of the next row or field: START + count * every, or infinity."""
-    if every <= 0.0 or memory[count_at] > limit:
+    if every <= 0.0 or loop_state[count_at] > limit:
         return 1e308
-    return orders[START] + memory[count_at] * every
+    return controls[START] + loop_state[count_at] * every
 
 
 @njit(forceinline=True)
-def row_due(orders, memory, times):
-    """Time of the next row: the next of `times` where there are any [s]."""
+def row_due(controls, loop_state, times):
+    """Time of the next row, from `times` if it is not empty [s]."""
     if times.size == 0:
-        return output_due(orders, memory, NEXT_OUTPUT, orders[EVERY], 1e300)
-    count = int(memory[NEXT_OUTPUT])
+        return output_due(controls, loop_state, NEXT_OUTPUT, controls[EVERY], 1e300)
+    count = int(loop_state[NEXT_OUTPUT])
     return times[count] if count < times.size else 1e308
 
 
 @njit(forceinline=True)
-def next_due(orders, memory, times):
-    """Time of whatever is to be written next [s]."""
-    row = row_due(orders, memory, times)
-    return min(row, output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT]))
+def next_due(controls, loop_state, times):
+    """Time of the next row or field, whichever comes first [s]."""
+    row = row_due(controls, loop_state, times)
+    return min(row, output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT]))
 
 
 @njit(forceinline=True)
-def whole(at, by, y):
-    """What a state is a share of: base + gain (y[j] + y[k]), of both, one or none."""
-    found = by[BASE]
-    if at[1] >= 0:
-        found += by[GAIN] * (y[at[1]] + (y[at[2]] if at[2] >= 0 else 0.0))
-    return found
+def whole(states, bounds, y):
+    """Amount of which a state is a share: base + gain (y[j] + y[k]), without the terms whose index is negative."""
+    amount = bounds[BASE]
+    if states[1] >= 0:
+        amount += bounds[GAIN] * (y[states[1]] + (y[states[2]] if states[2] >= 0 else 0.0))
+    return amount
 
 
 @njit
-def keep_within(at, by, y_old, y, out):
-    """Hold what is read between two states to the bounds that these have: a polynomial through both may leave them.
+def keep_within(states, bounds, y_old, y, out):
+    """Limit interpolated states to their bounds, because a polynomial between two valid states may leave them.
 
-    at : int64[3 q]  a state, and up to two that say what it is a share of, else -1
-    by : float64[q, 4]  BASE, GAIN (see `whole`), LEAST and MOST share, which either end may have left
+    states : int64[3 q]  a state, and up to two states that give the amount it is a share of, else -1
+    bounds : float64[q, 4]  BASE, GAIN (see `reference_amount`), LEAST and MOST share; shares at the ends widen them
     """
-    for r in range(by.shape[0]):
-        place, low, high = at[3 * r : 3 * r + 3], by[r, LEAST], by[r, MOST]
+    for r in range(bounds.shape[0]):
+        row_states, low, high = states[3 * r : 3 * r + 3], bounds[r, LEAST], bounds[r, MOST]
         for y_end in (y_old, y):
-            total = whole(place, by[r], y_end)
+            total = whole(row_states, bounds[r], y_end)
             if total > LITTLE:
-                share = y_end[place[0]] / total
+                share = y_end[row_states[0]] / total
                 low, high = min(low, share), max(high, share)
-        total = max(whole(place, by[r], out), 0.0)
-        found = max(out[place[0]], low * total)
-        out[place[0]] = min(found, high * total) if high < HUGE else found
+        total = max(whole(row_states, bounds[r], out), 0.0)
+        value = max(out[row_states[0]], low * total)
+        out[row_states[0]] = min(value, high * total) if high < HUGE else value
 
 
 @njit(forceinline=True)
-def comes_apart(orders, work):
-    """Whether rows within the step behind come from steps of their own, see `slots.APART`."""
-    if orders[CONTROL] == TOLERANCE or orders[APART] == NEVER_APART:
+def comes_apart(controls, work):
+    """True if rows within the last step come from separate steps, see `SEPARATE_ROWS`."""
+    if controls[CONTROL] == TOLERANCE or controls[APART] == NEVER_APART:
         return False
-    return orders[APART] == ALWAYS_APART or work[KNOWN] < 2.0
+    return controls[APART] == ALWAYS_APART or work[KNOWN] < 2.0
 
 
 @njit
 def step_apart(
-    attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y,
-    old, new, supply, where, out, scale, orders, memory, work, spare, spare_flat, spare_complex,
+    attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums,
+    t, h, y, old, new, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, spare, spare_flat,
+    spare_complex,
 ):  # fmt: skip
-    """y[new] at t + h by a step of the method from y[old], as from a start; True where it could be solved.
+    """Compute y[new] at t + h by a step from y[old], as from a start; returns True if its stages could be solved.
 
-    It works on arrays of its own, so that neither the steps of a run nor the stages that `energy` reads depend on its
-    rows; what it costs is counted.
-    supply : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + store]
+    It uses separate arrays, so that neither the steps of a run nor the stages that `energy` reads depend on the rows.
+    Its cost is counted.
+    ledger_rates : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + factors]
     """
-    s, worst, radius = supply.shape[0], memory[WORST], memory[RADIUS]
-    if work.size > 0:  # no Jacobian, no stages to go on from
+    s, worst, radius = ledger_rates.shape[0], loop_state[WORST], loop_state[RADIUS]
+    if work.size > 0:  # no Jacobian and no earlier stages
         spare_flat[:STORE] = 0.0
         spare_flat[HAS], spare_flat[SEEN], spare_flat[DAMPED], spare_flat[SURE] = 0.0, -1.0, -1.0, 1.0
         spare_flat[STORE] = work[STORE]
     rhs(t, y[old], spare[0], out, handle)
-    memory[CALLS] += 1.0
-    for m in range(supply.shape[1]):
-        supply[0, m] = out[where + m]
+    loop_state[CALLS] += 1.0
+    for m in range(ledger_rates.shape[1]):
+        ledger_rates[0, m] = out[ledger_offset + m]
     e = attempt(
-        rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, old,
-        new, spare[:s], supply, where, out, scale, orders, memory, spare_flat[: work.size], spare[s:],
-        spare_flat[work.size :], spare_complex,
+        rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t,
+        h, y, old, new, spare[:s], ledger_rates, ledger_offset, out, scale, controls, loop_state,
+        spare_flat[: work.size], spare[s:], spare_flat[work.size :], spare_complex,
     )  # fmt: skip
-    memory[WORST], memory[RADIUS] = worst, radius
+    loop_state[WORST], loop_state[RADIUS] = worst, radius
     return e != NEWTON_FAILED
 
 
 @njit
 def emit(
-    attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums,
-    orders, memory, times, flags, t_old, y, now, old, f_old, f, k, where, dense, bend, scale, out, y_out, rows,
-    within_at, within_by, work, spare, spare_supply, spare_flat, spare_complex,
+    attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure,
+    row_blocks, sums, controls, loop_state, times, progress, t_old, y, now, old, f_old, f, k, ledger_offset, dense,
+    start_slope, scale, out, y_out, rows, bounded_states, bounds, work, spare, spare_ledger_rates, spare_flat,
+    spare_complex,
 ):  # fmt: skip
-    """Write the rows due up to now; stops early at a field, which waits in y_out, or when the rows are full."""
-    t, h, apart = memory[T], memory[T] - t_old, comes_apart(orders, work)
+    """Write the rows due up to the present time; returns early at a due field, held in y_out, or with full rows."""
+    t, h, separate = loop_state[T], loop_state[T] - t_old, comes_apart(controls, work)
     while True:
-        row = row_due(orders, memory, times)
-        field = output_due(orders, memory, NEXT_FIELD, orders[FIELD_EVERY], orders[FIELD_COUNT])
+        row = row_due(controls, loop_state, times)
+        field = output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT])
         due = min(row, field)
-        if due > t or (due >= orders[STOP_AT]):
+        if due > t or (due >= controls[STOP_AT]):
             return DONE
-        if row <= due and flags[ROWS] == rows.shape[0]:
+        if row <= due and progress[ROWS] == rows.shape[0]:
             return ROWS_FULL
         solved, new = False, 3 - now - old
-        if apart and due < t - AT_END * h:
+        if separate and due < t - AT_END * h:
             solved = step_apart(
-                attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans,
-                sums, t_old, due - t_old, y, old, new, spare_supply, where, out, scale, orders, memory, work, spare,
-                spare_flat, spare_complex,
+                attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure,
+                row_blocks, sums, t_old, due - t_old, y, old, new, spare_ledger_rates, ledger_offset, out, scale,
+                controls, loop_state, work, spare, spare_flat, spare_complex,
             )  # fmt: skip
-        for m in range(spans.shape[0]):
-            begin, end = spans[m, BEGIN], spans[m, STOP]
+        for m in range(row_blocks.shape[0]):
+            begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
             if solved:
                 copy(y[new, begin:end], y_out[begin:end])
-            elif apart:
+            elif separate:
                 theta = (due - t_old) / h
                 for i in range(begin, end):
                     y_out[i] = y[old, i] + theta * (y[now, i] - y[old, i])
             else:
-                interpolate(begin, end, (due - t_old) / h, h, y[old], f_old, y[now], f, k, dense, bend, y_out)
-        keep_within(within_at, within_by, y[old], y[now], y_out)
+                interpolate(begin, end, (due - t_old) / h, h, y[old], f_old, y[now], f, k, dense, start_slope, y_out)
+        keep_within(bounded_states, bounds, y[old], y[now], y_out)
         rhs(due, y_out, y_out[:0], out, handle)
         if row <= due:
-            rows[flags[ROWS], 0] = due
-            observe(due, y_out, out, handle, rows[flags[ROWS], 1:])
-            flags[ROWS] += 1
-            memory[NEXT_OUTPUT] += 1.0
+            rows[progress[ROWS], 0] = due
+            observe(due, y_out, out, handle, rows[progress[ROWS], 1:])
+            progress[ROWS] += 1
+            loop_state[NEXT_OUTPUT] += 1.0
         if field <= due:
-            memory[NEXT_FIELD] += 1.0
+            loop_state[NEXT_FIELD] += 1.0
             return FIELD

@@ -1,8 +1,9 @@
-"""One step of an SSP method whose stages are divided by what is quick in them, f + G y with G = -r by state.
+"""One step of a semi-implicit SSP method for f + G y, with a fast decay G = -r of each state.
 
-Chertock, Cui, Kurganov and Wu 2015 (SIAM J. Numer. Anal. 53): each stage is a mean of Euler steps of the whole
-length h, y + h (f + G y) / (1 + h R), and the step ends with what makes it second order. Where f + G y is zero nothing
-changes, so a steady state is that of f + G y for any h. R >= r may be another rate than r, see `free_surface.friction`.
+Chertock, Cui, Kurganov and Wu 2015 (SIAM J. Numer. Anal. 53): each stage is a mean of Euler steps of the full length
+h, y + h (f + G y) / (1 + h R). A correction at the end of the step makes it second order. Where f + G y is zero the
+state does not change, so steady states are those of f + G y for any h. R >= r may differ from r, see
+`free_surface.friction`.
 """
 
 from fvsolve.jit import njit
@@ -13,14 +14,16 @@ from fvsolve.steppers.step import BEGIN, STOP, combine, copy
 
 
 @njit
-def settle(begin, end, b, quick, k):
-    """Let k of the last stage bring y + h sum b_j k_j, of [begin:end], to what is second order in h.
+def settle(begin, end, b, damping, k):
+    """Correct k of the last stage so that y + h sum b_j k_j, for states [begin:end], is second order in h.
 
-    An Euler step of length h (h R), backward in G, from there: with f + G y of the stage at the end, k[2] (1 + h R).
+    The correction is an Euler step of length h (h R) from there, implicit in G, with f + G y of the stage at the end,
+    k[2] (1 + h R).
+    damping : float64[n]  h R
     """
     last = b.size - 1
     for i in range(begin, end):
-        q, mean = quick[i], 0.0
+        q, mean = damping[i], 0.0
         for j in range(1, b.size):
             mean += b[j] * k[j, i]
         k[last, i] += q * (k[2, i] * (1.0 + q) + q * (k[1, i] - mean)) / ((1.0 + q * q) * b[last])
@@ -28,30 +31,31 @@ def settle(begin, end, b, quick, k):
 
 @njit
 def attempt(
-    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, shape, spans, sums, t, h, y, now,
-    new, k, supply, where, out, scale, orders, memory, work, vectors, store, store_complex,
+    rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t, h, y,
+    now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors, factors, complex_factors,
 ):  # fmt: skip
-    """y[new] and the stages k from y[now] and k[0] = f(t, y[now]), a stage of no weight; k[1] is that divided.
+    """Compute y[new] and the stages k from y[now] and k[0] = f(t, y[now]), a stage of weight zero; returns 0.
 
-    supply[i] keeps the ledger rates of stage i. store : h R of the first two stages and of those that follow, zero
-    where nothing is quick; what else other methods need is not looked at.
+    k[1] is k[0] divided by 1 + h R. ledger_rates[i] receives the ledger rates of stage i.
+    factors : float64[2 n]  h R of the first two stages, then of the later stages; zero for states without fast decay
+    The other arguments of implicit steps are not used.
     """
     s, b, c, n = k.shape[0], weights_of(coefficients, k.shape[0]), nodes_of(coefficients, k.shape[0]), scale.size
-    for m in range(spans.shape[0]):
-        copy(k[0, spans[m, BEGIN] : spans[m, STOP]], k[1, spans[m, BEGIN] : spans[m, STOP]])
-    for m in range(supply.shape[1]):
-        supply[1, m] = supply[0, m]
-    damp_in_turn(h, y[now], k[1], store[:n], handle)
+    for m in range(row_blocks.shape[0]):
+        copy(k[0, row_blocks[m, BEGIN] : row_blocks[m, STOP]], k[1, row_blocks[m, BEGIN] : row_blocks[m, STOP]])
+    for m in range(ledger_rates.shape[1]):
+        ledger_rates[1, m] = ledger_rates[0, m]
+    damp_in_turn(h, y[now], k[1], factors[:n], handle)
     for i in range(2, s):
-        for m in range(spans.shape[0]):
-            combine(spans[m, BEGIN], spans[m, STOP], y[now], h, row_of(coefficients, s, i), i, k, y[3])
+        for m in range(row_blocks.shape[0]):
+            combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, row_of(coefficients, s, i), i, k, y[3])
         rhs(t + c[i] * h, y[3], k[i], out, handle)
-        for m in range(supply.shape[1]):
-            supply[i, m] = out[where + m]
-        damp_in_turn(h, y[3], k[i], store[:n] if i == 2 else store[n:], handle)
-    for m in range(spans.shape[0]):
+        for m in range(ledger_rates.shape[1]):
+            ledger_rates[i, m] = out[ledger_offset + m]
+        damp_in_turn(h, y[3], k[i], factors[:n] if i == 2 else factors[n:], handle)
+    for m in range(row_blocks.shape[0]):
         if s > 2:
-            settle(spans[m, BEGIN], spans[m, STOP], b, store[:n], k)
-        combine(spans[m, BEGIN], spans[m, STOP], y[now], h, b, s, k, y[new])
-    memory[CALLS] += s - 2.0
+            settle(row_blocks[m, BEGIN], row_blocks[m, STOP], b, factors[:n], k)
+        combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, b, s, k, y[new])
+    loop_state[CALLS] += s - 2.0
     return 0.0

@@ -1,7 +1,8 @@
-"""The declared types of what the time loop calls, and functions compiled for them alone. Knows no function's meaning.
+"""Declared types of the functions that the time loop calls, and functions compiled for exactly these types.
 
-Declared, so that the loop is compiled once, cached, and serves every method and every model. Letters are those of
-`jit.plain_kinds`: t, i numbers, c a complex one, v, w rows and tables of numbers, h, s of integers, z of complex ones.
+With declared types the loop is compiled once, cached, and used for every method and every model. Letters are those of
+`jit.plain_kinds`: t, i numbers, c a complex number, v, w rows and tables of floats, h, s of integers, z of complex
+numbers.
 """
 
 import functools
@@ -11,13 +12,13 @@ import numpy as np
 from fvsolve.jit import COMPILING, Intrinsic, declared, njit, plain_kinds
 
 FACTOR, SOLVE, FACTOR_COMPLEX, SOLVE_COMPLEX = "hvtv", "hvv", "hvcz", "hzz"
-ATTEMPT = "hvhsvttwiiwwivvvvvwvz"  # of a step, after its functions
+ATTEMPT = "hvhsvttwiiwwivvvvvwvz"  # arguments of a step, after its functions
 LEAP, OBSERVE, EVENTS, RHS, JOIN = "ttvvvhv", "tvvhv", "tvhv", "tvvvh", "vsh"
 
 
 @functools.cache
 def function_types():
-    """Numba types of (attempt, leap, observe, record, events, rhs, linear algebra, real and complex, and join)."""
+    """Numba types of (attempt, fused step, observe, record, events, rhs, real and complex linear algebra, join)."""
     from numba import types
 
     def of(letters, returned=types.void):
@@ -32,27 +33,27 @@ def function_types():
 
 
 def kinds_of(letters: str) -> tuple:
-    """Numba's types of arguments; of F the functions that a step takes."""
+    """Numba types of the arguments; F stands for the functions that a step takes."""
     kinds = plain_kinds()
-    return tuple(one for letter in letters for one in (function_types()[5:] if letter == "F" else (kinds[letter],)))
+    return tuple(kind for letter in letters for kind in (function_types()[5:] if letter == "F" else (kinds[letter],)))
 
 
 if COMPILING:
 
-    def taken(which: int):
-        """What makes a function of an address, as compiled code calls those of `function_types`."""
+    def taken(index: int):
+        """Intrinsic that turns an address into a callable of type `index` in `function_types`."""
 
         @Intrinsic
         def function_at(typingctx, address):
             from numba.core import cgutils, types
 
-            kind = function_types()[which]
+            kind = function_types()[index]
 
-            def generate(context, builder, signature, given):
-                made = cgutils.create_struct_proxy(kind)(context, builder)
-                made.c_addr = builder.inttoptr(given[0], cgutils.voidptr_t)
-                made.py_addr = made.jit_addr = cgutils.voidptr_t(None)
-                return made._getvalue()
+            def generate(context, builder, signature, arguments):
+                proxy = cgutils.create_struct_proxy(kind)(context, builder)
+                proxy.c_addr = builder.inttoptr(arguments[0], cgutils.voidptr_t)
+                proxy.py_addr = proxy.jit_addr = cgutils.voidptr_t(None)
+                return proxy._getvalue()
 
             return kind(types.int64), generate
 
@@ -63,41 +64,41 @@ if COMPILING:
 
 
 def addresses(functions: tuple):
-    """Functions as compiled code that Python calls takes them : int64[n], themselves where JIT is off."""
-    return np.array([one.address for one in functions]) if COMPILING else functions
+    """Addresses of functions, to pass from Python to compiled code : int64[n]; the functions themselves without JIT."""
+    return np.array([function.address for function in functions]) if COMPILING else functions
 
 
-def no_factor(shape, jacobian, shift, store):
-    """In place of a factorisation, where nothing is solved."""
+def no_factor(structure, jacobian, shift, factors):
+    """Do nothing, in place of a factorisation, for steps that solve no equations."""
     return 0
 
 
-def no_solve(shape, store, x):
-    """In place of a solution, where nothing is solved."""
+def no_solve(structure, factors, x):
+    """Do nothing, in place of a solution, for steps that solve no equations."""
 
 
 @functools.cache
 def no_algebra():
-    """(factor, solve, factor_complex, solve_complex) for steps that solve nothing."""
+    """(factor, solve, factor_complex, solve_complex) for steps that solve no equations."""
     letters = (FACTOR, SOLVE, FACTOR_COMPLEX, SOLVE_COMPLEX)
     return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((no_factor, no_solve) * 2, letters, strict=True))
 
 
-def alone(sums, spans, handle):
-    """In place of a joint, where one band is all there is."""
+def alone(sums, row_blocks, handle):
+    """Do nothing, in place of an exchange between bands, for a single band."""
 
 
 @functools.cache
 def no_joint():
-    """A joint of one band."""
+    """Compiled exchange for a single band."""
     return compiled_as(njit(alone), JOIN)
 
 
 def compiled_as(function, letters: str):
-    """A function compiled for arguments of these kinds alone, as the loop takes it."""
+    """Compile a function for arguments of these types only, in the form that the loop calls."""
     return declared(function, letters, kinds_of)
 
 
 def compiled_step(attempt):
-    """A step compiled for the one signature that the loop calls."""
+    """Compile a step for the signature that the loop calls."""
     return compiled_as(attempt, "F" + ATTEMPT)

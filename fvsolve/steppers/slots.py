@@ -1,9 +1,9 @@
-"""What the time loop is told and what it remembers: places in two flat arrays. Knows no numbers."""
+"""Indices into the flat arrays of the time loop: its state, its controls, its progress within a step."""
 
-# What the loop remembers, in one flat array of floats that a restart stores.
+# loop_state : float64[MEMORY], stored by a restart
 T, STEP, T_MARK, N_MARK, ERROR_OLD, NEXT_OUTPUT, NEXT_FIELD, STEPS, REJECTIONS, CALLS, LAST, UNBOOKED = range(12)
 JACOBIANS, FACTORS, NEWTON, NEWTON_FAILURES, WORST, RADIUS, CASES, SWITCHES = range(12, 20)
-# What is left of a given step that is taken in parts [s], and how many there were.
+# Rest of a given step that is taken in parts [s], and the number of such steps.
 LEFT, PARTED = range(20, 22)
 MEMORY = 22
 COUNTS = {
@@ -11,36 +11,35 @@ COUNTS = {
     "newton": NEWTON, "newton_failures": NEWTON_FAILURES,
     "parted": PARTED,
 }  # fmt: skip
-# What a call is told.
+# controls : float64[ORDERS], set before each call
 START, END, EVERY, FIELD_EVERY, CONTROL, SIZE, STEP_MAX, BUDGET, FIELD_COUNT, STOP_AT, LEAPS = range(11)
-# Power of h of the error estimate; whether the last stage is the next first; the kind of step; whether stiffness is
-# watched, and then the price of an implicit step in explicit ones; where rows come from, by error control and else.
+# Power of h of the error estimate; 1 where the last stage is the first stage of the next step; kind of step; 1 for the
+# stiffness test, and the cost of an implicit step in explicit steps; source of rows with and without error control.
 ORDER, FSAL, KIND, WATCH, PRICE, LANDS, APART = range(11, 18)
 ORDERS = 18
-# Values of APART: rows within a given step come from its polynomial; from steps of their own in the first two steps
-# behind a start; from steps of their own.
+# Values of SEPARATE_ROWS: rows within a given step come from its polynomial; from separate steps within the first two
+# steps after a start; always from separate steps.
 NEVER_APART, APART_AT_FIRST, ALWAYS_APART = 0, 1, 2
-CHECKED = 16.0  # steps between two looks for growth
-EXCEEDED = -1.0  # in orders[BUDGET]: a state has grown, come back
+CHECKED = 16.0  # steps between two checks for growth
+EXCEEDED = -1.0  # in controls[BUDGET]: a state has grown beyond its largest value, so the call returns
 EXPLICIT, NEWTON_SOLVED, LINEARLY_IMPLICIT = 0, 1, 2  # values of KIND
 COURANT, FIXED_STEP, TOLERANCE = 0, 1, 2  # values of CONTROL
-# Why a call came back.
+# Reasons for which a call returns.
 DONE, CHUNK, ROWS_FULL, FIELD, BAD_VALUE, TINY_STEP, BAD_STATUS, STOPPED, NEWTON_STUCK, SWITCHED, CHATTERS = range(11)
-# What passes between calls while rows are still to be written: phase, whether a step lies behind, buffers, rows, and
-# whether the rule of the rhs changes at its end.
+# progress : int64[6], kept between calls while rows remain to be written: phase, 1 after a step, buffers of the present
+# and the last state, number of rows, 1 if the rhs switches at the end of the last step
 PHASE, BEHIND, NOW, OLD, ROWS, BENT = range(6)
 FRESH, LEAPT, EMIT, READY = range(4)
 
-RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # the entries of `out` that the loop reads
-NEVER = -1e300  # in ARRIVES: no jump is on its way
-AMENDED, ARRIVED = 7, 8  # in STATUS: the state was put right as it was noted; a jump is to arrive now
+RATE, STATUS, WHERE, CLOSING, ARRIVES = 0, 1, 2, 3, 4  # entries of `out` that the loop reads
+NEVER = -1e300  # in JUMP_TIME: no jump will arrive
+AMENDED, ARRIVED = 7, 8  # in STATUS: the record has corrected the accepted state; the record lets a jump arrive now
 NOT_FINITE = 3  # a value of out[STATUS]
-STOP_HERE = -2.0  # in out[WHERE]: the record asks for an end
+STOP_HERE = -2.0  # in out[PLACE]: the record requests the end of the run
 NEWTON_FAILED = -1.0  # in place of an error: the stages could not be solved with this step
 
-# The header of `work`: whether there is a Jacobian, the step it was made at, how many steps before are known (2: or
-# more), the step that the present stages belong to, the shift factored last (0: none; below 0: one that a resumed run
-# has to factor again), the worst ratio of two increments of a step, the last such ratio / (1 - ratio), the last step
-# that was damped, the size of a factor.
+# Header of `work`: 1 with a Jacobian; step at which it was computed; number of earlier steps known (2: or more); step
+# of the present stages; shift of the last factors (0: none; negative: a resumed run has to factor again); greatest
+# ratio of successive increments of a step; last ratio / (1 - ratio); last step with damping; size of a factor.
 HAS, MADE, KNOWN, SEEN, SHIFT, RATIO, SURE, DAMPED, STORE = range(9)
 HEADER = 9

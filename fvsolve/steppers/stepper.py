@@ -1,4 +1,4 @@
-"""The arrays that one run of the time loop works on, for any method and any number of states. Knows no model."""
+"""Arrays and compiled functions of one run of the time loop, for any method and any number of states."""
 
 from __future__ import annotations
 
@@ -18,10 +18,11 @@ from fvsolve.steppers.tableau import Method
 
 
 class Stepper:
-    """Buffers of one run, and the compiled functions that are the method's.
+    """Arrays of one run and the compiled functions of its method.
 
-    structure() : of the Jacobian, asked for by implicit methods alone; scale : float64[n], what small deviations are
-    measured against; ledgers : rows of rates beside dydt; damped : whether stages are divided, see `semi_implicit`.
+    structure() : structure of the Jacobian, called for implicit methods only
+    scale : float64[n]  reference size of small deviations; ledgers : number of ledger rates in addition to dydt
+    damped : True for semi-implicit stages, see `semi_implicit`
     """
 
     def __init__(
@@ -33,7 +34,7 @@ class Stepper:
         self.flags = np.array([slots.FRESH, 0, 0, 1, 0, 0], dtype=np.int64)
         self.none, self.nobody = np.zeros(0), np.zeros(0, dtype=np.int64)
         self.stored, self.carry, self.times = self.nobody, np.zeros(0), self.none
-        self.largest = self.none  # what no state may exceed, where growth is looked for
+        self.largest = self.none  # largest allowed states, where growth is checked
         self.out, self.out_row, self.values = np.zeros(5), np.zeros(5), np.zeros(0)
         self.out[slots.ARRIVES] = slots.NEVER
         self.g = self.g_new = self.none
@@ -43,7 +44,7 @@ class Stepper:
         self.use(method)
 
     def use(self, method: Method) -> None:
-        """Step by this method from now on."""
+        """Use this method for the following steps."""
         n, ledgers = self.scale.size, self.ledger.size // SUMS
         self.method = method
         self.coefficients, self.dense, s = coefficients(method, self.damped)
@@ -61,14 +62,14 @@ class Stepper:
             self.attempt = attempt_of(method.kind, structure.kind)
             self.solve_by(structure, s, n, ledgers)
         self.orders[slots.ORDER] = method.control_order
-        self.orders[slots.LANDS] = self.dense_order + 1 < method.order  # else rows are as good as ends of steps
+        self.orders[slots.LANDS] = self.dense_order + 1 < method.order  # else rows are as accurate as ends of steps
         self.orders[slots.APART] = self.apart
         self.orders[slots.FSAL] = method.explicit and method.first_same_as_last
         self.orders[slots.KIND] = KINDS[method.kind][1]
         self.flags[slots.PHASE], self.flags[slots.BEHIND] = slots.FRESH, 0
 
     def solve_by(self, structure: Structure, s: int, n: int, ledgers: int) -> None:
-        """Room and functions for Newton's linear algebra."""
+        """Allocate arrays and select functions for the linear algebra of Newton iterations."""
         from fvsolve.steppers import newton
 
         q = pairs = 0
@@ -76,7 +77,7 @@ class Stepper:
             from fvsolve.steppers.irk import pairs_of
 
             q, pairs = s - 1, pairs_of(self.method)
-        reals = max(q - 2 * pairs, 1)  # stages that are solved in turn want one, whatever the method
+        reals = max(q - 2 * pairs, 1)  # stages that are solved one by one need a real factor, whatever the method
         size, self.shape = structure.store_size, structure.shape
         self.work = np.zeros(slots.HEADER + structure.nnz + n + 2 * ledgers + q * q)
         self.work[slots.STORE] = size
@@ -91,16 +92,17 @@ class Stepper:
 
     @property
     def dense_order(self) -> int:
-        """Order of what stands between steps: of the method's polynomial, else of the cubic through both ends."""
-        more = self.method.kind == "full" and bent(self.method).size > 0
-        return min(self.dense.shape[1] + more, self.method.order) if self.dense.size else 3
+        """Order of the dense output: of the polynomial of the method, else of the cubic through both ends."""
+        extra = self.method.kind == "full" and bent(self.method).size > 0
+        return min(self.dense.shape[1] + extra, self.method.order) if self.dense.size else 3
 
     @property
     def apart(self) -> int:
-        """Where rows within given steps come from: a value of `slots.APART`.
+        """Source of rows within given steps: a value of `SEPARATE_ROWS`.
 
-        A polynomial whose order is too low, or that contains f(t, y) of a stiff problem, which magnifies what y is off
-        the slow solution by, is not read. Slopes of the last stage do not magnify it, but at a start only f is known.
+        The polynomial is not used if its order is too low, or if it contains f(t, y) of a stiff problem: that f
+        amplifies the distance of y from the slow solution. Slopes of the last stage do not amplify it, but at a start
+        only f is known.
         """
         method = self.method
         if self.dense.shape[1] == 1:  # a straight line
@@ -113,7 +115,7 @@ class Stepper:
         return slots.APART_AT_FIRST if solved else slots.ALWAYS_APART
 
     def forget(self) -> None:
-        """Remember nothing over a kink but what has been counted."""
+        """Discard at a kink the step size, the last error, the stiffness count and the Jacobian; keep other counts."""
         self.memory[[slots.STEP, slots.ERROR_OLD, slots.CASES, slots.LEFT]] = 0.0
         if self.work.size:
             from fvsolve.steppers.newton import forget
@@ -121,59 +123,58 @@ class Stepper:
             forget(self.work)
 
     def memories(self) -> list[np.ndarray]:
-        """Views of all that the next step depends on, beside t and y."""
+        """Views of all arrays that the next step depends on, except t and y."""
         views = [self.memory, self.ledger, self.carry]
         if self.kept:  # header and Jacobian; f at the start of the last step, and its stages
             views += [self.work[: self.kept], self.vectors[self.k.shape[0]], self.k]
         return views
 
-    def remember(self, memory: np.ndarray) -> np.ndarray:
-        """Take back what `memories` held, from one flat array; returns what is left of it."""
+    def remember(self, loop_state: np.ndarray) -> np.ndarray:
+        """Restore `restart_arrays` from the beginning of a flat array; returns the rest of it."""
         for view in self.memories():
-            view[...] = memory[: view.size].reshape(view.shape)
-            memory = memory[view.size :]
+            view[...] = loop_state[: view.size].reshape(view.shape)
+            loop_state = loop_state[view.size :]
         if self.work.size:
-            self.work[slots.SHIFT] = -abs(
-                self.work[slots.SHIFT]
-            )  # to be factored once more, which is not counted again
-        return memory
+            # negative: factor once more, without counting it again
+            self.work[slots.SHIFT] = -abs(self.work[slots.SHIFT])
+        return loop_state
 
     def counts(self) -> dict[str, int]:
-        """How much work the run was."""
-        return {name: int(self.memory[at]) for name, at in slots.COUNTS.items()}
+        """Numbers of steps, rejections, rhs calls, Jacobians, factorisations, Newton iterations and failures."""
+        return {name: int(self.memory[index]) for name, index in slots.COUNTS.items()}
 
-    def once(self, rhs, handle, where: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
-        """The state after a single step of h from y at t, whatever step was before; NaN where it is not to be had.
+    def once(self, rhs, handle, ledger_offset: int, t: float, h: float, y: np.ndarray) -> np.ndarray:
+        """State after a single step of h from y at t, independent of earlier steps; NaN if its stages are not solvable.
 
-        Of what is remembered a Newton step takes the Jacobian alone, a linearly implicit one nothing.
+        Of the stored data a Newton step uses only the Jacobian, a linearly implicit step nothing.
         """
         self.y[0] = y
         self.memory[slots.STEPS] += 1.0
         rhs(t, self.y[0], self.k[0], self.out, handle)
-        self.supply[0] = self.out[where : where + self.supply.shape[1]]
+        self.supply[0] = self.out[ledger_offset : ledger_offset + self.supply.shape[1]]
         error = compiled_attempt()(
-            addresses((self.attempt, rhs, *self.algebra, self.join)), handle, self.coefficients, self.shape,
-            self.spans, self.sums, t, h, self.y, 0, 1, self.k, self.supply, where, self.out, self.scale, self.orders,
+            addresses((self.attempt, rhs, *self.algebra, self.join)), handle, self.coefficients, self.shape, self.spans,
+            self.sums, t, h, self.y, 0, 1, self.k, self.supply, ledger_offset, self.out, self.scale, self.orders,
             self.memory, self.work, self.vectors, self.store, self.store_complex,
         )  # fmt: skip
         return self.y[1].copy() if error != slots.NEWTON_FAILED else np.full(y.size, np.nan)
 
-    def call(self, leap, observe, record, events, rhs, handle, where: int, armed: np.ndarray) -> int:
-        """March on; returns one of the codes of `steppers.orders`."""
+    def call(self, fused_step, observe, record, events, rhs, handle, ledger_offset: int, armed: np.ndarray) -> int:
+        """Continue the time loop; returns a code of `steppers.slots`, from DONE to CHATTERS."""
         if self.orders[slots.APART] and self.orders[slots.CONTROL] != slots.TOLERANCE and not self.spare[0].size:
             flat = np.zeros(self.work.size + self.store.size)
             spare = np.zeros((len(self.k) + len(self.vectors), self.scale.size))
             self.spare = spare, np.zeros_like(self.supply), flat, self.store_complex.copy()
         return self.march(
-            addresses((self.attempt, leap, observe, record, events, rhs, *self.algebra, self.join)), handle,
+            addresses((self.attempt, fused_step, observe, record, events, rhs, *self.algebra, self.join)), handle,
             self.coefficients, self.shape, self.spans, self.sums, self.dense, self.orders, self.memory, self.times,
-            self.flags, self.y, self.k, self.f_old, self.supply, where, self.ledger, self.scale, self.out,
+            self.flags, self.y, self.k, self.f_old, self.supply, ledger_offset, self.ledger, self.scale, self.out,
             self.out_row, self.values, self.g, self.g_new, armed, self.stored, self.carry, self.y_out, self.rows,
             *self.within, self.work, self.vectors, self.store, self.store_complex, *self.spare, self.largest,
         )  # fmt: skip
 
 
-# Kinds of methods: the file of their steps, and what they are to the loop.
+# Kinds of methods: module of their steps, and value of KIND in the time loop.
 KINDS = {
     "explicit": ("erk", slots.EXPLICIT),
     "damped": ("semi_implicit", slots.EXPLICIT),
@@ -185,14 +186,14 @@ KINDS = {
 
 @once
 def attempt_of(kind: str, algebra: str = ""):
-    """The compiled step of a kind of methods, compiled only where one is used.
+    """Compiled step of a kind of methods, compiled on first use.
 
-    A second process compiles the linear algebra meanwhile, for real shifts and those of full methods.
+    A second process compiles the linear algebra at the same time: for real shifts, and complex shifts of full methods.
     """
-    room = f"fvsolve.steppers.{KINDS[kind][0]}"
+    module = f"fvsolve.steppers.{KINDS[kind][0]}"
     if not algebra:
-        return compiled_step(importlib.import_module(room).attempt)
+        return compiled_step(importlib.import_module(module).attempt)
     shifts = {False, kind == "full"}
     code = f"from fvsolve.steppers.structure import functions; [functions({algebra!r}, of) for of in {shifts}]"
     with beside(code, "factor"):
-        return compiled_step(importlib.import_module(room).attempt)
+        return compiled_step(importlib.import_module(module).attempt)

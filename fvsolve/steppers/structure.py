@@ -1,7 +1,7 @@
-"""Where a Jacobian may differ from zero, how its columns are grouped for differences, and how it is factored.
+"""Structure of a Jacobian: sparsity pattern, column groups for differences, kind of factorisation.
 
-Knows one flat array of integers that every compiled function reads: a header of lengths and offsets, the pattern
-by columns, the columns by colour, and behind them what the kind of factorisation needs. Knows no physics.
+Compiled functions read it as one flat array of integers: a header of lengths and offsets, the pattern by columns, the
+columns by colour, and the data of the kind of factorisation.
 """
 
 from __future__ import annotations
@@ -20,21 +20,22 @@ from fvsolve.steppers.signatures import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COM
 # The header: lengths, then offsets into the same array.
 SIZE, LEDGERS, COLORS = 0, 1, 2  # states n, ledger rows m, colours
 STARTS, ROWS, COLOR_STARTS, COLOR_COLUMNS = 3, 4, 5, 6  # pattern by columns; columns by colour
-FINE, OWN = 7, 8  # by columns, 1 where the increment is fine; the kind's own
+FINE, OWN = 7, 8  # 1 for columns with a fine increment; data of the kind of factorisation
 HEADER = 9
 
 KINDS = ("dense", "banded", "sparse")
-SMALL = 16  # states up to which dense factors are as quick as any (0.2 to 0.6 us), with nothing to set up
-CROWDED = 0.2  # share of the entries from which on factors fill up, and dense ones are quicker
+SMALL = 16  # number of states up to which dense factors are as quick as others (0.2 to 0.6 us), without setup
+CROWDED = 0.2  # fraction of non-zero entries from which factors fill up, so that dense factors are quicker
 
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """A Jacobian's pattern and the linear algebra chosen for it.
+    """Pattern of a Jacobian and the linear algebra chosen for it.
 
-    pattern : bool[n + m, n], sparse by columns: n states, then m ledger rows that are no part of the factorisation
-    kind : "dense", "banded" or "sparse"; chosen by n and the pattern where None. Raises FvsolveError for another.
-    fine : numbers of the states whose increments in differences are fine
+    pattern : bool[n + m, n]  sparse by columns: n states, then m ledger rows that are not part of the factorisation
+    kind : "dense", "banded" or "sparse"; None: chosen by n and the pattern
+    fine : numbers of the states with fine increments in differences
+    Raises FvsolveError for another kind and for a pattern with fewer rows than columns.
     """
 
     pattern: Any
@@ -49,18 +50,18 @@ class Structure:
         pattern.eliminate_zeros()
         pattern.sort_indices()
         if pattern.shape[0] < pattern.shape[1]:
-            raise FvsolveError(f"a pattern of shape {pattern.shape} has fewer rows than states")
+            raise FvsolveError(f"a Jacobian pattern of shape {pattern.shape} has fewer rows than states")
         if self.kind is not None and self.kind not in KINDS:
             near = nearest(str(self.kind), KINDS)
-            hint = f'did you mean "{near}"?' if near else f"there are {', '.join(KINDS)}"
-            raise FvsolveError(f'no kind of structure named "{self.kind}"; {hint}')
+            hint = f'did you mean "{near}"?' if near else f"expected one of {', '.join(KINDS)}"
+            raise FvsolveError(f'unknown kind of structure "{self.kind}"; {hint}')
         object.__setattr__(self, "pattern", pattern)
         if self.kind is None:
             object.__setattr__(self, "kind", choose(pattern))
 
     @classmethod
     def full(cls, n: int, m: int = 0) -> Structure:
-        """The structure of a function of which nothing is known: dense, one colour a column."""
+        """Structure of a function with unknown pattern: dense, with a colour for each column."""
         return cls(np.ones((n + m, n), dtype=bool), "dense")
 
     @property
@@ -80,24 +81,24 @@ class Structure:
 
     @cached_property
     def colors(self) -> np.ndarray:
-        """int64[n]: columns of one colour share no row, ledger rows included."""
+        """int64[n]: colours; columns of equal colour have no row in common, ledger rows included."""
         from fvsolve.steppers.colors import colors
 
         return colors(self.pattern)
 
     @property
     def color_count(self) -> int:
-        """Number of colours: what a Jacobian costs in evaluations."""
+        """Number of colours, which is the number of rhs calls for a Jacobian."""
         return int(self.colors.max(initial=-1)) + 1
 
     @cached_property
     def _own(self) -> tuple[np.ndarray, int]:
-        """(what the kind's compiled functions read behind the pattern, length of its store)."""
+        """(data for the compiled functions of this kind, length of a factor)."""
         return kind_module(self.kind).prepare(self.pattern)
 
     @cached_property
     def shape(self) -> np.ndarray:
-        """int64[:] that every compiled function reads."""
+        """Flat array that every compiled function reads : int64[:]."""
         counts = np.bincount(self.colors, minlength=self.color_count)
         color_starts = np.concatenate(([0], np.cumsum(counts)))
         parts = [self.pattern.indptr, self.pattern.indices, color_starts, np.argsort(self.colors, kind="stable")]
@@ -108,36 +109,37 @@ class Structure:
 
     @property
     def store_size(self) -> int:
-        """Length of the array that holds a factor."""
+        """Length of the array for a factor."""
         return self._own[1]
 
     def functions(self, complex: bool = False) -> tuple:
-        """(factor, solve) of this kind, compiled on first use for real or for complex shifts alone.
+        """(factor, solve) of this kind, compiled on first use, for real or for complex shifts.
 
-        factor(shape, jacobian, shift, store) -> 0, or 1 + the state at which shift I - J has no good pivot;
-        solve(shape, store, x) -> None, in place.
+        factor(structure, jacobian, shift, factors) -> 0, or 1 + the state at which shift I - J has no good pivot
+        solve(structure, factors, x) -> None, in place
         """
         return functions(self.kind, complex)
 
 
 def choose(pattern) -> str:
-    """The kind that is quickest for a pattern, by its size and how crowded it is.
+    """Quickest kind of factorisation for a pattern, by its size and density.
 
-    Sparse factors come out banded on a line, and quicker than `banded` (1000 cells of two waves, upwind: 19 us a
-    factor and 7 a solution, against 24 and 18); that one exchanges rows, so it can serve where they find no pivot.
+    Sparse factors of a line of cells are banded, and quicker than the kind "banded" (1000 cells of two waves, upwind:
+    19 us a factor and 7 a solution, against 24 and 18). Banded factors exchange rows, so they can be used where sparse
+    factors find no pivot.
     """
     n = pattern.shape[1]
     return "dense" if n <= SMALL or pattern[:n].nnz >= CROWDED * n * n else "sparse"
 
 
 def kind_module(kind: str):
-    """The file that knows one kind."""
+    """Module with the functions of a kind."""
     return importlib.import_module(f"fvsolve.steppers.linear_{kind}")
 
 
 @once
 def functions(kind: str, complex: bool) -> tuple:
-    """(factor, solve) of a kind, each compiled for one signature."""
+    """(factor, solve) of a kind, compiled for real or complex shifts."""
     module = kind_module(kind)
     letters = (FACTOR_COMPLEX, SOLVE_COMPLEX) if complex else (FACTOR, SOLVE)
     return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((module.factor, module.solve), letters, strict=True))

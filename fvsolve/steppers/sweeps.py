@@ -1,10 +1,10 @@
-"""Stages of a fully implicit step solved in turn, for rates whose slope differs by orders from stage to stage.
+"""Stages of a fully implicit step solved one by one in sweeps, for slopes of f that differ by orders between stages.
 
-With A = C U, C lower triangular and the diagonal of U one, K <- F(y + h (a_0 k_0 + C K + (A - C) K_before)) is a
-diagonally implicit step, which `newton.damp` solves. On a stiff part it ends after q such sweeps, I - U being
-nilpotent; a soft part gains a factor of 4 or more by each (van der Houwen and de Swart 1997). A limiter or weno's
-weights take that gain, or let sweeps go to and fro: then K goes on from where the last two changes would cancel
-(Anderson 1965, of depth one).
+With A = C U, C lower triangular and U with unit diagonal, K <- F(y + h (a_0 k_0 + C K + (A - C) K_before)) is a
+diagonally implicit step, which `newton.damped_newton` solves. Stiff components converge in q sweeps, as I - U is
+nilpotent; the error of other components falls by a factor of 4 or more in each (van der Houwen and de Swart 1997).
+Limiters and the weights of weno can reduce that factor or make sweeps oscillate: then K is extrapolated to where the
+last two changes cancel (Anderson 1965, depth one).
 """
 
 from __future__ import annotations
@@ -20,23 +20,24 @@ from fvsolve.steppers.slots import CONTROL, TOLERANCE
 from fvsolve.steppers.step import copy
 
 MOST = 40
-SLOW, FARTHEST = 0.4, 10.0  # what a sweep may leave of the change of the one before; how many changes K is led on
+# Ratio of successive changes above which K is extrapolated; greatest extrapolation, in changes.
+SLOW, FARTHEST = 0.4, 10.0
 
 
 @inner
 def sweep(
-    rhs, factor, solve, handle, coefficients, low, shape, t, h, y, y_stage, k, supply, where, out, scale, orders,
-    memory, nnz, room, work, vectors, store,
+    rhs, factor, solve, handle, coefficients, low, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out,
+    scale, controls, loop_state, nnz, first_row, work, vectors, factors,
 ):  # fmt: skip
-    """Slopes k of the stages and their ledger rates; returns CONVERGED or FAILED.
+    """Compute the slopes k of the stages and their ledger rates; returns CONVERGED or FAILED.
 
-    low : float64[q q], C flat; room : first of 3 q rows of `vectors`, for the slopes from which a sweep starts, what it
-    changed, and what came of it.
+    low : float64[q q]  C, flat
+    first_row : first of 3 q rows of `vectors`, for slopes at the start of a sweep, their changes, and the results
     """
     s, n = k.shape
     q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
-    enough, rounded, floor = tight(orders)
-    still = floor if orders[CONTROL] == TOLERANCE else rounded
+    enough, rounded, floor = tight(controls)
+    settled = floor if controls[CONTROL] == TOLERANCE else rounded
     before = 0.0
     for i in range(1, s):
         if low[(i - 1) * s] == 0.0:
@@ -45,13 +46,13 @@ def sweep(
     for turn in range(MOST):
         total = 0.0
         for i in range(1, s):
-            copy(k[i], vectors[room + i - 1])
+            copy(k[i], vectors[first_row + i - 1])
         for i in range(1, s):
             row, own, first = row_of(coefficients, s, i), h * low[(i - 1) * s], (i - 1) * q
             for e in range(n):
                 base[e] = y[e] + h * row[0] * k[0, e]
             for j in range(1, s):
-                c_ij, last = low[first + j - 1], vectors[room + j - 1]
+                c_ij, last = low[first + j - 1], vectors[first_row + j - 1]
                 lead, lag = h * c_ij if j < i else 0.0, h * (row[j] - c_ij)
                 for e in range(n):
                     base[e] += lead * k[j, e] + lag * last[e]
@@ -59,41 +60,53 @@ def sweep(
                 for e in range(n):
                     k[i, e] = (y[e] - base[e]) / own
             if reach(
-                rhs, factor, solve, handle, shape, t + c[i] * h, own, i, k, y, y_stage, supply, where, out, scale,
-                orders, memory, nnz, work, vectors, store,
+                rhs, factor, solve, handle, structure, t + c[i] * h, own, i, k, y, y_stage, ledger_rates, ledger_offset,
+                out, scale, controls, loop_state, nnz, work, vectors, factors,
             ) == FAILED:  # fmt: skip
                 return FAILED
-            last = vectors[room + i - 1]
+            last = vectors[first_row + i - 1]
             for e in range(n):
                 change = h * (k[i, e] - last[e]) * weights[e]
                 total += change * change
         size = sqrt(total / max(q * n, 1))
-        if size <= enough or size <= still and turn >= q and size >= 0.5 * before or size <= floor and turn == MOST - 1:
+        if (
+            size <= enough
+            or size <= settled
+            and turn >= q
+            and size >= 0.5 * before
+            or size <= floor
+            and turn == MOST - 1
+        ):
             return CONVERGED
-        lead_on(q, k, room, weights, vectors, 1.0 if turn >= q and size > SLOW * before else 0.0)
+        lead_on(q, k, first_row, weights, vectors, 1.0 if turn >= q and size > SLOW * before else 0.0)
         before = size
     return FAILED
 
 
 @inner
-def lead_on(q, k, room, weights, vectors, share):
-    """K <- K - g (K - K_before), g = <d, d - d_before> / |d - d_before|^2 of the changes d; keeps both for the next.
+def lead_on(q, k, first_row, weights, vectors, weight):
+    """K <- K - weight g (K - K_before), g = <d, d - d_before> / |d - d_before|^2 with the changes d.
 
-    share : 0 to keep them alone.
+    Stores the change and the result of this sweep. weight : 0 to store them only, else 1
     """
     dot, square = 0.0, 0.0
     for i in range(q):
-        ki, last, change = k[i + 1], vectors[room + i], vectors[room + q + i]
+        ki, last, change = k[i + 1], vectors[first_row + i], vectors[first_row + q + i]
         for e in range(weights.size):
             d = (ki[e] - last[e]) * weights[e]
-            more = d - change[e] * weights[e]
-            dot += d * more
-            square += more * more
-    g = share * max(dot / square, -FARTHEST) if square > 0.0 and square < np.inf else 0.0
+            difference = d - change[e] * weights[e]
+            dot += d * difference
+            square += difference * difference
+    g = weight * max(dot / square, -FARTHEST) if square > 0.0 and square < np.inf else 0.0
     for i in range(q):
-        ki, last, change, came = k[i + 1], vectors[room + i], vectors[room + q + i], vectors[room + 2 * q + i]
+        ki, last, change, swept = (
+            k[i + 1],
+            vectors[first_row + i],
+            vectors[first_row + q + i],
+            vectors[first_row + 2 * q + i],
+        )
         for e in range(weights.size):
             new = ki[e]
             change[e] = new - last[e]
-            ki[e] = new - g * (new - came[e])
-            came[e] = new
+            ki[e] = new - g * (new - swept[e])
+            swept[e] = new

@@ -1,4 +1,4 @@
-"""A Butcher array as it stands in the book, with its name and source; all else follows from it. Knows no time loop."""
+"""Runge-Kutta methods: Butcher array as printed in its source, with name and derived properties."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from fvsolve.steppers.numbers.algebraic import MIXED, Algebraic
 from fvsolve.steppers.numbers.expression import digits, root, value_of
 from fvsolve.units import show
 
-METHODS: dict[str, Method] = {}  # some under two names: `gauss-2` is `implicit-midpoint`
-LARGEST = 10**30  # entry
-OWN: set[str] = set()  # names of the package's own, which nobody may take
-EXACT_DECIMALS = 6  # decimals no longer than this are meant as they stand
+METHODS: dict[str, Method] = {}  # some methods have two names: `gauss-2` is `implicit-midpoint`
+LARGEST = 10**30  # greatest size of an entry
+OWN: set[str] = set()  # names of built-in methods, not available for user methods
+EXACT_DECIMALS = 6  # decimals with at most this many digits are exact
 
 
 @dataclass(frozen=True)
 class Array:
-    """The exact numbers of a tableau: fractions, or algebraic numbers with one root."""
+    """Exact numbers of a tableau: fractions, or algebraic numbers with a common root."""
 
     a: tuple[tuple, ...]
     b: tuple
     c: tuple
-    embedded: tuple  # empty where there is none
+    embedded: tuple  # empty without an embedded solution
     start: object  # weight of f(t, y) in the embedded solution
     dense: tuple[tuple, ...]
 
@@ -41,10 +41,11 @@ class Array:
 class Method:
     """A Runge-Kutta method: k_i = f(y + h sum_j a_ij k_j, t + c_i h), y+ = y + h sum_i b_i k_i (14), (23).
 
-    Everything but name, source and text is derived on first use:
-    a : float64[s, s]; b, c : float64[s]; error : float64[s] or empty, weights of y+ less the embedded
-    solution, start_error what that lacks: the weight of f(t, y) at the start; dense : float64[s, d] or empty,
-    y(theta) = y + h sum_i k_i sum_j dense_ij theta^(j+1).
+    All properties except name, source and text are derived on first use:
+    a : float64[s, s]; b, c : float64[s]
+    error : float64[s] or empty  weights of y+ less the embedded solution
+    start_error : weight of f(t, y) at the start in that difference
+    dense : float64[s, d] or empty  y(theta) = y + h sum_i k_i sum_j dense_ij theta^(j+1)
     """
 
     name: str
@@ -57,18 +58,18 @@ class Method:
 
     @functools.cached_property
     def exact(self) -> Array:
-        """The array in exact numbers; raises FvsolveError that names every fault of the text."""
+        """Butcher array in exact numbers; raises FvsolveError with all faults of the text."""
         return _exact(self)
 
     @functools.cached_property
     def digits(self) -> int | None:
-        """Significant digits that the source gives, None where its numbers are exact."""
-        found = self.given_digits or digits(self.text)
-        return found if found > EXACT_DECIMALS else None
+        """Significant digits of the source, None where its numbers are exact."""
+        count = self.given_digits or digits(self.text)
+        return count if count > EXACT_DECIMALS else None
 
     @property
     def rounding(self) -> Fraction:
-        """Relative error of a coefficient: 0 where they are exact."""
+        """Relative error of a coefficient; 0 for exact coefficients."""
         return Fraction(5, 10**self.digits) if self.digits else Fraction(0)
 
     @functools.cached_property
@@ -102,7 +103,7 @@ class Method:
 
     @property
     def adaptive(self) -> bool:
-        """Whether it estimates its error."""
+        """True if the method has an error estimate."""
         return len(self.exact.embedded) > 0
 
     @functools.cached_property
@@ -111,7 +112,7 @@ class Method:
 
     @functools.cached_property
     def error_order(self) -> int:
-        """Order of the embedded solution, 0 where there is none."""
+        """Order of the embedded solution, 0 without one."""
         if not self.adaptive:
             return 0
         if self.exact.start == 0:
@@ -121,7 +122,7 @@ class Method:
 
     @property
     def control_order(self) -> int:
-        """The power of h that the error estimate goes with; without one that of the global error."""
+        """Power of h of the error estimate; without an error estimate the power of h of the global error."""
         return min(self.order, self.error_order) + 1 if self.adaptive else self.order
 
     @functools.cached_property
@@ -130,32 +131,32 @@ class Method:
 
     @property
     def times(self) -> tuple[float, ...]:
-        """Of its stages, in steps."""
+        """Times of the stages, in steps."""
         return tuple(map(float, self.exact.c))
 
     @functools.cached_property
     def explicit(self) -> bool:
-        """Whether each stage needs only those before it."""
+        """True if each stage depends only on earlier stages."""
         return not np.any(np.triu(self.a))
 
     @functools.cached_property
     def diagonally_implicit(self) -> bool:
-        """Whether the stages can be solved in turn, and at least one must be solved."""
+        """True if the stages can be solved one after another and at least one of them is implicit."""
         return not self.explicit and not np.any(np.triu(self.a, 1))
 
     @property
     def kind(self) -> str:
-        """What a step solves: nothing (explicit), a stage at a time (diagonal), all of them at once (full)."""
+        """Kind by the equations of a step: none (explicit), single stages (diagonal), all stages together (full)."""
         return "explicit" if self.explicit else "diagonal" if self.diagonally_implicit else "full"
 
     @functools.cached_property
     def stiffly_accurate(self) -> bool:
-        """Whether the last stage is the new state."""
+        """True if the last stage is the new state."""
         return self.exact.a[-1] == self.exact.b
 
     @functools.cached_property
     def first_same_as_last(self) -> bool:
-        """Whether the last rate of a step is the first one of the next."""
+        """True if the last stage derivative of a step is the first one of the next step."""
         return self.stiffly_accurate and self.exact.c[-1] == 1 and not np.any(self.a[0])
 
     @functools.cached_property
@@ -169,26 +170,28 @@ def tableau(
     dense: Sequence = (), start_weight: str | None = None, numbers: Mapping[str, tuple[str, float]] | None = None,
     digits: int | None = None,
 ) -> Method:  # fmt: skip
-    """A method from its Butcher array, in text or as A, b, c; it is known by `name` everywhere from then on.
+    """Define a method by its Butcher array, as text or as A, b, c; afterwards it can be used by its name.
 
-    A : [s, s], b : [s], or two rows, the second embedded; c : [s], the sums of rows of A where left out; integers,
-    fractions and floating-point numbers, the last taken as rounded in their last digit.
-
-    Rows `c | a1 a2 ...`, a ruled line, `| b1 b2 ...` and, with an embedded solution, a second such row. Entries
-    have no blanks: `1/3`, `0.161`, `(88-7sqrt(6))/360`, or expressions in `numbers`, for example
-    `{"g": ("x^3-3x^2+3x/2-1/6", 0.4358665215)}`: the root of that polynomial next to that number.
-    Decimals of more than six digits are taken as rounded, other entries as exact unless `digits` says how many
-    of them count. `start_weight` is the weight of f(t, y) in an embedded solution of quadrature type.
-    Raises FvsolveError with all faults: rows that do not fit, that do not add up to c, entries that are no numbers.
+    text : rows `c | a1 a2 ...`, a ruled line, `| b1 b2 ...` and, with an embedded solution, a second such row. Entries
+    have no blanks: `1/3`, `0.161`, `(88-7sqrt(6))/360`, or expressions in `numbers`. Or A : [s, s], with
+    b : [s], or two rows, the second embedded; c : [s], default the sums of rows of A. Integers and fractions are exact,
+    floating-point numbers are rounded in their last digit
+    dense : coefficients of the dense output, see `Method`
+    start_weight : weight of f(t, y) in an embedded solution of quadrature type
+    numbers : for example `{"g": ("x^3-3x^2+3x/2-1/6", 0.4358665215)}`: root of that polynomial nearest to that number
+    digits : significant digits of the entries; default: decimals of more than six digits are rounded, others exact
+    Raises FvsolveError with all faults: rows of wrong length, rows that do not add up to c, invalid entries.
     """
     if name in OWN or name == "auto" or not name.strip() or name != name.strip():
-        raise FvsolveError(f'"{name}" is not free: it is empty or names a method of the package; choose another name')
+        raise FvsolveError(f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
+                           "method. Choose another name")  # fmt: skip
     if b is not None:
         if isinstance(text, str):
-            raise FvsolveError("b is given beside a text, which has it; wanted A, b, c in numbers, or the text alone")
+            raise FvsolveError("b is given twice: as an argument and in the text. Expected A, b, c in numbers, or only "
+                               "the text")  # fmt: skip
         text = printed(text, b, c)
     elif not isinstance(text, str):
-        raise FvsolveError(f'method "{name}": A alone is no method; give tableau(name, A, b) or tableau(name, A, b, c)')
+        raise FvsolveError(f'method "{name}": b is missing. Expected tableau(name, A, b) or tableau(name, A, b, c)')
     method = Method(name, source, text, numbers or {}, dense, start_weight, digits)
     method.exact  # noqa: B018  (raises)
     METHODS[name] = method
@@ -196,17 +199,17 @@ def tableau(
 
 
 def method_of_file(path: Path) -> Method:
-    """The method whose tableau a file holds as text, known by the name of the file, without its ending, from then on.
+    """Define the method whose tableau a text file contains; its name is the file name without its ending.
 
-    Raises FvsolveError for a file that is no tableau, and where that name is another method's.
+    Raises FvsolveError for a file that is not a tableau, and for a name that another method has.
     """
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise FvsolveError(f"{path} cannot be read as a tableau: {error}") from None
-    source, known = str(path.resolve()), METHODS.get(path.stem)
-    if known is not None and path.stem not in OWN and known.source != source and known.text != text:
-        raise FvsolveError(f'{path}: "{path.stem}" is another method already, from {known.source}; rename the file')
+    source, existing = str(path.resolve()), METHODS.get(path.stem)
+    if existing is not None and path.stem not in OWN and existing.source != source and existing.text != text:
+        raise FvsolveError(f'{path}: "{path.stem}" is another method already, from {existing.source}; rename the file')
     try:
         return tableau(path.stem, text, source=source)
     except FvsolveError as error:
@@ -214,16 +217,17 @@ def method_of_file(path: Path) -> Method:
 
 
 def printed(a: Sequence, b: Sequence, c: Sequence | None = None) -> str:
-    """The text of a Butcher array that is given as numbers; FvsolveError for shapes that are none."""
+    """Text of a Butcher array given as numbers; raises FvsolveError for wrong shapes."""
     a, b = np.atleast_2d(np.asarray(a, dtype=object)), np.atleast_2d(np.asarray(b, dtype=object))
     s = a.shape[0]
     if a.shape != (s, s) or b.ndim != 2 or b.shape[0] > 2 or b.shape[1] != s:
-        raise FvsolveError(f"A is {a.shape}, b {b.shape}; wanted s x s and s, or two rows of s where one is embedded")
+        raise FvsolveError(f"A has shape {a.shape}, b {b.shape}. Expected s x s and s, or two rows of s for an "
+                           "embedded solution")  # fmt: skip
     if c is None:
         c = [sum(map(_number, row), Fraction(0)) for row in a]
     c = np.atleast_1d(np.asarray(c, dtype=object))
     if c.shape != (s,):
-        raise FvsolveError(f"c is {c.shape}; wanted {s} numbers")
+        raise FvsolveError(f"c has shape {c.shape}. Expected {s} numbers")
     rows = [f"{_entry(left)} | {' '.join(map(_entry, row))}" for left, row in zip(c, a, strict=True)]
     return "\n".join([*rows, "---", *(f"| {' '.join(map(_entry, row))}" for row in b)])
 
@@ -242,7 +246,7 @@ def declare(
     name: str, text: str, source: str, dense: Sequence = (), start_weight: str | None = None,
     numbers: Mapping[str, tuple[str, float]] | None = None, digits: int | None = None, also: str | None = None,
 ) -> Method:  # fmt: skip
-    """One of the package's own methods, which is read on first use; `also` is its name within a family."""
+    """Declare a built-in method, whose text is read on first use; `also` is its second name, within a family."""
     method = METHODS[name] = Method(name, source, text, numbers or {}, dense, start_weight, digits)
     OWN.add(name)
     if also:
@@ -252,11 +256,11 @@ def declare(
 
 
 def method_named(name: str | Method) -> Method:
-    """The method of that name, or that one; raises FvsolveError that suggests the nearest."""
+    """Method of a name, or the given method; raises FvsolveError with the nearest name for an unknown name."""
     if isinstance(name, Method):
         return name
     if not isinstance(name, str):
-        raise FvsolveError(f"method = {show(name)}; wanted a name")
+        raise FvsolveError(f"method = {show(name)} is not a name. Expected the name of a method")
     if name in METHODS:
         return METHODS[name]
     near = nearest(name, METHODS)
@@ -278,7 +282,7 @@ def _exact(method: Method) -> Array:
     if not faults:
         faults += _mixed([*head, *weights]) or _faults(head, weights, method.rounding)
     if not faults and method.start_weight is not None and len(weights) == 2:
-        faults.append("a second row of weights and start_weight both give the embedded solution; keep one")
+        faults.append("a second row of weights and start_weight both define the embedded solution; keep one of them")
     if faults:
         raise FvsolveError(_said(method.name, faults))
     s = len(head)
@@ -313,7 +317,7 @@ def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
                 faults.append(f'row "{line}": {error}')
         (weights if below else head).append(row)
     if not head or not below:
-        faults.append("wanted rows, a ruled line and weights")
+        faults.append("incomplete tableau. Expected rows, a ruled line and weights")
     return head, weights
 
 
@@ -323,29 +327,29 @@ def _mixed(rows: list) -> list[str]:
 
 
 def _faults(head: list, weights: list, rounding: Fraction) -> list[str]:
-    """What does not fit or add up."""
-    s, found = len(head), []
+    """Faults of a tableau: rows of wrong length or wrong sum."""
+    s, faults = len(head), []
 
-    def off(row, wanted) -> bool:
+    def differs(row, expected) -> bool:
         total = sum(row, Fraction(0))
         return (
-            abs(total - wanted) > 2 * rounding * sum((abs(x) for x in row), Fraction(1))
+            abs(total - expected) > 2 * rounding * sum((abs(x) for x in row), Fraction(1))
             if rounding
-            else total != wanted
+            else total != expected
         )
 
     for i, (c, *row) in enumerate(head, start=1):
         if len(row) > s:
-            found.append(f"row {i} has {len(row)} entries; wanted at most {s}")
-        elif off(row, c):
-            found.append(f"row {i} adds up to {_show(sum(row, Fraction(0)))}; wanted c = {_show(c)}")
+            faults.append(f"row {i} has {len(row)} entries; expected at most {s}")
+        elif differs(row, c):
+            faults.append(f"row {i} adds up to {_show(sum(row, Fraction(0)))}; expected c = {_show(c)}")
     if not 1 <= len(weights) <= 2 or any(len(row) != s for row in weights):
-        found.append(f"wanted one or two rows of {s} weights below the line")
+        faults.append(f"wrong rows of weights below the line. Expected one or two rows of {s}")
     else:
         for row in weights:
-            if off(row, 1):
-                found.append(f"weights must add up to 1, these add up to {_show(sum(row, Fraction(0)))}")
-    return found
+            if differs(row, 1):
+                faults.append(f"weights add up to {_show(sum(row, Fraction(0)))}; expected 1")
+    return faults
 
 
 def _show(value) -> str:

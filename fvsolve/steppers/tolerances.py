@@ -1,4 +1,4 @@
-"""What rounding leaves of steps and tolerances. Knows no method."""
+"""Least tolerance and least step that rounding allows."""
 
-LEAST_TOLERANCE = 1e-13  # below it rounding rules
-LEAST_STEP = 4e-16  # of the time it moves
+LEAST_TOLERANCE = 1e-13  # below it rounding errors dominate
+LEAST_STEP = 4e-16  # relative to the time

@@ -1,4 +1,4 @@
-"""What Newton on the stages of a full Butcher array needs, from the array alone. Knows matrices; takes no step."""
+"""Matrices for Newton iterations on the stages of a fully implicit method, computed from its Butcher array."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
     """[T, T^-1, L, T L, P, C, T^-1 A^-1 a0, A^-1 a0], flat, for the implicit stages: A : float64[q, q].
 
-    Pairs in L stand as [[a, -b], [b, a]], b > 0. P, ahead : sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x of
-    the j-th Lagrange polynomial on c: what the last step's slopes say of this one; zero where c repeats.
-    Raises LinAlgError for a singular A, ValueError for one without a basis of eigenvectors.
+    A^-1 = T L T^-1; a complex pair of eigenvalues is a block [[a, -b], [b, a]] of L with b > 0. C : see `lower`.
+    P : sum of P[j, d] x^(d+1) is the integral from 1 to 1 + x of the j-th Lagrange polynomial on c, which extrapolates
+    the slopes of the last step to this step; zero where c has equal nodes
+    Raises LinAlgError for a singular A, ValueError for an A without a basis of eigenvectors.
     """
     q = len(c)
     inverse = np.linalg.inv(a)
@@ -22,7 +23,7 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
         v = vectors[:, i] / np.abs(vectors[:, i]).max()
         if real[i]:
             t[:, at], blocks[at, at], at = v.real, values[i].real, at + 1
-        else:  # A^-1 (u - i w) = (a + i b) (u - i w): on the basis u, w it is [[a, -b], [b, a]]
+        else:  # A^-1 (u - i w) = (a + i b) (u - i w): in the basis u, w A^-1 is [[a, -b], [b, a]]
             t[:, at], t[:, at + 1] = v.real, -v.imag
             blocks[at : at + 2, at : at + 2] = [[values[i].real, -values[i].imag], [values[i].imag, values[i].real]]
             at += 2
@@ -37,7 +38,7 @@ def transformed(a: np.ndarray, c: np.ndarray, a0: np.ndarray) -> np.ndarray:
 
 
 def lower(a: np.ndarray) -> np.ndarray:
-    """C of A = C U (Crout): float64[q, q]; no zero may stand on its diagonal."""
+    """C of A = C U (Crout): float64[q, q]; usable only if its diagonal has no zero."""
     rest, c = a.copy(), np.zeros_like(a)
     for j in range(len(a)):
         c[j:, j] = rest[j:, j]

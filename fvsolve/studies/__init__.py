@@ -1,8 +1,8 @@
-"""Questions asked of a case by running it: order, chart, stability, energy. Knows cases and runs; prints nothing."""
+"""Studies of a case by many runs: order of convergence, accuracy against cost, stability, energy, sizing, sweeps."""
 
 from fvsolve.names import offer
 
-_HOMES = {  # public name -> module of this room
+_HOMES = {  # public name -> module of this package
     "LineImpedance": "ports.line",
     "Linear": "linear.linearise",
     "Transfer": "ports.state_space",

@@ -1,4 +1,4 @@
-"""Workers of a Dask scheduler that do chunks of work. Knows Dask; knows no work."""
+"""Workers of a Dask scheduler that compute chunks of tasks."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.restart import programs
 from fvsolve.run.crew import done
 
-PATIENCE = 10.0  # s for a scheduler, and for a first worker
-AHEAD = 2  # chunks of each thread: one that is done, one that waits there
-SAME = ("python", "distributed", "msgpack", "cloudpickle", "numpy")  # what both ends must agree in
+PATIENCE = 10.0  # timeout for a scheduler, and for its first worker [s]
+AHEAD = 2  # chunks per thread: one in work, one that waits on the worker
+SAME = ("python", "distributed", "msgpack", "cloudpickle", "numpy")  # versions must be equal on both sides
 
 
 class Cluster:
-    """The workers of the scheduler at an address such as "tcp://10.0.0.1:8786"; their program is this one."""
+    """Workers of the scheduler at an address such as "tcp://10.0.0.1:8786". They must have the same versions."""
 
     def __init__(self, work: Any, address: str) -> None:
         self.work, self.name, self.address = pickle.dumps(work), uuid.uuid4().hex, address
@@ -39,7 +39,10 @@ class Cluster:
         future.add_done_callback(self.ended.put)
 
     def take(self) -> tuple[int, list | None, float]:
-        """The next chunk that is done; what a worker raised is raised here."""
+        """(chunk, answers, seconds) of the next finished chunk; answers is None if its worker was killed.
+
+        Raises the exception that a worker raised, and RunError if the scheduler is lost.
+        """
         future = self._next()
         chunk, status = self.given.pop(future), future.status
         if status == "finished":
@@ -62,73 +65,80 @@ class Cluster:
                     raise RunError(self._gone()) from None
 
     def _gone(self) -> str:
-        return f"the Dask scheduler at {self.address} has gone; what is finished is kept, and the same command goes on"
+        return f"lost the Dask scheduler at {self.address}. Finished runs are kept; the same command resumes from there"
 
     def close(self) -> None:
-        """Take back what is not done, and leave."""
+        """Cancel unfinished chunks and close the connection."""
         self.client.cancel([*self.given], force=True) if self.client.status == "running" else None
         self.client.close()
 
 
-KNOWN = threading.local()  # of a worker's thread: the work that it did last and its name, with what that has read
+KNOWN = threading.local()  # per worker thread: name of the last work, and the work with the data that it has read
 
 
 def done_there(name: str, work: bytes, tasks: list) -> tuple[Any, float]:
-    """`done` on a worker."""
+    """Compute a chunk of tasks on a worker; the unpickled work is reused for later chunks."""
     if getattr(KNOWN, "name", None) != name:
         KNOWN.name, KNOWN.work = name, pickle.loads(work)
     return done(KNOWN.work, tasks)
 
 
 def connected(address: str) -> Any:
-    """A client of the scheduler at an address; FvsolveError where there is none, or no package."""
+    """Connect to the scheduler at an address. Raises FvsolveError if there is none or the package is missing."""
     try:
         from distributed import Client
     except ImportError:
         raise FvsolveError("--dask needs the package distributed: pip install fvsolve[dask]") from None
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
-    except Exception as error:  # Dask has many, of its own and of the system's
-        said = str(error).split("\n")[0] or type(error).__name__
-        raise FvsolveError(f'no Dask scheduler answers at "{address}": {said}; wanted one such as '
-                           "tcp://10.0.0.1:8786, which dask scheduler prints") from None  # fmt: skip
+    except Exception as error:  # Dask raises many types of exceptions
+        text = str(error).split("\n")[0] or type(error).__name__
+        raise FvsolveError(f'no Dask scheduler answers at "{address}": {text}. Expected an address such as '
+                           "tcp://10.0.0.1:8786; the command dask scheduler prints it") from None  # fmt: skip
     return client
 
 
 def agree(client: Any, address: str) -> None:
-    """FvsolveError with all in which scheduler and workers are not as this process is; one worker at least is there."""
+    """Check versions on scheduler and workers against this process, after waiting for the first worker.
+
+    Raises FvsolveError if no worker comes, and with all differences of versions.
+    """
     try:
         client.wait_for_workers(1, timeout=PATIENCE)
     except TimeoutError:
-        said = f"the Dask scheduler at {address} has no workers; start some: dask worker {address}"
-        raise FvsolveError(said) from None
-    found = client.get_versions(check=False)
-    ends = {"the scheduler": found["scheduler"]}
-    ends |= {f"worker {name}": said for name, said in found["workers"].items()}
-    here = versions(found["client"])
-    faults = [f"{who} has {one}" for who, said in ends.items() for one in other(here, versions(said))]
-    faults = faults or [f"worker {name} has {one}" for name, said in client.run(programs, on_error="return").items()
-                        for one in strange(said)]  # fmt: skip
+        text = f"the Dask scheduler at {address} has no workers. Start workers: dask worker {address}"
+        raise FvsolveError(text) from None
+    reported = client.get_versions(check=False)
+    ends = {"the scheduler": reported["scheduler"]}
+    ends |= {f"worker {name}": text for name, text in reported["workers"].items()}
+    here = versions(reported["client"])
+    faults = [f"{end} has {item}" for end, text in ends.items() for item in other(here, versions(text))]
+    faults = faults or [f"worker {name} has {item}" for name, text in client.run(programs, on_error="return").items()
+                        for item in strange(text)]  # fmt: skip
     if faults:
-        raise FvsolveError(f"the Dask cluster at {address} is of another version, and its rows would not be the same: "
-                           f"{listing(faults)}; install the same there and here")  # fmt: skip
+        raise FvsolveError(f"the Dask cluster at {address} has other versions, so its results could differ: "
+                           f"{listing(faults)}. Install the same versions there and here")  # fmt: skip
 
 
-def strange(said: Any) -> list[str]:
-    """What a worker computes with other than this process, in words; what it raised where it has none of it."""
-    if not isinstance(said, dict):
-        return [f"no fvsolve ({said})"]
-    own = {name: one for name, one in programs().items() if name != "target"}  # workers may be of other kinds
-    return other(own, said)
+def strange(reported: Any) -> list[str]:
+    """Differences of the programs on a worker and here, as texts; its exception if fvsolve is missing there."""
+    if not isinstance(reported, dict):
+        return [f"no fvsolve ({reported})"]
+    own = {
+        name: version for name, version in programs().items() if name != "target"
+    }  # processors of workers may differ
+    return other(own, reported)
 
 
-def versions(said: dict) -> dict[str, str]:
-    """Versions of what both ends must agree in, as Dask tells them; of Python without the last number."""
-    host, packages = said.get("host", {}), said.get("packages", {})
-    found = {name: str(packages.get(name)) for name in SAME[1:]}
-    return {"python": ".".join(str(host.get("python", packages.get("python"))).split(".")[:2]), **found}
+def versions(reported: dict) -> dict[str, str]:
+    """Versions of `MATCHING_PACKAGES` in a report of Dask; Python as major.minor."""
+    host, packages = reported.get("host", {}), reported.get("packages", {})
+    numbers = {name: str(packages.get(name)) for name in SAME[1:]}
+    return {"python": ".".join(str(host.get("python", packages.get("python"))).split(".")[:2]), **numbers}
 
 
 def other(here: dict[str, str], there: dict[str, str]) -> list[str]:
-    """What there is other than here, in words."""
-    return [f"{name} {there.get(name)} (here {own})" for name, own in here.items() if there.get(name) != own]
+    """Texts of versions on the remote side that differ from those here."""
+    return [
+        f"{name} {there.get(name)} (here {version})" for name, version in here.items() if there.get(name) != version
+    ]

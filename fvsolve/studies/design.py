@@ -1,4 +1,4 @@
-"""A study of a design: events times protections of one case, each a run with verdicts. Knows cases and runs."""
+"""Scenario study: runs of a case with every combination of events and protections, with limit verdicts."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ STUDY = "study.json"
 
 @dataclass(frozen=True)
 class Studied:
-    """A study that has run: of every run event, protection, directory, ok, reason, t, verdicts, extremes and more."""
+    """Results of a scenario study.
+
+    rows : for every run event, protection, directory, ok, reason, t, verdicts, extremes and more of its summary
+    """
 
     design: Design
     folder: Path
@@ -31,12 +34,18 @@ class Studied:
 
     @property
     def holds(self) -> list[str]:
-        """Protections (the case itself where there are none) whose runs are ok and hold all limits in all events; none
-        without limits."""
-        of: dict[str, list[dict[str, Any]]] = {}
+        """Protections whose runs are all ok and satisfy all limits in all events; "" is the case without protection.
+
+        Empty if there are no limits.
+        """
+        by_protection: dict[str, list[dict[str, Any]]] = {}
         for row in self.rows:
-            of.setdefault(row["protection"] or "", []).append(row)
-        return [name for name, rows in of.items() if all(map(passed, rows)) and any(row["verdicts"] for row in rows)]
+            by_protection.setdefault(row["protection"] or "", []).append(row)
+        return [
+            name
+            for name, rows in by_protection.items()
+            if all(map(passed, rows)) and any(row["verdicts"] for row in rows)
+        ]
 
     @property
     def limited(self) -> bool:
@@ -45,11 +54,11 @@ class Studied:
 
     @property
     def ok(self) -> bool:
-        """True if all runs are ok, and one protection at least holds all limits, if there are any."""
+        """True if all runs are ok and, if there are limits, at least one protection satisfies all of them."""
         return all(row["ok"] for row in self.rows) and (bool(self.holds) or not self.limited)
 
     def plain(self) -> dict[str, Any]:
-        """As study.json has it."""
+        """Plain values as written to study.json."""
         design = self.design
         return plain({"title": design.title, "study": design.name, "case": str(design.case), "ok": self.ok,
                       "events": list(design.events), "protections": list(design.protections), "holds": self.holds,
@@ -58,16 +67,16 @@ class Studied:
 
 
 def passed(row: dict[str, Any]) -> bool:
-    """Whether a run came to its end rightly and holds its limits."""
-    return row["ok"] and all(one["ok"] for one in row["verdicts"])
+    """True if a run is ok and satisfies all its limits."""
+    return row["ok"] and all(verdict["ok"] for verdict in row["verdicts"])
 
 
 def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None = None, force: bool = False,
           progress=None) -> Studied:  # fmt: skip
-    """Run all events with all protections of a study file, `jobs` at a time, each into a run directory of its own.
+    """Run all events with all protections of a study file, `jobs` runs at a time, each in its own run directory.
 
-    What is there of the same study goes on or stays; `force` begins anew. Raises CaseError with the faults of the file
-    and of all runs, RunError where a directory holds another run.
+    Runs of the same study that exist are kept, and resumed if unfinished; `force` repeats all. Raises CaseError with
+    the faults of the file and of all runs, RunError if a directory holds a different run.
     """
     design = source if isinstance(source, Design) else read_design(source)
     folder = Path(out) if out is not None else Path("runs") / design.name
@@ -81,13 +90,13 @@ def study(source, out: str | Path | None = None, jobs: int = 1, dask: str | None
         rows[at] = row
         if progress is not None:
             progress(done, len(tasks), name_of(row))
-    found = Studied(design, folder, rows)
-    write_study(found)
-    return found
+    results = Studied(design, folder, rows)
+    write_study(results)
+    return results
 
 
 class DesignRun:
-    """What makes the runs of a study, wherever."""
+    """Callable that makes one run of a study, in this or another process."""
 
     def __init__(self, source: Any, error: bool, force: bool) -> None:
         self.sent, self.error, self.force = Sent(source), error, force
@@ -102,53 +111,55 @@ class DesignRun:
 
             peak_errors(result, case)
             write_summary(place / "summary.json", result.summary)
-        said = result.summary
-        kept = ("ok", "reason", "t", "invalid_from", "verdicts", "extremes", "peaks", "resolution", "marks", "events",
-                "expectations", "time_unit", "envelope_units", "warnings")  # fmt: skip
+        summary = result.summary
+        keys_shown = ("ok", "reason", "t", "invalid_from", "verdicts", "extremes", "peaks", "resolution", "marks",
+                      "events", "expectations", "time_unit", "envelope_units", "warnings")  # fmt: skip
         return {key: task[key] for key in ("event", "protection", "directory")} | {
-            key: plain(said[key]) for key in kept if key in said
+            key: plain(summary[key]) for key in keys_shown if key in summary
         }
 
     def lost(self, task: dict[str, Any]) -> Any:
-        """Nothing can stand for it."""
-        raise RunError(f"the process that ran {task['directory']} has ended, again and again; was memory too small?")
+        """Raise RunError: a run directory has no substitute result."""
+        raise RunError(f"the process that ran {task['directory']} was killed repeatedly. Is there enough memory?")
 
 
 def name_of(row: dict[str, Any]) -> str:
-    """`trip with vessel`."""
+    """Name of a run, such as "trip with vessel"."""
     return " with ".join(name for name in (row["event"], row["protection"]) if name) or "the case"
 
 
-def write_study(found: Studied) -> None:
-    """study.json and study.csv: a row a run, value, margin and state of every limit."""
-    said = found.plain()
-    for row in said["runs"]:
-        row["directory"] = os.path.relpath(row["directory"], found.folder)
-    clear_reports(found.folder)
-    fresh = found.folder / f"{STUDY}.tmp"
-    fresh.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
-    os.replace(fresh, found.folder / STUDY)
-    limits = list(dict.fromkeys(one["name"] for row in found.rows for one in row["verdicts"]))
+def write_study(results: Studied) -> None:
+    """Write study.json and study.csv: a row for each run with value, margin and state of every limit."""
+    data = results.plain()
+    for row in data["runs"]:
+        row["directory"] = os.path.relpath(row["directory"], results.folder)
+    clear_reports(results.folder)
+    temporary = results.folder / f"{STUDY}.tmp"
+    temporary.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    os.replace(temporary, results.folder / STUDY)
+    limits = list(dict.fromkeys(verdict["name"] for row in results.rows for verdict in row["verdicts"]))
     columns = [
-        f"{name} {what}" for name in limits for what in ("value", "margin", "unit", "state", "place", "time [s]")
+        f"{name} {quantity}"
+        for name in limits
+        for quantity in ("value", "margin", "unit", "state", "place", "time [s]")
     ]
-    with open(found.folder / "study.csv", "w", encoding="utf-8", newline="") as file:
+    with open(results.folder / "study.csv", "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(["event", "protection", "ok", "reason", *columns])
-        for row in found.rows:
-            verdicts = {one["name"]: one for one in row["verdicts"]}
+        for row in results.rows:
+            verdicts = {verdict["name"]: verdict for verdict in row["verdicts"]}
             cells = [verdicts.get(name, {}).get(key) for name in limits
                      for key in ("value", "margin", "unit", "state", "place", "time")]  # fmt: skip
             table.writerow([row["event"] or "", row["protection"] or "", row["ok"], row["reason"], *cells])
 
 
 def open_study(folder: str | Path) -> dict[str, Any]:
-    """study.json of a folder, its directories as they lie from here; FvsolveError where there is none."""
+    """Read study.json of a folder; directories become paths through that folder. Raises FvsolveError if invalid."""
     folder = Path(folder)
     try:
-        said = json.loads((folder / STUDY).read_text(encoding="utf-8"))
-        for row in said["runs"]:
+        data = json.loads((folder / STUDY).read_text(encoding="utf-8"))
+        for row in data["runs"]:
             row["directory"] = str(folder / row["directory"])
-        return said
+        return data
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise FvsolveError(f"{folder} holds no study that ended (no {STUDY}): {error}") from None
+        raise FvsolveError(f"{folder} has no finished study (no {STUDY}): {error}") from None

@@ -1,4 +1,4 @@
-"""The file of a study: sets of overrides by name, and what is wrong of them. Knows cases; runs nothing."""
+"""Files of scenario studies: named sets of overrides of a case, and their faults."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from fvsolve.errors import CaseError, Fault, did_you_mean
 from fvsolve.units import show
 
 KEYS = ("case", "title", "error", "events", "protections")
-DEEP = ("nodes", "links", "limits", "routes", "scalars", "defaults")  # of named tables whose keys are set one by one
+DEEP = ("nodes", "links", "limits", "routes", "scalars", "defaults")  # tables of named parts: keys are set one by one
 Say = Callable[[tuple, str], None]
 
 
 @dataclass(frozen=True)
 class Design:
-    """What a study file says: sets of overrides, dotted key -> value, by the names of events and protections."""
+    """Content of a study file: overrides (dotted key -> value) by the names of events and protections."""
 
     name: str
     path: Path
@@ -33,40 +33,43 @@ class Design:
     protections: dict[str, dict[str, Any]]
 
     def runs(self) -> Iterator[tuple[str | None, str | None, dict[str, Any]]]:
-        """(event, protection, keys) of every run; None where the file has none of a kind."""
+        """(event, protection, overrides) of every run; event or protection is None if the file has none."""
         for event, of_event in (self.events or {None: {}}).items():
             for protection, of_protection in (self.protections or {None: {}}).items():
                 yield event, protection, {**of_protection, **of_event}
 
 
 def read_design(path: str | Path) -> Design:
-    """The study of a TOML file; CaseError with all that is wrong in it and in its runs, by line."""
+    """Read the study of a TOML file. Raises CaseError with all faults of the file and of its runs, with lines."""
     path = Path(path)
-    said, lines = read_text(path)
+    data, lines = read_text(path)
     faults: dict[tuple, Fault] = {}
 
     def fault(keys: tuple, message: str) -> None:
         place = ".".join(keys)
-        at = next((lines[one] for one in spellings(keys) if one in lines), None)
-        faults.setdefault((place, message), Fault(place, message, at))
+        line = next((lines[spelling] for spelling in spellings(keys) if spelling in lines), None)
+        faults.setdefault((place, message), Fault(place, message, line))
 
-    if {"nodes", "fluid"} & said.keys():
-        text = f'is a case, no study; a study names it, case = "{path.name}", beside [events.NAME], [protections.NAME]'
+    if {"nodes", "fluid"} & data.keys():
+        text = (
+            f'is a case, not a study. A study refers to it by case = "{path.name}" '
+            "and has [events.NAME], [protections.NAME]"
+        )
         raise CaseError([Fault("", text)], path.name)
-    for key in said:
+    for key in data:
         if key not in KEYS:
-            fault((key,), f"unknown key{did_you_mean(key, KEYS) or '; keys are ' + ', '.join(KEYS)}")
-    for key, kind, what in (("title", str, "text"), ("error", bool, "true or false")):
-        if not isinstance(said.get(key, kind()), kind):
-            fault((key,), f"{show(said[key])} is not {what}")
-    sets = {group: read_sets(said.get(group, {}), group, fault) for group in ("events", "protections")}
+            fault((key,), f"unknown key{did_you_mean(key, KEYS) or '. Expected ' + ', '.join(KEYS)}")
+    for key, kind, kind_text in (("title", str, "text"), ("error", bool, "true or false")):
+        if not isinstance(data.get(key, kind()), kind):
+            fault((key,), f"{show(data[key])} is not {kind_text}")
+    sets = {group: read_sets(data.get(group, {}), group, fault) for group in ("events", "protections")}
     if not faults and not any(sets.values()):
-        fault((), "nothing is studied; wanted [events.NAME], [protections.NAME] or both")
+        fault((), "the study has no runs. Expected [events.NAME], [protections.NAME] or both")
     for event, protection, key, other in all_clashes(**sets):
-        text = f"{key} is set here and {other} by protections.{protection}; a run cannot have both"
+        text = f"{key} is set here, and {other} in protections.{protection}; the two are in conflict"
         fault(("events", event, key), text)
-    place = studied(said.get("case"), path.parent, fault)
-    design = Design(path.stem, path, said.get("title", ""), place, said.get("error", False), **sets)
+    place = studied(data.get("case"), path.parent, fault)
+    design = Design(path.stem, path, data.get("title", ""), place, data.get("error", False), **sets)
     if place is not None:
         run_faults(design, fault)
     if faults:
@@ -75,7 +78,7 @@ def read_design(path: str | Path) -> Design:
 
 
 def spellings(keys: tuple) -> Iterator[tuple]:
-    """Paths under which a key of a set may stand in the file, the nearest first: as tables, in quotes, its table."""
+    """Paths at which a key of a set may be in the file, most specific first: nested, quoted, then its tables."""
     below = dotted(keys[2]) if len(keys) > 2 else ()
     for n in range(len(below), 0, -1):
         yield (*keys[:2], *below[:n])
@@ -84,7 +87,7 @@ def spellings(keys: tuple) -> Iterator[tuple]:
 
 
 def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
-    """What a TOML file says, and the lines of its keys; CaseError where it says nothing."""
+    """Read a TOML file: (data, line of each key). Raises CaseError if it is missing, unreadable or invalid."""
     text = ""
     try:
         text = path.read_text(encoding="utf-8-sig").replace("\r\n", "\n")
@@ -99,40 +102,40 @@ def read_text(path: Path) -> tuple[dict[str, Any], dict[tuple, int]]:
 
 
 def studied(case: Any, folder: Path, fault: Say) -> Path | None:
-    """The file of the case; None where it is at fault."""
+    """Path of the case file; adds a fault and returns None if there is no such file."""
     if not isinstance(case, str):
-        text = "case is missing, the file that is studied" if case is None else f"{show(case)} is no text"
+        text = "case is missing, the case file of the study" if case is None else f"{show(case)} is not a text"
         fault(() if case is None else ("case",), text)
         return None
     place = folder / case
     if not place.is_file() and case in shipped.names():
         return shipped.find(case)
     if not place.is_file():
-        near = [one.name for one in place.parent.glob("*.toml")] if place.parent.is_dir() else []
-        near = did_you_mean(place.name, [*near, *shipped.names()])
-        fault(("case",), f"{show(case)}: there is no such file{near}; a path is relative to the study")
+        suggestion = [file.name for file in place.parent.glob("*.toml")] if place.parent.is_dir() else []
+        suggestion = did_you_mean(place.name, [*suggestion, *shipped.names()])
+        fault(("case",), f"{show(case)}: there is no such file{suggestion}; a path is relative to the study")
         return None
     return place
 
 
-def read_sets(given: Any, group: str, fault) -> dict[str, dict[str, Any]]:
-    """Sets of overrides by name, as dotted keys."""
-    if not isinstance(given, dict):
-        fault((group,), f"{show(given)} is no table of tables by name")
+def read_sets(table: Any, group: str, fault) -> dict[str, dict[str, Any]]:
+    """Sets of overrides by name, with dotted keys; adds faults."""
+    if not isinstance(table, dict):
+        fault((group,), f"{show(table)} is not a table. Expected named tables, [{group}.NAME]")
         return {}
-    found = {}
-    for name, one in given.items():
-        if not isinstance(one, dict):
-            fault((group, name), f'{show(one)} is no table; wanted keys of the case, such as links.pump.trip = "2 s"')
+    sets = {}
+    for name, overrides in table.items():
+        if not isinstance(overrides, dict):
+            fault((group, name), f'{show(overrides)} is not a table. Expected keys such as links.pump.trip = "2 s"')
         elif not name.replace("-", "").replace("_", "").isalnum():
-            fault((group, name), f"{show(name)} is no name; a name has letters, digits, _ and -")
+            fault((group, name), f"{show(name)} is not a valid name. Expected letters, digits, _ and -")
         else:
-            found[name] = dict(keys_of(one))
-    return found
+            sets[name] = dict(keys_of(overrides))
+    return sets
 
 
 def keys_of(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Dotted keys of nested tables: those of parts one by one, whatever stands under them whole."""
+    """Pairs (dotted key, value) of nested tables. Keys of named parts are separate; deeper tables are values."""
     for first, inner in table.items():
         if "." in first or not isinstance(inner, dict):
             yield first, inner
@@ -145,68 +148,71 @@ def keys_of(table: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
 
 
 def path(*keys: str) -> str:
-    """Keys as TOML writes them, in quotes where they are not bare."""
+    """Join keys to a dotted TOML key, with quotes where necessary."""
     return ".".join(key if key.replace("-", "").replace("_", "").isalnum() else json.dumps(key) for key in keys)
 
 
 def all_clashes(events: dict, protections: dict) -> Iterator[tuple[str, str, str, str]]:
-    """(event, protection, key of the one, key of the other) of all that no run can have both."""
+    """(event, protection, key of the event, key of the protection) of all pairs of conflicting keys."""
     for event, of_event in events.items():
         for protection, of_protection in protections.items():
-            yield from ((event, protection, one, other) for one, other in clashes(of_event, of_protection))
+            yield from (
+                (event, protection, event_key, protection_key)
+                for event_key, protection_key in clashes(of_event, of_protection)
+            )
 
 
-def clashes(one: dict[str, Any], other: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    """Keys of both of which one is, or lies within, the other, unless both say the same."""
-    for key in one:
-        for beside in other:
-            a, b = dotted(key), dotted(beside)
-            if a[: len(b)] == b[: len(a)] and not (a == b and one[key] == other[beside]):
-                yield key, beside
+def clashes(first: dict[str, Any], second: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    """Pairs of keys of two sets that are equal or nested, unless equal keys have equal values."""
+    for key in first:
+        for other_key in second:
+            a, b = dotted(key), dotted(other_key)
+            if a[: len(b)] == b[: len(a)] and not (a == b and first[key] == second[other_key]):
+                yield key, other_key
 
 
 def run_faults(design: Design, fault: Say) -> None:
-    """Tell the faults of all runs that could not start: of the key that is to blame, and of which runs, if not of all.
+    """Add the faults of all runs that cannot start, at the responsible key, with the runs if not all are affected.
 
-    Runs of sets that clash are left out.
+    Runs of conflicting sets are omitted.
     """
     try:
         base = load(design.case)
     except CaseError as error:
-        for one in error.faults:
-            fault(("case",), f"{error.file}: {one}")
+        for case_fault in error.faults:
+            fault(("case",), f"{error.file}: {case_fault}")
         return
     clash = {(event, protection) for event, protection, *_ in all_clashes(design.events, design.protections)}
     runs = [(pair, keys) for *pair, keys in design.runs() if tuple(pair) not in clash]
-    found: dict[tuple[str, str], list] = {}  # (place, message) -> pairs of event and protection
+    groups: dict[tuple[str, str], list] = {}  # (place, message) -> pairs of event and protection
     for pair, keys in runs:
         try:
             load(base, keys)
         except CaseError as error:
-            for one in error.faults:
-                found.setdefault((one.place, one.message), []).append(pair)
-    for (place, message), failed in found.items():
-        of_keys = list(blamed(design, place, failed))
-        for keys in of_keys or blamed(design, None, failed):
-            at = 0 if keys[0] == "events" else 1
-            beside = [pair[1 - at] for pair in failed if pair[at] == keys[1]]
-            often = len(beside) == sum(pair[at] == keys[1] for pair, _ in runs)
-            said = message if of_keys or not place else f"{place}: {message}"
-            fault(keys, said if often else f"{said} (with {', '.join(beside)})")
+            for case_fault in error.faults:
+                groups.setdefault((case_fault.place, case_fault.message), []).append(pair)
+    for (place, message), pairs in groups.items():
+        of_keys = list(blamed(design, place, pairs))
+        for keys in of_keys or blamed(design, None, pairs):
+            position = 0 if keys[0] == "events" else 1
+            partners = [pair[1 - position] for pair in pairs if pair[position] == keys[1]]
+            in_all = len(partners) == sum(pair[position] == keys[1] for pair, _ in runs)
+            text = message if of_keys or not place else f"{place}: {message}"
+            fault(keys, text if in_all else f"{text} (with {', '.join(partners)})")
 
 
-def blamed(design: Design, place: str | None, failed: list) -> Iterator[tuple]:
-    """(group, name, place) of the sets of runs that say what stands there; without a place (group, name) of all."""
-    for at, group in enumerate(("events", "protections")):
-        for name in dict.fromkeys(pair[at] for pair in failed if pair[at] is not None):
+def blamed(design: Design, place: str | None, pairs: list) -> Iterator[tuple]:
+    """(group, name, place) of the sets that change a place; without a place (group, name) of the sets of one group."""
+    for position, group in enumerate(("events", "protections")):
+        for name in dict.fromkeys(pair[position] for pair in pairs if pair[position] is not None):
             if place is None:
                 yield group, name
             elif any(within(place, key) or within(key, place) for key in getattr(design, group)[name]):
                 yield group, name, place
-        if place is None and failed[0][at] is not None:
+        if place is None and pairs[0][position] is not None:
             return
 
 
 def within(place: str, key: str) -> bool:
-    """Whether a place is a key, or lies below it."""
+    """True if a place is a key or below it."""
     return place == key or place.startswith((f"{key}.", f"{key}["))

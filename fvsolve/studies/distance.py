@@ -1,7 +1,7 @@
-"""How far a run is from the truth: end fields, rows, extremes; in SI or in ranges. Knows fields, rows; runs nothing.
+"""Errors of a run against a reference: end fields, probe rows and extremes, in SI or relative to ranges.
 
-Every probe has its own range in the truth, every pipe that of its pressure, so that an error of 0.01 is a hundredth of
-what that component does there.
+The range of a probe is its range in the reference; the range of a pipe is that of its pressure. An error of 0.01 is a
+hundredth of the range of that component.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.plane import contents, variable_of
 from fvsolve.studies.outcome import Outcome
 
-END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # before quantities
+END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # prefixes of quantities
 NORMS = ("L1", "L2", "max")
-STILL = 1e-9  # a component that moves by less of its size than this says nothing
+STILL = 1e-9  # a component whose range is below this fraction of its size counts as constant
 
 
 @dataclass(frozen=True)
 class Gap:
-    """How far one component is off.
+    """Error of a component.
 
-    off : float64[k]  run less truth [SI]; weights : float64[k]  lengths, areas or times that each counts for
-    span : its range in the truth [SI], nan where it stands still
+    off : float64[k]  run less reference [SI]; weights : float64[k]  lengths, areas or times of the values
+    span : range in the reference [SI]; nan if constant
     """
 
     off: np.ndarray
@@ -39,16 +39,17 @@ class Gap:
         return {"L1": float(share @ size), "L2": math.sqrt(float(share @ size**2)), "max": float(size.max(initial=0.0))}
 
     def ranges(self) -> dict[str, float]:
-        """The same over the range."""
-        return {norm: one / self.span for norm, one in self.norms().items()}
+        """Norms divided by the range."""
+        return {norm: value / self.span for norm, value in self.norms().items()}
 
 
 @dataclass(frozen=True)
 class Distance:
-    """Error over the trajectory (mean over time), its greatest value at any row, and at the end; nan: not known.
+    """Errors of the worst component relative to its range; nan if not known.
 
-    All in ranges, of the worst component. overshoot : by how much a probe leaves the range that it has in the truth
-    worst : the component whose trajectory error is the greatest
+    trajectory : mean over time; greatest : greatest value at any row; end : error at the end
+    overshoot : amount by which a probe leaves its range in the reference
+    worst : component with the greatest trajectory error
     """
 
     trajectory: float = math.nan
@@ -58,55 +59,57 @@ class Distance:
     worst: str = ""
 
 
-# what runs are asked for --------------------------------------------------------------------------------------------
+# recorded probes ----------------------------------------------------------------------------------------------------
 
 
 def recorded(case, keys: Mapping | None = None) -> dict:
-    """Keys with which a run of a case also records the end of all nodes and links; no frames."""
+    """Overrides with which a run also records the probes of `end_probes`, and no frames."""
     own = [probe.text for probe in case.probes]
     return {**(keys or {}), "output.probes": list(dict.fromkeys([*own, *end_probes(case)])), "output.fields": 0}
 
 
 def end_probes(case) -> list[str]:
-    """What nodes without a given pressure, and links without cells, show."""
-    found = []
+    """Probes of nodes other than reservoirs and frames, and flows of links without cells."""
+    probes = []
     for name, node in case.nodes.items():
-        shown = [key for key in ("pressure", "level", "position", "velocity") if key in node.quantities]
+        quantities = [key for key in ("pressure", "level", "position", "velocity") if key in node.quantities]
         if node.kind not in ("reservoir", "frame"):
-            found += [f"nodes.{name}.{key}" for key in shown]
+            probes += [f"nodes.{name}.{key}" for key in quantities]
     for name, link in case.links.items():
         if "flow" in link.quantities and name not in pipes(case):
-            found.append(f"links.{name}.flow")
-    return found
+            probes.append(f"links.{name}.flow")
+    return probes
 
 
 # measures -----------------------------------------------------------------------------------------------------------
 
 
 def differences(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict[str, dict[str, float]]:
-    """Variable -> errors of a run in L1, L2 and max: end fields, probes over time, ends of nodes and links [SI].
+    """Variable -> errors of a run in L1, L2 and max [SI]: end fields, probes over time, end values of nodes and links.
 
-    own : probes that are compared over time, all if left out; `recorded` adds further ones for the ends.
+    own : probes compared over time (default all); `recording_keys` adds probes that are needed only for end values.
     """
-    found, parts = {}, field_gaps(run, truth)
+    deviations, by_component = {}, field_gaps(run, truth)
     for quantity in ("pressure", "flow") if run.model.pipes else ():
-        gaps = [parts[pipe.name, quantity] for pipe in run.model.pipes]
-        found[quantity] = Gap(*(np.concatenate([getattr(one, key) for one in gaps]) for key in ("off", "weights")))
+        gaps = [by_component[pipe.name, quantity] for pipe in run.model.pipes]
+        deviations[quantity] = Gap(
+            *(np.concatenate([getattr(deviation, key) for deviation in gaps]) for key in ("off", "weights"))
+        )
     for basin in run.model.basins:
-        known = {what: parts.get((basin, what)) for what in contents(basin, run.y)}
-        found |= {variable_of(basin, what): gap for what, gap in known.items() if gap is not None}
-    ends, last = set(end_probes(run.model.case)), {}
+        by_content = {content: by_component.get((basin, content)) for content in contents(basin, run.y)}
+        deviations |= {variable_of(basin, content): gap for content, gap in by_content.items() if gap is not None}
+    ends, at_end = set(end_probes(run.model.case)), {}
     for name, gap in row_gaps(run, truth).items():
         if name in ends:
-            last.setdefault(END[name.split(".")[0]] + name.rsplit(".", 1)[1], []).append(gap.off[-1])
+            at_end.setdefault(END[name.split(".")[0]] + name.rsplit(".", 1)[1], []).append(gap.off[-1])
         if own is None or name in own:
-            found[name] = gap
-    found |= {name: Gap(np.array(off), np.ones(len(off))) for name, off in last.items()}
-    return {name: gap.norms() for name, gap in found.items()}
+            deviations[name] = gap
+    deviations |= {name: Gap(np.array(off), np.ones(len(off))) for name, off in at_end.items()}
+    return {name: gap.norms() for name, gap in deviations.items()}
 
 
 def distance(run: Outcome, truth) -> Distance:
-    """Errors of a run in ranges; all nan where it did not reach the end."""
+    """Errors of a run relative to ranges; all nan if it did not reach the end."""
     if not run.ok:
         return Distance()
     with np.errstate(invalid="ignore", over="ignore"):
@@ -123,15 +126,15 @@ def distance(run: Outcome, truth) -> Distance:
 
 
 def extremes_apart(run: Outcome, truth) -> float:
-    """How far least and greatest values of probes differ, in ranges; nan where none moves."""
+    """Greatest difference of least and greatest values of probes, relative to ranges; nan if all are constant."""
     return max((max(abs(low), abs(high)) for low, high in extremes(run, truth)), default=math.nan)
 
 
 def extremes(run: Outcome, truth) -> list[tuple[float, float]]:
-    """By how much the least and the greatest value of probes that move lie above those of the truth, in ranges."""
-    mine, theirs = run.rows[:, 1:], truth.rows(run)
-    span = ranges(theirs)
-    low, high = ((pick(mine, axis=0) - pick(theirs, axis=0)) / span for pick in (np.min, np.max))
+    """Differences (run less reference) of least and greatest values of changing probes, relative to ranges."""
+    values, reference_values = run.rows[:, 1:], truth.rows(run)
+    span = ranges(reference_values)
+    low, high = ((pick(values, axis=0) - pick(reference_values, axis=0)) / span for pick in (np.min, np.max))
     return [(float(low[k]), float(high[k])) for k in np.flatnonzero(span > 0.0)]
 
 
@@ -139,109 +142,123 @@ def extremes(run: Outcome, truth) -> list[tuple[float, float]]:
 
 
 def moving(run: Outcome, truth) -> dict[str, Gap]:
-    """Of the probes that move in the truth."""
+    """Deviations of the probes that change in the reference."""
     return {name: gap for name, gap in row_gaps(run, truth).items() if gap.span > 0.0}
 
 
 def row_gaps(run: Outcome, truth) -> dict[str, Gap]:
-    """Probe -> how far it is off over time, of those that the truth knows."""
-    share, theirs = times(run.rows[:, 0]), truth.rows(run)
-    off, span = run.rows[:, 1:] - theirs, ranges(theirs)
-    known = [k for k in range(len(run.probes)) if not np.isnan(theirs[:, k]).all()]
-    return {run.probes[k]: Gap(off[:, k], share, float(span[k])) for k in known}
+    """Probe -> deviation over time, for probes with values in the reference."""
+    weights, reference_values = times(run.rows[:, 0]), truth.rows(run)
+    off, span = run.rows[:, 1:] - reference_values, ranges(reference_values)
+    columns = [k for k in range(len(run.probes)) if not np.isnan(reference_values[:, k]).all()]
+    return {run.probes[k]: Gap(off[:, k], weights, float(span[k])) for k in columns}
 
 
 def field_gaps(run: Outcome, truth) -> dict[tuple, Gap]:
-    """(pipe or basin, quantity) -> how far it is off over the cells at the end.
+    """(pipe or basin, quantity) -> deviation over the cells at the end.
 
-    Both quantities of a pipe go by the range of its pressure, a flow by that times A / (rho a); what cells of basins
-    hold by its own range there, flows along x and y by the greater one.
+    The range of a pipe is that of its pressure; for its flow it is multiplied by A / (rho a). The range of a quantity
+    of a basin is its range over the cells; flows along x and y both have the greater of their two ranges.
     """
-    model, found = run.model, {}
-    theirs = truth.fields(model) if model.pipes or model.basins else {}
-    mine = fields(model, waves(run)) if model.pipes else {}
+    model, deviations = run.model, {}
+    reference_fields = truth.fields(model) if model.pipes or model.basins else {}
+    own_fields = fields(model, waves(run)) if model.pipes else {}
     for k, pipe in enumerate(model.pipes):
         lengths, span = np.full(pipe.cells, pipe.length / pipe.cells), truth.spans.get(pipe.name, math.nan)
-        per = float(model.tables.pipes[k]["admittance"]) / model.case.properties.density
-        for quantity, one, other, width in zip(("pressure", "flow"), mine[pipe.name], theirs[pipe.name],
-                                               (span, span * per), strict=True):  # fmt: skip
-            found[pipe.name, quantity] = Gap(one - other, lengths, width)
+        flow_per_pressure = float(model.tables.pipes[k]["admittance"]) / model.case.properties.density
+        for quantity, values, reference_values, width in zip(
+            ("pressure", "flow"),
+            own_fields[pipe.name],
+            reference_fields[pipe.name],
+            (span, span * flow_per_pressure),
+            strict=True,
+        ):
+            deviations[pipe.name, quantity] = Gap(values - reference_values, lengths, width)
     for basin in model.basins:
-        known = theirs.get(("basin", basin.name))
-        if known is None:
+        basin_fields = reference_fields.get(("basin", basin.name))
+        if basin_fields is None:
             continue
-        spans = np.ptp(known, axis=1)
+        spans = np.ptp(basin_fields, axis=1)
         if len(spans) >= 3 and basin.quantities:
             spans[1:3] = spans[1:3].max()
-        for (what, one), other, span in zip(contents(basin, run.y).items(), known, spans, strict=True):
-            found[basin, what] = Gap(one - other, basin.mesh.area, float(span) if span > STILL else math.nan)
-    return found
+        for (content, values), reference_values, span in zip(
+            contents(basin, run.y).items(), basin_fields, spans, strict=True
+        ):
+            deviations[basin, content] = Gap(
+                values - reference_values, basin.mesh.area, float(span) if span > STILL else math.nan
+            )
+    return deviations
 
 
 def times(t: np.ndarray) -> np.ndarray:
-    """What each row counts for in a mean over time [s]; those before and after a jump share one and count half."""
+    """Weights of rows in a mean over time [s], trapezoidal; 1 each if all rows have the same time."""
     steps = 0.5 * np.diff(t)
-    found = np.append(steps, 0.0) + np.append(0.0, steps)
-    return found if found.sum() > 0.0 else np.ones(t.size)
+    weights = np.append(steps, 0.0) + np.append(0.0, steps)
+    return weights if weights.sum() > 0.0 else np.ones(t.size)
 
 
 def ranges(values: np.ndarray) -> np.ndarray:
-    """Range of every column : float64[columns], nan for those that stand still."""
+    """Range of every column : float64[columns], nan for constant columns."""
     span, size = np.ptp(values, axis=0), np.abs(values).max(axis=0)
     return np.where(span > STILL * size, span, np.nan)
 
 
 def spans_of(envelope: Mapping[str, Mapping]) -> dict[str, float]:
-    """Pipe -> range of its pressure over a run [Pa], of its envelope."""
-    met = {name: np.append(one["least_pressure"], one["greatest_pressure"]) for name, one in envelope.items()}
-    return {name: float(ranges(one)) for name, one in met.items()}
+    """Pipe -> range of its pressure over a run [Pa], from the envelope."""
+    pressures = {
+        name: np.append(entry["least_pressure"], entry["greatest_pressure"]) for name, entry in envelope.items()
+    }
+    return {name: float(ranges(entry)) for name, entry in pressures.items()}
 
 
 # fields -------------------------------------------------------------------------------------------------------------
 
 
 def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
-    """{pipe: (pressure [Pa], flow [m3/s])} of sums and differences of both waves, averaged over a model's cells."""
-    found = {}
+    """{pipe: (pressure [Pa], flow [m3/s])} from cell averages of the sums and differences of both waves."""
+    by_pipe = {}
     for k, pipe in enumerate(model.pipes):
         total, mass_flow = waves[pipe.name]
         pressure = model.cell_pressure(k, total)
-        found[pipe.name] = pressure, (model.tables.pipes[k]["flow"] + mass_flow) / model.case.law.density(pressure)
-    return found
+        by_pipe[pipe.name] = pressure, (model.tables.pipes[k]["flow"] + mass_flow) / model.case.law.density(pressure)
+    return by_pipe
 
 
 def waves(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Sum and difference of both waves in the cells of every pipe at the end [kg/s]."""
-    found = dict(run.lines)
+    sums = dict(run.lines)
     for row, pipe in zip(run.model.tables.pipes, run.model.pipes, strict=True):
-        if pipe.name not in found:
+        if pipe.name not in sums:
             o, n = int(row["y"]), pipe.cells
             r, l = run.y[o : o + n], run.y[o + n : o + 2 * n]  # noqa: E741
-            found[pipe.name] = r + l, r - l
-    return found
+            sums[pipe.name] = r + l, r - l
+    return sums
 
 
 def averaged(fine: np.ndarray, cells: int) -> np.ndarray:
-    """Averages over fewer or more equal cells; what the cells hold together stays the same to the last bit or so."""
+    """Averages over fewer or more equal cells, conservative to rounding.
+
+    If the number of old cells is not a multiple of `cells`, the integral is interpolated by a spline of degree 5.
+    """
     n = fine.size
     if n % cells == 0:
         return fine.reshape(cells, n // cells).mean(axis=1)
     from scipy.interpolate import make_interp_spline
 
-    held = np.concatenate([[0.0], np.cumsum(fine)]) / n
-    curve = make_interp_spline(np.linspace(0.0, 1.0, n + 1), held, k=min(5, n))
+    integral = np.concatenate([[0.0], np.cumsum(fine)]) / n
+    curve = make_interp_spline(np.linspace(0.0, 1.0, n + 1), integral, k=min(5, n))
     return np.diff(curve(np.linspace(0.0, 1.0, cells + 1))) * cells
 
 
 def size_of(run: Outcome, name: str) -> float:
-    """How large a variable of a run is."""
+    """Greatest absolute value of a variable of a run [SI]."""
     if name in ("pressure", "flow"):
         k = ("pressure", "flow").index(name)
         return max(float(np.max(np.abs(pair[k]))) for pair in fields(run.model, waves(run)).values())
     for basin in run.model.basins:
-        for what, one in contents(basin, run.y).items():
-            if name == variable_of(basin, what):
-                return float(np.max(np.abs(one)))
+        for quantity, values in contents(basin, run.y).items():
+            if name == variable_of(basin, quantity):
+                return float(np.max(np.abs(values)))
     named = [(text, END.get(text.split(".")[0], "") + text.rsplit(".", 1)[-1]) for text in run.probes]
     columns = [k for k, texts in enumerate(named, 1) if name in texts]
     return float(np.max(np.abs(run.rows[:, columns]), initial=0.0))

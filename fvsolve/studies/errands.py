@@ -1,4 +1,4 @@
-"""Runs that a study asks for, made by other processes where there are any. Knows cases and runs; judges nothing."""
+"""Queue of the runs of a study, computed in parallel if other processes are available."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from fvsolve.studies.sent import Sent
 
 
 class Errand(NamedTuple):
-    """A run: how(case, keys), a function of a module that gives an `Outcome`, or one and more.
+    """Request for a run: how(case, keys) is a module-level function that returns an `Outcome` or a collection with it.
 
-    stages : what is set on the study's case before, in turn
+    stages : overrides applied to the study's case before, in order
     """
 
     how: Callable[[Case, Mapping[str, Any]], Any]
@@ -25,9 +25,10 @@ class Errand(NamedTuple):
 
 
 class Errands:
-    """Runs of one study: those that were made ahead are handed out once, all others are made when they are asked for.
+    """Runs of a study. A result computed ahead is returned once; other runs are computed when requested.
 
-    jobs : processes of this machine; dask : address of a scheduler, in place of these. A context: nobody stays.
+    jobs : number of local processes; dask : address of a scheduler, used instead of local processes.
+    Context manager: workers are closed on exit.
     """
 
     def __init__(self, source: Any, jobs: int = 1, dask: str | None = None) -> None:
@@ -36,28 +37,29 @@ class Errands:
 
     @property
     def alone(self) -> bool:
-        """Whether all are made here, in turn."""
+        """True if all runs are computed in this process, one after another."""
         return self.bench.alone
 
-    def ahead(self, errands: Sequence[Errand]) -> Iterator[int]:
-        """Make runs, the cheapest first of all and then from the end, where the dearest stand; the number of each.
+    def ahead(self, requests: Sequence[Errand]) -> Iterator[int]:
+        """Compute runs ahead of their request; yields the index of each finished run.
 
-        None with one job: who asks for them has them made in turn.
+        The first, cheapest run comes first, then runs from the end, where the most expensive are. With a single
+        process nothing is computed ahead; each run is computed when requested.
         """
-        if self.alone or not errands:
+        if self.alone or not requests:
             return
-        order = [0, *range(len(errands) - 1, 0, -1)]
-        for at, answer in self.bench.do([errands[k] for k in order]):
-            self.found[repr(errands[order[at]])] = answer
-            yield order[at]
+        order = [0, *range(len(requests) - 1, 0, -1)]
+        for position, answer in self.bench.do([requests[k] for k in order]):
+            self.found[repr(requests[order[position]])] = answer
+            yield order[position]
 
-    def __call__(self, case: Case, errand: Errand) -> Any:
-        """What a run gave; `case` is the study's with the stages of the errand."""
-        answer = self.found.pop(repr(errand), None)
+    def __call__(self, case: Case, request: Errand) -> Any:
+        """Result of a run, computed now unless it was computed ahead; `case` is the case with the stages applied."""
+        answer = self.found.pop(repr(request), None)
         if answer is None:
-            return errand.how(case, errand.keys)
+            return request.how(case, request.keys)
         if isinstance(answer, Outcome) and not answer.refused and answer.model is None:
-            return replace(answer, model=prepared(case, errand.keys))
+            return replace(answer, model=prepared(case, request.keys))
         return answer
 
     def __enter__(self) -> Errands:
@@ -68,26 +70,26 @@ class Errands:
 
 
 class Runner:
-    """What makes runs of one case, wherever."""
+    """Callable that makes runs of a case, in this or another process; cases after stages are reused."""
 
     def __init__(self, source: Any) -> None:
         self.sent = Sent(source)
         self.staged: dict[str, Case] = {}
 
-    def __call__(self, errand: Errand) -> Any:
-        name = repr(errand.stages)
+    def __call__(self, request: Errand) -> Any:
+        name = repr(request.stages)
         if name not in self.staged:
-            first, *others = errand.stages or ({},)
-            case = load(self.sent.source, first)
-            for stage in others:
+            first_stage, *later = request.stages or ({},)
+            case = load(self.sent.source, first_stage)
+            for stage in later:
                 case = load(case, stage)
             self.staged[name] = case
-        return errand.how(self.staged[name], errand.keys)
+        return request.how(self.staged[name], request.keys)
 
-    def lost(self, errand: Errand) -> Any:
-        """Nothing can stand for it."""
-        keys = ", ".join(f"{key} = {value}" for key, value in errand.keys.items())
-        raise RunError(f"the process that made the run of {keys} has ended, again and again; was memory too small?")
+    def lost(self, request: Errand) -> Any:
+        """Raise RunError: a study cannot continue without the run."""
+        keys = ", ".join(f"{key} = {value}" for key, value in request.keys.items())
+        raise RunError(f"the process that made the run with {keys} was killed repeatedly. Is there enough memory?")
 
     def __getstate__(self) -> dict[str, Any]:
         return {"sent": self.sent, "staged": {}}

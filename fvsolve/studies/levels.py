@@ -1,4 +1,4 @@
-"""A case at half, twice or four times its resolution: which keys say so. Knows cases; runs nothing."""
+"""Overrides that change the resolution of a case by a factor."""
 
 from __future__ import annotations
 
@@ -10,28 +10,30 @@ from fvsolve.studies.lines import lines, settled, slowest
 
 
 def finer(case, times: float) -> dict[str, Any]:
-    """Keys of a case of `times` the resolution: cells of pipes and basins, stretches of delay lines, steps, and
-    tolerances, which go by the square of it. Courant numbers stay.
+    """Overrides for `times` the resolution: cells of pipes and basins, stretches of delay lines, steps, tolerances.
 
-    Empty where its cells cannot be said so, as patches of a basin would begin within one.
+    Tolerances change with the inverse square; Courant numbers stay. Empty if the coarser case is invalid, for example
+    because a patch of a basin would begin within a cell.
     """
-    found = cell_keys(scaled(counts(case), times))
+    keys = cell_keys(scaled(counts(case), times))
     if times < 1.0 and not loads(case, scaled(counts(case), times)):
         return {}
     numerics = case.numerics
     if numerics.step is not None:
-        found["numerics.step"] = numerics.step / times
+        keys["numerics.step"] = numerics.step / times
     if numerics.rtol is not None:
-        found["numerics.rtol"] = min(numerics.rtol / times**2, 0.5)
+        keys["numerics.rtol"] = min(numerics.rtol / times**2, 0.5)
     if lines(case):
-        found["numerics.accuracy"] = min(numerics.accuracy / times, 0.5)
-        found |= finer_steps(case, times)
-    return found | settled(case)
+        keys["numerics.accuracy"] = min(numerics.accuracy / times, 0.5)
+        keys |= finer_steps(case, times)
+    return keys | settled(case)
 
 
 def finer_steps(case, times: float) -> dict[str, Any]:
-    """Keys by which delay lines take `times` as many steps: without cells the Courant number, else `cells` of the line
-    whose places steps go by."""
+    """Overrides with which delay lines take `times` as many steps.
+
+    Without cells it is the Courant number, otherwise `cells` of the slowest line, which sets the step.
+    """
     if case.numerics.step is not None:
         return {}
     if case.numerics.courant is not None and not counts(case):
@@ -41,5 +43,5 @@ def finer_steps(case, times: float) -> dict[str, Any]:
 
 
 def kept(case) -> list[str]:
-    """What no resolution changes: basins whose cells a file has."""
+    """Basins whose cells come from a file; no resolution changes them."""
     return from_files(case)

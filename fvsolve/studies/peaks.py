@@ -1,8 +1,9 @@
-"""How far peaks and limits are off: those of a run beside the same at half and twice its resolution. Knows runs.
+"""Error bounds of peaks and limit margins, from runs at half, one and twice the resolution.
 
-Each is bounded from the local extrema of its signal (`extrema.py`), that of a limit from those of some places of each
-part. Where liquid parts no order is believed, as blows of cavities come to their limit slowly (docs/cavitation.md).
-Where nothing has cells, a peak between rows is missed by an eighth of their second difference.
+Each error is bounded from the local extrema of the signal (`extrema.py`); that of a limit from the signals of some
+places of each part. With column separation no order of convergence is assumed, because peaks after cavity collapse
+converge slowly (docs/cavitation.md). Without cells, the part of a peak missed between rows is an eighth of the second
+difference of rows.
 """
 
 from __future__ import annotations
@@ -23,83 +24,85 @@ from fvsolve.studies.levels import finer, kept
 from fvsolve.studies.unresolved import NAMED, WIDE, Unresolved, parted
 
 LEVELS = (0.5, 1.0, 2.0)
-LEAST = 5e-6  # of a value: what iterations, rows between steps, and swings that have all but died leave
-ROUNDING = 1e-12  # of the greatest value in that unit, of angles of a radian at least
+LEAST = 5e-6  # least relative error, from iterations, interpolated rows and nearly decayed oscillations
+ROUNDING = 1e-12  # rounding error relative to the greatest value in that unit (for angles at least 1 rad)
 SIGNS = {"least": -1.0, "greatest": 1.0}
 SIDES = tuple(SIGNS)
 QUIET = {"output.fields": 0, "output.lines": {}}
-FEWEST_ROWS, MOST_ROWS = 500, 4000  # of signals, at the resolution of the run itself
-PLACES, MOST_PLACES = 12, 400  # of a part under a bound, and of all limits, whose signals are followed
+FEWEST_ROWS, MOST_ROWS = 500, 4000  # limits of the number of rows of signals, at the resolution of the run itself
+PLACES, MOST_PLACES = 12, 400  # greatest number of places with signals: of a part under a bound, and of all limits
 
 
 def peak_errors(result: Result, case: Any, progress: Callable[[str], None] | None = None) -> dict[str, Any]:
-    """Add to the summary of a run how far its peaks and verdicts may be off, from more runs of its case.
+    """Add errors of peaks, expectations and limit verdicts to the summary of a run, from further runs of its case.
 
-    `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order, reason}; `error` is None where another
-    run did not come to its end or a pipe is too short, `order` None where there is none to believe, `reason` why an
-    error is not known or wide. Expectations get their `error`, and so does every
-    bound of every place of a limit: a limit is open where a margin is smaller than its error. `resolution` says how.
+    `peaks`: probe -> unit, and `least` and `greatest` as {value, error, order, reason}; `error` is None if another run
+    did not finish or a pipe is too short; `order` is None if no order can be determined; `reason` is the reason of an
+    unknown or wide error. Each expectation and each bound of a limit at each place gets its `error`; a limit is open if
+    a margin is smaller than its error. `resolution` describes the method.
     """
     own = result if result.places is not None else run(case, set=QUIET, pictures=False)
     runs = levels(own, case, progress)
-    said, unresolved = result.summary, Unresolved(case, runs)
-    said["peaks"] = peaks(result, runs, unresolved)
-    said["verdicts"] = [verdict([judged(runs, k, j, row, unresolved) for j, row in enumerate(rows)])
+    summary, unresolved = result.summary, Unresolved(case, runs)
+    summary["peaks"] = peaks(result, runs, unresolved)
+    summary["verdicts"] = [verdict([judged(runs, k, j, row, unresolved) for j, row in enumerate(rows)])
                         for k, rows in enumerate(own.places)]  # fmt: skip
-    for k, claim in enumerate(said["expectations"]):
-        claim["error"] = of_claim(runs, case.expect[claim["text"]], k, said["peaks"])
-    said["resolution"] = {"levels": sorted(runs), "kept": kept(case), "words": words(runs, case),
-                          "reasons": reasons(said)}  # fmt: skip
-    return said
+    for k, claim in enumerate(summary["expectations"]):
+        claim["error"] = of_claim(runs, case.expect[claim["text"]], k, summary["peaks"])
+    summary["resolution"] = {"levels": sorted(runs), "kept": kept(case), "words": words(runs, case),
+                          "reasons": reasons(summary)}  # fmt: skip
+    return summary
 
 
-def reasons(said: dict[str, Any]) -> list[str]:
-    """Why errors of peaks and limits are not known or wide, each once with what it is of."""
-    found: dict[str, dict[str, None]] = {}
-    for probe, peak in said["peaks"].items():
+def reasons(summary: dict[str, Any]) -> list[str]:
+    """Reasons of unknown or wide errors, each once with the names of its peaks and limits."""
+    names_by_reason: dict[str, dict[str, None]] = {}
+    for probe, peak in summary["peaks"].items():
         for side in SIDES:
-            found.setdefault(peak[side]["reason"], {})[probe] = None
-    for one in said["verdicts"]:
-        for row in one["worst"]:
-            found.setdefault(row["reason"], {})[f"{one['name']} at {row['place']}"] = None
-    return [f"{listing(list(of), NAMED)}: {text}" for text, of in found.items() if text is not None]
+            names_by_reason.setdefault(peak[side]["reason"], {})[probe] = None
+    for limit in summary["verdicts"]:
+        for row in limit["worst"]:
+            names_by_reason.setdefault(row["reason"], {})[f"{limit['name']} at {row['place']}"] = None
+    return [f"{listing(list(names), NAMED)}: {text}" for text, names in names_by_reason.items() if text is not None]
 
 
 def levels(own: Result, case: Any, progress: Callable[[str], None] | None) -> dict[float, Result]:
-    """Runs at half, one and twice the resolution, with rows so dense that they show every peak."""
+    """Runs at half, one and twice the resolution, with rows dense enough to resolve every peak."""
     named = [probe.text for probe in case.output.probes]
     rows = min(max(own.summary["steps"], FEWEST_ROWS), MOST_ROWS)
     every = min(case.output.every, own.summary["t"] / rows) if own.summary["t"] > 0.0 else case.output.every
-    shared, runs = QUIET | {"output.probes": [*named, *followed(own, case, named)]}, {}
+    settings, runs = QUIET | {"output.probes": [*named, *followed(own, case, named)]}, {}
     for times in LEVELS:
         keys = finer(case, times) if times != 1.0 else {}
         if keys or times == 1.0:
             if progress is not None:
                 progress(f"{times:g} times the resolution")
-            runs[times] = run(case, set=keys | shared | {"output.every": every / times}, pictures=False)
+            runs[times] = run(case, set=keys | settings | {"output.every": every / times}, pictures=False)
     return runs
 
 
 def followed(own: Result, case: Any, named: list[str]) -> list[str]:
-    """Probes of places of limits whose signals are read, those that the case can say."""
+    """Probes at selected places of limits, as far as the case accepts them."""
     rows = [row[BESIDE] for rows in own.places for row in rows]
-    texts = dict.fromkeys(one.probes[at] for one in rows for at in chosen(one, len(rows)))
+    texts = dict.fromkeys(
+        neighbours.probes[position] for neighbours in rows for position in chosen(neighbours, len(rows))
+    )
     extra = [text for text in texts if text not in named]
     return extra if says(case, extra) else [text for text in extra if says(case, [text])]
 
 
-def chosen(one: Beside, rows: int) -> list[int]:
-    """The place with the least margin, those with the least beside them, and some between."""
-    margins, most = np.where(np.isfinite(one.margins), one.margins, -np.inf), max(MOST_PLACES // rows, 1)
-    beside = np.pad(margins, 1, constant_values=np.inf)
-    least = np.flatnonzero((margins <= beside[:-2]) & (margins <= beside[2:]))
+def chosen(neighbours: Beside, rows: int) -> list[int]:
+    """Indices of the place with the least margin, of local minima of the margin, and of some places between."""
+    margins, most = np.where(np.isfinite(neighbours.margins), neighbours.margins, -np.inf), max(MOST_PLACES // rows, 1)
+    padded = np.pad(margins, 1, constant_values=np.inf)
+    least = np.flatnonzero((margins <= padded[:-2]) & (margins <= padded[2:]))
     least = least[np.argsort(margins[least], kind="stable")][: max(min(PLACES, most) // 2, 1)]
-    even = np.linspace(0, len(margins) - 1, min(PLACES, most) - len(least)).astype(int) if most > len(least) else []
-    return list(dict.fromkeys([int(np.argmin(margins)), *least.tolist(), *list(even)]))
+    spaced = np.linspace(0, len(margins) - 1, min(PLACES, most) - len(least)).astype(int) if most > len(least) else []
+    return list(dict.fromkeys([int(np.argmin(margins)), *least.tolist(), *list(spaced)]))
 
 
 def says(case: Any, texts: list[str]) -> bool:
-    """True if a case can have these probes."""
+    """True if the case accepts these probes."""
     try:
         load(case, {"output.probes": texts})
     except CaseError:
@@ -108,61 +111,66 @@ def says(case: Any, texts: list[str]) -> bool:
 
 
 def peaks(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> dict[str, Any]:
-    """`peaks` of a summary."""
-    said, largest, made = result.summary, {"rad": 1.0}, {}
+    """Entry `peaks` of a summary, see `peak_errors`."""
+    summary, largest, rows = result.summary, {"rad": 1.0}, {}
     parts = {probe.text: (probe.part, probe.name) for probe in unresolved.case.probes}
-    for one in said["extremes"].values():
-        largest[one["unit"]] = max([largest.get(one["unit"], 0.0), *(abs(one[side] or 0.0) for side in SIDES)])
-    for name, one in said["extremes"].items():
-        made[name] = {"unit": one["unit"]}
+    for extreme in summary["extremes"].values():
+        largest[extreme["unit"]] = max(
+            [largest.get(extreme["unit"], 0.0), *(abs(extreme[side] or 0.0) for side in SIDES)]
+        )
+    for name, extreme in summary["extremes"].items():
+        rows[name] = {"unit": extreme["unit"]}
         for side, sign in SIGNS.items():
-            missed = 0.0 if said["cells"] else between_rows(result, name, side)
+            missed = 0.0 if summary["cells"] else between_rows(result, name, side)
             triple = values(runs, lambda run, n=name, s=side: run.summary["extremes"][n][s], sign)
             unknown = parts[name] in unresolved.unknown
             error = None if unknown else bounded(runs, triple, [signals(runs, name, lambda v, sign=sign: sign * v)])
-            span = (one["greatest"] or 0.0) - (one["least"] or 0.0)
+            span = (extreme["greatest"] or 0.0) - (extreme["least"] or 0.0)
             if error is not None:
-                least = 2.0 * (missed + ROUNDING * largest[one["unit"]]) + LEAST * abs(one[side])
-                error += least + abs(sign * one[side] - triple[1]) + unresolved.tolerance * span
-                span += 2.0 * least / WIDE  # what rounding leaves of a constant is not wide
-            made[name][side] = {
-                "value": one[side], "error": error, "order": None if unknown else order(triple, parted(runs)),
-                "reason": unresolved.reason(parts[name], triple, error, span, one["unit"])}  # fmt: skip
-    return made
+                least = 2.0 * (missed + ROUNDING * largest[extreme["unit"]]) + LEAST * abs(extreme[side])
+                error += least + abs(sign * extreme[side] - triple[1]) + unresolved.tolerance * span
+                span += 2.0 * least / WIDE  # so that the rounding error of a constant does not count as wide
+            rows[name][side] = {
+                "value": extreme[side], "error": error, "order": None if unknown else order(triple, parted(runs)),
+                "reason": unresolved.reason(parts[name], triple, error, span, extreme["unit"])}  # fmt: skip
+    return rows
 
 
 def bounded(runs: dict[float, Result], triple: Sequence[float | None], places: Sequence = ()) -> float | None:
-    """The error of the second of three values that rise, with signals of its places; None where it is not known."""
-    c, *known = triple
-    if not all(one is not None and math.isfinite(one) for one in known):
+    """Error bound of the second of three values at increasing resolutions; None if it is not known.
+
+    places : signals of its places at the resolutions, oriented so that the peak is a maximum
+    """
+    c, *finer = triple
+    if not all(value is not None and math.isfinite(value) for value in finer):
         return None
-    whole = c is not None and math.isfinite(c)
-    places = [one if whole else one[-2:] for one in places if usable(one)]
-    return greatest_error(places, triple if whole else known, not parted(runs))
+    all_finite = c is not None and math.isfinite(c)
+    places = [value if all_finite else value[-2:] for value in places if usable(value)]
+    return greatest_error(places, triple if all_finite else finer, not parted(runs))
 
 
-def usable(one: Sequence) -> bool:
-    """True if there are signals, all of numbers."""
-    return len(one) > 1 and all(len(v) > 0 and bool(np.isfinite(v).all()) for _, v in one)
+def usable(signals_of_place: Sequence) -> bool:
+    """True if there are at least two signals and all values are finite."""
+    return len(signals_of_place) > 1 and all(len(v) > 0 and bool(np.isfinite(v).all()) for _, v in signals_of_place)
 
 
 def signals(runs: dict[float, Result], probe: str, rising: Callable[[np.ndarray], np.ndarray]) -> list:
-    """Times and values of a probe at every resolution that came to its end; none where it is no probe."""
-    done = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
-    return [(one.seconds, rising(one[probe])) for one in done if probe in one.units]
+    """Times and transformed values of a probe at every resolution whose run finished and recorded the probe."""
+    finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
+    return [(run.seconds, rising(run[probe])) for run in finished if probe in run.units]
 
 
 def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], unresolved: Unresolved) -> dict:
-    """A row of a limit with its error: one that holds is open where its margin is smaller or nothing is known."""
+    """Row of a limit with its error. A limit that holds becomes open if the margin is smaller or the error unknown."""
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
-    triple = values(runs, lambda one: one.places[limit][k]["margin"], -1.0)
+    triple = values(runs, lambda run: run.places[limit][k]["margin"], -1.0)
     places = []
-    for at, probe in enumerate(row[BESIDE].probes):
-        allowed = float(row[BESIDE].limits[at])
+    for position, probe in enumerate(row[BESIDE].probes):
+        allowed = float(row[BESIDE].limits[position])
         places.append(signals(runs, probe, lambda v, a=allowed: sign * ((np.abs(v) if magnitude else v) - a)))
     part = (row[BESIDE].probes[0].split(".")[0], row["place"])
     error = None if part in unresolved.unknown else bounded(runs, triple, places)
-    span = max((float(np.ptp(one[-2][1])) for one in places if usable(one)), default=math.inf)
+    span = max((float(np.ptp(run[-2][1])) for run in places if usable(run)), default=math.inf)
     if error is not None:
         error += LEAST * abs(row["value"] or 0.0) + unresolved.tolerance * (span if math.isfinite(span) else 0.0)
     doubtful = row["state"] == HOLDS and (error is None or not row["margin"] >= error)
@@ -170,25 +178,25 @@ def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], u
     return row | {"error": error, "reason": reason, "state": OPEN if doubtful else row["state"]}
 
 
-def of_claim(runs: dict[float, Result], expect: Any, k: int, found: dict[str, Any]) -> float | None:
-    """The error of what a claim is about: that of a peak, or by three values alone."""
+def of_claim(runs: dict[float, Result], expect: Any, k: int, peak_rows: dict[str, Any]) -> float | None:
+    """Error of the value of an expectation: that of a peak, or from three values alone."""
     side = {"min": "least", "least": "least", "max": "greatest", "greatest": "greatest"}.get(expect.function)
-    if side is not None and expect.probe is not None and expect.probe.text in found:
-        return found[expect.probe.text][side]["error"]
-    triple = values(runs, lambda one: one.summary["expectations"][k]["found"])
+    if side is not None and expect.probe is not None and expect.probe.text in peak_rows:
+        return peak_rows[expect.probe.text][side]["error"]
+    triple = values(runs, lambda run: run.summary["expectations"][k]["found"])
     error = bounded(runs, triple)
     return None if error is None else error + LEAST * abs(triple[1])
 
 
 def values(runs: dict[float, Result], of: Callable, sign: float = 1.0) -> tuple[float | None, ...]:
-    """Of half, one and twice the resolution; None of a run that is not there or did not come to its end."""
-    found = [of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS]
-    return tuple(None if one is None else sign * one for one in found)
+    """Values at half, one and twice the resolution, times `sign`; None for a missing or unfinished run."""
+    results = [of(runs[times]) if times in runs and runs[times].reason == "finished" else None for times in LEVELS]
+    return tuple(None if value is None else sign * value for value in results)
 
 
-def order(triple: Sequence[float | None], apart: bool) -> float | None:
-    """The order that three values show, 2 at most; None of less than one, or where their differences differ in sign."""
-    if apart or any(one is None or not math.isfinite(one) for one in triple):
+def order(triple: Sequence[float | None], separated: bool) -> float | None:
+    """Observed order of three values, at most 2; None below order 1, or if the differences have opposite signs."""
+    if separated or any(value is None or not math.isfinite(value) for value in triple):
         return None
     first, second = triple[1] - triple[0], triple[2] - triple[1]
     if first == 0.0 or first * second < 0.0 or abs(second) > 0.5 * abs(first) * (1.0 + 1e-6):
@@ -197,25 +205,25 @@ def order(triple: Sequence[float | None], apart: bool) -> float | None:
 
 
 def between_rows(result: Result, probe: str, side: str) -> float:
-    """What a smooth peak may rise between rows beyond the highest of them."""
+    """Height of a smooth peak above the highest row, an eighth of the second difference of rows."""
     t, v = result.t, result[probe]
-    at = int(np.argmin(v) if side == "least" else np.argmax(v))
-    if not 0 < at < len(v) - 1 or t[at - 1] == t[at] or t[at] == t[at + 1]:
+    position = int(np.argmin(v) if side == "least" else np.argmax(v))
+    if not 0 < position < len(v) - 1 or t[position - 1] == t[position] or t[position] == t[position + 1]:
         return 0.0
-    return abs(float(v[at - 1] - 2.0 * v[at] + v[at + 1])) / 8.0
+    return abs(float(v[position - 1] - 2.0 * v[position] + v[position + 1])) / 8.0
 
 
 def words(runs: dict[float, Result], case: Any) -> str:
-    """What was done, and what it leaves out."""
-    others = " and ".join(f"{one:g}" for one in sorted(runs) if one != 1.0)
-    said = f"peaks beside those of {others} times the resolution"
+    """Description of the method and of its restrictions for this case."""
+    others = " and ".join(f"{factor:g}" for factor in sorted(runs) if factor != 1.0)
+    text = f"peaks compared with those at {others} times the resolution"
     if kept(case):
-        said += f"; cells of {', '.join(kept(case))} come from files and stayed, so their part is not in it"
+        text += f"; cells of {', '.join(kept(case))} come from files and did not change: their error is not included"
     if parted(runs):
-        said += "; liquid parts, so no order is believed"
-    stopped = [f"{one:g}" for one in sorted(runs) if runs[one].reason != "finished"]
+        text += "; column separation, so no order of convergence is assumed"
+    stopped = [f"{factor:g}" for factor in sorted(runs) if runs[factor].reason != "finished"]
     if stopped:
-        said += f"; the run of {' and '.join(stopped)} did not come to its end"
+        text += f"; the run at {' and '.join(stopped)} did not finish"
     if 0.5 not in runs:
-        said += "; half the resolution cannot be said (patches would begin within cells), so no order is believed"
-    return said
+        text += "; half the resolution is not possible (patches would begin within cells), so no order is assumed"
+    return text

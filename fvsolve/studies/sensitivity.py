@@ -1,4 +1,4 @@
-"""By which key an outcome varies how much: Sobol's indices and Morris's effects, by SALib. Knows sweeps."""
+"""Global sensitivity analysis: Sobol indices and Morris effects of keys on an outcome, by SALib."""
 
 from __future__ import annotations
 
@@ -20,18 +20,20 @@ from fvsolve.studies.sweep import VARY, sweep
 from fvsolve.units import show
 
 COLUMNS = ("S1", "S1_conf", "ST", "ST_conf", "mu_star", "mu_star_conf", "mu", "sigma")
-LEVELS = 4  # of Morris's grid
-PATHS = 4  # of Morris's, at least
-LEAST = 2  # points of Sobol's
+LEVELS = 4  # levels of the Morris grid
+PATHS = 4  # least number of Morris trajectories
+LEAST = 2  # least base sample size of Sobol
 
 
 @dataclass(frozen=True, repr=False)
 class Sensitivity(Shown, Plain):
-    """Indices of every key; confidence at 95 %.
+    """Sensitivity indices of every key.
 
-    S1, ST : share of the variance of the outcome that goes with a key alone, and with it and all that it acts together
-    with (Saltelli 2010, Jansen 1999); mu_star, mu, sigma : mean size, mean and spread of the effect of a move over the
-    whole range (Morris 1991, Campolongo 2007), in the unit of the outcome; *_conf : half widths of their intervals
+    S1, ST : first-order and total index, the fraction of the variance of the outcome due to a key alone, and due to the
+    key with all its interactions (Saltelli 2010, Jansen 1999)
+    mu_star, mu, sigma : mean absolute value, mean and standard deviation of the elementary effect over the whole range
+    (Morris 1991, Campolongo 2007), in the unit of the outcome
+    *_conf : half widths of the 95 % confidence intervals
     """
 
     keys: tuple[str, ...]
@@ -49,8 +51,8 @@ class Sensitivity(Shown, Plain):
     picture = "fvsolve.draw.sweep:sensitivity_figure"
 
     def said(self) -> str:
-        first = max(range(len(self.keys)), key=lambda k: self.ST[k])
-        return f"of {self.outcome} over {len(self.keys)} keys by {self.runs} runs: most by {self.keys[first]}"
+        strongest = max(range(len(self.keys)), key=lambda k: self.ST[k])
+        return f"of {self.outcome} to {len(self.keys)} keys, {self.runs} runs: greatest for {self.keys[strongest]}"
 
     @property
     def sheet(self) -> Sheet:
@@ -75,75 +77,75 @@ def sensitivity(
     out: str | Path | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Sensitivity:
-    """Sobol's and Morris's indices of an outcome, such as "max(gate.pressure)", over the ranges of keys.
+    """Compute Sobol and Morris indices of an outcome, such as "max(gate.pressure)", over the ranges of keys.
 
-    case : what `run` takes, or a function of a dict of numbers, one a key; samples : Sobol's N (a power of two), which
-    takes N (keys + 2) runs; Morris takes N / 4 (keys + 1) more. The rest as in `sweep`, which makes the runs and finds
-    those again that were made before. Raises FvsolveError where a run has no such outcome.
+    case : as for `run`, or a function of a dict key -> number; samples : base sample size N of Sobol (a power of two),
+    which needs N (keys + 2) runs; Morris needs N / 4 (keys + 1) more. Other arguments as for `sweep`, which makes the
+    runs and reuses earlier ones. Raises FvsolveError if a run does not have the outcome.
     """
     if samples < LEAST:
-        raise FvsolveError(f"samples = {samples}; wanted {LEAST} or more, a power of two")
+        raise FvsolveError(f"samples = {samples} is too small. Expected {LEAST} or more, a power of two")
     if callable(case):
         bounds = {key: (float(low), float(high)) for key, (low, high) in vary.items()}
     else:
         bounds = ranges(load(case, set), vary)
     if not bounds:
-        raise FvsolveError("nothing varies; give the two ends of a key at least, links.main.length=900,1000")
+        raise FvsolveError("no key varies. Give at least one key and its range: links.main.length=900,1000")
     sobol, morris = planned(bounds, samples, seed)
     points = [dict(zip(bounds, row, strict=True)) for row in np.concatenate([sobol, morris]).tolist()]
     if callable(case):
         values = np.array([float(case(point)) for point in points])
         if not np.isfinite(values).all():
-            raise FvsolveError("the function is not finite at some points; wanted ranges in which it is")
+            raise FvsolveError("the function is not finite at some points. Expected ranges in which it is finite")
     else:
         if outcome is None:
-            raise FvsolveError('no outcome; wanted one such as "max(gate.pressure)"')
-        made = sweep(case, set=set, jobs=jobs, out=out, progress=progress, points=points, dask=dask)
-        outcome, values = made.outcome(outcome), values_of(made, outcome)
-    found = analysed(bounds, sobol, values[: len(sobol)], morris, values[len(sobol) :], seed)
-    return Sensitivity(tuple(bounds), outcome or "the function", len(points), *found)
+            raise FvsolveError('no outcome. Expected an outcome such as "max(gate.pressure)"')
+        sweep_result = sweep(case, set=set, jobs=jobs, out=out, progress=progress, points=points, dask=dask)
+        outcome, values = sweep_result.outcome(outcome), values_of(sweep_result, outcome)
+    indices = analysed(bounds, sobol, values[: len(sobol)], morris, values[len(sobol) :], seed)
+    return Sensitivity(tuple(bounds), outcome or "the function", len(points), *indices)
 
 
-def values_of(made, outcome: str) -> np.ndarray:
-    """A column of a sweep; FvsolveError where a run has nothing there."""
-    name = made.outcome(outcome)
-    lacks = [row for row in made.rows if row.get(name) is None]
-    if lacks:
-        where = ", ".join(f"{key} = {lacks[0][key]:.6g}" for key in made.keys)
-        raise FvsolveError(f"{len(lacks)} of {len(made.rows)} runs have no {name}, the first at {where}: "
-                           f"{lacks[0]['reason']}; wanted ranges in which all do")  # fmt: skip
-    return np.array([float(row[name]) for row in made.rows])
+def values_of(result, outcome: str) -> np.ndarray:
+    """Column of a sweep : float64[runs]. Raises FvsolveError if a run has no value there."""
+    name = result.outcome(outcome)
+    missing = [row for row in result.rows if row.get(name) is None]
+    if missing:
+        values = ", ".join(f"{key} = {missing[0][key]:.6g}" for key in result.keys)
+        raise FvsolveError(f"{len(missing)} of {len(result.rows)} runs have no {name}, the first at {values}: "
+                           f"{missing[0]['reason']}. Expected ranges in which all runs have it")  # fmt: skip
+    return np.array([float(row[name]) for row in result.rows])
 
 
 def planned(bounds: Mapping[str, tuple[float, float]], samples: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Points of Sobol's and of Morris's method : float64[n, keys]."""
+    """Sample points of the Sobol and the Morris method : float64[n, keys] each."""
     _known()
     from SALib.sample import morris, sobol
 
     problem = problem_of(bounds)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of numbers that are no power of two
-        first = sobol.sample(problem, samples, calc_second_order=False, seed=seed)
-    return first, morris.sample(problem, max(PATHS, samples // 4), num_levels=LEVELS, seed=seed)
+        warnings.simplefilter("ignore", UserWarning)  # warnings on sample sizes that are not powers of two
+        sobol_points = sobol.sample(problem, samples, calc_second_order=False, seed=seed)
+    return sobol_points, morris.sample(problem, max(PATHS, samples // 4), num_levels=LEVELS, seed=seed)
 
 
 def analysed(bounds, sobol_points, sobol_values, morris_points, morris_values, seed: int) -> list[list[float]]:
-    """Columns of COLUMNS."""
+    """Indices of all keys in the order of `COLUMNS`. Raises FvsolveError if the outcome is constant."""
     from SALib.analyze import morris, sobol
 
     problem = problem_of(bounds)
     if np.ptp(sobol_values) == 0.0:
-        raise FvsolveError(f"the outcome is {show(float(sobol_values[0]))} in all runs: no key moves it")
-    scale = float(np.std(sobol_values))  # SALib's sums of squares keep their digits
+        raise FvsolveError(f"the outcome is {show(float(sobol_values[0]))} in all runs: no key changes it")
+    scale = float(np.std(sobol_values))  # scaled values keep their digits in the sums of squares of SALib
     shares = sobol.analyze(problem, (sobol_values - sobol_values.mean()) / scale, calc_second_order=False, seed=seed)
     effects = morris.analyze(problem, morris_points, morris_values, num_levels=LEVELS, seed=seed)
-    found = {**{name: shares[name] for name in COLUMNS[:4]}, **{name: effects[name] for name in COLUMNS[4:]}}
-    return [np.asarray(found[name], dtype=float).tolist() for name in COLUMNS]
+    indices = {**{name: shares[name] for name in COLUMNS[:4]}, **{name: effects[name] for name in COLUMNS[4:]}}
+    return [np.asarray(indices[name], dtype=float).tolist() for name in COLUMNS]
 
 
 def problem_of(bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    """As SALib says it."""
-    return {"num_vars": len(bounds), "names": [*bounds], "bounds": [list(one) for one in bounds.values()]}
+    """Problem definition of SALib."""
+    return {"num_vars": len(bounds), "names": [*bounds], "bounds": [list(limits) for limits in bounds.values()]}
 
 
 def _known() -> None:

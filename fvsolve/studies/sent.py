@@ -1,4 +1,4 @@
-"""A case on its way to another process, with the methods that only this one knows. Knows cases; runs nothing."""
+"""Pickle support for a case, including user-defined Runge-Kutta methods."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from fvsolve.steppers.tableau import METHODS, OWN
 
 
 class Sent:
-    """What `load` takes; elsewhere what a case says, not what it was read as, which may hold functions and meshes."""
+    """Argument of `load` in picklable form: raw values of the case, as a resolved case may hold functions."""
 
     def __init__(self, source: Any) -> None:
         self.source = source
 
     def __getstate__(self) -> dict[str, Any]:
-        known = self.source
-        if isinstance(known, Case):
-            known = Raw(known.raw, known.name, known.path, known.folder)
-        source = known if isinstance(known, Raw) else read_raw(named(known))
-        return {"source": source, "methods": {name: one for name, one in METHODS.items() if name not in OWN}}
+        raw = self.source
+        if isinstance(raw, Case):
+            raw = Raw(raw.raw, raw.name, raw.path, raw.folder)
+        source = raw if isinstance(raw, Raw) else read_raw(named(raw))
+        return {"source": source, "methods": {name: method for name, method in METHODS.items() if name not in OWN}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         METHODS.update(state["methods"])

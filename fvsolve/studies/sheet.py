@@ -1,6 +1,6 @@
-"""Rows under columns that are declared once: as CSV, as plain values, as words on a terminal, as a table for a frame.
+"""Tables of results: columns are declared once for CSV, plain values, text on a terminal, and data frames.
 
-Knows no study. A row is a mapping; what a row does not have is None: an empty field, null, "-".
+A row is a mapping. A missing value is None: an empty field in CSV, null in JSON, "-" on a terminal.
 """
 
 from __future__ import annotations
@@ -15,20 +15,21 @@ from fvsolve.output.summary import plain
 
 
 class Plain:
-    """What says itself in plain values: all its fields, and what is asked of them besides."""
+    """Base class of dataclasses with plain values for JSON: all fields, and the properties named in `also`."""
 
     also: ClassVar[tuple[str, ...]] = ()  # names of properties
 
     def plain(self) -> dict:
-        """For JSON: complex numbers as [re, im], None for what is not finite."""
-        return {name: plain(getattr(self, name)) for name in (*(one.name for one in fields(self)), *self.also)}
+        """Plain values for JSON: complex numbers as [re, im], None for values that are not finite."""
+        return {name: plain(getattr(self, name)) for name in (*(field.name for field in fields(self)), *self.also)}
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column: the key of its values, the header of files with its unit, and how a terminal says it.
+    """Column of a table: key of its values, header in files with unit, and format on a terminal.
 
-    header : the key if left out; words : a format of numbers, or what says a whole row; head : the header there
+    header : default the key; words : format of numbers, or a function of the row; head : header on a terminal
+    (default header)
     """
 
     key: str
@@ -38,11 +39,11 @@ class Column:
 
     @property
     def title(self) -> str:
-        """The header in files."""
+        """Header in files."""
         return self.header or self.key
 
     def said(self, row: Mapping) -> str:
-        """The value of a row in words."""
+        """Text of the value of a row."""
         return self.words(row) if callable(self.words) else text(row.get(self.key), self.words)
 
 
@@ -54,40 +55,40 @@ class Sheet:
     rows: Sequence[Mapping[str, Any]]
 
     def plain(self) -> list[dict]:
-        """Rows of plain values, as JSON says them."""
-        return [{one.key: plain(row.get(one.key)) for one in self.columns} for row in self.rows]
+        """Rows of plain values for JSON."""
+        return [{column.key: plain(row.get(column.key)) for column in self.columns} for row in self.rows]
 
     def listed(self) -> dict[str, list]:
-        """The values of every column, by key: what a frame is made of."""
-        return {one.key: [row.get(one.key) for row in self.rows] for one in self.columns}
+        """Values of every column by key, for a data frame."""
+        return {column.key: [row.get(column.key) for row in self.rows] for column in self.columns}
 
     def write(self, path: Path) -> Path:
-        """As CSV; returns its path."""
-        rows = ([row[one.key] for one in self.columns] for row in self.plain())
-        return write(path, [one.title for one in self.columns], rows)
+        """Write the table as CSV; returns the path."""
+        rows = ([row[column.key] for column in self.columns] for row in self.plain())
+        return write(path, [column.title for column in self.columns], rows)
 
     def words(self) -> tuple[list[str], list[list[str]]]:
-        """Headers and rows for a terminal."""
-        heads = [one.head or one.title for one in self.columns]
-        return heads, [[one.said(row) for one in self.columns] for row in self.rows]
+        """Headers and rows as text for a terminal."""
+        heads = [column.head or column.title for column in self.columns]
+        return heads, [[column.said(row) for column in self.columns] for row in self.rows]
 
 
 def columns(**titles: str) -> tuple[Column, ...]:
-    """Columns by key and header, for what is only written."""
+    """Columns from keys and headers, for tables that are only written to files."""
     return tuple(Column(key, title) for key, title in titles.items())
 
 
 def text(value: Any, spec: str = "") -> str:
-    """A value in words: "-" for None, yes and no, numbers by their format, words as they are."""
+    """Text of a value: "-" for None, yes or no for bool, numbers in their format, text unchanged."""
     if value is None or isinstance(value, str):
         return "-" if value is None else value
     return ("yes" if value else "no") if isinstance(value, bool) else format(value, spec)
 
 
 def write(path: Path, header: Iterable[str], rows: Iterable[Iterable[Any]]) -> Path:
-    """A CSV, an empty field for None; returns its path."""
+    """Write a CSV file, with an empty field for None; returns the path."""
     with open(path, "w", newline="", encoding="utf-8") as file:
-        made = csv.writer(file)
-        made.writerow(header)
-        made.writerows(["" if value is None else value for value in row] for row in rows)
+        writer = csv.writer(file)
+        writer.writerow(header)
+        writer.writerows(["" if value is None else value for value in row] for row in rows)
     return path

@@ -1,4 +1,4 @@
-"""The value of a key at which all limits hold, by bracketing. Knows runs with verdicts; knows no physics."""
+"""Sizing: search by bracketing for the least or greatest value of a key at which all limits hold."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from fvsolve.studies.plans import bare_unit, is_known, quantity_of
 from fvsolve.units import UNITS, show
 
 GOALS = ("least", "greatest")
-LOOKS = 8  # places between two ends of which neither holds, where it is looked for
+LOOKS = 8  # greatest number of trials between two ends if limits fail at both
 MOST_RUNS = 60
-EDGE = 0.1  # of the bracket that a guess keeps from its ends
+EDGE = 0.1  # least distance of the next value from the ends of the bracket, as a fraction of its width
 _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
 @dataclass(frozen=True)
 class SizeRun:
-    """One run: the value of the key, whether all limits hold, the least margin over its limit, and of which limit.
+    """Result of a run: value of the key, whether all limits hold, least margin over its limit, name of that limit.
 
-    margin : less its error where that is known
-    open : why a run that passes no limit holds none either, as what it schedules goes on after its end, its numbers
-    are not to be trusted, or an error is more than its margin; else empty
+    margin : less the error, if that is known
+    open : reason for which limits are undecided, else empty: a schedule continues after the end of the run, the results
+    are not to be trusted, or an error is larger than the margin
     """
 
     value: float
@@ -46,11 +46,10 @@ class SizeRun:
 
 @dataclass(frozen=True)
 class Size:
-    """What was found: the value that holds, the bracket (what fails, what holds), the runs as they came.
+    """Result of a sizing.
 
-    unit : that of the ends; of bare numbers that of the key, SI, "" where it has none
-
-    value is None where the limits cannot be met between the ends; nearest is then the run that came nearest.
+    value : value at which all limits hold, None if none was found; bracket : (value that fails, value that holds)
+    runs : all runs in order; unit : unit of the range; for bare numbers the SI unit of the key, "" if it has none
     """
 
     key: str
@@ -64,43 +63,45 @@ class Size:
     @property
     def nearest(self) -> SizeRun:
         """The run with the greatest margin."""
-        return max(self.runs, key=lambda one: -math.inf if one.margin is None else one.margin)
+        return max(self.runs, key=lambda run: -math.inf if run.margin is None else run.margin)
 
     def plain(self) -> dict[str, Any]:
-        """As JSON says it."""
-        made = {"key": self.key, "unit": self.unit, "goal": self.goal, "value": self.value, "bracket": self.bracket,
-                "ties": list(self.ties), "runs": [vars(one) for one in self.runs]}  # fmt: skip
-        return made if self.value is not None else made | {"nearest": vars(self.nearest)}
+        """Plain values for JSON; with the nearest run if no value was found."""
+        data = {"key": self.key, "unit": self.unit, "goal": self.goal, "value": self.value, "bracket": self.bracket,
+                "ties": list(self.ties), "runs": [vars(run) for run in self.runs]}  # fmt: skip
+        return data if self.value is not None else data | {"nearest": vars(self.nearest)}
 
 
 def amount(given: Any) -> tuple[float, str]:
-    """A number and its unit, "" of a bare one; ValueError where it is none."""
+    """(number, unit) of a value, unit "" for a bare number. Raises ValueError if it is not a number."""
     if isinstance(given, (int, float)) and not isinstance(given, bool):
         return float(given), ""
     match = _VALUE.fullmatch(given) if isinstance(given, str) else None
     if match is None:
-        raise ValueError(f'{show(given)} is no number; wanted one such as 2 or "2 m3"')
+        raise ValueError(f'{show(given)} is not a number. Expected a value such as 2 or "2 m3"')
     return float(match[1]), match[2]
 
 
 def ends(low: Any, high: Any) -> tuple[float, float, str]:
-    """Both ends of a range in one unit; FvsolveError where they have none in common or do not rise."""
+    """(low, high, unit) of a range in a common unit. Raises FvsolveError for different dimensions or low >= high."""
     try:
         (a, unit_a), (b, unit_b) = amount(low), amount(high)
     except ValueError as error:
         raise FvsolveError(str(error)) from None
     if unit_a != unit_b:
-        one, other = UNITS.get(unit_a), UNITS.get(unit_b)
-        if one is None or other is None or one.dimension != other.dimension or one.gauge != other.gauge:
-            raise FvsolveError(f"{show(low)} and {show(high)} have not one unit; write both in the same")
-        a = float(other.number(one.si(a)))
+        first, second = UNITS.get(unit_a), UNITS.get(unit_b)
+        if first is None or second is None or first.dimension != second.dimension or first.gauge != second.gauge:
+            raise FvsolveError(
+                f"{show(low)} and {show(high)} have different kinds of units. Use the same unit for both"
+            )
+        a = float(second.number(first.si(a)))
     if not a < b:
-        raise FvsolveError(f"{show(low)} is not below {show(high)}; wanted LOW,HIGH")
+        raise FvsolveError(f"{show(low)} is not below {show(high)}. Expected LOW,HIGH")
     return a, b, unit_b
 
 
 class Sizing:
-    """One search while it lasts."""
+    """State of a search."""
 
     def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None,
                  error: bool = False) -> None:  # fmt: skip
@@ -109,22 +110,22 @@ class Sizing:
         self.rules = {tied: Arithmetic(text) for tied, text in ties.items()}
 
     def keys(self, value: float) -> dict[str, Any]:
-        """What is set for a value of the key; formulas take its SI value as x."""
+        """Overrides for a value of the key, with dependent keys from formulas of x, the value in SI."""
         unit = UNITS.get(self.unit)
         x = value if unit is None else float(unit.si(value)) + (self.case.ambient_pressure if unit.gauge else 0.0)
-        found: dict[str, Any] = {self.key: f"{value!r} {self.unit}" if self.unit else value}
+        overrides: dict[str, Any] = {self.key: f"{value!r} {self.unit}" if self.unit else value}
         for tied, rule in self.rules.items():
             try:
-                found[tied] = float(np.asarray(rule(np.array([x]), np.array([0.0])))[0])
+                overrides[tied] = float(np.asarray(rule(np.array([x]), np.array([0.0])))[0])
             except ValueError as error:
                 raise CaseError([Fault(f"--tie {tied}", str(error))], self.case.name) from None
-        return found
+        return overrides
 
     def __call__(self, value: float) -> SizeRun:
-        """The run of a value."""
-        known = next((one for one in self.runs if one.value == value), None)
-        if known is not None:
-            return known
+        """Run the case with a value of the key; a value that was run before is not run again."""
+        earlier = next((entry for entry in self.runs if entry.value == value), None)
+        if earlier is not None:
+            return earlier
         if self.progress is not None:
             self.progress(len(self.runs), f"{self.key} = {value:.6g} {self.unit}".rstrip())
         try:
@@ -143,14 +144,14 @@ class Sizing:
         return self.runs[-1]
 
     def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
-        """(the value that holds and is least or greatest, (what fails, what holds)); None where nothing holds."""
-        best, other = (low, high) if goal == "least" else (high, low)
+        """(value, bracket) with the least or greatest value that holds; (None, None) if no value holds."""
+        best, opposite = (low, high) if goal == "least" else (high, low)
         if self(best).ok:
             return best, None
-        good = other if self(other).ok else self.between()
+        good = opposite if self(opposite).ok else self.between()
         if good is None:
             return None, None
-        bad = max((one.value for one in self.runs if not one.ok and (one.value - good) * (best - good) > 0.0),
+        bad = max((entry.value for entry in self.runs if not entry.ok and (entry.value - good) * (best - good) > 0.0),
                   key=lambda x: -abs(x - good))  # fmt: skip
         while abs(good - bad) > rtol * max(abs(good), abs(bad)) and len(self.runs) < MOST_RUNS:
             x = self.guess(bad, good)
@@ -158,11 +159,11 @@ class Sizing:
         return good, (bad, good)
 
     def between(self) -> float | None:
-        """A value that holds beside the runs so far, which do not: where the margin is greatest, ever closer."""
+        """Search a value that holds near the run with the greatest margin, in ever smaller intervals."""
         for _ in range(LOOKS):
-            runs = sorted(self.runs, key=lambda one: one.value)
-            at = max(range(len(runs)), key=lambda k: -math.inf if runs[k].margin is None else runs[k].margin)
-            gaps = [(runs[k + 1].value - runs[k].value, k) for k in (at - 1, at) if 0 <= k < len(runs) - 1]
+            runs = sorted(self.runs, key=lambda run: run.value)
+            position = max(range(len(runs)), key=lambda k: -math.inf if runs[k].margin is None else runs[k].margin)
+            gaps = [(runs[k + 1].value - runs[k].value, k) for k in (position - 1, position) if 0 <= k < len(runs) - 1]
             k = max(gaps)[1]
             x = 0.5 * (runs[k].value + runs[k + 1].value)
             if self(x).ok:
@@ -170,7 +171,7 @@ class Sizing:
         return None
 
     def guess(self, bad: float, good: float) -> float:
-        """Where the margin would vanish on a straight line, away from both ends; the middle where that is unknown."""
+        """Next value: zero of the linear interpolation of margins, away from the ends, in turn with the midpoint."""
         margins = [self(x).margin for x in (bad, good)]
         share = 0.5
         if None not in margins and margins[1] > margins[0] and len(self.runs) % 2:
@@ -179,25 +180,34 @@ class Sizing:
 
 
 def sized(value: float, result: Any) -> SizeRun:
-    """The run of a value in a row."""
-    margins = [(relative(row, one.quantity), one.name) for one in result.verdicts for row in one.worst]
+    """Evaluate the limit verdicts of a run."""
+    margins = [(relative(row, verdict.quantity), verdict.name) for verdict in result.verdicts for row in verdict.worst]
     margin, name = min(margins)
-    ok, failed = all(one.ok for one in result.verdicts), any(one.state == FAILS for one in result.verdicts)
-    doubts = [one.text for one in result.marks] + [one.text for one in result.warnings if one.kind == "end"]
-    doubts += [f"{one.name}: its margin is smaller than its error" for one in result.verdicts if one.doubtful]
-    why = "" if ok or failed or not result.ok else next(iter(doubts), f"{name}: its margin is not known")
-    known = result.ok and (ok or margin < 0.0) and math.isfinite(margin)
-    return SizeRun(value, result.ok and ok, margin if known else None, name, result.reason, why)
+    ok, failed = (
+        all(verdict.ok for verdict in result.verdicts),
+        any(verdict.state == FAILS for verdict in result.verdicts),
+    )
+    doubts = [verdict.text for verdict in result.marks] + [
+        verdict.text for verdict in result.warnings if verdict.kind == "end"
+    ]
+    doubts += [
+        f"{verdict.name}: its margin is smaller than its error" for verdict in result.verdicts if verdict.doubtful
+    ]
+    reason = "" if ok or failed or not result.ok else next(iter(doubts), f"{name}: its margin is not known")
+    is_known = result.ok and (ok or margin < 0.0) and math.isfinite(margin)
+    return SizeRun(value, result.ok and ok, margin if is_known else None, name, result.reason, reason)
 
 
 def relative(row: Mapping[str, Any], quantity: str) -> float:
-    """The margin of a place, less its error, over its limit; of a pressure or head, over an atmosphere where its limit
-    is less."""
+    """Margin at a place, less its error, relative to the limit.
+
+    The divisor is at least the usual size of the quantity, such as an atmosphere for pressures and heads.
+    """
     if row["margin"] is None:
         return -math.inf
-    shown = UNITS.get(row["unit"])
+    unit = UNITS.get(row["unit"])
     usual = SIZES.get(quantity, 0.0)
-    least = usual / abs(float(shown.si(1.0) - shown.si(0.0))) if usual and shown is not None else usual
+    least = usual / abs(float(unit.si(1.0) - unit.si(0.0))) if usual and unit is not None else usual
     return (row["margin"] - (row["error"] or 0.0)) / (max(abs(row["limit"]), least) or abs(row["value"]) or 1.0)
 
 
@@ -205,72 +215,75 @@ def size(
     case, key: str, low: Any, high: Any, goal: str = "least", ties: Mapping[str, str] | None = None,
     set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None, error: bool = False,
 ) -> Size:  # fmt: skip
-    """The least (or greatest) value of a key between `low` and `high` at which a case holds all its limits.
+    """Find the least (or greatest) value of a key between `low` and `high` at which all limits of a case hold.
 
-    Bracketed to `rtol` of itself; between two ends of which neither holds, places are tried where margins are greatest.
-    ties : other keys as formulas of x, the value in SI. error : each limit holds by more than its error, from two more
-    runs of each value. Raises FvsolveError where the case has no limits, CaseError for
-    what is no case.
+    rtol : relative tolerance of the bracket. If limits fail at both ends, interior values with the greatest margins are
+    tried. ties : dependent keys as formulas of x, the value in SI. error : require margins larger than their errors,
+    from two more runs of each value. Raises CaseError for an invalid case, a case without limits, and wrong arguments.
     """
     faults: list[Fault] = []
-    made = None
+    loaded = None
     with gathered(faults):
-        made = load(case, dict(set or {}))
-    faults += asked(made, key, (low, high), goal, ties or {}, rtol)
+        loaded = load(case, dict(set or {}))
+    faults += asked(loaded, key, (low, high), goal, ties or {}, rtol)
     if faults:
-        raise CaseError(faults, "case" if made is None else made.name)
+        raise CaseError(faults, "case" if loaded is None else loaded.name)
     first, last, unit = ends(low, high)
-    search = Sizing(made, key, unit, ties or {}, progress, error)
+    search = Sizing(loaded, key, unit, ties or {}, progress, error)
     value, bracket = search.search(first, last, goal, rtol)
-    said = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
-    return Size(key, unit or bare_unit(made.raw, key), goal, value, bracket, search.runs, said)
+    tie_texts = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
+    return Size(key, unit or bare_unit(loaded.raw, key), goal, value, bracket, search.runs, tie_texts)
 
 
 def asked(
     case: Case | None, key: str, span: Sequence[Any], goal: str, ties: Mapping[str, str], rtol: float
 ) -> list[Fault]:
-    """All that is wrong of a search before it runs; case : None where it is at fault itself, and so span, if empty."""
+    """Faults of the arguments of a search, before any run.
+
+    case : None if the case has faults itself; span : empty if the range has faults itself
+    """
     faults: list[Fault] = []
     if goal not in GOALS:
-        near = did_you_mean(str(goal), GOALS)
-        faults.append(Fault("goal", f"{show(goal)} is none{near}; wanted {' or '.join(GOALS)}"))
+        suggestion = did_you_mean(str(goal), GOALS)
+        faults.append(Fault("goal", f"{show(goal)} is unknown{suggestion}. Expected {' or '.join(GOALS)}"))
     if not 0.0 < rtol < 1.0:
-        faults.append(Fault("rtol", f"{rtol} is out of range; wanted a number between 0 and 1"))
-    found = len(faults)
+        faults.append(Fault("rtol", f"{rtol} is out of range. Expected a number between 0 and 1"))
+    count = len(faults)
     with gathered(faults, f"--vary {key}"):
         low, high, unit = ends(*span) if span else (0.0, 1.0, "")
         if case is not None and is_known(case.raw, key) and quantity_of(case.raw, key) is None:
-            raise ValueError("takes words or whole numbers, of which there are none between two; wanted a sweep of it")
+            raise ValueError("has words or whole numbers as values, so it has no range. Use a sweep")
     for name, text in ties.items():
         with gathered(faults, f"--tie {name}"):
             Arithmetic(text)
             if name == key:
-                raise ValueError("is what is varied; wanted another key")
+                raise ValueError("is the key that is sized. Expected another key")
     if case is not None and not case.limits:
-        text = 'states no [limits], which a size would hold; wanted for example { on = "pipes", greatest = "10 barg" }'
+        text = 'states no [limits] to satisfy. Expected for example { on = "pipes", greatest = "10 barg" }'
         faults.append(Fault("", f"{case.name} {text}"))
-    if case is not None and span and len(faults) == found + (not case.limits):
-        wrong: list[Fault] = []
-        with gathered(wrong):
+    if case is not None and span and len(faults) == count + (not case.limits):
+        run_faults: list[Fault] = []
+        with gathered(run_faults):
             load(case, Sizing(case, key, unit, ties, None).keys(high if goal == "greatest" else low))
         options = {key: "--vary", **dict.fromkeys(ties, "--tie")}
-        faults += [Fault(f"{options[one.place]} {one.place}", one.message) if one.place in options else one
-                   for one in wrong]  # fmt: skip
+        faults += [Fault(f"{options[run_fault.place]} {run_fault.place}", run_fault.message)
+                   if run_fault.place in options else run_fault
+                   for run_fault in run_faults]  # fmt: skip
     return faults
 
 
 def tied(texts: Sequence[str]) -> dict[str, str]:
-    """`KEY = formula` of each as pairs; CaseError with all that are none."""
-    found: dict[str, str] = {}
+    """Parse `KEY = formula` texts: key -> formula. Raises CaseError with all faults."""
+    ties: dict[str, str] = {}
     faults = []
     for text in texts:
-        key, equals, rule = (one.strip() for one in text.partition("="))
+        key, equals, rule = (part.strip() for part in text.partition("="))
         if not (equals and key and rule):
             example = '"nodes.vessel.gas_volume = x / 2"'
-            faults.append(Fault(f"--tie {text}", f'wanted "KEY = formula of x", for example {example}'))
-        elif key in found:
-            faults.append(Fault(f"--tie {text}", f"{key} is {found[key]} before; keep one"))
-        found.setdefault(key, rule)
+            faults.append(Fault(f"--tie {text}", f'expected "KEY = formula of x", for example {example}'))
+        elif key in ties:
+            faults.append(Fault(f"--tie {text}", f"{key} is given before as {ties[key]}. Give it once"))
+        ties.setdefault(key, rule)
     if faults:
         raise CaseError(faults)
-    return found
+    return ties

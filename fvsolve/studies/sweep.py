@@ -1,4 +1,4 @@
-"""One run for each of many sets of values: a row of numbers apiece, failed ones with their reason. Knows runs."""
+"""Sweeps: runs of a case with many sets of values; a row of results for each run."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ from fvsolve.units import show
 
 FIRST = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
 LAST = ("expectations", "verdicts", "steps", "seconds")
-KEPT = {"row": 5}  # counts up when a row holds something else: older ones on disk are not reused
-WORDS = ("title", "description", "source")  # of a case, which change no row
+KEPT = {"row": 5}  # version of the content of rows: rows of older versions on disk are not reused
+WORDS = ("title", "description", "source")  # keys of a case that do not change rows
 
 
 @dataclass(frozen=True, repr=False)
 class Sweep(Shown):
-    """Rows in the order of the values, the last key fastest; a value that a run does not have is None.
+    """Results of a sweep, rows in the order of the values (last key fastest); a missing value is None.
 
     keys : the keys that vary
-    rows : their values, `ok`, `reason`, `t [s]`, `marks` (the first thing that the model could not follow, in words,
-    or nothing); `warnings` and `fluid` as in the summary; of each probe `min(...)`, `max(...)`, their times and
-    `final(...)` in the units of `[output]`, None where the run ended in a value that is not finite; `expectations`
-    (whether all hold), `steps`, `seconds` of stepping
-    reused : how many rows were there before
+    rows : their values, `ok`, `reason`, `t [s]`, `marks` (text of the first event outside the validity of the model,
+    or empty); `warnings` and `fluid` as in the summary; for each probe `min(...)`, `max(...)`, their times and
+    `final(...)` in the units of `[output]`, None if the run diverged; `expectations` (True if all hold), `verdicts`
+    (True if all limits hold), `steps`, `seconds` of stepping
+    reused : number of rows from earlier sweeps
     """
 
     keys: tuple[str, ...]
@@ -52,45 +52,45 @@ class Sweep(Shown):
     picture = "fvsolve.draw.objects:sweep_figure"
 
     def said(self) -> str:
-        wrong = sum(not row["ok"] for row in self.rows)
-        return f"over {', '.join(self.keys)}: {len(self.rows)} runs, {wrong} of them not ok"
+        failed = sum(not row["ok"] for row in self.rows)
+        return f"over {', '.join(self.keys)}: {len(self.rows)} runs, {failed} of them not ok"
 
     def listed(self) -> dict[str, list]:
         return Sheet([Column(name) for name in self.columns], self.rows).listed()
 
     @property
     def columns(self) -> list[str]:
-        """All columns, those of the probes in the order in which they first appear."""
-        seen = dict.fromkeys(name for row in self.rows for name in row)
-        own = {*self.keys, *FIRST, *LAST}
-        return [*self.keys, *FIRST, *(name for name in seen if name not in own), *LAST]
+        """Names of all columns; those of probes in the order of first appearance."""
+        names = dict.fromkeys(name for row in self.rows for name in row)
+        fixed = {*self.keys, *FIRST, *LAST}
+        return [*self.keys, *FIRST, *(name for name in names if name not in fixed), *LAST]
 
     @property
     def outcomes(self) -> list[str]:
-        """Columns of probes: numbers that runs have found."""
+        """Names of the columns of probes."""
         return self.columns[len(self.keys) + len(FIRST) : -len(LAST)]
 
     def outcome(self, name: str) -> str:
-        """The column of an outcome, with or without its unit; FvsolveError where there is none."""
-        known = {one.partition(" [")[0]: one for one in self.outcomes}
-        if name not in known and name not in known.values():
-            said = f"{did_you_mean(name, known)}; there are {listing(known) or 'none'}"
-            raise FvsolveError(f"no outcome {show(name)}{said}")
-        return known.get(name, name)
+        """Column of an outcome, given with or without its unit. Raises FvsolveError for an unknown outcome."""
+        by_name = {column.partition(" [")[0]: column for column in self.outcomes}
+        if name not in by_name and name not in by_name.values():
+            hint = f"{did_you_mean(name, by_name)}. Outcomes are {listing(by_name) or 'none'}"
+            raise FvsolveError(f"no outcome {show(name)}{hint}")
+        return by_name.get(name, name)
 
     def plain(self) -> dict[str, Any]:
-        """As JSON says it."""
+        """Plain values for JSON."""
         return {"keys": list(self.keys), "columns": self.columns, "rows": self.rows, "reused": self.reused}
 
     def write(self, path: Path) -> None:
-        """The table as CSV, the values of the keys as `--set` reads them; whole, or what was there stays."""
+        """Write the table as CSV, with values of keys in the format of `--set`. The file is replaced atomically."""
         rows = ({name: self._cell(name, x) for name, x in row.items()} for row in self.rows)
         with writing(path):
-            fresh = Sheet([Column(name) for name in self.columns], [*rows]).write(path.with_suffix(".tmp"))
-            os.replace(fresh, path)
+            temporary = Sheet([Column(name) for name in self.columns], [*rows]).write(path.with_suffix(".tmp"))
+            os.replace(temporary, path)
 
     def write_parquet(self, path: Path) -> bool:
-        """The same as Parquet, numbers as such; False where pyarrow is not installed."""
+        """Write the table as Parquet, with numeric columns; returns False if pyarrow is not installed."""
         try:
             import pyarrow
             import pyarrow.parquet
@@ -109,7 +109,7 @@ class Sweep(Shown):
 
     def _cell(self, name: str, value: Any) -> Any:
         if name == "warnings":
-            return "; ".join(one["text"] for one in value or ())
+            return "; ".join(notice["text"] for notice in value or ())
         if name == "fluid":
             return value["name"] if value else ""
         return pasted(value) if name in self.keys else "" if value is None else value
@@ -138,110 +138,112 @@ def sweep(
     seed: int = 0,
     dask: str | None = None,
 ) -> Sweep:
-    """Run a case once for every combination of the values of `vary`, `jobs` at a time.
+    """Run a case once for every combination of the values of `vary`, `jobs` runs at a time.
 
-    `case` is a path, a dict shaped like the file or a `Case`; `set` overrides keys for all runs. With `sample`,
-    "sobol:64" or "lhs:100", `vary` holds two values of each key, and so many points between them are run, the same for
-    the same `seed`; `points` are the values of every run, or a CSV file of them, in place of `vary`. With `out`,
-    finished rows are kept in that folder as they come, reused by the next sweep, and written to `sweep.csv` at the end
-    or when it is interrupted. A run that is refused or stops is a row with its reason. With jobs above 1 other
-    processes run, which start the program anew: a script must then stand under `if __name__ == "__main__"`. `dask` is
-    the address of a scheduler whose workers run in their place.
-    Raises FvsolveError where nothing varies and where every run is refused for the same reason, CaseError where the
-    case itself has faults, and where it has no such key.
+    `case` is a path, a dict shaped like the file or a `Case`; `set` are overrides of all runs. With `sample`,
+    "sobol:64" or "lhs:100", `vary` has two values of each key, and that number of points between them is run; equal
+    values of `seed` give equal points. `points` are the values of every run, or a CSV file of them, instead of `vary`.
+    With `out`, finished rows are saved in that folder at once, reused by later sweeps, and written to `sweep.csv` at
+    the end or at an interruption. A run that is refused or stops gives a row with its reason. With jobs above 1, other
+    processes import the main script again: put its code under `if __name__ == "__main__"`. `dask` is the address of a
+    scheduler whose workers are used instead.
+    Raises FvsolveError if no key varies, and if every run is refused for the same reason; CaseError if the case itself
+    has faults or a key is unknown.
     """
     if jobs < 1:
-        raise FvsolveError(f"jobs = {jobs}; wanted 1 or more")
+        raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
     raw, base = raw_of(case), dict(set or {})
     runs = planned(case, raw, base, vary or {}, points, sample, seed)
     refuse_unknown(case, {**base, **runs[0]}, raw)
     folder = None if out is None else Path(out)
-    with Points(folder) as kept:
-        return Sweeping(case, raw, base, runs, kept, progress).go(folder, jobs, dask)
+    with Points(folder) as cache:
+        return Sweeping(case, raw, base, runs, cache, progress).go(folder, jobs, dask)
 
 
 def planned(source: Any, raw: dict, base: dict, vary: Mapping, points, sample: str | None, seed: int) -> list[dict]:
-    """The values of every run."""
+    """Values of every run: from points, a sample or a grid."""
     if points is not None:
         if vary or sample:
-            raise FvsolveError("points say all values of every run; wanted no vary and no sample beside them")
-        runs = of_file(Path(points), source, raw) if PATH.holds(points) else [dict(one) for one in points]
-        if not runs or not runs[0] or any(one.keys() != runs[0].keys() for one in runs):
-            raise FvsolveError("points have not all the same keys; wanted one at least, with a value in every run")
+            raise FvsolveError("points have all values of every run. Expected no vary and no sample in addition")
+        runs = of_file(Path(points), source, raw) if PATH.holds(points) else [dict(point) for point in points]
+        if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
+            raise FvsolveError("points have different keys. Expected at least one key, with a value in every run")
         return runs
     if sample is not None:
         if not vary:
-            raise FvsolveError("nothing varies; give the two ends of a key at least, links.main.length=900,1000")
+            raise FvsolveError("no key varies. Give at least one key and its range: links.main.length=900,1000")
         return sampled(load(source, base), vary, sample, seed)
     if not vary or all(len(values) < 2 for values in vary.values()):
-        raise FvsolveError("nothing varies; give two values of a key at least, for example links.main.cells=100,200")
+        raise FvsolveError("no key varies. Give at least two values of a key, for example links.main.cells=100,200")
     empty = [key for key, values in vary.items() if not len(values)]
     if empty:
-        raise FvsolveError(f"{', '.join(empty)}: no values; wanted one at least")
+        raise FvsolveError(f"{', '.join(empty)}: no values. Expected at least one value")
     return grid(vary)
 
 
 class Sweeping:
-    """One sweep while it lasts."""
+    """State of a sweep."""
 
-    def __init__(self, source, raw: dict, base: dict, runs: list[dict], kept: Points, progress) -> None:
-        self.runs, self.kept, self.told = runs, kept, progress or (lambda done, total, what: None)
+    def __init__(self, source, raw: dict, base: dict, runs: list[dict], cache: Points, progress) -> None:
+        self.runs, self.kept, self.told = runs, cache, progress or (lambda done, total, text: None)
         self.source, self.base = source, base
         self.found: dict[int, dict] = {}
-        self.digests: dict[str, str] = {}  # of files
-        about = {key: one for key, one in raw.items() if key not in WORDS}
-        by = programs() | {"numba": "", "coolprop": coolprop()}
-        self.who = hashed({**by, "case": about, "base": base, "files": [*self.files((about, base))]})
+        self.digests: dict[str, str] = {}  # name of a file -> hash of its content
+        relevant = {key: value for key, value in raw.items() if key not in WORDS}
+        versions_used = programs() | {"numba": "", "coolprop": coolprop()}
+        self.who = hashed({**versions_used, "case": relevant, "base": base, "files": [*self.files((relevant, base))]})
 
     def go(self, folder: Path | None, jobs: int, dask: str | None) -> Sweep:
-        """All rows, written where there is a folder."""
+        """Compute all rows; files are written if there is a folder, also after an interruption."""
         self.began = time.perf_counter()
         try:
             self.fill(jobs, dask)
         except BaseException:
-            with suppress(RunError):  # that what is there cannot be written is not what is wrong
+            with suppress(RunError):  # a failure to write must not hide the original exception
                 self.made(folder)
             raise
         return self.made(folder)
 
     def fill(self, jobs: int, dask: str | None) -> None:
-        """Find all rows: what is there already, then what is to be run."""
+        """Read the rows of earlier sweeps, then run the remaining ones."""
         keys = [hashed({"who": self.who, "set": values, "files": [*self.files(values)]}) for values in self.runs]
-        for at, key in enumerate(keys):
-            if (known := self.kept.known(key)) is not None:
-                self.found[at] = self.runs[at] | known
-        waiting = [at for at in range(len(keys)) if at not in self.found]
+        for index, key in enumerate(keys):
+            if (earlier := self.kept.known(key)) is not None:
+                self.found[index] = self.runs[index] | earlier
+        waiting = [index for index in range(len(keys)) if index not in self.found]
         self.tell(waiting[:1])
-        for number, row in many(RowMaker(self.source, self.base), [self.runs[at] for at in waiting], jobs, dask):
-            at = waiting[number]
-            self.found[at] = self.runs[at] | self.kept.keep(keys[at], KEPT, row)
-            self.tell([at + 1] if at + 1 < len(keys) else [])
+        for number, row in many(RowMaker(self.source, self.base), [self.runs[index] for index in waiting], jobs, dask):
+            index = waiting[number]
+            self.found[index] = self.runs[index] | self.kept.keep(keys[index], KEPT, row)
+            self.tell([index + 1] if index + 1 < len(keys) else [])
 
     def made(self, folder: Path | None) -> Sweep:
-        """What is found so far; FvsolveError where all of it is refused for one reason."""
-        made = Sweep(tuple(self.runs[0]), [self.found[at] for at in sorted(self.found)], self.kept.reused)
-        refused = {row["reason"] if row["reason"].startswith(REFUSED) else "" for row in made.rows}
-        if len(made.rows) == len(self.runs) and len(refused) == 1 and "" not in refused:
+        """Rows so far, written to the folder. Raises FvsolveError if all runs are refused for the same reason."""
+        result = Sweep(tuple(self.runs[0]), [self.found[index] for index in sorted(self.found)], self.kept.reused)
+        refused = {row["reason"] if row["reason"].startswith(REFUSED) else "" for row in result.rows}
+        if len(result.rows) == len(self.runs) and len(refused) == 1 and "" not in refused:
             raise FvsolveError(f"all {len(self.runs)} runs are {refused.pop()}")
-        if folder is not None and made.rows:
-            made.write(folder / "sweep.csv")
-            made.write_parquet(folder / "sweep.parquet")
-        return made
+        if folder is not None and result.rows:
+            result.write(folder / "sweep.csv")
+            result.write_parquet(folder / "sweep.parquet")
+        return result
 
     def tell(self, coming: list[int]) -> None:
-        """How far it is, how long it will be, and what comes."""
-        own, left = len(self.found) - self.kept.reused, len(self.runs) - len(self.found)
+        """Report progress: finished rows, estimated remaining time and the next values."""
+        own, remaining = len(self.found) - self.kept.reused, len(self.runs) - len(self.found)
         spent = time.perf_counter() - self.began
-        rest = f"{span(spent / own * left)} left, " if own and left else ""
-        self.told(len(self.found), len(self.runs), rest + "".join(_said(self.runs[at]) for at in coming))
+        text = f"{span(spent / own * remaining)} left, " if own and remaining else ""
+        self.told(len(self.found), len(self.runs), text + "".join(_said(self.runs[index]) for index in coming))
 
-    def files(self, said: Any) -> Iterator[str]:
-        """What files hold that are named somewhere in values: one of the case's, where its text is that of a file."""
-        for one in said.values() if isinstance(said, Mapping) else said if isinstance(said, (list, tuple)) else ():
-            if isinstance(one, str):
-                yield from self.digest(one)
+    def files(self, values: Any) -> Iterator[str]:
+        """Hashes of all files that are named in values, searched recursively."""
+        for value in (
+            values.values() if isinstance(values, Mapping) else values if isinstance(values, (list, tuple)) else ()
+        ):
+            if isinstance(value, str):
+                yield from self.digest(value)
             else:
-                yield from self.files(one)
+                yield from self.files(value)
 
     def digest(self, name: str) -> list[str]:
         if name not in self.digests:
@@ -254,12 +256,12 @@ class Sweeping:
 
 
 def raw_of(source) -> dict[str, Any]:
-    """The nested dicts of what `load` takes."""
+    """Nested dicts of a case given as for `load`."""
     return source.raw if isinstance(source, Case) else read_raw(named(source)).table
 
 
 def folder_of(source) -> Path:
-    """Where the files of a case are."""
+    """Folder of the files of a case."""
     if isinstance(source, Case):
         return source.folder or Path.cwd()
     source = named(source)
@@ -267,7 +269,7 @@ def folder_of(source) -> Path:
 
 
 def span(seconds: float) -> str:
-    """A span of time in words."""
+    """Text of a duration [s] in s, min or h."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
@@ -278,7 +280,7 @@ def _said(values: Mapping[str, Any]) -> str:
 
 
 def pasted(value: Any) -> str:
-    """A value as `--set` reads it back: TOML, words without quotes where they stay what they are."""
+    """Text of a value in the format of `--set`: TOML, with quotes around words only if necessary."""
     import tomllib
 
     if not isinstance(value, str) or value != value.strip() or {*value} & {*",[]{}\"'\n"}:

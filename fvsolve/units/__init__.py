@@ -1,6 +1,6 @@
-"""Texts with units to SI numbers and back. Knows spellings and dimensions; knows no case and no physics.
+"""Conversion of text with units to SI numbers and back.
 
-A bare number is SI. Text is a number and a unit, `"304.8 mm"`. Spellings outside `UNITS` are left to pint.
+A bare number is SI. Text is a number and a unit, `"304.8 mm"`. Spellings outside `UNITS` are read by pint.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ __all__ = [
     "vacuum", "wanted",
 ]  # fmt: skip
 
-LONGEST = 100  # letters of a unit
-MOST = 1e100  # of a quantity [SI]
+LONGEST = 100  # greatest length of a unit [characters]
+MOST = 1e100  # greatest magnitude of a quantity [SI]
 _NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
 def parse(given: Any, dimension: str) -> Any:
-    """The SI value of a bare number or of text with a unit; for a pressure the pair (value, gauge).
+    """SI value of a bare number or of text with a unit; for a pressure the pair (value, gauge).
 
-    A kinematic viscosity where a viscosity is wanted comes back as `Kinematic` [m2/s].
-    Raises ValueError with what was found, what was wanted and what was probably meant.
+    A kinematic viscosity is returned as `Kinematic` [m2/s] if `dimension` is a viscosity.
+    Raises ValueError with the text found, the dimension expected and a suggestion.
     """
     if isinstance(given, str):
         value, unit = _parse_text(given, dimension)
@@ -46,12 +46,12 @@ def parse(given: Any, dimension: str) -> Any:
 
 
 class Kinematic(float):
-    """A viscosity stated as kinematic [m2/s], still to be multiplied by a density."""
+    """A kinematic viscosity [m2/s], not yet multiplied by a density."""
 
 
 def find(spelling: str, dimension: str, number: str = "") -> Unit:
-    """The unit of that spelling, if it measures `dimension`; ValueError says what was probably meant."""
-    if len(spelling) > LONGEST:  # which pint would read for minutes
+    """Unit of a spelling that measures `dimension`; ValueError with a suggestion otherwise."""
+    if len(spelling) > LONGEST:  # pint would take minutes to read it
         raise ValueError(
             f"{show(f'{number} {spelling}'.strip())}: no unit has {len(spelling)} letters; {wanted(dimension)}"
         )
@@ -85,7 +85,7 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
 
 
 def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: float = 101325.0) -> str:
-    """What to say of a given pressure that comes to `pressure` [Pa] absolute, too little for a liquid."""
+    """Text for a given pressure whose absolute value `pressure` [Pa] is too low for a liquid."""
     below = "a vacuum" if pressure <= 0 else f"not above the vapour pressure of {vapor_pressure:.4g} Pa"
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (str(given), "Pa")
@@ -97,21 +97,21 @@ def vacuum(given: Any, pressure: float, vapor_pressure: float = 0.0, ambient: fl
 
 
 def convert(value_si: Any, dimension: str, unit: str, ambient: float = 101325.0) -> Any:
-    """An SI value or array in `unit`; an absolute pressure in a gauge unit counts from `ambient` [Pa]."""
-    found = find(unit, dimension)
-    if found.gauge and dimension == "pressure":
+    """SI value or array in `unit`; an absolute pressure in a gauge unit counts from `ambient` [Pa]."""
+    target = find(unit, dimension)
+    if target.gauge and dimension == "pressure":
         value_si = value_si - ambient
-    return found.number(value_si)
+    return target.number(value_si)
 
 
 def span(unit: str) -> str:
-    """The unit of differences of what is told in a unit: "bar" of "barg" and of "bara"."""
-    found = UNITS.get(unit)
-    return unit[:-1] if found is not None and (found.gauge or found.absolute) else unit
+    """Unit of differences of values in a unit: "bar" of "barg" and of "bara"."""
+    entry = UNITS.get(unit)
+    return unit[:-1] if entry is not None and (entry.gauge or entry.absolute) else unit
 
 
 def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
-    """'; did you mean "304.8 mm"?': the number of `given` in the unit that brings it from `least` to `greatest`, SI."""
+    """'; did you mean "304.8 mm"?': `given` in a unit that puts it in the range `least` to `greatest` (SI)."""
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     number, said = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
     fit = [unit for unit, weight in LIKELY.get(DIMENSIONS[dimension].base or dimension, {}).items()
@@ -127,7 +127,7 @@ def wanted(dimension: str) -> str:
 
 
 def show(given: Any) -> str:
-    """A value of a case file as the file would write it, cut where it is long."""
+    """Text of a value as in a case file, cut to 60 characters."""
     if isinstance(given, bool):
         return str(given).lower()
     text = f'"{given}"' if isinstance(given, str) else repr(given)
@@ -168,7 +168,7 @@ def _spellings(dimension: str) -> list[str]:
 
 @functools.lru_cache(maxsize=1024)
 def _plain(spelling: str) -> str:
-    """The spelling as the table has it: `m^3 / h`, `m³/h` and `m**3/h` are `m3/h`; `Pa.s` is `Pa s`."""
+    """Spelling as in the table: `m^3 / h`, `m³/h` and `m**3/h` are `m3/h`; `Pa.s` is `Pa s`."""
     text = spelling.strip().replace("**", "").replace("^", "")
     for old, new in (("²", "2"), ("³", "3"), ("µ", "u"), ("μ", "u"), ("°", "deg"), ("·", " "), ("*", " ")):
         text = text.replace(old, new)

@@ -1,4 +1,4 @@
-"""Units outside the table. The only door to pint, which is imported when the first of them is met."""
+"""Units outside the table, read by pint, which is imported at the first such unit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ BASE = {
 
 
 def ask_pint(spelling: str) -> Unit | None:
-    """A unit outside the table, by pint; None where pint does not know it either."""
+    """Unit outside the table, by pint; None if pint does not know it."""
     if not _ASKABLE.fullmatch(spelling):  # pint would compute 9**9**9
         return None
     import pint
@@ -39,12 +39,12 @@ def ask_pint(spelling: str) -> Unit | None:
 
 
 def base_units(dimensionality: Mapping[str, float]) -> str:
-    """Base units of a quantity by the alphabet, "kg·m²/s³": the order of pint changes with its version."""
+    """Base units of a quantity in alphabetical order, "kg·m²/s³"; the order of pint changes with its version."""
     powers = sorted((BASE.get(name, name), power) for name, power in dimensionality.items())
     over = "·".join(unit + raised(power) for unit, power in powers if power > 0) or "1"
     return "/".join([over, *(unit + raised(-power) for unit, power in powers if power < 0)])
 
 
 def raised(power: float) -> str:
-    """A power above the line, nothing for 1."""
+    """Superscript text of a power; empty for 1."""
     return "" if power == 1 else f"{power:g}".translate(str.maketrans("0123456789.-", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻"))

@@ -1,4 +1,4 @@
-"""The field's spellings of units and their factors, one table. Knows numbers; reads no text."""
+"""Spellings and factors of units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import Any
 class Unit:
     """SI value = (number + offset) numerator / denominator; a gauge unit counts from ambient pressure.
 
-    An absolute one says that it does not; a plain one is absolute where a pressure is absolute.
+    An absolute unit counts from vacuum; a plain unit is absolute if the pressure is absolute.
     """
 
     dimension: str
@@ -23,11 +23,11 @@ class Unit:
     absolute: bool = False
 
     def si(self, number: Any) -> Any:
-        """The SI value of a number (or array of numbers) of this unit, gauge where the unit is."""
+        """SI value of a number (or array) in this unit; gauge for a gauge unit."""
         return (number + self.offset) * self.numerator / self.denominator
 
     def read(self, number: str) -> float:
-        """The SI value of a decimal number, rounded once: "0.26" of mm is 0.00026."""
+        """SI value of a decimal number, rounded once: "0.26" of mm is 0.00026."""
         try:
             exact = (Decimal(number) + Decimal(repr(self.offset))) * Decimal(repr(self.numerator))
             return float(exact / Decimal(repr(self.denominator)))
@@ -35,13 +35,13 @@ class Unit:
             return math.inf if float(number) != 0 else 0.0
 
     def number(self, si: Any) -> Any:
-        """The number (or array of numbers) of this unit that has the SI value `si`."""
+        """Number (or array) in this unit of the SI value `si`."""
         return si * self.denominator / self.numerator - self.offset
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """How a message speaks of a dimension: its words, SI unit and an example; `base` holds its spellings."""
+    """Text, SI unit and example of a dimension for messages; `base` : dimension with its spellings."""
 
     words: str
     si: str
@@ -104,7 +104,7 @@ WATER = 1000 * GRAVITY  # one metre of the conventional column of water, 1000 kg
 MERCURY = 133.322387415  # one millimetre of mercury, conventional [Pa]
 MINUTE, HOUR, DAY = 60, 3600, 86400
 
-# Per dimension: spelling -> numerator, or (numerator, denominator) where the quotient is the exact one.
+# Per dimension: spelling -> numerator, or (numerator, denominator) if only the quotient is exact.
 SPELLINGS: dict[str, dict[str, Any]] = {
     "length": {
         "m": 1, "mm": (1, 1000), "cm": (1, 100), "dm": (1, 10), "km": 1000, "um": (1, 10**6),
@@ -230,7 +230,7 @@ def _table() -> dict[str, Unit]:
 
 UNITS: dict[str, Unit] = _table()
 
-# Near misses that are units of something else, or no unit at all: what was probably meant.
+# Near misses that are units of another dimension, or not units -> suggested unit.
 MEANT = {
     "C": "degC", "F": "degF", "R": "degR", "deg C": "degC", "deg F": "degF", "degK": "K", "deg": "degC",
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "mins": "min", "minute": "min", "minutes": "min",
@@ -245,8 +245,8 @@ MEANT = {
     "centipoise": "cP", "kg": "", "kg/s": "", "kg/h": "", "t/h": "",
 }  # fmt: skip
 
-# Units in which a number that is far off was probably meant, the likeliest first -> what brings them to SI beside their
-# factor: a kinematic viscosity counts in water.
+# Likely units of a number out of range, likeliest first -> extra factor to SI besides that of the unit: kinematic
+# viscosity is multiplied by the density of water.
 LIKELY = {
     dimension: dict.fromkeys(units, 1.0) | ({"cSt": 1000.0} if dimension == "viscosity" else {})
     for dimension, units in {

@@ -214,17 +214,20 @@ def test_what_the_network_gives_a_basin_gets():
 FAULTS = {
     "cut": (
         {"patches": {"east": {"side": "east", "span": [0.3, 1.4]}}},
-        "not hold whole faces .*; nearest is 0.5 to 1.5 m",
+        "not consist of whole faces .*; nearest is 0.5 to 1.5 m",
     ),
-    "span": ({"patches": {"east": {"side": "east", "span": [1.0, 9.0]}}}, "not hold whole faces of the east side"),
+    "span": (
+        {"patches": {"east": {"side": "east", "span": [1.0, 9.0]}}},
+        "not consist of whole faces of the east side",
+    ),
     "side": ({"patches": {"east": {"side": "wst"}}}, r'patches.east.side: no side named "wst"; did you mean "west"'),
     "shared": ({"patches": {"east": {"side": "east"}, "b": {"side": "east", "span": [0.0, 1.0]}}}, 'overlaps "east"'),
     "cells": ({"cells": [4.5, 3]}, "not a pair of cell numbers"),
     "physics": ({"pressure": "1 bar"}, 'is not a key of physics "free-surface"; it belongs to liquid'),
     "needs": ({"physics": "liquid"}, "thickness is missing"),
-    "start": ({"start": {"pressure": "1 bar"}}, 'start.pressure: means nothing to physics "free-surface"'),
+    "start": ({"start": {"pressure": "1 bar"}}, 'start.pressure: does not apply to physics "free-surface"'),
     "formula": ({"bed": "0.1*z"}, "z is unknown"),
-    "number": ({"bed": "sqrt(x - 1)"}, "is no number at x = 0.25 m"),
+    "number": ({"bed": "sqrt(x - 1)"}, "is not a number at x = 0.25 m"),
     "holes": ({"holes": [[0.1, 0.0, 1.0, 1.0]]}, "holes.0.: x0 = 0.1 m is on no grid line"),
 }
 

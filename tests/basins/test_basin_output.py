@@ -192,15 +192,21 @@ def test_a_run_records_points_and_patches_and_claims_about_them():
 @pytest.mark.parametrize(
     "probe, says",
     [
-        ("pool.depth", 'a basin is read at points: say where, for example "pool.depth@'),
-        ("pool.depth@here", '"@here" is no point x,y [m]; wanted for example "@'),
-        ("pool.depth@1", '"@1" is no point x,y [m]'),
-        ("pool.depth@nan,1", "nan, 1 is no point"),
+        ("pool.depth", 'a probe of a basin needs a point, for example "pool.depth@'),
+        ("pool.depth@here", '"@here" is not a point x,y [m]; expected for example "@'),
+        ("pool.depth@1", '"@1" is not a point x,y [m]'),
+        ("pool.depth@nan,1", "nan, 1 is not a point"),
         ("pool.depth@11,2", "11,2 m lies outside the mesh or in a hole; the nearest point inside is 9.99"),
-        ("pool.dept@1,1", 'pool is a basin, without "dept"; it has depth, surface, bed, u, v, speed; did you mean'),
-        ("pool.pressure@1,1", 'without "pressure"'),
-        ("pool.outlet.depth", 'pool.outlet is a patch, without "depth"; it has pressure, gauge_pressure, head, flow'),
-        ("pool.outlet.flow@1,2", "pool.outlet is a patch: flow has no place along it; leave @1,2 out"),
+        (
+            "pool.dept@1,1",
+            'pool is a basin, which has no "dept"; it has depth, surface, bed, u, v, speed; did you mean',
+        ),
+        ("pool.pressure@1,1", 'which has no "pressure"'),
+        (
+            "pool.outlet.depth",
+            'pool.outlet is a patch, which has no "depth"; it has pressure, gauge_pressure, head, flow',
+        ),
+        ("pool.outlet.flow@1,2", "pool.outlet is a patch, and flow has no place along it; leave @1,2 out"),
     ],
 )
 def test_a_probe_that_means_no_point_is_refused(probe, says):
@@ -276,9 +282,9 @@ def test_a_line_that_lies_in_no_basin_is_refused():
     for says in (
         'output.lines.a.basin: no basin named "pol"; did you mean "pool"?',
         "output.lines.b.to: 12,2 m lies outside the mesh or in a hole; the nearest point inside is",
-        "output.lines.c.to: is where the line starts",
-        '"d d" is no name',
-        "output.lines: are written at every frame, and fields is 0",
+        "output.lines.c.to: is also the start of the line",
+        '"d d" is not a valid name',
+        "output.lines: are written with every frame, but fields is 0",
     ):
         assert says in str(error.value)
 
@@ -433,7 +439,7 @@ def test_what_a_mesh_leaves_unsaid_is_noted(tmp_path):
     path = write(tmp_path / "mm.msh", 1e7 * np.array(points), cells)
     model = fvsolve.build(fvsolve.load(liquid([], mesh={"file": str(path)})))
     assert any("basin block: the mesh is" in note.text and 'unit = "mm"' in note.text for note in model.warnings)
-    assert any("the file names no group of lines" in note.text for note in model.warnings)
+    assert any("the file contains no named group of lines" in note.text for note in model.warnings)
 
 
 def test_a_summary_counts_the_cells_of_basins():
@@ -489,8 +495,8 @@ def test_a_line_has_scalars_and_a_velocity_by_name_its_parameters(tmp_path):
     "velocity, said",
     [
         ({"expression": "swirl", "speed": "fast"}, 'nodes.sheet.velocity.speed: "fast" is no number with a unit'),
-        ({"expression": "shear", "rate": 1, "y1": 0}, 'velocity "shear" has no y1; it takes rate, u, y0'),
-        ({"stream": "y", "u": 1}, "nodes.sheet.velocity: has stream, u; wanted { u, v } or { stream }"),
+        ({"expression": "shear", "rate": 1, "y1": 0}, 'velocity "shear" has no parameter y1; expected rate, u, y0'),
+        ({"stream": "y", "u": 1}, "nodes.sheet.velocity: has stream, u; expected { u, v } or { stream }"),
         (
             {"expression": "rotation", "centre": [0], "angular_velocity": 1},
             "nodes.sheet.velocity.centre: [0] has 1 values",
@@ -521,10 +527,10 @@ def test_quantities_of_a_basin():
     [
         ({"level": "two"}, "nodes.pool.level"),
         ({"holes": "none"}, "nodes.pool.holes"),
-        ({"bed": "0.5*(y"}, 'nodes.pool.bed: "0.5*(y" is no formula of x and y: a bracket is left open'),
-        ({"bed": "0.5*y)"}, "a bracket is closed that was not opened"),
-        ({"bed": "2*x y"}, '"2*x y" is no formula of x and y: invalid syntax'),
-        ({"bed": {"file": "bed.csv"}}, 'nodes.pool.bed.file: bed.csv, line 4: "deep" is no number in column "z"'),
+        ({"bed": "0.5*(y"}, 'nodes.pool.bed: "0.5*(y" is not a formula of x and y: a bracket is not closed'),
+        ({"bed": "0.5*y)"}, "a closing bracket has no opening bracket"),
+        ({"bed": "2*x y"}, '"2*x y" is not a formula of x and y: invalid syntax'),
+        ({"bed": {"file": "bed.csv"}}, 'nodes.pool.bed.file: bed.csv, line 4: "deep" is not a number in column "z"'),
     ],
 )
 def test_a_fault_in_a_basin_comes_once(changes, said, tmp_path):

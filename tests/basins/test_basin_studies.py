@@ -109,7 +109,7 @@ def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
     meshio.write(tmp_path / "square.vtu", meshio.Mesh(points, [("triangle", np.array([[0, 1, 2], [0, 2, 3]]))]))
     basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0}
     case = fvsolve.load(scene({"pool": basin}, {}, 1.0, PLANE))
-    with pytest.raises(FvsolveError, match="the mesh of pool is a file, which nothing refines"):
+    with pytest.raises(FvsolveError, match="the mesh of pool is a file, which cannot be refined"):
         plan(case, "both")
 
 
@@ -307,7 +307,9 @@ def test_a_slosh_is_warned_of_where_it_is_short_against_its_depth(more):
         basin = pool((32, 8), f"{depth} + 0.01*cos({k!r}*x)", depth=depth, **more)
         said = [one for one in built(alone(basin, 1.0)).warnings if "slower" in one.text]
         assert len(said) == (1 if depth > 1.0 else 0)
-    assert f"waves about 20 m long in 1.8 m of water (k h = 0.57): real ones run {slower(k, 1.8):.2g} %" in said[0].text
+    assert f"waves about 20 m long in 1.8 m of water (k h = 0.57): real waves are {slower(k, 1.8):.2g} %" in (
+        said[0].text
+    )
 
 
 def test_wavenumbers_are_those_of_the_waves_that_there_are():

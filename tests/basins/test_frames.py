@@ -173,15 +173,15 @@ def test_a_tank_that_falls_freely_ends_the_run_by_name():
 # faults ----------
 
 FAULTS = {
-    "rides on body; say where with at": ({}, {"elevation": 1.0}),
-    "wanted a body: body; did you mean": ({}, {"on": "bdy"}),
-    "name that with on": ({}, {"on": None, "at": [0, 0, 1]}),
-    "would have to feel what leaves here": (
+    "the node is on body; give its place with at": ({}, {"elevation": 1.0}),
+    "expected a body: body; did you mean": ({}, {"on": "bdy"}),
+    "name the body with on": ({}, {"on": None, "at": [0, 0, 1]}),
+    "and the reaction to outflow is not modelled": (
         {"joint": {"kind": "revolute", "axis": [0, 0, 1]}},
         {"patches": {"gap": {"side": "east", "boundary": "open"}}},
     ),
-    "rides on no body; wanted": ({}, {"physics": "transport", "level": None, "velocity": {"u": 0.0, "v": 0.0}}),
-    "one of both": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
+    "cannot be on a body; expected": ({}, {"physics": "transport", "level": None, "velocity": {"u": 0.0, "v": 0.0}}),
+    "a basin on a body cannot have moving walls": ({}, {"patches": {"lid": {"side": "east", "travel": 0.1}}}),
     "unknown key": ({}, {"attitude": {"rol": 0.1}}),
 }
 

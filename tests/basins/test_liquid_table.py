@@ -246,5 +246,5 @@ def test_walls_make_no_wave_quicker_than_the_fluids_own():
 
 def test_a_mixture_is_refused():
     fluid = {"name": "ISO VG 46", "law": "mixture", "air_fraction": 0.01}
-    with pytest.raises(CaseError, match='"mixture" does not go with basins; wanted "linear", "log" or "table"'):
+    with pytest.raises(CaseError, match='"mixture" does not apply to basins; expected "linear", "log" or "table"'):
         fvsolve.load(scene({"pool": basin()}, {}, 1.0, {"scheme": "muscl"}, (), 0.1, fluid=fluid))

@@ -176,10 +176,13 @@ def test_walls_of_a_file_that_cannot_move_are_refused_by_name(tmp_path):
     }
     wanted = {
         ("stair", "shoulder"): "does not lie where the basin ends along x, at 0 m",
-        ("stair", "inlet"): r"would take along the outline at 1,1.5 m, which does not run along x; wanted an outline",
-        ("stair", "end"): r"would take along the outline at",
-        ("funnel", "east"): r"would take along the outline at 1.5,0.25 m",
-        ("funnel", "west"): r"would take along the outline at 1.5,0.25 m",
+        (
+            "stair",
+            "inlet",
+        ): r"would move the outline at 1,1.5 m, which is not parallel to x; expected a parallel outline",
+        ("stair", "end"): r"would move the outline at",
+        ("funnel", "east"): r"would move the outline at 1.5,0.25 m",
+        ("funnel", "west"): r"would move the outline at 1.5,0.25 m",
     }
     for (name, patch), text in wanted.items():
         for more in ({"zone": 1.0}, {}):
@@ -200,7 +203,7 @@ def test_a_travel_that_turns_a_cell_over_where_its_zone_ends_is_refused(tmp_path
         scene({"b": pool(file, {"east": {"travel": ramp(0.0, 1.0, 0.0, -1.5), "zone": zone}})}, {}, 1.0,
               {**STEPPED, "step": 0.01}) for zone in ("2 m", "3 m")
     ]  # fmt: skip
-    with pytest.raises(CaseError, match=r"travel: turns over the cell at 1,0.516667 m, in which the zone ends"):
+    with pytest.raises(CaseError, match=r"travel: inverts the cell at 1,0.516667 m, in which the zone ends"):
         load(cases[0])
     load(cases[1])
 

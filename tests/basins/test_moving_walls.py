@@ -217,7 +217,7 @@ def test_a_wall_that_uses_up_its_zone_ends_the_run_by_name():
                            "initial_velocity": -2.0}, 1.0, 0.0)  # fmt: skip
     result = run(case)
     assert not result.ok
-    assert "the wall has left no room at b.lid" in result.reason and "end-stop" in result.reason
+    assert "the wall has no space left at b.lid" in result.reason and "end-stop" in result.reason
 
 
 # a link on a side along which lines move ----------

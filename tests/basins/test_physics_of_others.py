@@ -173,11 +173,11 @@ def test_it_is_stepped_implicitly(said):
 
 
 def test_it_is_checked_by_its_own_declaration(said):
-    assert 'no physics named "belt"; wanted one of free-surface, liquid, transport' in said["unknown"]
+    assert 'no physics named "belt"; expected one of free-surface, liquid, transport' in said["unknown"]
     assert "nodes.belt: pace is missing" in said["missing"]
     assert 'nodes.belt.level: is not a key of physics "belt"; it belongs to free-surface' in said["other"]
-    assert 'nodes.belt.start.u: means nothing to physics "belt"' in said["start"]
-    assert 'fluid.law: "log" does not go with basins; wanted "linear"' in said["law"]
+    assert 'nodes.belt.start.u: does not apply to physics "belt"' in said["start"]
+    assert 'fluid.law: "log" does not apply to basins; expected "linear"' in said["law"]
     assert said["path"] == "grid" and said["schema"]
 
 

@@ -274,14 +274,14 @@ FAULTS = {
         "given by velocity",
     ),
     "expression": ({"physics": "transport", "velocity": {"expression": "swril"}}, {}, 'did you mean "swirl"'),
-    "ways": ({"physics": "transport", "velocity": {"u": 1.0, "stream": "x"}}, {}, "wanted"),
+    "ways": ({"physics": "transport", "velocity": {"u": 1.0, "stream": "x"}}, {}, "expected"),
     "impedance": (
         {"level": 1.0, "patches": {"out": {"side": "east", "impedance": 1.0}}},
         {},
-        "means nothing to physics",
+        "does not apply to physics",
     ),
     "scalar": ({"level": 1.0, "scalars": {"dye": 1.0}}, {}, "no scalar named"),
-    "start": ({"level": 1.0, "start": {"pressure": 1.0}}, {}, "means nothing to physics"),
+    "start": ({"level": 1.0, "start": {"pressure": 1.0}}, {}, "does not apply to physics"),
 }
 
 

@@ -240,17 +240,18 @@ def test_a_valve_between_basins_that_touch_lets_them_come_to_one_level_in_the_wo
 STANDS = {"type": "basin", "size": [1, 1], "cells": [2, 2], "level": 1.0, "elevation": 0.0,
           "patches": {"gap": {"side": "west"}}}  # fmt: skip
 FAULTS = {  # text: (keys of nodes, of the link)
-    "joins a.gap, on hull and b.gap, which stands still: between these goes a hose": ({"b": STANDS}, {}),
-    "joins a.gap, on hull and b.gap, on deck: between these goes a hose": (
+    "joins a.gap, on hull and b.gap, which is fixed: this would be a flexible hose": ({"b": STANDS}, {}),
+    "joins a.gap, on hull and b.gap, on deck: this would be a flexible hose": (
         {"deck": hull(kind="fixed", on="hull"), "b": basin((0, 0, 0), "west") | {"on": "deck"}}, {}),
-    "0.9 m is too short: its way on hull is 1 m long (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0])": (
+    "0.9 m is too short: its route on hull is 1 m long (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0])": (
         {}, {"length": 0.9}),
-    "its ends lie 1 m apart (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0]), and a valve has no way between": (
+    "its ends lie 1 m apart (a.gap at [2, 0.5, 0] and b.gap at [3, 0.5, 0]), and a valve has no length": (
         {}, {"type": "valve", "area": 0.1, "length": None, "diameter": None}),
-    'joins a.gap, behind which there are no cells; wanted sloshing = "cells"': ({"a": {"sloshing": "frozen"}}, {}),
-    'joins a.gap of a basin that rides, which physics "liquid" does not go with yet': (
+    'joins a.gap, a patch without cells; expected sloshing = "cells"': ({"a": {"sloshing": "frozen"}}, {}),
+    'joins a.gap of a basin on a body, which physics "liquid" does not support yet': (
         {"a": {"physics": "liquid", "pressure": 2e5, "thickness": 0.1, "level": None}}, {}),
-    "what passes a.gap is not felt by its body yet; wanted a tank in place of the basin, or a driven joint": (
+    "the reaction of the flow through a.gap is not modelled yet; "
+    "expected a tank instead of the basin, or a driven joint": (
         {"hull": hull(kind="revolute", axis=[1, 0, 0])}, {}),
 }  # fmt: skip
 
@@ -277,10 +278,14 @@ def test_links_that_cannot_be_are_refused_by_name(text):
 def test_what_a_joint_holds_and_energy_are_refused_where_a_link_joins_a_basin_that_rides(link):
     case = changed(twins({"kind": "fixed"}, COLUMN), {"b": {"at": [2, 0, 0]} if link["type"] == "valve" else {}}, {})
     case["links"]["duct"] = changed({"nodes": {}, "links": {"duct": case["links"]["duct"]}}, {}, link)["links"]["duct"]
-    with pytest.raises(FvsolveError, match="not supported; links.duct: what passes a.gap is not felt by its body yet"):
+    with pytest.raises(
+        FvsolveError, match="not supported; links.duct: the reaction of the flow through a.gap is not modelled yet"
+    ):
         energy(case)
     case["output"]["probes"] = ["hull.joint_fx"]
-    with pytest.raises(CaseError, match="what passes a.gap is not felt .* a probe reads forces of joints"):
+    with pytest.raises(
+        CaseError, match="the reaction of the flow through a.gap is not modelled .* a probe reads forces of joints"
+    ):
         fv.build(fv.load(case))
 
 

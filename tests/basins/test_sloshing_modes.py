@@ -260,10 +260,10 @@ def test_depth_is_level_at_the_start_however_suddenly_its_body_is_let_go():
 @pytest.mark.parametrize(
     ("change", "place", "said"),
     [
-        ({"on": None}, "nodes.b.sloshing", "is of water that rides on a body; name that with on"),
-        ({"holes": [[0, 0, 0.5, 0.25]]}, "nodes.b.sloshing", "modes are known of boxes and of upright cylinders"),
-        ({"bed": "0.1 * x"}, "nodes.b.bed", "modes are known over a flat bed"),
-        ({"bed": 1.0}, "nodes.b.level", "no water is above the bed, at 1 m"),
+        ({"on": None}, "nodes.b.sloshing", "applies only to water on a body; name the body with on"),
+        ({"holes": [[0, 0, 0.5, 0.25]]}, "nodes.b.sloshing", "modes are known only for boxes and upright cylinders"),
+        ({"bed": "0.1 * x"}, "nodes.b.bed", "modes are known only over a flat bed"),
+        ({"bed": 1.0}, "nodes.b.level", "there is no water above the bed, at 1 m"),
         ({"attitude": {"roll": 0.6}}, "nodes.b.sloshing", "its bed is 34.4 deg off level at the start"),
         ({"manning": 0.02}, "nodes.b.manning", "modes have no friction"),
         ({"start": {"u": 0.1}}, "nodes.b.start.u", "modes start from level water at rest"),
@@ -279,7 +279,7 @@ def test_what_modes_do_not_know_is_named(change, place, said):
 
 
 def test_only_depth_is_read_of_water_in_modes():
-    with pytest.raises(CaseError, match='b is a basin, without "u"; it has depth'):
+    with pytest.raises(CaseError, match='b is a basin, which has no "u"; it has depth'):
         load(case_of(hull({"kind": "fixed"}), tank(), probes=["b.u@1,0.5"]))
 
 
@@ -292,5 +292,5 @@ def test_without_gravity_no_water_stands():
 
 
 def test_nothing_is_read_of_frozen_water():
-    with pytest.raises(CaseError, match='b is a basin, without "depth"; its water is one with its body'):
+    with pytest.raises(CaseError, match='b is a basin, which has no "depth"; its water is part of its body'):
         load(case_of(hull({"kind": "fixed"}), tank(sloshing="frozen"), probes=["b.depth@1,0.5"]))

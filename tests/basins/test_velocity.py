@@ -101,7 +101,7 @@ def test_flows_of_a_grid_go_east_and_north(cells):
 def test_flows_of_a_grid_want_a_full_rectangle(mixed):
     holed = rectangle((1.0, 1.0), (4, 4), holes=[(0.5, 0.5, 1.0, 1.0)])
     for mesh in (mixed, holed):
-        with pytest.raises(ValueError, match="no full rectangle"):
+        with pytest.raises(ValueError, match="not a full rectangle"):
             grid_flows(mesh, np.zeros(mesh.left.size))
 
 
@@ -128,13 +128,13 @@ def test_a_stream_function_from_a_file_leaves_no_divergence(tmp_path, mixed):
 @pytest.mark.parametrize(
     "velocity, words",
     [
-        ({"expression": "rotaton"}, 'no velocity; there are .*; did you mean "rotation"'),
-        ({"expression": "rotation", "centre": (0, 0)}, "wants angular_velocity as well"),
-        ({"expression": "shear", "rate": 1.0, "slope": 2.0}, "has no slope; it takes rate, u, y0"),
+        ({"expression": "rotaton"}, 'unknown velocity "rotaton"; expected .*; did you mean "rotation"'),
+        ({"expression": "rotation", "centre": (0, 0)}, "needs angular_velocity as well"),
+        ({"expression": "shear", "rate": 1.0, "slope": 2.0}, "has no parameter slope; expected rate, u, y0"),
         ({"expression": "swirl", "size": 0.0}, "not finite at"),
-        ({"stream": np.zeros(3)}, r"wanted a value for each of 20 corners"),
-        ({}, "velocity has nothing; wanted one of expression, file, stream"),
-        ({"file": "a.csv", "stream": np.zeros(20)}, "velocity has file, stream; wanted one"),
+        ({"stream": np.zeros(3)}, r"expected a value for each of 20 corners"),
+        ({}, "velocity has nothing; expected one of expression, file, stream"),
+        ({"file": "a.csv", "stream": np.zeros(20)}, "velocity has file, stream; expected one"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
@@ -147,12 +147,12 @@ def test_velocities_that_cannot_be_had_are_refused_with_what_is_wanted(velocity,
     "text, words",
     [
         (None, "No such file"),
-        ("", "is empty; wanted a header"),
-        ("x,y,u\n0,0,1\n", "line 1: its header is x, y, u; wanted x, y, u, v or x, y, psi"),
-        ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "b" is no number in column "psi"'),
-        ("x,y,psi\n0,0,1\n1,0,2\n", "2 points; wanted at least three"),
+        ("", "is empty; expected a header"),
+        ("x,y,u\n0,0,1\n", "line 1: its header is x, y, u; expected x, y, u, v or x, y, psi"),
+        ("x,y,psi\n0,0,1\n1,0,b\n", 'line 3: "b" is not a number in column "psi"'),
+        ("x,y,psi\n0,0,1\n1,0,2\n", "2 points; expected at least three"),
         ("x,y,psi\n0,0,1\n1,0,2\n2,0,3\n", "lie on one line"),
-        ("x,y,psi\n0,0,1\n1,0,2\n0,1,3\n", "do not reach around 9 of 20 places of the mesh, the first"),
+        ("x,y,psi\n0,0,1\n1,0,2\n0,1,3\n", "do not enclose 9 of 20 positions of the mesh, the first"),
     ],
 )
 def test_files_that_do_not_do_are_refused_with_the_line(tmp_path, text, words):
@@ -192,7 +192,7 @@ def carrying(velocity, mesh=None, **more) -> dict:
 @pytest.mark.parametrize("key", ["u", "level"])
 def test_what_is_carried_starts_from_no_flow_of_its_own(key):
     case = carrying({"stream": "sin(pi*x)*sin(pi*y)"}, size=[1.0, 1.0], cells=[4, 4], start={key: 1.0})
-    with pytest.raises(CaseError, match=f'start.{key}: means nothing to physics "transport"'):
+    with pytest.raises(CaseError, match=f'start.{key}: does not apply to physics "transport"'):
         fvsolve.load(case)
 
 
@@ -233,7 +233,7 @@ def test_a_slanted_channel_passes_its_ends_alone(velocity, tmp_path):
 
 def test_a_stream_that_passes_the_outline_by_little_is_still_refused():
     case = carrying({"stream": "0.1*sin(pi*x)*sin(pi*y) + 1e-9*x*y"}, size=[1.0, 1.0], cells=[8, 8])
-    with pytest.raises(CaseError, match="passes the outline at"):
+    with pytest.raises(CaseError, match="crosses the outline at"):
         fvsolve.build(fvsolve.load(case))
 
 

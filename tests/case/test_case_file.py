@@ -406,7 +406,7 @@ def test_a_parts_key_is_documented_with_its_unit():
         "from",
         "to",
     ]  # a length or a profile, a diameter or a nominal size, as it likes
-    assert pipe["properties"]["length"]["description"] == "along its axis [m]"
+    assert pipe["properties"]["length"]["description"] == "length along its axis [m]"
     assert made["required"] == ["fluid", "nodes", "numerics"]
 
 
@@ -439,7 +439,7 @@ def headings(page: str) -> dict[str, str]:
 def test_the_page_of_the_parts_names_every_kind_and_key_in_its_section():
     found = headings(folders.page("parts"))
     found["orifice"] += found["valve"]
-    found |= {name: text + found["valve"] for name, text in found.items() if "as of a [valve](#valve)" in text}
+    found |= {name: text + found["valve"] for name, text in found.items() if "see [valve](#valve)" in text}
     every = {"nodes": found["Every node"], "links": found["Every link"]}
     wanted = {kind: (model, every[group]) for group in KINDS for kind, model in KINDS[group].items()}
     wanted |= {"numerics": (Numerics, ""), "output": (Output, ""), "friction": (Friction, "")}
@@ -494,6 +494,6 @@ def test_reading_a_case_is_light():
 
 
 def test_load_takes_a_case_path_or_dict_alone():
-    with pytest.raises(CaseError, match="a int is no case"):
+    with pytest.raises(CaseError, match="a int is not a case"):
         load(3)
     assert isinstance(load(two_tanks()), Case)

@@ -55,7 +55,7 @@ def test_the_command_says_which_and_why(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(write(marked(expect={"final(gate.head)": WIDE})))
     status, text, _ = fvs("run", "scene.toml", "--no-pictures")
-    assert status == 1 and "OPEN, as results from" in text and "final(gate.head)" in text
+    assert status == 1 and "OPEN, because results from" in text and "final(gate.head)" in text
     said = json.loads((tmp_path / "runs" / "scene" / "summary.json").read_text())["expectations"]
     assert [(one["state"], one["ok"]) for one in said] == [("open", False)]
     assert fvs("report", "runs/scene")[0] == 0

@@ -157,26 +157,26 @@ BAD = {
         add("numerics", "zzz = 3"),
         "numerics.zzz: unknown key; keys are accuracy, below_vapor, ",
     ),
-    "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: wanted one of length, profile"),
+    "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: expected one of length, profile"),
     "unknown type": (
         swap('"valve"', '"vavle"'),
-        'line 33: links.valve.type: no type "vavle"; types are bushing, check-valve, cylinder, damper, ',
+        'line 33: links.valve.type: unknown type "vavle"; types are bushing, check-valve, cylinder, damper, ',
     ),
     "unknown type, nearest": (swap('"valve"', '"vavle"'), 'did you mean "valve"?'),
     "missing type": (
         swap('type = "junction"\n', ""),
-        "line 15: nodes.gate: type is missing; wanted one of accumulator, ",
+        "line 15: nodes.gate: type is missing; expected one of accumulator, ",
     ),
     "a link among nodes": (
         swap('"junction"', '"pipe"'),
-        'nodes.gate.type: no type "pipe"; types are accumulator, ',
+        'nodes.gate.type: unknown type "pipe"; types are accumulator, ',
     ),
     "a link among nodes, where": (swap('"junction"', '"pipe"'), "it belongs under [links]"),
-    "type that is no text": (swap('"junction"', "3"), "nodes.gate.type: no type 3"),
-    "bad name": (swap("[nodes.gate]", '[nodes."ga te"]'), 'nodes."ga te": "ga te" is no name'),
+    "type that is no text": (swap('"junction"', "3"), "nodes.gate.type: unknown type 3"),
+    "bad name": (swap("[nodes.gate]", '[nodes."ga te"]'), 'nodes."ga te": "ga te" is not a valid name'),
     "a part that is no table": (
         swap("[nodes.lake]", "[nodes]\nx = 3\n[nodes.lake]"),
-        "nodes.x: 3 is no table",
+        "nodes.x: 3 is not a table",
     ),
     "nodes that are no table": (
         "nodes = 3\n" + SCENE[SCENE.index("[fluid]") : SCENE.index("[nodes.lake]")],
@@ -184,16 +184,16 @@ BAD = {
     ),
     "unknown schema": (
         swap("schema = 1", "schema = 2"),
-        "line 1: schema: 2 is out of range; wanted a value between 1",
+        "line 1: schema: 2 is out of range; expected a value between 1",
     ),
-    "title that is no text": (swap('"A valve shuts"', "3"), "line 2: title: 3 is no text"),
+    "title that is no text": (swap('"A valve shuts"', "3"), "line 2: title: 3 is not text"),
     # the network
     "unknown place": (
         swap('from = "lake"', 'from = "lak"'),
         'line 24: links.main.from: no place named "lak"; places are',
     ),
     "a link as a place": (swap('to = "outfall"', 'to = "main"'), 'links.valve.to: "main" is a link'),
-    "place that is no text": (swap('from = "lake"', "from = 3"), "line 24: links.main.from: 3 is no text"),
+    "place that is no text": (swap('from = "lake"', "from = 3"), "line 24: links.main.from: 3 is not text"),
     "joined to itself": (
         swap('to = "gate"', 'to = "lake"'),
         'line 25: links.main.to: joins "lake" to itself',
@@ -202,18 +202,18 @@ BAD = {
         SCENE + '[nodes.x]\ntype = "tank"\narea = 1\nlevel = 1',
         "line 46: nodes.x: no link touches it",
     ),
-    "disconnected": (SCENE + ISLAND, "links: disconnected network of 2 pieces: gate, lake, outfall | c, d"),
+    "disconnected": (SCENE + ISLAND, "links: disconnected network of 2 parts: gate, lake, outfall | c, d"),
     "nothing fixes the pressure": (
         swap('"reservoir"\nhead = "45.72 m"', '"junction"').replace('"reservoir"\npressure = "0 barg"', '"junction"'),
-        "nodes: nothing fixes the pressure; wanted a reservoir, tank or chamber",
+        "nodes: nothing fixes the pressure; expected a reservoir, tank or chamber",
     ),
     "only rigid columns": (
         SCENE + RIGID,
-        "nodes.c: only rigid columns meet here, so nothing sets its pressure",
+        "nodes.c: only rigid columns join here, so nothing sets its pressure",
     ),
     "a demand above its pressure between rigid columns": (
         SCENE + RIGID.replace('type = "junction"', 'type = "junction"\ndemand = 0.1\nrequired_pressure = 3e5'),
-        "nothing sets its pressure, as above its required_pressure it takes the same at any",
+        "nothing sets its pressure, since its demand is constant above its required_pressure",
     ),
     # two of a kind
     "two step settings": (
@@ -226,7 +226,7 @@ BAD = {
     ),
     "neither pressure nor head": (
         swap('head = "45.72 m"\n', ""),
-        "line 11: nodes.lake: wanted one of pressure, head",
+        "line 11: nodes.lake: expected one of pressure, head",
     ),
     "two sizes of a valve": (
         add("links.valve", "diameter = 1"),
@@ -238,15 +238,15 @@ BAD = {
     ),
     "Kv with an area": (
         swap("discharge_coefficient = 0.6", "Kv = 1"),
-        "links.valve.area: Kv says it all; leave area out",
+        "links.valve.area: Kv already gives the size; leave area out",
     ),
     "no size": (
         swap('area = "0.001768 m2"\n', ""),
-        "links.valve: discharge_coefficient wants area or diameter",
+        "links.valve: discharge_coefficient needs area or diameter",
     ),
     "no size at all": (
         swap('area = "0.001768 m2"\ndischarge_coefficient = 0.6\n', ""),
-        "line 32: links.valve: no size; wanted area, diameter, Kv or Cv",
+        "line 32: links.valve: size is missing; expected area, diameter, Kv or Cv",
     ),
     "wall and wave speed": (
         add("links.main", 'wall = "stiff"'),
@@ -258,7 +258,7 @@ BAD = {
     ),
     "friction without number": (
         swap(', roughness = "0.26 mm"', ""),
-        "links.main.friction: wanted one of roughness, factor",
+        "links.main.friction: expected one of roughness, factor",
     ),
     "friction with a stray number": (
         swap('"steady", r', '"none", r'),
@@ -271,11 +271,11 @@ BAD = {
     # sizes
     "negative size": (
         swap('"914.4 m"', '"-914.4 m"'),
-        'links.main.length: "-914.4 m" is out of range; wanted a value above 0',
+        'links.main.length: "-914.4 m" is out of range; expected a value above 0',
     ),
     "zero size": (
         swap('"304.8 mm"', "0"),
-        "line 27: links.main.diameter: 0 is out of range; wanted a value above 0",
+        "line 27: links.main.diameter: 0 is out of range; expected a value above 0",
     ),
     "infinite size": (swap('"914.4 m"', "inf"), "links.main.length: inf is not finite; wanted a length"),
     "size not a number": (swap('"914.4 m"', "nan"), "links.main.length: nan is not finite; wanted a length"),
@@ -293,16 +293,16 @@ BAD = {
     ),
     "zero cells": (
         swap("cells = 200", "cells = 0"),
-        "links.main.cells: 0 is out of range; wanted a value between 1 and",
+        "links.main.cells: 0 is out of range; expected a value between 1 and",
     ),
-    "half a cell": (swap("cells = 200", "cells = 2.5"), "links.main.cells: 2.5 is no whole number"),
+    "half a cell": (swap("cells = 200", "cells = 2.5"), "links.main.cells: 2.5 is not a whole number"),
     "too many cells": (
         swap("cells = 200\n", "").replace("courant = 0.9", "cell_time = 1e-12"),
         "numerics.cell_time: would cut main into 7.5e+11 cells",
     ),
     "coefficient above 1": (
         swap("= 0.6", "= 1.6"),
-        "discharge_coefficient: 1.6 is out of range; wanted a value above 0, 1",
+        "discharge_coefficient: 1.6 is out of range; expected a value above 0, 1",
     ),
     "wall without thickness": (
         swap('wave_speed = "1219.2 m/s"', "wall = { youngs_modulus = 1e11 }"),
@@ -310,10 +310,10 @@ BAD = {
     ),
     "wall of a word": (
         swap('wave_speed = "1219.2 m/s"', 'wall = "soft"'),
-        'links.main.wall: "soft" is no wall; wanted "stiff"',
+        'links.main.wall: "soft" is not a wall; expected "stiff"',
     ),
     "gauge modulus": (swap('"2.2 GPa"', '"2.2 barg"'), 'fluid.bulk_modulus: "2.2 barg" is a gauge pressure'),
-    "position": (add("nodes.gate", "position = [1]"), "nodes.gate.position: [1] has 1 values; wanted 2"),
+    "position": (add("nodes.gate", "position = [1]"), "nodes.gate.position: [1] has 1 values; expected 2"),
     # pressures
     "vacuum": (
         swap('"0 barg"', '"0 bar"'),
@@ -345,7 +345,7 @@ BAD = {
         'ambient_pressure = "1 barg"\n' + SCENE,
         'line 1: ambient_pressure: "1 barg" is a gauge pressure',
     ),
-    "no ambient": ('ambient_pressure = "0 bar"\n' + SCENE, 'ambient_pressure: "0 bar" is absolute, a vacuum'),
+    "no ambient": ('ambient_pressure = "0 bar"\n' + SCENE, 'ambient_pressure: "0 bar" is absolute and not above 0'),
     "vacuum of the fluid": (
         add("fluid", 'pressure = "0 bar"'),
         'fluid.pressure: "0 bar" is absolute, a vacuum',
@@ -358,13 +358,13 @@ BAD = {
     # elevations
     "some elevations": (
         add("nodes.gate", "elevation = 3"),
-        "nodes.outfall: elevation is missing: gate state one, so all",
+        "nodes.outfall: elevation is missing, but stated for gate; expected for all",
     ),
     "too steep": (
         add("nodes.gate", "elevation = 1000")
         .replace('"0 barg"', '"0 barg"\nelevation = 0')
         .replace('head = "45.72 m"', 'head = "1100 m"\nelevation = 0'),
-        "links.main.length: 914.4 m is too short: its ends lie 1000 m apart in height",
+        "links.main.length: 914.4 m is too short: its ends differ by 1000 m in elevation",
     ),
     # tanks
     "tank without level": (tank("level = 1\n", ""), "nodes.t: level is missing"),
@@ -374,7 +374,7 @@ BAD = {
     ),
     "negative level": (
         tank("level = 1", "level = -1"),
-        "nodes.t.level: -1 is out of range; wanted a value of at least 0",
+        "nodes.t.level: -1 is out of range; expected a value of at least 0",
     ),
     "area table of unlike lengths": (
         tank("area = 1", "area = { level = [0, 1], area = [1] }"),
@@ -386,7 +386,7 @@ BAD = {
     ),
     "area table not from the bottom": (
         tank("area = 1", "area = { level = [1, 2], area = [1, 1] }"),
-        "nodes.t.area.level: levels count from the bottom",
+        "nodes.t.area.level: levels are measured from the bottom",
     ),
     "area zero": (
         tank("area = 1", "area = { level = [0, 1], area = [1, 0] }"),
@@ -403,19 +403,19 @@ BAD = {
     ),
     "unlike lengths": (
         opening("{ time = [0, 1], value = [1] }"),
-        "opening.value: 1 values for 2 times; wanted as many of both",
+        "opening.value: 1 values for 2 times; expected the same number",
     ),
     "opening above 1": (
         opening("{ time = [0, 1], value = [1, 2] }"),
-        "opening.value[1]: 2 is out of range; wanted a value between 0",
+        "opening.value[1]: 2 is out of range; expected a value between 0",
     ),
     "constant opening below 0": (
         opening("-0.1"),
-        "links.valve.opening: -0.1 is out of range; wanted a value between 0 and 1",
+        "links.valve.opening: -0.1 is out of range; expected a value between 0 and 1",
     ),
     "empty schedule": (
         opening("{ time = [], value = [] }"),
-        "opening.time: [] is no list; wanted a list of values",
+        "opening.time: [] is not a list; expected a list of values",
     ),
     "schedule kind": (
         opening('{ time = [0, 1], value = [1, 0], kind = "cubic" }'),
@@ -442,11 +442,11 @@ BAD = {
     "signal with more keys": (opening('{ signal = "x", time = [1] }'), "opening.time: unknown key"),
     "a signal at fault": (
         opening('{ signal = "x" }') + "[signals.x]\ntime = [0, 1]\nvalue = [2, 3]\n",
-        "line 48: signals.x.value[0]: 2 is out of range; wanted a value between 0 and 1",
+        "line 48: signals.x.value[0]: 2 is out of range; expected a value between 0 and 1",
     ),
     "a signal of a signal": (
         opening('{ signal = "x" }') + '[signals.x]\nsignal = "x"\n',
-        'signal "x" names another signal',
+        'signal "x" refers to another signal',
     ),
     "an unused signal at fault": (SCENE + "[signals.x]\ntime = [1]\n", "signals.x: value is missing"),
     "schedule file missing": (
@@ -460,15 +460,15 @@ BAD = {
     "schedule file is a folder": (opening('{ file = "." }'), 'opening.file: ".": is a directory'),
     "schedule file without header": (
         opening('{ file = "bare.csv" }'),
-        "bare.csv has no header; wanted one such as",
+        "bare.csv has no header; expected for example",
     ),
     "schedule file empty": (
         opening('{ file = "empty.csv" }'),
-        "empty.csv is empty; wanted a header and rows of numbers",
+        "empty.csv is empty; expected a header and rows of numbers",
     ),
     "schedule file, one column": (
         opening('{ file = "one.csv" }'),
-        "one.csv has one column; wanted a time and a value",
+        "one.csv has one column; expected a time and a value",
     ),
     "schedule file, no such column": (
         opening('{ file = "good.csv", value = "opening" }'),
@@ -480,7 +480,7 @@ BAD = {
     ),
     "schedule file, no number": (
         opening('{ file = "text.csv" }'),
-        'text.csv, line 3: "shut" is no number in column "s"',
+        'text.csv, line 3: "shut" is not a number in column "s"',
     ),
     "schedule file, out of order": (
         opening('{ file = "back.csv" }'),
@@ -499,7 +499,7 @@ BAD = {
     ),
     "characteristic that ends early": (
         add("links.valve", "characteristic = { opening = [0, 0.9], flow_area = [0, 1] }"),
-        "characteristic.opening: openings must lead from 0 to 1",
+        "characteristic.opening: openings must begin at 0 and end at 1",
     ),
     # numerics
     "no end": (swap('end = "10 s"\n', ""), "line 40: numerics: end is missing"),
@@ -520,14 +520,14 @@ BAD = {
     ),
     "negative step": (
         swap("courant = 0.9", "step = -1"),
-        "numerics.step: -1 is out of range; wanted a value above 0",
+        "numerics.step: -1 is out of range; expected a value above 0",
     ),
     "Courant number without cells": (
         swap('type = "pipe"', 'type = "rigid-column"')
         .replace('wave_speed = "1219.2 m/s"\n', "")
         .replace("cells = 200", "")
         .replace('"junction"', '"chamber"\nvolume = 1'),
-        "numerics.courant: no pipe, so no cell to cross; give step or rtol",
+        "numerics.courant: needs cells, and the case has no pipe or basin; give step or rtol",
     ),
     # output
     "probe of nothing": (
@@ -540,36 +540,36 @@ BAD = {
     ),
     "probe of no quantity": (
         swap("gate.pressure", "gate.presure"),
-        'gate is a junction, without "presure"; it has pressure, gauge_pressure, head; did you mean "pressure"?',
+        'gate is a junction, which has no "presure"; it has pressure, gauge_pressure, head; did you mean "pressure"?',
     ),
     "probe of a level that is not there": (
         swap("gate.pressure", "lake.level"),
-        'lake is a reservoir, without "level"',
+        'lake is a reservoir, which has no "level"',
     ),
     "probe without a place": (
         swap("gate.pressure", "main.head"),
-        'main is a pipe: say where, for example "main.head@0.5"',
+        'main is a pipe, and this probe needs a place, for example "main.head@0.5"',
     ),
     "probe beyond the pipe": (
         swap("gate.pressure", "main.head@1.5"),
-        '"@1.5" is no fraction of the length; wanted 0 to 1',
+        '"@1.5" is not a fraction of the length; expected 0 to 1',
     ),
     "probe at no number": (
         swap("gate.pressure", "main.head@half"),
-        '"@half" is no fraction of the length; wanted 0 to 1',
+        '"@half" is not a fraction of the length; expected 0 to 1',
     ),
     "probe along a node": (
         swap("gate.pressure", "gate.head@0.5"),
-        "gate is a junction: head has no place along it; leave @0.5 out",
+        "gate is a junction, and head has no place along it; leave @0.5 out",
     ),
     "probe that is none": (
         swap("gate.pressure", "gate"),
-        'output.probes[0]: "gate" is no probe; wanted NAME.QUANTITY',
+        'output.probes[0]: "gate" is not a probe; expected NAME.QUANTITY',
     ),
-    "probe that is a number": (swap('"gate.pressure"', "3"), "output.probes[0]: 3 is no probe"),
+    "probe that is a number": (swap('"gate.pressure"', "3"), "output.probes[0]: 3 is not a probe"),
     "probes that are no list": (
         swap('["gate.pressure"]', '"gate.pressure"'),
-        'output.probes: "gate.pressure" is no list',
+        'output.probes: "gate.pressure" is not a list',
     ),
     "output unit": (
         add("output", 'units = { pressure = "l/s" }'),
@@ -583,7 +583,7 @@ BAD = {
     # expect
     "claim": (
         SCENE + '[expect]\n"mx(gate.pressure)" = { value = 1 }',
-        'expect."mx(gate.pressure)": no such claim; wanted max',
+        'expect."mx(gate.pressure)": is not a claim; expected max',
     ),
     "claim of nothing": (
         SCENE + '[expect]\n"max(gat.pressure)" = { value = 1, rtol = 1 }',
@@ -592,7 +592,7 @@ BAD = {
     "claim without value": (SCENE + '[expect]\n"max(gate.head)" = { rtol = 1 }', "value is missing"),
     "claim without tolerance": (
         SCENE + '[expect]\n"max(gate.head)" = { value = 1 }',
-        "no tolerance; wanted rtol, atol",
+        "tolerance is missing; expected rtol, atol",
     ),
     "claim in a wrong unit": (
         SCENE + '[expect]\n"max(gate.head)" = { value = "1 bar", rtol = 1 }',
@@ -600,11 +600,11 @@ BAD = {
     ),
     "claim without time": (
         SCENE + '[expect]\n"at(gate.head)" = { value = 1, rtol = 1 }',
-        "wanted at(PROBE, TIME)",
+        "expected at(PROBE, TIME)",
     ),
     "claim with a time": (
         SCENE + '[expect]\n"max(gate.head, 3)" = { value = 1, rtol = 1 }',
-        "wanted max(PROBE)",
+        "expected max(PROBE)",
     ),
     "claim at no time": (
         SCENE + '[expect]\n"at(gate.head, 3 m)" = { value = 1, rtol = 1 }',
@@ -634,15 +634,15 @@ BAD = {
     # what was meant
     "a closing time": (
         swap("discharge_coefficient = 0.6", "closing_time = 3"),
-        'links.valve.closing_time: unknown key; say opening = { start = "1 s", duration = "2 s", value = [1, 0] }',
+        'links.valve.closing_time: unknown key; use opening = { start = "1 s", duration = "2 s", value = [1, 0] }',
     ),
     "a roughness beside its friction": (
         swap("cells = 200", "roughness = 3e-4"),
-        'links.main.roughness: unknown key; say friction = { model = "quasi-steady", roughness = ',
+        'links.main.roughness: unknown key; use friction = { model = "quasi-steady", roughness = ',
     ),
     "friction after Colebrook": (
         swap('"steady"', '"Colebrook"'),
-        'friction.model: no friction model named "Colebrook"; say "quasi-steady" or "steady" with a roughness',
+        'friction.model: no friction model named "Colebrook"; use "quasi-steady" or "steady" with a roughness',
     ),
     "friction of one key": (
         swap('"steady", roughness = "0.26 mm"', '"hazen-williams"'),
@@ -654,23 +654,29 @@ BAD = {
     ),
     "a fluid that is a text": (
         re.sub(r"\[fluid\](\n.+)*\n", "", SCENE).replace("schema = 1", 'schema = 1\nfluid = "oil"'),
-        'line 2: fluid: "oil" is no table; wanted [fluid] with name = "ISO VG 46"',
+        'line 2: fluid: "oil" is not a table; expected [fluid] with name = "ISO VG 46"',
     ),
     "water at 20 K": (
         swap('name = "user"', 'name = "Water"\ntemperature = 20'),
         'outside the range of Water, 0.01 degC to 1726.85 degC; a bare number is in K, did you mean "20 degC"?',
     ),
-    "a hose": (swap('type = "pipe"', 'type = "hose"'), 'links.main.type: no type "hose"; say a "pipe" with'),
-    "a filter": (swap('type = "valve"', 'type = "Filter"'), 'links.valve.type: no type "Filter"; say an "orifice"'),
+    "a hose": (swap('type = "pipe"', 'type = "hose"'), 'links.main.type: unknown type "hose"; use a "pipe" with'),
+    "a filter": (
+        swap('type = "valve"', 'type = "Filter"'),
+        'links.valve.type: unknown type "Filter"; use an "orifice"',
+    ),
     "a bare name with an umlaut": (
         swap("[links.valve]", "[links.düse]"),
-        'line 32: TOML: a name with letters beyond a to z wants quotes: "düse"',
+        'line 32: TOML: a name with letters beyond a to z needs quotes: "düse"',
     ),
     "a bare name with a blank": (
         swap("[links.valve]", "[links.main valve]"),
-        "line 32: TOML: a bare name has no blank; write main_valve",
+        "line 32: TOML: an unquoted name has no blank; write main_valve",
     ),
-    "a bare key with a blank": (swap("cells = 200", "wave speed = 3"), "a bare name has no blank; write wave_speed"),
+    "a bare key with a blank": (
+        swap("cells = 200", "wave speed = 3"),
+        "an unquoted name has no blank; write wave_speed",
+    ),
     # TOML
     "syntax": (swap("end = ", "end "), "line 41: TOML: expected '=' after a key in a key/value pair: "),
     "a key twice": (add("links.main", "cells = 3"), 'TOML: this key is given twice: "cells = 200"'),
@@ -733,8 +739,8 @@ SET = {
     "no such node": ({"nodes.x.head": 4}, '--set nodes.x.head: no node named "x"'),
     "no such key": ({"links.main.cell": 4}, '--set links.main.cell: unknown key; did you mean "cells"?'),
     "no such table": ({"numeric.end": 4}, '--set numeric: unknown key; did you mean "numerics"?'),
-    "below a value": ({"title.x": 4}, '--set title.x: "title" is no table but "A valve shuts"'),
-    "no fit": ({"links.main.cells": "many"}, '--set links.main.cells: "many" is no whole number'),
+    "below a value": ({"title.x": 4}, '--set title.x: "title" is "A valve shuts", not a table'),
+    "no fit": ({"links.main.cells": "many"}, '--set links.main.cells: "many" is not a whole number'),
     "two steps": (
         {"numerics.step": 1, "numerics.rtol": 1},
         "--set numerics.rtol: step and rtol are given; keep one",
@@ -852,7 +858,7 @@ def test_no_file_a_folder_and_noise(tmp_path):
     for path, message in (
         (tmp_path / "scen.toml", 'there is no such file; did you mean "scene.toml"?'),
         (tmp_path / "no" / "scene.toml", "there is no such file"),
-        (tmp_path, "is a directory; wanted a TOML file"),
+        (tmp_path, "is a directory; expected a TOML file"),
         ("a\0b", "cannot be read"),
     ):
         with pytest.raises(CaseError, match=re.escape(message)):

@@ -193,7 +193,7 @@ def test_where_numbers_are_not_to_be_trusted_no_limit_holds(fvs, tmp_path, monke
     status, text, _ = fvs("run", "scene.toml", "--no-pictures")
     assert status == 1 and text.count("pressure falls below vapour pressure") == 1
     assert "high, gate, low and 1 more: pressure falls" in text
-    assert "OPEN, as results from" in text and "on are not to be trusted: top: " in text and "FAILS: low: " in text
+    assert "OPEN, because results from" in text and "on are not to be trusted: top: " in text and "FAILS: low: " in text
     found = fvsolve.open_run("runs/scene")
     assert found.ok and [one.ok for one in found.verdicts] == [False, False] and found.verdicts[0].margin > 0.0
 
@@ -206,14 +206,17 @@ def test_what_goes_on_after_the_end_is_noted_and_nothing_is_sized_by_it(fvs, tmp
     (tmp_path / "scene.toml").write_text(fvsolve.load(case).resolved())
     late = {"nodes.gate.demand.duration": 30.0}
     (note,) = [one for one in fvsolve.run(case, set=late).warnings if one.kind == "end"]
-    assert note.text == "nodes.gate.demand: goes on to 30.1 s, after the end of the run at 4 s"
+    assert note.text == "nodes.gate.demand: continues to 30.1 s, after the end of the run at 4 s"
     assert not fvsolve.run(case, set=late).verdicts[0].ok and fvsolve.run(case, set=late).verdicts[0].margin > 0.0
     status, text, _ = fvs("run", "scene.toml", "--no-pictures", "--set", "nodes.gate.demand.duration=30")
-    assert status == 1 and "OPEN, as nodes.gate.demand: goes on to 30.1 s, after the end of the run at 4 s: top" in text
+    assert (
+        status == 1
+        and "OPEN, because nodes.gate.demand: continues to 30.1 s, after the end of the run at 4 s: " in text
+    )
     held = {"nodes.gate.demand": {"time": [0.0, 30.0], "value": [flow, flow]}}  # goes on, but changes nothing
     assert [one for one in fvsolve.run(case, set=held).warnings if one.kind == "end"] == []
     status, text, _ = fvs("size", "scene.toml", "--vary", "nodes.gate.demand.duration=0.1 s,30 s", "--goal", "least")
-    assert status == 0 and "open: nodes.gate.demand: goes on to 30.1 s" in text
+    assert status == 0 and "open: nodes.gate.demand: continues to 30.1 s" in text
     value = float(text.split("holds all limits: ")[1].split(" s;")[0])
     assert 1.0 < value < 4.0 - SHUT and "open" in text
 
@@ -248,18 +251,18 @@ def test_expect_reaches_whole_pipes_and_routes() -> None:
     ("limit", "place", "told"),
     [
         ({"on": "hihg", "greatest": 1e6}, "on", 'did you mean "high"'),
-        ({"on": "high"}, "", "nothing is limited; wanted one of least, greatest, share_of_class"),
+        ({"on": "high"}, "", "bound is missing; expected one of least, greatest, share_of_class"),
         ({"greatest": 1e6}, "", "on is missing"),
         ({"on": "high", "greatest": "3 m/s"}, "greatest", "is a velocity; wanted a pressure"),
-        ({"on": "high", "quantity": "gas_volume", "greatest": 1.0}, "quantity", "high without"),
+        ({"on": "high", "quantity": "gas_volume", "greatest": 1.0}, "quantity", "high has no"),
         ({"on": "high", "least": 2e6, "greatest": 1e6}, "least", "is not below greatest"),
-        ({"on": "high", "quantity": "velocity", "least": "vacuum"}, "least", "is a pressure; wanted a velocity"),
+        ({"on": "high", "quantity": "velocity", "least": "vacuum"}, "least", "is a pressure; expected a velocity"),
         ({"on": "high", "least": "vaccum"}, "least", 'did you mean "vacuum"'),
-        ({"on": "high", "share_of_class": 1.0}, "share_of_class", "without a class"),
-        ({"on": [], "greatest": 1e6}, "on", "names nothing"),
+        ({"on": "high", "share_of_class": 1.0}, "share_of_class", "has no pressure class"),
+        ({"on": [], "greatest": 1e6}, "on", "is not a name"),
         ({"on": "nodes", "quantity": "level", "greatest": 2.0}, "quantity", "no node has"),
         ({"on": "high", "top": 2.0, "greatest": 1e6}, "top", "unknown key"),
-        (3.0, "", "is no table"),
+        (3.0, "", "is not a table"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named(limit, place: str, told: str) -> None:
@@ -282,7 +285,9 @@ def test_a_fluid_that_does_not_boil_limits_nothing_at_its_vapour() -> None:
 def test_where_nothing_weighs_there_is_no_head() -> None:
     weightless = shut(limits={"deep": DEEP}) | {"gravity": 0.0}
     weightless["nodes"]["lake"] = reservoir(1.1e6, elevation=0.0)
-    with pytest.raises(fvsolve.CaseError, match="limits.deep.quantity: nothing weighs where gravity is 0"):
+    with pytest.raises(
+        fvsolve.CaseError, match="limits.deep.quantity: pressure_head does not exist where gravity is 0"
+    ):
         fvsolve.load(weightless)
 
 
@@ -290,11 +295,14 @@ def test_where_nothing_weighs_there_is_no_head() -> None:
     ("route", "told"),
     [
         ({"pipes": ["low", "hihg"]}, 'did you mean "high"'),
-        ({"pipes": ["low", "low"]}, "stands twice"),
-        ({"pipes": []}, "is no list"),
-        ({"pipes": ["low", "far"]}, "far does not follow: low joins lake and middle and far joins gate and end"),
+        ({"pipes": ["low", "low"]}, "is given twice"),
+        ({"pipes": []}, "is not a list"),
+        (
+            {"pipes": ["low", "far"]},
+            "far does not join the previous pipe: low joins lake and middle and far joins gate and end",
+        ),
         ({"pipes": ["low"], "start": "3 s"}, "is a time; wanted a length"),
-        ({"pipes": ["tap"]}, '"tap" is no pipe but a valve'),
+        ({"pipes": ["tap"]}, '"tap" is a valve, not a pipe'),
     ],
 )
 def test_routes_that_do_not_hang_together_are_named(route: dict, told: str) -> None:

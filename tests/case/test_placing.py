@@ -191,15 +191,15 @@ def test_probes_count_along_the_whole_pipe() -> None:
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (("half", "at", "900 m"), "links.half.at: \"900 m\" is not within: main runs from 1000 m to 4000 m"),
-        (("half", "at", 1000), "links.half.at: 1000 is its end, which is lake"),
-        (("half", "at", 4000), "links.half.at: 4000 is its end, which is gate"),
+        (("half", "at", "900 m"), "links.half.at: \"900 m\" is outside: main runs from 1000 m to 4000 m"),
+        (("half", "at", 1000), "links.half.at: 1000 is the end of main, place lake"),
+        (("half", "at", 4000), "links.half.at: 4000 is the end of main, place gate"),
         (("half", "at", "3 kg"), "is a mass; wanted a length"),
         (("half", "on", "mian"), 'links.half.on: no pipe named "mian"; did you mean "main"?'),
-        (("half", "on", None), "links.half: at says 1500.0; on is missing"),
-        (("half", "at", None), "links.half: at is missing, where along main it stands"),
-        (("half", "from", "lake"), "links.half.from: it is on a pipe, which is where it starts from"),
-        (("hole", "at", 1500.0), "links.half.at: hole stands there; join it to that, or place it elsewhere"),
+        (("half", "on", None), "links.half: at is 1500.0, but on is missing"),
+        (("half", "at", None), "links.half: at is missing; expected the chainage along main"),
+        (("half", "from", "lake"), "links.half.from: on and at place it on a pipe, so it starts there"),
+        (("hole", "at", 1500.0), "links.half.at: hole has the same place; join the part to it, or change at"),
         (("main", "diameter", -1.0), "links.main.diameter: -1.0 is out of range"),
         (("main", "friction", {"model": "steady"}), "links.main.friction"),
     ],
@@ -237,10 +237,13 @@ def test_what_lies_in_the_middle_of_a_cell_goes_to_the_same_face_from_either_end
     [
         (lambda case: case["links"].update({"main-2": valve("gate", "sea", 1e-4)}), "main-2"),
         (lambda case: case["nodes"].update({"hole-at": junction(elevation=20.0)}), "hole joins main at a place"),
-        (lambda case: case.update(routes={"main": {"pipes": ["main"]}}), "main is cut, and so a route by itself"),
-        (lambda case: case["links"]["main"].update(pieces={"main-9": {"cells": 3}}), "no piece of main has that name"),
-        (lambda case: case["links"]["main"].update(pieces=3), "3 is no table of tables"),
-        (lambda case: case["links"]["hole"].update(type="laek"), 'no type "laek"'),
+        (
+            lambda case: case.update(routes={"main": {"pipes": ["main"]}}),
+            "main is cut, and its pieces form a route of that name",
+        ),
+        (lambda case: case["links"]["main"].update(pieces={"main-9": {"cells": 3}}), "main has no piece of that name"),
+        (lambda case: case["links"]["main"].update(pieces=3), "3 is not a table; expected tables"),
+        (lambda case: case["links"]["hole"].update(type="laek"), 'unknown type "laek"'),
     ],
 )  # fmt: skip
 def test_names_are_given_once_and_pieces_are_there(change, told: str) -> None:
@@ -253,8 +256,8 @@ def test_names_are_given_once_and_pieces_are_there(change, told: str) -> None:
 
 def test_what_cannot_stand_in_a_pipe_is_named() -> None:
     case = line({"m": {"type": "mass", "mass": 1.0, "on": "main", "at": 2000.0}}, {"main": main()})
-    with pytest.raises(fvsolve.CaseError, match="a mass does not stand in a pipe"):
+    with pytest.raises(fvsolve.CaseError, match="a mass cannot be placed on a pipe"):
         fvsolve.load(case)
     case = line({}, {"main": main(), "second": main() | {"on": "main", "at": 2000.0}})
-    with pytest.raises(fvsolve.CaseError, match="a pipe has length"):
+    with pytest.raises(fvsolve.CaseError, match="a pipe has a length"):
         fvsolve.load(case)

@@ -29,7 +29,7 @@ EXAMPLES = {  # what the docs print of cases
 SLIPS = {  # settings -> (place, key, value, limit, what the text says)
     "per cent of a class": (
         {"links.main.allowable_pressure": 1e6, "limits.top": {"on": "main", "share_of_class": 100}},
-        "limits.top", "share_of_class", 100.0, 3.0, "a share of 1 is all of it",
+        "limits.top", "share_of_class", 100.0, 3.0, "1 is the class itself",
     ),
     "diameter in mm": ({"links.main.diameter": 304.8}, "links.main", "diameter", 304.8, 14.0, '"304.8 mm"'),
     "diameter with its unit": ({"links.main.diameter": "300 m"}, "links.main", "diameter", 300.0, 14.0, '"300 mm"'),
@@ -76,11 +76,11 @@ SLIPS = {  # settings -> (place, key, value, limit, what the text says)
     ),
     "Hazen-Williams": (
         {"links.main.friction": {"model": "hazen-williams", "coefficient": 0.012}},
-        "links.main", "friction.coefficient", 0.012, 40.0, 'model = "chezy-manning" meant?',
+        "links.main", "friction.coefficient", 0.012, 40.0, 'did you mean model = "chezy-manning"?',
     ),
     "Manning": (
         {"links.main.friction": {"model": "chezy-manning", "coefficient": 130}},
-        "links.main", "friction.coefficient", 130.0, 0.06, 'model = "hazen-williams" meant?',
+        "links.main", "friction.coefficient", 130.0, 0.06, 'did you mean model = "hazen-williams"?',
     ),
     "viscosity": ({"fluid.viscosity": 32}, "fluid", "viscosity", 32.0, 5.0, '"32 mPa s" or "32 cSt"'),
     "density": ({"fluid.density": 0.998}, "fluid", "density", 0.998, 60.0, '"0.998 g/cm3"'),

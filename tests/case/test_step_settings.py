@@ -35,19 +35,25 @@ FAULTS = {
         'method "gauss-4" estimates no error; use ',
     ),
     "no estimate by default": (cellless(method="gauss-4"), 'numerics.method: method "gauss-4" estimates no error; use'),
-    "rtol below rounding": (piped(method="radau-iia-5", rtol=1e-14), "numerics.rtol: 1e-14 is below rounding; wanted"),
+    "rtol below rounding": (
+        piped(method="radau-iia-5", rtol=1e-14),
+        "numerics.rtol: 1e-14 is below rounding; expected",
+    ),
     "rtol of no kind": (piped(method="radau-iia-5", rtol="small"), "numerics.rtol"),
-    "step that moves nothing": (piped(method="gauss-4", step=1e-17), "numerics.step: 1e-17 s would not move the time"),
+    "step that moves nothing": (
+        piped(method="gauss-4", step=1e-17),
+        "numerics.step: 1e-17 s is below the rounding of the time",
+    ),
     "step of no time": (piped(method="gauss-4", step="1 m"), "numerics.step"),
     "step of zero": (piped(method="gauss-4", step=0.0), "numerics.step"),
     "courant of zero": (piped(method="gauss-4", courant=0.0), "numerics.courant"),
     "courant of text": (piped(method="gauss-4", courant="fast"), "numerics.courant"),
     "courant without cells": (
         cellless(method="gauss-4", courant=20.0),
-        "no pipe, so no cell to cross",
+        "needs cells, and the case has no pipe or basin",
     ),
-    "auto by courant": (piped(method="auto", courant=0.9), 'method "auto" goes by the error of its steps; give rtol'),
-    "auto by step": (piped(method="auto", step=1e-3), 'method "auto" goes by the error of its steps; give rtol'),
+    "auto by courant": (piped(method="auto", courant=0.9), 'method "auto" controls the error of its steps; give rtol'),
+    "auto by step": (piped(method="auto", step=1e-3), 'method "auto" controls the error of its steps; give rtol'),
     "two settings": (piped(method="radau-iia-5", rtol=1e-6, courant=2.0), "courant and rtol are given; keep one"),
     "no such algebra": (piped(method="gauss-4", linear_algebra="bandid"), 'did you mean "banded"?'),
 }
@@ -71,20 +77,23 @@ def test_who_asks_for_error_control_is_told_who_can():
 
 INTEGRATE = {
     "misspelt": (dict(method="radau-iia5"), 'no method named "radau-iia5"; did you mean "radau-iia-5"'),
-    "below rounding": (dict(method="radau-iia-5", rtol=1e-14), "rtol = 1e-14 is below rounding; wanted 1e-13 or more"),
+    "below rounding": (
+        dict(method="radau-iia-5", rtol=1e-14),
+        "rtol = 1e-14 is below rounding errors. Expected 1e-13 or more",
+    ),
     "moves nothing": (
         dict(method="gauss-4", step=1e-17),
-        "step = 1e-17 would not move the time; wanted more",
+        "step = 1e-17 is too small to change the time. Expected more",
     ),
     "neither": (dict(method="gauss-4"), "gauss-4 has no error estimate; give step, or one of"),
     "rtol without an estimate": (dict(method="gauss-4", rtol=1e-6), "gauss-4 has no error estimate"),
-    "both": (dict(method="radau-iia-5", rtol=1e-6, step=0.1), "rtol and step both set the step; keep one"),
+    "both": (dict(method="radau-iia-5", rtol=1e-6, step=0.1), "rtol and step both set the step; give only one"),
     "negative": (dict(method="radau-iia-5", rtol=-1e-6), "rtol = -1e-06 is not a positive number"),
     "infinite": (dict(method="radau-iia-5", step=float("inf")), "step = inf is not a positive number"),
     "text": (dict(rtol="1e-6"), "rtol = '1e-6' is not a positive number"),
-    "auto by steps": (dict(method="auto", step=0.1), 'method "auto" goes by the error of its steps'),
-    "negative atol": (dict(atol=-1.0), "atol must be a positive number, or 1 of them"),
-    "atol of another length": (dict(atol=[1e-6, 1e-6]), "atol must be a positive number, or 1 of them"),
+    "auto by steps": (dict(method="auto", step=0.1), 'method "auto" uses error control; give rtol'),
+    "negative atol": (dict(atol=-1.0), "atol is not valid. Expected a positive number, or 1 of them"),
+    "atol of another length": (dict(atol=[1e-6, 1e-6]), "atol is not valid. Expected a positive number, or 1 of them"),
 }
 
 

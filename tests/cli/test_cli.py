@@ -115,18 +115,18 @@ def test_set_overrides_any_key(case, fvs):
 
 def test_set_without_a_value_says_what_was_wanted(case, fvs):
     code, out, err = fvs("run", case, "--set", "links.main.cells")
-    assert code == 2 and out == "" and "wanted KEY=VALUE" in err
+    assert code == 2 and out == "" and "expected KEY=VALUE" in err
 
 
 def test_all_bad_settings_are_said_at_once(case, fvs):
     settings = ["nope", "links.mian.cells=4", "=3", "numeric.end=4", "links.main.cells=many"]
     code, out, err = fvs("check", case, *(f"--set={one}" for one in settings))
     assert code == 2 and out == "" and "shut.toml: 5 faults" in err
-    assert err.count("wanted KEY=VALUE") == 2
+    assert err.count("expected KEY=VALUE") == 2
     for key in ("--set nope", "--set =3", "--set links.mian.cells", "--set numeric", "--set links.main.cells"):
         assert f"  {key}: " in err
     code, _, err = fvs("check", case, "--set", "nope")
-    assert code == 2 and "shut.toml: 1 fault\n  --set nope: wanted KEY=VALUE" in err
+    assert code == 2 and "shut.toml: 1 fault\n  --set nope: expected KEY=VALUE" in err
 
 
 def test_a_case_that_cannot_start_says_where(case, fvs):

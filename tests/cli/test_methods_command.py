@@ -72,7 +72,7 @@ def test_a_name_that_no_method_has(said, tmp_path):
 
 def test_a_picture_of_all_methods_is_refused(said):
     code, _, err = said("methods", "--out", "all.png")
-    assert code == 2 and "give its NAME" in err
+    assert code == 2 and "Add the NAME" in err
 
 
 def test_a_picture_of_a_kind_that_nobody_can_draw_is_refused(said):

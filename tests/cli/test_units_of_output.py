@@ -55,7 +55,7 @@ TOLD = [  # command, a number and its unit as both print them, and how many of t
     ("response", r"over pressure \[(?P<unit>.*?)\]; (?P<number>10) states", "m3/s/Pa", "l/s/bar", 1.0),
     ("size", r"links.valve.area \[(?P<unit>.*?)\].*?\n +(?P<number>\S+)", "m2", "m2", 1.0),
     ("sweep", r"links.main.length \[(?P<unit>.*?)\].*?\n +(?P<number>\S+)", "m", "m", 1.0),
-    ("check", r"links.valve.opening: goes on to (?P<number>\S+) (?P<unit>\w+),", "s", "ms", 1e3),
+    ("check", r"links.valve.opening: continues to (?P<number>\S+) (?P<unit>\w+),", "s", "ms", 1e3),
     ("check", r"step at the start (?P<number>\S+) (?P<unit>\w+),", "s", "ms", 1e3),
 ]
 

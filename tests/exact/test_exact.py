@@ -326,16 +326,16 @@ MISFITS = [
     ("rays", changed(PULSE, "main", {"minor_loss": 1.5}), "links.main.minor_loss"),
     ("rays", {**PULSE, "fluid": {**scenes.WATER, "law": "log"}}, "fluid.law"),
     ("rays", column(None, 1e4, 0.0, True), "rigid-column"),
-    ("levelling", PULSE, "knows no pipe"),
+    ("levelling", PULSE, "does not support a pipe"),
     ("levelling", "cases/chamber-chain.toml", "exactly one"),
     ("column", column(None, 1e4, 0.0, True) | {"nodes": {
         **column(None, 1e4, 0.0, True)["nodes"], "gate": scenes.junction(1e-3)}}, "no demand"),
     ("levelling", {**scenes.scene({"a": scenes.tank(2.0, 3.0), "b": scenes.tank(5.0, 0.1, height=0.9)},
-                                  {"hole": scenes.valve("a", "b", 0.1)}, 900.0, {"rtol": 1e-6})}, "spills"),
+                                  {"hole": scenes.valve("a", "b", 0.1)}, 900.0, {"rtol": 1e-6})}, "overflows"),
     ("levelling", {**scenes.scene({"a": scenes.tank(2.0, 1.0), "b": scenes.lake(-3.0)},
                                   {"hole": scenes.valve("a", "b", 0.1)}, 900.0, {"rtol": 1e-6})}, "runs dry"),
-    ("oscillation", column(None, 1e4, 0.02, False), "wants a tank"),
-    ("spring-mass", "cases/cylinder-servo.toml", "knows no"),
+    ("oscillation", column(None, 1e4, 0.02, False), "needs a tank"),
+    ("spring-mass", "cases/cylinder-servo.toml", "does not support"),
 ]  # fmt: skip
 
 

@@ -276,7 +276,7 @@ def test_a_run_can_be_told_to_stop_where_a_cavity_opens():
 
 
 def test_schemes_that_reach_over_the_edge_of_a_cavity_are_refused():
-    with pytest.raises(CaseError, match='"weno5" does not follow cavities in pipes; wanted "upwind" or "muscl"'):
+    with pytest.raises(CaseError, match='"weno5" does not follow cavities in pipes; expected "upwind" or "muscl"'):
         fvsolve.load(network(scheme="weno5"))
 
 

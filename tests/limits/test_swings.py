@@ -78,4 +78,4 @@ def test_a_body_that_swings_is_one_and_check_says_so_too(tmp_path, fvs):
     assert one.place.startswith("arm.") and late == pytest.approx(one.value, rel=5e-3)
     (tmp_path / "arm.toml").write_text(write(case))
     code, said, _ = fvs("check", tmp_path / "arm.toml")
-    assert code == 0 and "a swing at 0.59" in said
+    assert code == 0 and "an oscillation at 0.59" in said

@@ -119,7 +119,7 @@ def test_order_of_points_cells_and_corners_does_not_matter(tmp_path):
     turned = [np.roll(place[cells[c]], rng.integers(4))[:: rng.choice([1, -1])] for c in rng.permutation(len(cells))]
     other = read(write(tmp_path / "c.msh", moved, turned, {"west": place[west][::-1, ::-1]}))
     assert sets(one) == sets(other) and one.patches == other.patches
-    assert any("ran clockwise: turned" in note for note in other.notes) and len(west) == 5
+    assert any("were clockwise: reversed" in note for note in other.notes) and len(west) == 5
 
 
 def test_quality_of_known_shapes(tmp_path):
@@ -157,13 +157,13 @@ def test_decimals_near_a_line_mean_it():
 def test_notes_tell_what_the_file_leaves_unsaid(tmp_path):
     plain = read(write(tmp_path / "plain.msh", [*SQUARE, (7, 7)], [TWO[0], TWO[1][::-1]]))
     assert plain.notes == (
-        "1 of 7 points in the file belong to no cell: left out",
-        "1 of 2 cells: cell 1 at (1.5, 0.5) m ran clockwise: turned",
-        'the file names no group of lines: all 6 faces of the boundary are "wall"',
+        "1 of 7 points in the file belong to no cell: ignored",
+        "1 of 2 cells: cell 1 at (1.5, 0.5) m were clockwise: reversed",
+        'the file contains no named group of lines: all 6 boundary faces are "wall"',
     )
     some = read(write(tmp_path / "some.msh", SQUARE, TWO, {"in": [0, 3], "": [2, 5]}))
     assert some.patches == ("in", "wall")
-    assert some.notes == ('5 of 6 faces of the boundary are in no group: they are "wall"',)
+    assert some.notes == ('5 of 6 boundary faces are in no group: they are "wall"',)
     every = {"wall": [[0, 1], [1, 2], [5, 4], [4, 3]], "ends": [[0, 3], [2, 5]]}
     full = read(write(tmp_path / "full.msh", SQUARE, TWO, every))
     assert full.notes == () and full.patches == ("ends", "wall")

@@ -13,29 +13,31 @@ from fvsolve.mesh import contact, read, rectangle
 
 UNIT = dict(size=(1.0, 1.0), cells=(4, 4))
 BAD_RECTANGLES = {
-    "size: [1, 0]; wanted two positive lengths": dict(size=(1, 0)),
-    "cells: [4, 2.5]; wanted two whole numbers": dict(cells=(4, 2.5)),
-    "origin: [nan, 0]; wanted the two coordinates": dict(origin=(math.nan, 0)),
-    "grading: [0, 1]; wanted two positive ratios": dict(grading=(0, 1)),
-    "grading: [2, 1] with cells [1, 4]; wanted 1 where": dict(cells=(1, 4), grading=(2, 1)),
-    "grading: [1e+40, 1]: the least cells vanish": dict(origin=(1.0, 0.0), grading=(1e40, 1)),
-    "holes[0]: [0, 0, 0, 1]; wanted [x0, y0, x1, y1]": dict(holes=[(0, 0, 0, 1)]),
+    "size: [1, 0]; expected two positive lengths": dict(size=(1, 0)),
+    "cells: [4, 2.5]; expected two whole numbers": dict(cells=(4, 2.5)),
+    "origin: [nan, 0]; expected the two coordinates": dict(origin=(math.nan, 0)),
+    "grading: [0, 1]; expected two positive ratios": dict(grading=(0, 1)),
+    "grading: [2, 1] with cells [1, 4]; expected 1 along an axis": dict(cells=(1, 4), grading=(2, 1)),
+    "grading: [1e+40, 1]: the smallest cells vanish": dict(origin=(1.0, 0.0), grading=(1e40, 1)),
+    "holes[0]: [0, 0, 0, 1]; expected [x0, y0, x1, y1]": dict(holes=[(0, 0, 0, 1)]),
     "holes[0]: x1 = 0.3 m is on no grid line; nearest x: 0.25 and 0.5 m": dict(holes=[(0, 0, 0.3, 1)]),
     "holes[0]: y1 = 2 m is on no grid line; nearest y: 1 m": dict(holes=[(0, 0, 0.5, 2)]),
     "holes: they leave 2 pieces that share no face": dict(holes=[(0.25, 0, 0.5, 1)]),
     "holes: they leave no cell": dict(holes=[(0, 0, 1, 1)]),
-    'patches.a: "wets" is no side; did you mean "west"?': dict(patches={"a": "wets"}),
-    "patches.a: 0.2 to 0.5 m does not hold whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
+    'patches.a: unknown side "wets"; expected west, east, south, north; did you mean "west"?': dict(
+        patches={"a": "wets"}
+    ),
+    "patches.a: 0.2 to 0.5 m does not consist of whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
         patches={"a": ("west", 0.2, 0.5)}
     ),
-    "holes[0]: [0, 0, 1e-12, 1] has no cells; wanted x0 and x1": dict(holes=[(0, 0, 1e-12, 1)]),
-    "patches.a: 0 to 1e-12 m does not hold whole faces of the west side; nearest is 0 to 0.25 m": dict(
+    "holes[0]: [0, 0, 1e-12, 1] contains no cells; expected x0 and x1": dict(holes=[(0, 0, 1e-12, 1)]),
+    "patches.a: 0 to 1e-12 m does not consist of whole faces of the west side; nearest is 0 to 0.25 m": dict(
         patches={"a": ("west", 0.0, 1e-12)}
     ),
-    "patches.a: 0.3 to 0.31 m does not hold whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
+    "patches.a: 0.3 to 0.31 m does not consist of whole faces of the west side; nearest is 0.25 to 0.5 m": dict(
         patches={"a": ("west", 0.3, 0.31)}
     ),
-    "patches.a: [0.5, 0.25]; wanted from below to": dict(patches={"a": ("west", 0.5, 0.25)}),
+    "patches.a: [0.5, 0.25]; expected from below to": dict(patches={"a": ("west", 0.5, 0.25)}),
     'patches.b: overlaps "a" on the west side, about 0.625 to 0.875 m': dict(
         patches={"a": ("west", 0.5, 1.0), "b": "west"}
     ),
@@ -63,7 +65,7 @@ GRID = dict(points=SQUARE, cells=TWO)
 HANGING = dict(points=[*SQUARE, (1, 0.5)], cells=[[0, 1, 4, 3], [1, 2, 6], [2, 5, 6], [5, 4, 6]])
 TWICE = [*SQUARE, (1, 0), (1, 1)]  # the line between the squares once more
 BAD_FILES = {
-    "cells: 1 of 2 cells: cell 1 at (1.55, 0.3) m have corners in one place": dict(
+    "cells: 1 of 2 cells: cell 1 at (1.55, 0.3) m have coincident corners": dict(
         points=[*SQUARE[:2], (2, 0), (0, 1), (1, 1), (1.6, 0.6)], cells=[TWO[0], [1, 2, 5, 5]]
     ),
     "cells: 1 of 2 cells: cell 1 at (1.5, 0.5) m cross themselves": dict(points=SQUARE, cells=[TWO[0], [1, 2, 4, 5]]),
@@ -79,30 +81,30 @@ BAD_FILES = {
         points=SQUARE, cells=[TWO[0]] * 3
     ),
     "boundary: at 1 places faces have the corner of another cell between their ends: cell 3 at (0.5, 0.5) m": HANGING,
-    "boundary: at 1 places faces lie in one place and do not hang together: cell 0 at (0.5, 0.5) m and cell 1": dict(
+    "boundary: at 1 places faces coincide but are not connected: cell 0 at (0.5, 0.5) m and cell 1": dict(
         points=TWICE, cells=[TWO[0], [6, 2, 5, 7]]
     ),
     "cells: they are in 2 pieces that share no face: 2 with cell 1 at (0.5, 0.5) m, 1 with cell 0 at": dict(
         points=[*SQUARE, (5, 0), (6, 0), (6, 1)], cells=[[6, 7, 8], *TWO]
     ),
-    "groups.in: 1 of 1 lines no face of the boundary: the one from (1, 0) m to (1, 1) m lies between": dict(
+    "groups.in: 1 of 1 lines are not boundary faces: the line from (1, 0) m to (1, 1) m lies between": dict(
         **GRID, groups={"in": [1, 4]}
     ),
-    "groups.in: 1 of 2 lines no face of the boundary: the one from (0, 0) m to (1, 1) m is no side": dict(
+    "groups.in: 1 of 2 lines are not boundary faces: the line from (0, 0) m to (1, 1) m is not a side": dict(
         **GRID, groups={"in": [[0, 3], [0, 4]]}
     ),
-    "one ends in a point that no cell has": dict(points=[*SQUARE, (9, 9)], cells=TWO, groups={"in": [0, 6]}),
+    "a line ends at a point that belongs to no cell": dict(points=[*SQUARE, (9, 9)], cells=TWO, groups={"in": [0, 6]}),
     'groups.out: shares 1 faces with "in", the face from (0, 1) m to (0, 0) m': dict(
         **GRID, groups={"in": [0, 3], "out": [[3, 0], [0, 1]]}
     ),
-    "points: z runs from 0 to 0.2 m, beyond the middle in cell 1; wanted a mesh in one plane, z = constant": dict(
+    "points: z runs from 0 to 0.2 m, beyond the middle in cell 1; expected a mesh in one plane, z = constant": dict(
         points=[(x, y, 0.2 * (x > 1)) for x, y in SQUARE], cells=TWO
     ),
     "z = constant; y is constant: turn the mesh": dict(points=[(x, 0, y) for x, y in SQUARE], cells=TWO),
-    "cells: there are no cells of two dimensions (2 line); wanted triangle and quad": dict(
+    "cells: there are no two-dimensional cells (2 line); expected triangle and quad": dict(
         points=SQUARE, cells=[], groups={"in": [[0, 1], [1, 2]]}
     ),
-    "points: 1 of 6 are nowhere (not a number, or too large), first point 5": dict(
+    "points: 1 of 6 have invalid coordinates (not a number, or too large), first point 5": dict(
         points=[*SQUARE[:5], (math.nan, 1)], cells=TWO
     ),
 }
@@ -131,11 +133,11 @@ def test_a_thin_wall_may_be_named(tmp_path, monkeypatch):
     cells = [[0, 1, 4, 3], [9, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]]
     mesh = read(write(tmp_path / "wall.msh", points, cells, {"baffle": [1, 4]}))
     assert mesh.length[mesh.patch("baffle")].tolist() == [1.0] and mesh.inner == 3
-    with pytest.raises(MeshError, match="at 1 places faces lie in one place .* a group that names it as a thin wall"):
+    with pytest.raises(MeshError, match="at 1 places faces coincide .* a group that marks it as a thin wall"):
         read(write(tmp_path / "none.msh", points, cells))
     monkeypatch.setattr(contact, "BLOCK", 1)  # far into a long boundary
     assert read(tmp_path / "wall.msh").inner == 3
-    with pytest.raises(MeshError, match="at 1 or more places faces lie in one place"):
+    with pytest.raises(MeshError, match="at 1 or more places faces coincide"):
         read(tmp_path / "none.msh")
 
 
@@ -145,7 +147,7 @@ def test_faults_of_several_kinds_come_together(tmp_path):
     with pytest.raises(MeshError) as caught:
         read(write(tmp_path / "bad.msh", points, cells))
     found = [fault.message for fault in caught.value.faults]
-    assert [word in text for word, text in zip(["one place", "cross", "overlap"], found, strict=True)] == [True] * 3
+    assert [word in text for word, text in zip(["coincident", "cross", "overlap"], found, strict=True)] == [True] * 3
 
 
 def test_files_that_hold_no_plane_mesh(tmp_path, capsys):
@@ -158,12 +160,12 @@ def test_files_that_hold_no_plane_mesh(tmp_path, capsys):
     assert "pool.msh: 1 fault\n  meshio cannot read it (" in fault("pool.msh")
     assert 'there is no such file; did you mean "pool.msh"?' in fault("pol.msh")
     (tmp_path / "pool.dxf").write_text("0\n")
-    assert "wanted a name that ends in " in fault("pool.dxf") and ".msh" in fault("pool.dxf")
+    assert "expected a name that ends in " in fault("pool.dxf") and ".msh" in fault("pool.dxf")
     (tmp_path / "empty.vtk").write_text("")
     assert "empty.vtk: 1 fault\n  meshio cannot read it (" in fault("empty.vtk")
     cube = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
     meshio.Mesh(cube, [("tetra", [[0, 1, 2, 3]]), ("triangle", [[0, 1, 2]])]).write(tmp_path / "solid.vtk")
-    assert "cells: they are of three dimensions (1 tetra, 1 triangle)" in fault("solid.vtk")
+    assert "cells: they are three-dimensional (1 tetra, 1 triangle)" in fault("solid.vtk")
     six = np.array([(0, 0, 0), (2, 0, 0), (0, 2, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
     meshio.Mesh(six, [("triangle6", [[0, 1, 2, 3, 4, 5]])]).write(tmp_path / "six.vtk")
     assert "cells: triangle6 cannot be used (1 triangle6)" in fault("six.vtk")
@@ -179,7 +181,7 @@ def test_a_group_without_lines_is_told(tmp_path):
     (tmp_path / "four.msh").write_text(
         MSH4.replace('1 7 "in"', '1 7 "in"\n1 9 "rim"').replace("Names\n3\n", "Names\n4\n")
     )
-    with pytest.raises(MeshError, match="groups.rim: no line in the file is in it; .*Mesh.SaveAll"):
+    with pytest.raises(MeshError, match="groups.rim: the group contains no line of the file; .*Mesh.SaveAll"):
         read(tmp_path / "four.msh")
 
 
@@ -188,5 +190,7 @@ def test_a_cell_that_names_no_point(tmp_path):
         "# vtk DataFile Version 3.0\nx\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 double\n0 0 0 1 0 0 0 1 0\n"
         "CELLS 1 4\n3 0 1 7\nCELL_TYPES 1\n5\n"
     )
-    with pytest.raises(MeshError, match="cells: number 0 names a point that the file does not hold; it holds 3"):
+    with pytest.raises(
+        MeshError, match="cells: number 0 refers to a point that the file does not contain; it contains 3"
+    ):
         read(tmp_path / "lost.vtk")

@@ -205,11 +205,11 @@ def test_a_precharge_above_the_line_is_kept_until_the_line_exceeds_it(law):
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        ({"gas_volume": None}, "no gas; wanted one of precharge, gas_volume"),
+        ({"gas_volume": None}, "no gas; expected one of precharge, gas_volume"),
         ({"precharge": 1e5}, "precharge and gas_volume are given; keep one"),
         ({"gas_volume": 0.2}, "0.2 m3 is greater than volume, 0.1 m3"),
         ({"gas_volume": 0.0}, "out of range"),
-        ({"exponent": 0.9}, "out of range; wanted a value of at least 1"),
+        ({"exponent": 0.9}, "out of range; expected a value of at least 1"),
         ({"initial_pressure": 1000.0}, "vapour pressure"),
         ({"connection": {"loss_in": 1.0}}, "loss_out is missing"),
         ({"connection": 3.0}, "is not a connection; expected { diameter, loss_in, loss_out }"),

@@ -363,7 +363,7 @@ def test_where_a_valve_all_but_shuts_its_ledger_closes_under_linearly_implicit_s
 
 @pytest.mark.parametrize("opening", [step(1.0, 1, 0), ramp(1.0, 0.5, 1, 0)])
 def test_two_columns_at_a_junction_whose_last_valve_shuts_flow_on_as_one(opening):
-    """It stopped the run: "no flow can meet what is asked"."""
+    """It stopped the run: "the demand cannot be supplied"."""
     nodes = {"j": junction(elevation=HEIGHT), "side": low(2e5)}
     links = {"one": column("high", "j"), "two": column("j", "low", 80.0), "k": gate("j", "side", 0.01, opening)}
     case = summit(end=20.0, high=3.2e5, nodes=nodes, links=links, probes=["one.flow", "two.flow"])

@@ -75,11 +75,11 @@ def test_forms_that_agree_may_stand_together():
 
 def test_forms_that_disagree_are_named_with_the_angle_between_them():
     found = faults(yaw="90 deg", axis=[0, 0, 1], angle="80 deg", matrix=QUARTER)
-    assert found == {"attitude.axis": "is 10 deg away from what roll, pitch, yaw say; wanted the same rotation"}
+    assert found == {"attitude.axis": "is 10 deg away from what roll, pitch, yaw give; expected the same rotation"}
     found = faults(axis=[0, 0, 1], angle="80 deg", matrix=QUARTER, euler_parameters=[1, 0, 0, 0])
     assert found == {
-        "attitude.euler_parameters": "is 80 deg away from what axis says; wanted the same rotation",
-        "attitude.matrix": "is 10 deg away from what axis says; wanted the same rotation",
+        "attitude.euler_parameters": "is 80 deg away from what axis gives; expected the same rotation",
+        "attitude.matrix": "is 10 deg away from what axis gives; expected the same rotation",
     }
 
 
@@ -94,30 +94,33 @@ def test_a_length_that_is_not_one_is_divided_by_and_said():
 def test_typed_digits_are_no_fault_but_said():
     typed = [[0.8660, -0.5, 0], [0.5, 0.8660, 0], [0, 0, 1]]
     one = read(matrix=typed)
-    assert notes(one) == [("matrix", "R'R is the identity but for 4.4e-05; the nearest rotation is taken")]
+    assert notes(one) == [("matrix", "R'R differs from the identity by 4.4e-05; the nearest rotation is used")]
     assert_allclose(one.rotation, Rotation.from_euler("z", np.arctan2(0.5, 0.866)).as_matrix(), rtol=0, atol=1e-15)
     one = read(matrix=typed, yaw="30.01 deg")  # of atan(0.5 / 0.866) = 30.00073 deg
-    assert notes(one)[1] == ("matrix", "is 0.00927 deg away from what roll, pitch, yaw say; the latter is taken")
+    assert notes(one)[1] == ("matrix", "is 0.00927 deg away from what roll, pitch, yaw give; the latter is used")
     assert_allclose(one.rotation, Rotation.from_euler("z", 30.01, degrees=True).as_matrix(), rtol=0, atol=1e-15)
 
 
 BAD = {
-    "no rotation": ({"matrix": [[1, 0, 0], [0, 1, 0], [0, 0.1, 1]]}, {"matrix": "R'R is the identity but for 0.1"}),
-    "a mirror": ({"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, {"matrix": "a mirror: its determinant is -1"}),
+    "no rotation": (
+        {"matrix": [[1, 0, 0], [0, 1, 0], [0, 0.1, 1]]},
+        {"matrix": "R'R differs from the identity by 0.1"},
+    ),
+    "a mirror": ({"matrix": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, {"matrix": "a reflection: its determinant is -1"}),
     "zeros": (
         {"axis": [0, 0, 0], "angle": 1, "euler_parameters": [0, 0, 0, 0]},
-        {"axis": "is all zeros", "euler_parameters": "is all zeros"},
+        {"axis": "has zero length", "euler_parameters": "has zero length"},
     ),
-    "axis alone": ({"axis": [0, 0, 1]}, {"axis": "wants an angle beside it"}),
-    "angle alone": ({"angle": 1}, {"angle": "wants an axis beside it"}),
+    "axis alone": ({"axis": [0, 0, 1]}, {"axis": "needs angle too"}),
+    "angle alone": ({"angle": 1}, {"angle": "needs axis too"}),
     "unit": ({"yaw": "3 m", "zyz": [1, "2 kg", 3]}, {"yaw": '"3 m" is a length', "zyz.1": '"2 kg" is a mass'}),
     "sizes": (
         {"matrix": [[1, 0], [0, 1]], "euler_parameters": [1, 0, 0]},
-        {"matrix": "wanted three rows of three", "euler_parameters": "has 3 values; wanted 4"},
+        {"matrix": "expected three rows of three", "euler_parameters": "has 3 values; expected 4"},
     ),
-    "row": ({"matrix": [[1, 0, 0], [0, 1], [0, "x", 1]]}, {"matrix.1": "wanted 3", "matrix.2.1": "no number"}),
+    "row": ({"matrix": [[1, 0, 0], [0, 1], [0, "x", 1]]}, {"matrix.1": "expected 3", "matrix.2.1": "no number"}),
     "key": ({"rol": 1}, {"rol": 'did you mean "roll"?'}),
-    "key of others": ({"quaternion": [1, 0, 0, 0]}, {"quaternion": "say euler_parameters = [eta, e1, e2, e3]"}),
+    "key of others": ({"quaternion": [1, 0, 0, 0]}, {"quaternion": "use euler_parameters = [eta, e1, e2, e3]"}),
     "not finite": ({"euler_parameters": [float("nan"), 0, 0, 0]}, {"euler_parameters.0": "not finite"}),
     "no form that can be read": (  # and what can be read is held against nothing
         {"pitch": "x", "yaw": "90 deg", "matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]},
@@ -125,7 +128,13 @@ BAD = {
     ),
     "all at once": (
         {"axis": [0, 0, 0], "angle": "m", "matrix": 2 * [[2, 0, 0]] + [[0, 0, 1]], "yaw": 0, "zyz": [0, 1, 0], "x": 1},
-        {"axis": "all zeros", "angle": "no number", "matrix": "but for 7", "zyz": "57.3 deg away", "x": "unknown key"},
+        {
+            "axis": "has zero length",
+            "angle": "no number",
+            "matrix": "from the identity by 7",
+            "zyz": "57.3 deg away",
+            "x": "unknown key",
+        },
     ),
 }  # fmt: skip
 
@@ -146,11 +155,15 @@ def test_a_case_has_its_notes_and_faults_with_their_places():
     with pytest.raises(CaseError) as found:
         load(case)
     assert [(one.place, one.message) for one in found.value.faults] == [
-        ("nodes.arm.joint.attitude.axis", "wants an angle beside it")
+        ("nodes.arm.joint.attitude.axis", "needs angle too")
     ]
     body["joint"]["attitude"]["angle"] = 30
     assert [(one.key, one.value, one.text.split(": ")[1]) for one in load(scene({"arm": body}, {}, 1.0, {})).notes] == [
-        ("joint.attitude.angle", 30.0, '30 rad is outside -6.3 to 6.3 rad, a turn either way; did you mean "30 deg"?'),
+        (
+            "joint.attitude.angle",
+            30.0,
+            '30 rad is outside -6.3 to 6.3 rad, one turn in either direction; did you mean "30 deg"?',
+        ),
         ("joint.attitude.axis", 2.0, "its length is 2, not 1; it is divided by it"),
     ]
 
@@ -158,7 +171,7 @@ def test_a_case_has_its_notes_and_faults_with_their_places():
 def test_no_table_is_told_what_is_wanted():
     with pytest.raises(ValidationError) as found:
         Stand.model_validate({"attitude": "30 deg"})
-    assert "no table; wanted keys of angle, axis, euler_parameters" in str(found.value)
+    assert "not a table; expected keys of angle, axis, euler_parameters" in str(found.value)
 
 
 def test_its_schema_says_its_keys():

@@ -226,7 +226,7 @@ def test_faults(change, words):
 
 def test_exact_solutions_of_elastic_walls_refuse_it():
     for name in ("rays", "laminar-line"):
-        with pytest.raises(CaseError, match="walls that do not creep"):
+        with pytest.raises(CaseError, match="walls without creep"):
             fvsolve.load({**line(9), "exact": {"name": name}})
 
 
@@ -239,7 +239,7 @@ def test_laminar_friction_that_remembers_and_a_wall_that_creeps_are_exact_togeth
 
 
 def test_the_exact_line_wants_a_wall_that_creeps():
-    with pytest.raises(CaseError, match="wants a wall with creep"):
+    with pytest.raises(CaseError, match="needs a wall with creep"):
         fvsolve.load({**line(9, creep=None), "exact": {"name": "creeping-line"}})
 
 

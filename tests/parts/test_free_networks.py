@@ -408,7 +408,7 @@ def test_a_duct_most_of_which_is_a_pipe_is_the_rigid_column_that_it_was(truth):
 
 
 @pytest.mark.parametrize(("change", "place", "text"), [
-    ({"nodes": {"port": {"height": 2.0}}}, "nodes.port.height", "what passes here"),
+    ({"nodes": {"port": {"height": 2.0}}}, "nodes.port.height", "the reaction of its flow"),
     ({"nodes": {"port": {"area": {"level": [0, 1], "area": [1, 2]}}}}, "nodes.port.area", "one area"),
 ])  # fmt: skip
 def test_what_a_free_body_does_not_feel_is_refused_by_name(change, place, text):
@@ -422,14 +422,14 @@ def test_what_a_free_body_does_not_feel_is_refused_by_name(change, place, text):
 def test_a_pipe_at_a_tank_of_a_free_body_and_a_column_led_by_a_valve_are_refused_by_name():
     case = free()
     case["links"]["duct"] |= {"type": "pipe", "wave_speed": 1000.0}
-    assert "wanted a rigid-column between" in said(case)["links.duct"]
+    assert "expected a rigid-column between" in said(case)["links.duct"]
     case = free()
     case["nodes"]["mouth"] = {"type": "junction", "on": "hull", "at": [0, HALF, -DEPTH]}
     case["links"]["duct"][next(key for key in ("from", "to") if case["links"]["duct"][key] == "port")] = "mouth"
     case["links"]["gate"] = {"type": "valve", "from": "port", "to": "mouth", "area": 0.1, "discharge_coefficient": 1.0}
     found = said(case)
-    assert "a valve has no inertia" in found["links.gate"]
-    assert "at mouth it meets none but valves and columns" in found["links.duct"]
+    assert "the flow of a valve has no inertia" in found["links.gate"]
+    assert "at mouth it joins only valves and columns" in found["links.duct"]
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])

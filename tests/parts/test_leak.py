@@ -138,7 +138,7 @@ def test_what_leaks_is_dissipated_and_the_ledger_closes(law):
 @pytest.mark.parametrize(
     "wrong, said",
     [
-        ({"coefficient": -1e-6}, "out of range; wanted a value above 0"),
+        ({"coefficient": -1e-6}, "out of range; expected a value above 0"),
         ({"exponent": -0.5}, "out of range"),
         ({"from": "nowhere"}, 'no place named "nowhere"'),
         ({"to": "t"}, "unknown key"),

@@ -377,7 +377,9 @@ def test_a_controller_may_hold_spool_and_force():
         other = fvsolve.advance(model, fvsolve.initial_state(model), 0.02, {"push.force": -5000.0 * sign})
         x = model.state_names.index("load.position")
         assert sign * state.y[x] > 1e-3 and sign * other.y[x] < 0.0
-    with pytest.raises(fvsolve.FvsolveError, match="spool.position = 2 is out of range; wanted a number from -1 to 1"):
+    with pytest.raises(
+        fvsolve.FvsolveError, match="spool.position = 2 is out of range. Expected a number from -1 to 1"
+    ):
         fvsolve.advance(model, fvsolve.initial_state(model), 0.02, {"spool.position": 2.0})
 
 

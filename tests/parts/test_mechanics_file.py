@@ -115,18 +115,19 @@ BAD = {
     "a rod on a reservoir": (
         swap('rod = "load"', 'rod = "pump"'),
         'links.cyl.ports.rod: "pump" is a reservoir, a hydraulic place, and this port of a cylinder '
-        "a translational or spatial one; "
+        "needs a translational or spatial place; "
         "translational or spatial places are ground, load",
     ),
     "a spool on a mass": (
         swap('A = "cyl.A"', 'A = "load"'),
-        'links.spool.ports.A: "load" is a mass, a translational place, and this port of a spool-valve a hydraulic one; '
+        'links.spool.ports.A: "load" is a mass, a translational place, and this port of a spool-valve '
+        "needs a hydraulic place; "
         "hydraulic places are cyl.A, cyl.B, pump, sump",
     ),
     "a spring on a chamber": (
         swap('from = "ground"', 'from = "cyl.A"'),
         'links.spring.from: "cyl.A" is a chamber, a hydraulic place, and this port of a spring '
-        "a translational or spatial one",
+        "needs a translational or spatial place",
     ),
     "a cylinder for its chamber": (swap('"cyl.A"', '"cyl"'), '"cyl" is a cylinder; its places are cyl.A, cyl.B'),
     "no such chamber": (swap('"cyl.A"', '"cyl.C"'), 'no place named "cyl.C"; places are cyl.A, cyl.B, ground, load'),
@@ -134,7 +135,7 @@ BAD = {
     "rod and case alike": (swap('case = "ground"', 'case = "load"'), 'links.cyl.ports.case: joins "load" to itself'),
     "a port too few": (swap(', B = "cyl.B"', ""), "links.spool.ports: B is missing"),
     "a port too many": (swap(', B = "cyl.B"', ', B = "cyl.B", X = "pump"'), "links.spool.ports.X: unknown key"),
-    "ports that are none": (swap(SPOOL, "ports = 3"), 'links.spool.ports: 3 is no table; wanted { P = "...", T ='),
+    "ports that are none": (swap(SPOOL, "ports = 3"), 'links.spool.ports: 3 is not a table; expected { P = "...", T ='),
     "no ports": (swap(SPOOL, ""), "links.spool: ports is missing"),
     "from and to": (swap(SPOOL, 'from = "pump"'), "links.spool.from: unknown key; keys are "),
     "a force for a stiffness": (
@@ -168,7 +169,7 @@ BAD = {
     ),
     "no dead volume": (
         swap('dead_volume_A = "50 cm3"', "dead_volume_A = 0"),
-        "0 is out of range; wanted a value above",
+        "0 is out of range; expected a value above",
     ),
     "a vacuum": (
         swap("[links.spool]", 'initial_pressure_A = "0 bar"\n[links.spool]'),
@@ -176,7 +177,7 @@ BAD = {
     ),
     "a spool beyond 1": (
         swap("0.5, -0.5]", "0.5, -1.5]"),
-        "links.spool.position.value[2]: -1.5 is out of range; wanted a value between -1 and 1",
+        "links.spool.position.value[2]: -1.5 is out of range; expected a value between -1 and 1",
     ),
     "free length and preload": (
         swap('free_length = "100 mm"', 'free_length = "100 mm"\npreload = "3 N"'),
@@ -184,11 +185,11 @@ BAD = {
     ),
     "a spring backwards": (
         swap('from = "ground"\nto = "load"', 'from = "load"\nto = "ground"'),
-        "links.spring.to: ground lies behind load at the start; exchange from and to",
+        "links.spring.to: ground is behind load at the start; exchange from and to",
     ),
     "a stop without a side": (
         swap('least = "1 mm"\ngreatest = "199 mm"', ""),
-        "links.stop: wanted one of least, greatest",
+        "links.stop: expected one of least, greatest",
     ),
     "a stop without room": (swap('"199 mm"', '"1 mm"'), "links.stop.greatest: 0.001 m is not above least, 0.001 m"),
     "a force on nothing": (swap('to = "load"\nforce', "force"), "links.push: to is missing"),
@@ -198,15 +199,15 @@ BAD = {
     ),
     "an elevation missing": (
         swap('"100 barg"', '"100 barg"\nelevation = 1').replace('"0 barg"', '"0 barg"\nelevation = 1'),
-        "links.cyl: elevation is missing: pump, sump state one",
+        "links.cyl: elevation is missing, but stated for pump, sump",
     ),
     "a pressure of a mass": (
         swap('"load.position"', '"load.pressure"'),
-        'load is a mass, without "pressure"; it has position, velocity',
+        'load is a mass, which has no "pressure"; it has position, velocity',
     ),
     "a flow of a cylinder": (
         swap('"cyl.force"', '"cyl.flow"'),
-        'cyl is a cylinder, without "flow"; it has force, position, velocity',
+        'cyl is a cylinder, which has no "flow"; it has force, position, velocity',
     ),
     "a chamber's probe misspelt": (swap('"cyl.A.pressure"', '"cyl.A.presure"'), 'did you mean "pressure"?'),
     "a mass among links": (swap('type = "damper"', 'type = "mass"'), "it belongs under [nodes]"),

@@ -107,7 +107,7 @@ def test_what_has_no_force_is_named() -> None:
         fvsolve.run(shut(), set={"numerics.line": "delay", "numerics.method": "rk4"})
     case = shut()
     case["links"]["main"]["bends"] = [600.0, 900.0]
-    with pytest.raises(fvsolve.CaseError, match="links.main.bends.1.*is not within"):
+    with pytest.raises(fvsolve.CaseError, match="links.main.bends.1.*is outside"):
         fvsolve.load(case)
     case["links"]["main"]["bends"] = "600 m"
     with pytest.raises(fvsolve.CaseError, match="links.main.bends"):

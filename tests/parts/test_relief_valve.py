@@ -217,8 +217,8 @@ def test_it_dissipates_and_the_ledger_closes():
 @pytest.mark.parametrize(
     "more, text",
     [
-        ({"overpressure": -1e5}, "wanted a value above 0"),
-        ({"time_constant": 0.0}, "wanted a value above 0"),
+        ({"overpressure": -1e5}, "expected a value above 0"),
+        ({"time_constant": 0.0}, "expected a value above 0"),
         ({"set_pressure": "0 bar"}, "barg"),
         ({"time_constant": 1.0, "natural_frequency": 3.0, "damping_ratio": 0.1}, "keep one"),
         ({"natural_frequency": 3.0}, "damping_ratio"),

@@ -303,12 +303,12 @@ def test_what_does_not_ride_together_is_told_all_at_once():
     case["links"]["bridge"] = {**PIPE, "from": "port", "to": "shore", "length": 3.0}
     case["links"]["long"] = {**PIPE, "from": "port", "to": "head", "length": 3.0}
     found = said(case)
-    assert "say where with at" in found["nodes.port.elevation"]
+    assert "give its place with at" in found["nodes.port.elevation"]
     assert 'did you mean "hull"' in found["nodes.starboard.on"]
-    assert "name that with on" in found["nodes.shore.at"]
+    assert "name the body with on" in found["nodes.shore.at"]
     assert "counts from the ground" in found["nodes.head.head"]
-    assert "port, on hull and shore, which stands still: between these goes a hose" in found["links.bridge"]
-    assert "too short: its way on hull is" in found["links.long.length"]
+    assert "port, on hull and shore, which is fixed: this would be a flexible hose" in found["links.bridge"]
+    assert "too short: its route on hull is" in found["links.long.length"]
 
 
 def test_what_has_no_way_between_its_ends_joins_one_place():
@@ -319,7 +319,7 @@ def test_what_has_no_way_between_its_ends_joins_one_place():
 
 def test_a_way_round_that_is_longer_than_its_column_is_told():
     case = u_tube(route=[[3.0, 0.0, -DEPTH]])
-    assert said(case)["links.duct.length"].startswith("8 m is too short: its way on hull is 10 m")
+    assert said(case)["links.duct.length"].startswith("8 m is too short: its route on hull is 10 m")
 
 
 def test_a_route_of_a_column_that_stands_still_is_told():
@@ -327,7 +327,7 @@ def test_a_route_of_a_column_that_stands_still_is_told():
     del case["nodes"]["rig"]
     for name in ("a", "b"):
         case["nodes"][name] = {"type": "reservoir", "pressure": 1e5}
-    assert "its ends ride on none" in said(case)["links.way.route"]
+    assert "no end of the pipe is on a body" in said(case)["links.way.route"]
 
 
 def test_steps_that_are_taken_whole_feel_the_body_too():
@@ -414,7 +414,7 @@ def test_water_that_flows_from_a_place_which_moves_brings_what_moving_it_takes()
 
 UNFELT = {  # what bodies would not feel: change of the U-tube, place of the fault, words
     "a valve at a tank": (lambda: cut("linear"), "links.gate", "rigid-column between"),
-    "what spills": (lambda: with_tank(height=3.0), "nodes.port.height", "not felt"),
+    "what spills": (lambda: with_tank(height=3.0), "nodes.port.height", "not modelled"),
 }
 
 

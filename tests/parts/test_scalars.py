@@ -374,10 +374,10 @@ def test_a_controller_sets_what_flows_in_also_beyond_what_the_case_says():
 
 
 FAULTS = [
-    (("scalars", "pressure"), {}, '"pressure" has a meaning of its own'),
+    (("scalars", "pressure"), {}, '"pressure" is a reserved name'),
     (("nodes", "lake", "scalars"), {"dya": 1.0}, 'no scalar named "dya"; did you mean "dye"?'),
-    (("nodes", "tap", "scalars"), {"dye": 1.0}, "a junction has none of its own"),
-    (("nodes", "pool", "scalars"), {"dye": {"time": [0, 1], "value": [0, 1]}}, "no schedule"),
+    (("nodes", "tap", "scalars"), {"dye": 1.0}, "a junction has no value of a scalar"),
+    (("nodes", "pool", "scalars"), {"dye": {"time": [0, 1], "value": [0, 1]}}, "not a schedule"),
     (("links", "a", "scalars"), {"dye": "much"}, '"much" is no number'),
     (
         ("links", "a"),
@@ -387,8 +387,8 @@ FAULTS = [
     (("nodes", "pool"), {"type": "accumulator", "volume": 1.0, "precharge": 5e4}, "its contents carry no scalars yet"),
     (("scalars", "dye", "decay"), -1.0, "out of range"),
     (("scalars", "dye", "diffusivity"), "3 m", "a diffusivity"),
-    (("fluid", "law"), "log", '"log" carries no scalars yet'),
-    (("output", "probes"), ["lake.dye", "a.dye@0.5", "a.dye"], 'say where, for example "a.dye@0.5"'),
+    (("fluid", "law"), "log", '"log" does not support scalars yet'),
+    (("output", "probes"), ["lake.dye", "a.dye@0.5", "a.dye"], 'this probe needs a place, for example "a.dye@0.5"'),
     (("output", "probes"), ["v.dye"], "v is a valve"),
 ]
 

@@ -98,10 +98,10 @@ BAD = {
     "a schedule": ({"nominal": "DN100", "schedule": "45"}, "schedule", "did you mean"),
     "a schedule alone": ({"diameter": 0.1, "schedule": "40"}, "schedule", "keep one"),
     "both": ({"diameter": 0.1, "nominal": "DN100"}, "nominal", "keep one"),
-    "neither": ({}, "line", "wanted one of diameter, nominal"),
+    "neither": ({}, "line", "expected one of diameter, nominal"),
     "a near miss": ({"nominal": "DN100", "fittings": ["gate-vlave"]}, "fittings[0]", 'did you mean "gate-valve"?'),
-    "no list": ({"nominal": "DN100", "fittings": "gate-valve"}, "fittings", "no list"),
-    "a number": ({"nominal": 100}, "nominal", "100 is no text"),
+    "not a list": ({"nominal": "DN100", "fittings": "gate-valve"}, "fittings", "not a list"),
+    "a number": ({"nominal": 100}, "nominal", "100 is not text"),
 }
 
 
@@ -131,5 +131,5 @@ def nearest(inches: str) -> tuple[float, float]:
 
 @pytest.mark.parametrize("said", ["NPS 1/0", "NPS 1/", "NPS /2", "NPS 1--1/2", "NPS 1/2/4", "NPS 1-1.5", "NPS -1/2"])
 def test_what_is_no_fraction_is_no_size(said):
-    with pytest.raises(ValueError, match="is no nominal size"):
+    with pytest.raises(ValueError, match="is not a nominal size"):
         bore(said, "40")

@@ -44,31 +44,31 @@ def half(**keys) -> tuple:
 STILL = {"opening": 0, "unit_speed": [70], "unit_flow": [0], "unit_torque": [-30]}
 FOUND = [
     (half(opening=None), "hill_chart[0]: opening is missing"),
-    (half(opening=1.0), "hill_chart[1].opening: 1 is that of curve 1 already; one curve each"),
+    (half(opening=1.0), "hill_chart[1].opening: 1 is already the opening of curve 1"),
     (half(opening=1.2), "hill_chart[0].opening: 1.2 is out of range"),
-    (half(efficiency=None), "hill_chart[0]: wanted efficiency or unit_torque"),
+    (half(efficiency=None), "hill_chart[0]: efficiency or unit_torque is missing"),
     (half(unit_torque=[1, 2, 3]), "hill_chart[0].unit_torque: efficiency and unit_torque are given; keep one"),
-    (half(efficiency=[0.7, 85, 0.6]), "hill_chart[0].efficiency[1]: 85 is out of range; wanted a value between"),
-    (half(efficiency=[0.7, 0.8]), "3 of unit_speed, 3 of unit_flow, 2 of efficiency; wanted as many of each"),
-    (half(unit_speed=[40], unit_flow=[0.5], efficiency=[0.7]), "hill_chart[0]: has one point; wanted two at least"),
+    (half(efficiency=[0.7, 85, 0.6]), "hill_chart[0].efficiency[1]: 85 is out of range; expected a value between"),
+    (half(efficiency=[0.7, 0.8]), "3 of unit_speed, 3 of unit_flow, 2 of efficiency; expected equal numbers"),
+    (half(unit_speed=[40], unit_flow=[0.5], efficiency=[0.7]), "hill_chart[0]: has one point; expected at least two"),
     (half(unit_speed=[60, 40, 90]), "hill_chart[0]: turns back at point 2, (40, 0.5); a curve may fold in unit_speed"),
     (half(unit_speed=[40, 40, 90], unit_flow=[0.5, 0.5, 0.4]), "points 1 and 2, (40, 0.5) and (40, 0.5), are at one"),
-    (half(unit_speed=[-40, 60, 90]), "says no torque at point 1, (-40, 0.52); wanted unit_torque of such points"),
+    (half(unit_speed=[-40, 60, 90]), "gives no torque at point 1, (-40, 0.52); expected unit_torque for such points"),
     (half(unit_flow=[-0.5, -0.4, -0.3], efficiency=None, unit_torque=[-9e3] * 3), "unit_flow: is nowhere 0.001 or"),
     (half(unit_speed=[-90, -60], unit_flow=[0.4, 0.5], efficiency=None, unit_torque=[1, 1]),
-     "unit_speed: is nowhere 0.001 or more where its angle is least"),
+     "unit_speed: is below 0.001 at the end of least angle"),
     (half(unit_speed=[60, 20, -9], unit_flow=[0.4, -0.4, -0.5], efficiency=None, unit_torque=[1, -9e3, 9e3]),
-     "passes from (20, -0.4) to (-9, -0.5) across a standing runner that flow is driven back through"),
+     "passes from (20, -0.4) to (-9, -0.5) across reverse flow through a runner at rest"),
     (half(efficiency=None, unit_torque=[1, 9e3, 1]), "opening 0.5: torque at (60, 0.5) means an efficiency of 11.53"),
     (half(efficiency=[0.99, 0.99, 0.2]), "the efficiency would pass 1; give more points there"),
-    ((HALF, {**STILL, "unit_flow": [0.01]}), "hill_chart[1].unit_flow: 0.01 flows through shut vanes; wanted 0"),
-    ((HALF, {**STILL, "unit_torque": [3]}), "3 drives the runner behind shut vanes; wanted 0 or one below it"),
-    ((HALF, {**HALF, "opening": 0}), "vanes at opening 0 let nothing pass; wanted no curve, or one point"),
+    ((HALF, {**STILL, "unit_flow": [0.01]}), "hill_chart[1].unit_flow: 0.01 is a flow through shut vanes; expected 0"),
+    ((HALF, {**STILL, "unit_torque": [3]}), "3 drives the runner behind shut vanes; expected 0 or less"),
+    ((HALF, {**HALF, "opening": 0}), "vanes at opening 0 are shut; expected no curve, or a single point"),
     ((STILL,), "hill_chart: has no curve of an opening above 0"),
-    ([], "is no list of curves"),
-    ([3], "hill_chart[0]: 3 is no table"),
+    ([], "is not a list of curves"),
+    ([3], "hill_chart[0]: 3 is not a table"),
     ({"file": "nowhere.csv"}, "there is no such file"),
-    ({"file": "a.csv", "of": 1}, "hill_chart.of: unknown key; beside file there is none"),
+    ({"file": "a.csv", "of": 1}, "hill_chart.of: unknown key; expected only file"),
 ]  # fmt: skip
 
 
@@ -79,7 +79,7 @@ def test_a_fault_of_a_hill_chart(chart, message):
 
 def test_faults_of_its_keys_come_with_those_of_its_chart():
     said = faults(half(efficiency=[0.7, 0.85]), trip=1.0, diameter=-1.0, opening=1.5)
-    for one in ("trip: wants the inertia", "diameter: -1.0 is out of range", "opening: 1.5 is out", "2 of efficiency"):
+    for one in ("trip: needs inertia", "diameter: -1.0 is out of range", "opening: 1.5 is out", "2 of efficiency"):
         assert one in said
     assert "-1 s lies before the start" in faults(trip=-1.0, inertia=1e4)
     assert "give the turbine inertia" in torque_on({})
@@ -95,7 +95,7 @@ def torque_on(keys) -> str:
 
 
 @pytest.mark.parametrize("header, message", [
-    ("opening,unit_speed,unit_flow", "wanted a column efficiency or unit_torque, and it has neither"),
+    ("opening,unit_speed,unit_flow", "expected a column efficiency or unit_torque; the file has neither"),
     ("opening,unit_speed [rad/s],unit_flow,efficiency", 'unit_speed in rpm m^(1/2)'),
     ("opening,n11,unit_flow,efficiency", 'has no column "unit_speed"'),
     ("opening,unit_speed,unit_flow,efficiency", "chart.csv, opening 0.5: efficiency: 85.0 is out of range"),

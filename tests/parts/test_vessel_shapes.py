@@ -278,7 +278,7 @@ def test_limits_and_claims_look_at_its_level():
     [
         ({"diameter": None, "slope": None}, "level: has no effect on a vessel without a shape; give diameter or area"),
         ({"gas_volume": 0.05}, "gas_volume and level are given; keep one"),
-        ({"level": None}, "no gas; wanted one of precharge, gas_volume, level"),
+        ({"level": None}, "no gas; expected one of precharge, gas_volume, level"),
         ({"area": 0.1}, "diameter and area are given; keep one"),
         ({"diameter": None, "area": 0.1}, "slope: goes with diameter"),
         ({"level": None, "precharge": 4e5}, "does not go with precharge (a bladder)"),

@@ -178,7 +178,7 @@ def test_two_basins_and_one_that_each_steps_whole():
     found, summary = told(case, 3)
     assert found == bits
     (notice,) = [one for one in summary.warnings if one.kind == "threads"]
-    assert notice.text == "each thread steps the whole of round: its mesh is no full rectangle"
+    assert notice.text == "each thread steps the whole of round: its mesh is not a full rectangle"
 
 
 def stepped(case, threads: int, spoil=lambda team: None) -> bytes:
@@ -264,7 +264,7 @@ NETWORK = scene({"a": reservoir(AMBIENT), "b": reservoir(2 * AMBIENT)},
 ALONE = {
     "an implicit method": (water(method="tr-bdf2"), "tr-bdf2 solves for all states at once"),
     "no basin": (NETWORK, "there is no basin"),
-    "fifth order of a dye": (carried("weno5"), "sheet: weno5 carries scalars"),
+    "fifth order of a dye": (carried("weno5"), "sheet: its scalars use weno5"),
     "a dye that decays": (dyed(decay=0.1), "pool: dye decays"),
 }  # fmt: skip
 
@@ -286,10 +286,10 @@ def test_a_number_of_threads_that_is_none_is_named(threads):
 
 
 def test_more_threads_than_rows_are_named():
-    with pytest.raises(FvsolveError, match="pool has 12 rows, and each thread needs one; wanted 12 at most"):
+    with pytest.raises(FvsolveError, match="pool has 12 rows, and each thread needs a row. Expected 12 at most"):
         fvsolve.run(water(), threads=13)
 
 
 def test_check_says_what_can_be_shared_out(fvs):
-    assert "threads: up to 50 share out 50 rows of tank" in fvs("check", "dam-break")[1]
-    assert "threads: one; plain: its mesh is no full rectangle" in fvs("check", "flooding")[1]
+    assert "threads: up to 50 share 50 rows of tank" in fvs("check", "dam-break")[1]
+    assert "threads: 1; plain: its mesh is not a full rectangle" in fvs("check", "flooding")[1]

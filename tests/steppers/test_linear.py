@@ -176,7 +176,7 @@ def test_a_singular_matrix_is_reported(kind):
 
 
 def test_a_kind_that_does_not_exist_is_refused():
-    with pytest.raises(FvsolveError, match='no kind of structure named "bandad"; did you mean "banded"'):
+    with pytest.raises(FvsolveError, match='unknown kind of structure "bandad"; did you mean "banded"'):
         Structure(np.eye(2, dtype=bool), "bandad")
     with pytest.raises(FvsolveError, match="fewer rows than states"):
         Structure(np.ones((1, 2), dtype=bool))

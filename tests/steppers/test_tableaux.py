@@ -144,21 +144,24 @@ def test_every_decimal_of_a_published_array_counts():
 @pytest.mark.parametrize(
     "text, wanted",
     [
-        ("0 |\n1 | 1/2\n--+----\n | 1/2 1/2", "row 2 adds up to 1/2; wanted c = 1"),
-        ("0 |\n1 | 1\n--+----\n | 1/2 1/4", "weights must add up to 1, these add up to 3/4"),
-        ("0 |\n1 | 1 2 -2\n--+----\n | 1/2 1/2", "row 2 has 3 entries; wanted at most 2"),
+        ("0 |\n1 | 1/2\n--+----\n | 1/2 1/2", "row 2 adds up to 1/2; expected c = 1"),
+        ("0 |\n1 | 1\n--+----\n | 1/2 1/4", "weights add up to 3/4; expected 1"),
+        ("0 |\n1 | 1 2 -2\n--+----\n | 1/2 1/2", "row 2 has 3 entries; expected at most 2"),
         ("0 |\n1 | x\n--+----\n | 1/2 1/2", 'unknown symbol "x"; known are sqrt(n)'),
-        ("0 |\n1 | 1)\n--+----\n | 1/2 1/2", '"1)": ")" does not fit'),
+        ("0 |\n1 | 1)\n--+----\n | 1/2 1/2", '"1)": unexpected ")"'),
         ("0 |\n1 | 1/0\n--+----\n | 1/2 1/2", '"1/0" divides by zero'),
-        ("0 |\n1 | sqrt(2)\n--+----\n | sqrt(3) 1", "sqrt(2) and sqrt(3) in one tableau"),
-        ("0 |\n1 | sqrt(1/2)\n--+--\n | 1/2 1/2", "wanted sqrt(n) of a whole number"),
-        ("0 |\n1 | sqrt(123456789012)\n--+--\n | 1/2 1/2", "wanted sqrt(n) of a whole number"),
+        ("0 |\n1 | sqrt(2)\n--+----\n | sqrt(3) 1", "sqrt(2) and sqrt(3) are used in one tableau"),
+        ("0 |\n1 | sqrt(1/2)\n--+--\n | 1/2 1/2", "expected sqrt(n) of an integer"),
+        ("0 |\n1 | sqrt(123456789012)\n--+--\n | 1/2 1/2", "expected sqrt(n) of an integer"),
         ("0 |\n1e99 | 1e99\n--+--\n | 1/2 1/2", '"1e99" is beyond 1e+30'),
-        ("0 |", "wanted rows, a ruled line and weights"),
-        ("", "wanted rows, a ruled line and weights"),
+        ("0 |", "Expected rows, a ruled line and weights"),
+        ("", "Expected rows, a ruled line and weights"),
         ("0\n--+--\n | 1", 'has no "|"'),
-        ("0 |\n--+----\n | 1/2 1/2", "rows of 1 weights"),
-        ("0.123456789 | 0.1234567\n--+--\n | 1", "row 1 adds up to 1234567/10000000; wanted c = 123456789/1000000000"),
+        ("0 |\n--+----\n | 1/2 1/2", "one or two rows of 1"),
+        (
+            "0.123456789 | 0.1234567\n--+--\n | 1",
+            "row 1 adds up to 1234567/10000000; expected c = 123456789/1000000000",
+        ),
     ],
 )
 def test_a_wrong_array_is_refused_with_its_fault(text, wanted):
@@ -173,9 +176,9 @@ def test_all_faults_are_said_at_once():
         tableau("wrong", "0 | 1/2\n1 | 1/3 1/3\n--+--\n | 1/2 1/3")
     assert str(caught.value).splitlines() == [
         "wrong: 3 faults",
-        "  row 1 adds up to 1/2; wanted c = 0",
-        "  row 2 adds up to 2/3; wanted c = 1",
-        "  weights must add up to 1, these add up to 5/6",
+        "  row 1 adds up to 1/2; expected c = 0",
+        "  row 2 adds up to 2/3; expected c = 1",
+        "  weights add up to 5/6; expected 1",
     ]
 
 
@@ -201,7 +204,7 @@ def test_a_named_number_is_the_root_that_was_asked_for():
 @pytest.mark.parametrize(
     "polynomial, near, wanted",
     [
-        ("x+1", 1.0, "no polynomial in x of degree 2 or more"),
+        ("x+1", 1.0, "not a polynomial in x of degree 2 or more with rational coefficients"),
         ("x^2+y", 1.0, 'unknown symbol "y"'),
         ("x^2+1", 1.0, "no single root near 1"),
     ],

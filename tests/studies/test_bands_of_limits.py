@@ -81,7 +81,7 @@ def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "short.toml").write_text(write(short_pipe(greatest=NEAR, least=SURE)))
     status, text, _ = fvs("run", "short.toml", "--error", "--no-pictures", "--out", "run")
-    assert status == 1 and "OPEN, as its margin is smaller than its error: heads" in text
+    assert status == 1 and "OPEN, because its margin is smaller than its error: heads" in text
     said = json.loads((tmp_path / "run" / "summary.json").read_text())["verdicts"][0]
     assert (said["state"], said["ok"], said["bound"]) == ("open", False, "greatest")
     page = write_report(tmp_path / "run", tmp_path / "run.html", False)[0].read_text()

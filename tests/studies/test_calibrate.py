@@ -82,7 +82,7 @@ def test_what_cannot_be_told_apart_and_what_changes_nothing_is_named(measured):
             "numerics.end": [4.0, 4.1]}  # fmt: skip
     found = calibrate(case, free)
     said = "; ".join(found.doubts)
-    assert "links.valve.area and links.valve.discharge_coefficient cannot be told apart" in said
+    assert "links.valve.area and links.valve.discharge_coefficient cannot be distinguished" in said
     assert "numerics.end changes nothing that was measured" in said and found.plain()["sigma"]["numerics.end"] is None
 
 
@@ -104,11 +104,13 @@ def test_a_value_at_an_end_of_its_range_is_named(measured):
 
 def test_what_cannot_be_fitted_is_named(measured):
     case = line(LEAK, SPEED, 20, MODEL)
-    with pytest.raises(FvsolveError, match="nothing to fit to: the case has no .compare."):
+    with pytest.raises(
+        FvsolveError, match="no measured series to fit to. Expected a .compare. with a series in the case"
+    ):
         calibrate(case, {"links.valve.area": [0.0006, 0.001]})
-    with pytest.raises(FvsolveError, match="nothing is free"):
+    with pytest.raises(FvsolveError, match="no key to fit"):
         calibrate(compared(case), {})
     with pytest.raises(FvsolveError, match="LOW below HIGH"):
         calibrate(compared(case), {"links.valve.area": [0.001, 0.0006]})
-    with pytest.raises(FvsolveError, match="no run of the sample came to its end: .*halve it"):
+    with pytest.raises(FvsolveError, match="no run of the sample finished: .*halve it"):
         calibrate(compared(case), {"links.valve.area": [0.0006, 0.001]}, {"numerics.courant": 5.0})

@@ -430,8 +430,8 @@ def test_where_a_chamber_holds_explicit_steps_back_references_are_implicit():
 @pytest.mark.parametrize(
     "case, given, said",
     [
-        (line, {"schemes": ["upwnd"]}, 'no scheme upwnd; did you mean "upwind"'),
-        (line, {"methods": ["rk5"]}, "no method rk5"),
+        (line, {"schemes": ["upwnd"]}, 'unknown scheme upwnd; did you mean "upwind"'),
+        (line, {"methods": ["rk5"]}, "unknown method rk5"),
         (line, {"rtol": [1e-3]}, "has pipes.*--cells"),
         (pot, {"cells": [10]}, "no pipe.*rtol or step"),
         (pot, {"schemes": ["muscl"]}, "no pipe.*rtol or step"),

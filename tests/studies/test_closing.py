@@ -51,9 +51,9 @@ def test_the_command_prints_the_law_for_the_case(fvs, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("key", "told"),
     [
-        ("links.tap.area", "is no schedule"),
-        ("links.tpa.opening", "is no schedule"),
-        ("nodes.air.pressure", "does not go"),
+        ("links.tap.area", "is not a schedule"),
+        ("links.tpa.opening", "is not a schedule"),
+        ("nodes.air.pressure", "does not change"),
     ],
 )
 def test_what_is_no_law_is_named(key: str, told: str) -> None:
@@ -64,5 +64,5 @@ def test_what_is_no_law_is_named(key: str, told: str) -> None:
 def test_what_cannot_be_minimised_is_named() -> None:
     with pytest.raises(fvsolve.CaseError, match='did you mean "gate"'):
         optimise(column(), "links.tap.opening", "max(gaet.pressure)")
-    with pytest.raises(FvsolveError, match="wanted 15 or more"):
+    with pytest.raises(FvsolveError, match="Expected 15 or more"):
         optimise(column(), "links.tap.opening", "max(gate.pressure)", runs=4)

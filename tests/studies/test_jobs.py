@@ -79,9 +79,11 @@ def test_workers_of_dask_find_the_same(line, cluster, study, asked):
 
 
 def test_what_has_no_name_to_be_sent_by_is_refused(line):
-    with pytest.raises(FvsolveError, match="initial, source and exact are functions of this process; wanted jobs = 1"):
+    with pytest.raises(
+        FvsolveError, match="initial, source and exact are functions of this process. Expected jobs = 1"
+    ):
         order(line, jobs=2, initial=lambda pipe, x: (x, x))
-    with pytest.raises(FvsolveError, match="jobs = 0; wanted 1 or more"):
+    with pytest.raises(FvsolveError, match="jobs = 0 is out of range. Expected 1 or more"):
         order(line, jobs=0)
 
 
@@ -91,6 +93,6 @@ def test_commands_take_jobs(line, fvs, tmp_path):
     code, out, _ = fvs(*words, "--jobs", "2", "--out", tmp_path / "two")
     assert code == 0 and len(json.loads(out)["studies"][0]["rows"]) == 2
     code, _, err = fvs("stability", "--jobs", "2")
-    assert code == 2 and "--jobs: nothing to say without a case" in err
+    assert code == 2 and "--jobs: needs a case" in err
     code, _, err = fvs("chart", tmp_path / "line.toml", "--models", "--jobs", "2")
-    assert code == 2 and "--jobs: not with --models" in err
+    assert code == 2 and "--jobs: not valid with --models" in err

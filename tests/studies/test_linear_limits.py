@@ -92,10 +92,10 @@ def test_auto_is_the_method_it_begins_with_once_and_says_so():
 
 
 @pytest.mark.parametrize("arguments, said", [
-    (["--set", "a=1", "--at", "1", "--before"], "--set, --at, --before: nothing to say without a case"),
-    (["chamber-chain", "--cells", "4", "--courant", "1"], "--cells, --courant: nothing to say with a case"),
-    (["chamber-chain", "--method", ""], '--method "" lists nothing'),
-    (["--scheme", ","], '--scheme "," lists nothing'),
+    (["--set", "a=1", "--at", "1", "--before"], "--set, --at, --before: needs a case: fvsolve stability CASE"),
+    (["chamber-chain", "--cells", "4", "--courant", "1"], "--cells, --courant: not valid with a case, only without"),
+    (["chamber-chain", "--method", ""], '--method "" is an empty list'),
+    (["--scheme", ","], '--scheme "," is an empty list'),
 ])  # fmt: skip
 def test_options_that_say_nothing_are_refused(arguments, said, monkeypatch, capsys, tmp_path):
     assert said in ran(monkeypatch, capsys, tmp_path, "stability", *arguments)

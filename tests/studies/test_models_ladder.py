@@ -106,7 +106,7 @@ def test_rungs_that_would_be_ill_posed_are_skipped_by_name():
     assert "flow enters or leaves at gate" in named(found, "column and volume").reason
     case["nodes"]["out"] = junction(ramp(1.0, 0.5, 0.0, 0.01))
     case["links"]["valve"] = pipe("gate", "out", 50.0, 0.2, SPEED, 4)
-    assert "only rigid columns meet here" in named(ladder(case), "rigid column").reason
+    assert "only rigid columns join here" in named(ladder(case), "rigid column").reason
 
 
 def test_a_scene_in_which_nothing_moves_is_refused():
@@ -178,12 +178,12 @@ def test_ctrl_c_during_a_rung_ends_the_ladder(tmp_path):
         main()"""
     command = [sys.executable, "-c", script, "chart", "line.toml", "--models"]
     left = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
-    assert left.returncode == 130 and "none of them is kept" in left.stderr and "Traceback" not in left.stderr
+    assert left.returncode == 130 and "their results are lost" in left.stderr and "Traceback" not in left.stderr
 
 
 def test_what_means_nothing_to_the_ladder_is_refused_by_name(fvs):
     code, _, err = fvs("chart", "gradual-closure", "--models", "--scheme", "weno5", "--step", "1e-3")
-    assert code == 2 and err.startswith("--scheme, --step: not with --models")
+    assert code == 2 and err.startswith("--scheme, --step: not valid with --models")
 
 
 def test_the_quickest_change_is_the_range_over_the_steepest_slope():

@@ -60,7 +60,7 @@ def test_a_scene_said_by_modes_has_the_same_rungs():
 def test_basins_that_do_not_ride_are_refused_by_name():
     case = rolling(1e-4)
     case["nodes"]["pond"] = {"type": "basin", "size": [1, 1], "cells": [4, 4], "level": 0.1}
-    with pytest.raises(FvsolveError, match="does not know basins yet; the case has pond"):
+    with pytest.raises(FvsolveError, match="does not support basins yet; the case has pond"):
         ladder(case)
 
 
@@ -70,5 +70,5 @@ def test_a_liquid_that_rides_is_no_tank_that_sloshes():
     case = rolling(1e-4, **liquid)
     case["output"]["probes"] = ["hull.angle"]
     del case["nodes"]["tank"]["level"]
-    with pytest.raises(FvsolveError, match="chart --models does not know basins yet; the case has tank"):
+    with pytest.raises(FvsolveError, match="chart --models does not support basins yet; the case has tank"):
         ladder(case, target=0.05)

@@ -36,7 +36,7 @@ def test_where_liquid_parts_no_order_is_believed() -> None:
     case = fvsolve.load("pumping-main", set=trip | way)
     said = peak_errors(fvsolve.run(case), case)
     fine = fvsolve.run(case, set={"links.main.cells": 240})
-    assert said["cavities"] and "liquid parts" in said["resolution"]["words"]
+    assert said["cavities"] and "column separation" in said["resolution"]["words"]
     for probe, one in said["peaks"].items():
         assert one["greatest"]["order"] is one["least"]["order"] is None
         assert abs(fine.extremes[probe].greatest - one["greatest"]["value"]) <= one["greatest"]["error"], probe

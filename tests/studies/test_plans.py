@@ -46,15 +46,18 @@ def test_all_that_is_wrong_of_ranges_is_said_at_once(case):
     with pytest.raises(CaseError) as raised:
         ranges(case, wrong)
     said = str(raised.value)
-    assert "8 faults" in said and "the range from 0.002 to 0.001 has its ends the other way round" in said
-    assert 'the range from "900 m" to 900 has nothing in it' in said and '"1 kg" is a mass; wanted a length' in said
-    assert "links.main.cells: is no quantity" in said and "numerics.scheme: is no quantity" in said
-    assert 'no key "links.main.lengt"' in said and "[1, 2, 3] is no range" in said and "-1.0 is out of range" in said
+    assert "8 faults" in said and "the range from 0.002 to 0.001 is reversed" in said
+    assert 'the range from "900 m" to 900 is empty' in said and '"1 kg" is a mass; wanted a length' in said
+    assert (
+        "links.main.cells: is not a continuous quantity" in said
+        and "numerics.scheme: is not a continuous quantity" in said
+    )
+    assert 'no key "links.main.lengt"' in said and "[1, 2, 3] is not a range" in said and "-1.0 is out of range" in said
 
 
 @pytest.mark.parametrize("sample", ["sobol", "sobol:0", "sobol:-3", "halton:8", "lhs:1e3", "sobol:99999999999"])
 def test_a_sample_that_is_none_is_named(case, sample):
-    with pytest.raises(FvsolveError, match="wanted sobol:N or lhs:N with N runs"):
+    with pytest.raises(FvsolveError, match="Expected sobol:N or lhs:N with N runs"):
         sampled(case, RANGES, sample, 0)
 
 
@@ -104,19 +107,22 @@ def test_all_that_is_wrong_of_a_file_is_said_at_once(case, tmp_path):
     with pytest.raises(FvsolveError) as raised:
         read(case, tmp_path, text)
     said = str(raised.value)
-    assert 'links.valve.aera: unknown key; did you mean "area"?' in said and "two columns are nodes.lake.head" in said
-    assert '"kg" is a mass; wanted a head' in said and "a column of numerics.scheme has no unit" in said
-    assert "line 3, links.valve.aera: is empty; wanted a value in every row" in said and '"2 kg" is a mass' in said
+    assert (
+        'links.valve.aera: unknown key; did you mean "area"?' in said
+        and "two columns have the key nodes.lake.head" in said
+    )
+    assert '"kg" is a mass; wanted a head' in said and "values of numerics.scheme have no unit" in said
+    assert "line 3, links.valve.aera: is empty. Expected a value in every row" in said and '"2 kg" is a mass' in said
 
 
 @pytest.mark.parametrize(
     "text, said",
     [
-        ("", "is empty; wanted a header"),
-        ("links.valve.area\n", "is empty; wanted a header"),
+        ("", "is empty; expected a header"),
+        ("links.valve.area\n", "is empty; expected a header"),
         ("1,2\n3,4\n", "has no header"),
         ("links.valve.area,nodes.lake.head\n1,2\n1\n", "line 3: 1 cell under 2 headers"),
-        ("links.valve.area,nodes.lake.head\n0,5,3\n", "line 2: 3 cells under 2 headers; decimal commas"),
+        ("links.valve.area,nodes.lake.head\n0,5,3\n", "line 2: 3 cells under 2 headers; with decimal commas"),
         (b"\xff\xfe\x00", "is not UTF-8 or UTF-16 text"),
     ],
 )
@@ -133,10 +139,10 @@ def test_a_file_that_is_not_there_is_named(case, tmp_path):
 @pytest.mark.parametrize(
     "given, said",
     [
-        ({"points": []}, "points have not all the same keys"),
-        ({"points": [{"links.valve.area": 1.0}, {"nodes.lake.head": 1.0}]}, "points have not all the same keys"),
-        ({"points": [{"links.valve.area": 1.0}], "vary": {"links.valve.area": [1.0, 2.0]}}, "wanted no vary"),
-        ({"sample": "sobol:8"}, "nothing varies"),
+        ({"points": []}, "points have different keys"),
+        ({"points": [{"links.valve.area": 1.0}, {"nodes.lake.head": 1.0}]}, "points have different keys"),
+        ({"points": [{"links.valve.area": 1.0}], "vary": {"links.valve.area": [1.0, 2.0]}}, "Expected no vary"),
+        ({"sample": "sobol:8"}, "no key varies"),
         ({"vary": {"links.valve.area": [1.0, 2.0], "nodes.lake.head": []}}, "nodes.lake.head: no values"),
     ],
 )

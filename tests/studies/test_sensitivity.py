@@ -110,11 +110,17 @@ def test_what_cannot_be_asked_is_named(line):
     bounds = {"links.main.wave_speed": [900.0, 1300.0]}
     for given, said in (
         ({"vary": bounds, "outcome": "max(gate.flow)"}, 'no outcome "max.gate.flow."'),
-        ({"vary": bounds}, "no outcome; wanted one such as"),
-        ({"vary": {}, "outcome": "max(gate.pressure)"}, "nothing varies"),
-        ({"vary": bounds, "outcome": "max(gate.pressure)", "samples": 1}, "samples = 1; wanted 2 or more"),
-        ({"vary": {"nodes.gate.position": [0.0, 1.0]}, "outcome": "max(gate.pressure)"}, "is no quantity"),
-        ({"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "outcome": "max(gate.pressure)"}, "no key moves it"),
+        ({"vary": bounds}, "no outcome. Expected an outcome such as"),
+        ({"vary": {}, "outcome": "max(gate.pressure)"}, "no key varies"),
+        (
+            {"vary": bounds, "outcome": "max(gate.pressure)", "samples": 1},
+            "samples = 1 is too small. Expected 2 or more",
+        ),
+        (
+            {"vary": {"nodes.gate.position": [0.0, 1.0]}, "outcome": "max(gate.pressure)"},
+            "is not a continuous quantity",
+        ),
+        ({"vary": {"fluid.viscosity": [1e-3, 2e-3]}, "outcome": "max(gate.pressure)"}, "no key changes it"),
         ({"vary": bounds, "outcome": "t [s]"}, 'no outcome "t .s."'),
     ):
         with pytest.raises(FvsolveError, match=said):

@@ -56,7 +56,7 @@ def test_what_is_exact_at_any_step_is_said_to_be():
     assert found.words.startswith("upwind on") and any("exact here, at any step" in note for note in found.notes)
     with pytest.raises(FvsolveError, match="for want of friction"):
         studies.order(main(4.0), refine="space")
-    with pytest.raises(FvsolveError, match="functions along pipes want cells, and main would be"):
+    with pytest.raises(FvsolveError, match="functions along pipes need cells, but main would be"):
         studies.order(main(4.0), source=lambda pipe, x, t: (0.0 * x, 0.0 * x))
 
 
@@ -91,7 +91,7 @@ def test_a_chart_of_lines_is_judged_by_cells():
 
 def test_a_chart_of_lines_has_steps_and_no_more():
     for asked in ({"schemes": ["upwind"]}, {"cells": [10]}, {"rtol": [1e-3]}):
-        with pytest.raises(FvsolveError, match="their resolution is step"):
+        with pytest.raises(FvsolveError, match="Their resolution is step"):
             studies.chart(rough(), **asked)
     with pytest.raises(FvsolveError, match="where delay lines are exact any step will do"):
         studies.chart(main(2.0, every=0.0499), methods=["euler"], step=[0.05])

@@ -112,7 +112,7 @@ def test_an_order_that_would_take_long_begins_on_fewer_cells_and_says_so(monkeyp
     assert [level.cells for level in whole.levels] == [64, 128, 256] and "begun" not in whole.words
     monkeypatch.setattr(afford, "LONGEST", 1e-6)
     made = affordable(few, None, None, 3, None, "auto", Points(tmp_path))
-    assert [level.cells for level in made.levels] == [8, 16, 32] and "begun on 8 of 64 cells" in made.words
+    assert [level.cells for level in made.levels] == [8, 16, 32] and "starts with 8 of 64 cells" in made.words
     assert affordable(few, None, None, 3, 50, "auto", None).levels[0].cells == 50
     monkeypatch.undo()
     assert affordable(few, None, None, 3, None, "auto", Points(tmp_path)) == made  # a study that goes on
@@ -168,9 +168,9 @@ def test_what_acts_on_a_pump_that_trips_is_its_run_down():
 
 
 def test_a_vessel_is_not_said_by_a_volume():
-    with pytest.raises(Unsayable, match="top would take the place of the air-valve"):
+    with pytest.raises(Unsayable, match="a volume at top would replace the air-valve"):
         restated(case("air-valve"), "lumped volume")
-    with pytest.raises(Unsayable, match="all ends hold their pressure"):
+    with pytest.raises(Unsayable, match="all ends have a given pressure"):
         restated(case("pump-trip-air-vessel"), "column and volume")
 
 

@@ -1,6 +1,6 @@
-"""Power and stored energy of water with a free surface. Knows the tables; adds nothing up over time.
+"""Power and stored energy of water with a free surface.
 
-It stores rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)) per area. Rows: see `basins.energy`.
+The stored energy per area is rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)). For the rows see `basin_energy`.
 """
 
 from math import sqrt
@@ -19,14 +19,14 @@ MINE = kind_of(__package__)
 
 @njit(forceinline=True)
 def per_flow(depth):
-    """Velocity over flow of water so deep [1/m]."""
+    """Velocity over unit flow at a depth [1/m]."""
     wet = max(depth, THIN)
     return 2.0 * depth / (depth * depth + wet * wet)
 
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Rows of its basins."""
+    """Write the rows of its basins: losses at patches, friction, rate of storage."""
     tables = open_tables(handle)
     patches, layout = tables.patches, tables.layout[0]
     for b in range(tables.basins.size):
@@ -42,7 +42,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def water_power(st, basin, plane, y, dydt, rows):
-    """Friction, held as in the rates, and rate of storage of water with a free surface."""
+    """Friction, capped as in the rates, and rate of storage of water with a free surface."""
     n, o = basin["n"], basin["y"]
     depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
     weight, rest, area = st["rho"] * st["gravity"], at_rest(st, basin), plane[basin["area"] :]
@@ -54,15 +54,15 @@ def water_power(st, basin, plane, y, dydt, rows):
         share = per_flow(depth)
         u, v = share * qx, share * qy
         level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
-        moves = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
-        rate += drawn[i] * (level * dydt[o + i] + st["rho"] * moves)
+        kinetic = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
+        rate += drawn[i] * (level * dydt[o + i] + st["rho"] * kinetic)
         friction += area[i] * drag_power(st, basin, depth, sqrt(qx * qx + qy * qy), u * u + v * v)
     rows[2], rows[3] = friction, rate
 
 
 @njit
 def drag_power(st, basin, depth, flow, square):
-    """What the bed takes of water that runs over it, per area [W/m2]; square : of its velocity."""
+    """Power of bed friction per area [W/m2]. square : of the velocity"""
     if basin["friction"] == NO_DRAG:
         return 0.0
     rate = drag_per_flow(basin["friction"], st["gravity"], basin["roughness"], depth) * flow
@@ -71,38 +71,38 @@ def drag_power(st, basin, depth, flow, square):
 
 @njit
 def patch_loss(tables, patch, flow, y):
-    """What speed is lost where `flow` [kg/s] enters the cells behind a patch, or leaves them [W]; see `patches`."""
+    """Power lost by `flow` [kg/s] into the cells at a patch, or out of them [W]; see `surface_patches`."""
     st, basin, plane, integers = (
         tables.settings[0],
         tables.basins[patch["basin"]],
         tables.plane,
         tables.integers,
     )
-    n, o, lost, leaves = basin["n"], basin["y"], 0.0, flow < 0.0
+    n, o, total, leaves = basin["n"], basin["y"], 0.0, flow < 0.0
     depths, area = plane[basin["plan"] :], plane[basin["area"] :]
     each = flow / counted(tables, patch, leaves, y)
     for m in range(patch["count"]):
         i = integers[patch["first"] + m]
         share = per_flow(max(depths[i] + y[o + i], 0.0))
         square = share * share * (y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2)
-        lost += 0.5 * area[i] * square * each * weight(plane, basin, leaves, i, y)
+        total += 0.5 * area[i] * square * each * weight(plane, basin, leaves, i, y)
     for m in range(patch["faces"]):
-        i, at, many = integers[patch["ring"] + patch["faces"] + m], patch["normals"], patch["faces"]
+        i, at, count = integers[patch["ring"] + patch["faces"] + m], patch["normals"], patch["faces"]
         depth = max(depths[i] + y[o + i], 0.0)
-        share, wide = per_flow(depth), plane[at + 2 * many + m] * plane[basin["drawn"] + i]
+        share, wide = per_flow(depth), plane[at + 2 * count + m] * plane[basin["drawn"] + i]
         u, v = share * y[o + n + i], share * y[o + 2 * n + i]
         away = -each * weight(plane, basin, leaves, i, y) * area_of(tables, patch) / length_of(tables, patch)
-        along = u * plane[at + m] + v * plane[at + many + m]
-        held = away - st["rho"] * depth * along  # against a wall all that runs into it is lost
-        lost -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * held
+        along = u * plane[at + m] + v * plane[at + count + m]
+        net_outflow = away - st["rho"] * depth * along  # at a wall the inflow of momentum is lost
+        total -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * net_outflow
         if away > 0.0:
-            lost += wide * away * (u * u + v * v - along * along)
-    return lost
+            total += wide * away * (u * u + v * v - along * along)
+    return total
 
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Rows of its basins."""
+    """Write the stored energy of its basins."""
     tables = open_tables(handle)
     st, basins, plane = tables.settings[0], tables.basins, tables.plane
     weight = st["rho"] * st["gravity"]

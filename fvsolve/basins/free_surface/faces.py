@@ -1,8 +1,8 @@
-"""Shallow water on any mesh: rates of depth and flow. Knows cells and their sides; knows no patch and no network.
+"""Shallow water on any mesh: rates of depth and flow.
 
-The scheme is that of the grid (see `shallow`), with slopes by least squares and one limiter over all sides of a cell.
-Pressures count from the cell's own, and the bed's push from its own surface, so that where the surface is level every
-term is zero: a lake at rest stays at rest, with dry islands too.
+The scheme is that of the grid (`surface_grid`), with least-squares gradients and a common limiter for all sides of a
+cell. Pressures are relative to that of the cell, and the force of the bed to its surface. So every term is zero where
+the surface is level: a lake at rest stays at rest, with dry islands too.
 """
 
 from math import sqrt
@@ -31,13 +31,13 @@ from fvsolve.basins.stretch import swell
 from fvsolve.jit import njit
 from fvsolve.kernels.records import UPWIND
 
-DEPTH, SURFACE, PLANS = 0, 1, 2  # rows of plan: the profile's depth, its surface less the level
-THIN = 1e-6  # depth below which velocities fade [m]
+DEPTH, SURFACE, PLANS = 0, 1, 2  # rows of plan: depth of the profile, its surface above the level
+THIN = 1e-6  # depth below which velocities fade to zero [m]
 
-# rows of BLOCK in the scratch of `settle`: what lies beyond, rates, sums for the step, flow through the side
+# Rows of BLOCK in the scratch of `add_side_fluxes`: values beyond, rates, sums for the step, flow through the side.
 _E, _U, _V, _C, _RH, _RX, _RY, _FAST, _GONE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-_PUSH = 13 * BLOCK  # of what moves, thrust on the side less that of the cell's own depth
+_PUSH = 13 * BLOCK  # of moving sides: thrust minus that of the cell's own depth
 ROWS = 14
 
 
@@ -54,35 +54,35 @@ def put_primitives(g, depth0, surface0, dh, qx, qy, h, e, u, v, c):
 
 @njit
 def mirror(edges, ring, nx, ny, number, reflect, u, v, shown_u, shown_v, moves):
-    """Velocities that the boundary shows of the cells inside; where it moves, u of 2 w - u."""
+    """Velocities beyond the boundary, mirrored; at a moving side u becomes 2 w - u."""
     for q in range(edges.size):
         i = place(edges[q], ring)
         r = reflect[number[q]] if reflect.size > 0 else 1.0
         across = u[i] * nx[q] + v[i] * ny[q]
         if moves is not None:
             across -= moves[0][edges[q]]
-        turn = 2.0 * r * across
-        shown_u[q], shown_v[q] = u[i] - turn * nx[q], v[i] - turn * ny[q]
+        change = 2.0 * r * across
+        shown_u[q], shown_v[q] = u[i] - change * nx[q], v[i] - change * ny[q]
 
 
 @njit
 def mirror_sides(edges, nx, ny, number, reflect, ul, vl, w, moves):
-    """Put beyond sides of the boundary what it shows of the values inside."""
+    """Write mirrored velocities beyond boundary sides."""
     for q in range(edges.size):
         i = edges[q] % BLOCK
         r = reflect[number[q]] if reflect.size > 0 else 1.0
         across = ul[i] * nx[q] + vl[i] * ny[q]
         if moves is not None:
             across -= moves[0][edges[q]]
-        turn = 2.0 * r * across
-        w[_U + i], w[_V + i] = ul[i] - turn * nx[q], vl[i] - turn * ny[q]
+        change = 2.0 * r * across
+        w[_U + i], w[_V + i] = ul[i] - change * nx[q], vl[i] - change * ny[q]
 
 
 @njit
 def settle(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
-    """Take from the rates of a block of cells what leaves through one side of each, from the values inside it.
+    """Subtract from the rates of a block of cells the outflow through one side of each (HLLC).
 
-    speeds : of the sides [m/s], None where they stand still: F(U) - w U, found in axes that move along
+    speeds : of the sides [m/s], None if they do not move: the flux F(U) - w U is computed in moving axes
     """
     half = 0.5 * g
     for i in range(BLOCK):
@@ -94,10 +94,10 @@ def settle(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
         if speeds is not None:
             na, nb = na - speeds[i], nb - speeds[i]
         low, high = min(min(na, nb) - c, 0.0), max(max(na, nb) + c, 0.0)
-        both = 1.0 / (high - low + TINY)
+        per_width = 1.0 / (high - low + TINY)
         qa, qb = a * na, b * nb
-        mass = both * (high * qa - low * qb + high * low * (b - a))
-        flow = both * (high * (qa * na) - low * (qb * nb + half * (b - a) * (b + a)) + high * low * (qb - qa))
+        mass = per_width * (high * qa - low * qb + high * low * (b - a))
+        flow = per_width * (high * (qa * na) - low * (qb * nb + half * (b - a) * (b + a)) + high * low * (qb - qa))
         flow += half * (hl[i] + h0[i]) * (el[i] - e0[i])
         if speeds is not None:
             flow += speeds[i] * mass
@@ -107,13 +107,13 @@ def settle(g, h0, e0, c0, hl, el, ul, vl, geo, w, speeds):
         w[_RX + i] -= reach * (flow * nx - along * ny)
         w[_RY + i] -= reach * (flow * ny + along * nx)
         w[_FAST + i] += reach * max(high, -low)
-        w[_GONE + i] += reach * (high * (na - low) * both)
+        w[_GONE + i] += reach * (high * (na - low) * per_width)
         w[_MASS + i] = mass
 
 
 @njit
 def push_walls(g, edges, number, reflect, rest, h0, geo, w, thrust):
-    """Let nothing pass walls; thrust on them less that of the depth at rest there."""
+    """Set the mass flow through walls to zero; write the thrust on them minus that of the depth at rest."""
     for q in range(edges.size):
         i = edges[q] % BLOCK
         thrust[number[q]] = w[_PUSH + i] + 0.5 * g * ((h0[i] - rest[i]) * (h0[i] + rest[i]))
@@ -124,21 +124,21 @@ def push_walls(g, edges, number, reflect, rest, h0, geo, w, thrust):
 
 @njit
 def clear(w):
-    """No rates and no sums yet."""
+    """Set rates and sums to zero."""
     for i in range(BLOCK):
         w[_RH + i], w[_RX + i], w[_RY + i], w[_FAST + i], w[_GONE + i] = 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @njit
 def put_shores(h, shore):
-    """How much the surface may differ at the sides of a block of cells: not at all where the bed is dry."""
+    """Allowed deviation of the surface at the sides of a block of cells: 0 where the bed is dry."""
     for i in range(BLOCK):
         shore[i] = HUGE if h[i] > 0.0 else 0.0
 
 
 @njit
 def quickest(w, top):
-    """The greatest rate so far in each lane: half of what waves pass, or all that leaves."""
+    """Greatest rate so far in each lane: half the sum of wave speeds over sides, or the total outflow."""
     for i in range(BLOCK):
         top[i] = max(top[i], max(0.5 * w[_FAST + i], w[_GONE + i]))
 
@@ -160,7 +160,7 @@ def put_flow(where, w, length, flow):
 
 @njit
 def work_size(integers):
-    """Floats that `shallow_rates` works in."""
+    """Length of the work array of `shallow_rates`."""
     return 21 * integers[4] * BLOCK + 2 * integers[3] + ROWS * BLOCK
 
 
@@ -169,15 +169,18 @@ def shallow_rates(
     g, scheme, wide_by, floats, integers, reflect, plan, dh, qx, qy, flow, through, work, rate_h, rate_x, rate_y,
     moves,
 ):  # fmt: skip
-    """Rates of all cells; returns the greatest of sum L (|u| + c) / (2 A) and of the share that leaves a cell [1/s].
+    """Rates of all cells.
+
+    Returns the greatest of sum L (|u| + c) / (2 A) and of the outflow over a cell's volume [1/s].
 
     Euler steps up to half of its inverse, 1 / (2 rate), leave no depth below zero.
-    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
+    scheme : UPWIND or MUSCL; wide_by : allowed excess of values at sides over the range of neighbours, 1 for none
     reflect : float64[b], 1 wall, 0 open, empty for walls; plan : float64[PLANS, n]
-    flow : float64[f]  volumes through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
-    through : float64[b]  volumes inward through the boundary [m3/s], or empty
-    moves : None, or speeds of sides along their normals [m/s] and what they find, see `moving_meshes`: thrust on faces
-    of the boundary less that at rest, over density [m2/s2], float64[b]; and `wide`, see `basins.stretch`
+    flow : float64[f]  volume flows through faces, left to right [m3/s], or empty; work : float64[work_size(integers)]
+    through : float64[b]  inward volume flows through the boundary [m3/s], or empty
+    moves : None, or a tuple: speeds of sides along their normals [m/s], see `moving_meshes`; array float64[b] for the
+    thrust
+    on boundary faces minus that at rest, over density [m2/s2]; stretching `wide`, see `basins.cell_stretching`
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
@@ -197,28 +200,34 @@ def shallow_rates(
     top, shore = w[11 * BLOCK :], w[12 * BLOCK :]
     for i in range(BLOCK):
         top[i] = 0.0
-    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
+    cells_done, sides_done, wall, edge = (
+        0,
+        0,
+        0,
+        0,
+    )  # blocks with computed cells and sides; boundary sides done in both loops
     for j in range(count):
-        while sided < need[j]:
-            while known < need[sided]:
-                i, k, o = known * BLOCK, min((known + 1) * BLOCK, n), (known % ring) * BLOCK
+        while sides_done < need[j]:
+            while cells_done < need[sides_done]:
+                i, k, o = cells_done * BLOCK, min((cells_done + 1) * BLOCK, n), (cells_done % ring) * BLOCK
                 put_primitives(g, plan[DEPTH, i:k], plan[SURFACE, i:k], dh[i:k], qx[i:k], qy[i:k],
                                h[o:], e[o:], u[o:], v[o:], c[o:])  # fmt: skip
-                known += 1
+                cells_done += 1
             if not first_order:
-                k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
+                k, wall = wall, edges_before(edges, wall, 4 * (sides_done + 1) * BLOCK)
                 here, su, sv = edges[k:wall], shown[k:wall], shown[b + k : b + wall]
                 mirror(here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, u, v, su, sv, moves)
-                o = (sided % ring) * BLOCK
+                o = (sides_done % ring) * BLOCK
                 put_sides(
-                    sided, floats, integers, h, wide_by, h[o:], su, edges[:0], w, hs
-                )  # from zero to twice the depth
+                    sides_done, floats, integers, h, wide_by, h[o:], su, edges[:0], w, hs
+                )  # limits: zero to twice the depth
                 put_shores(h[o:], shore)
-                put_sides(sided, floats, integers, e, wide_by, shore, su, edges[:0], w, es)
-                # velocities by no more than waves run: beside a thin cell that runs away a linear field turns back
-                put_sides(sided, floats, integers, u, wide_by, c[o:], su, here, w, us)
-                put_sides(sided, floats, integers, v, wide_by, c[o:], sv, here, w, vs)
-            sided += 1
+                put_sides(sides_done, floats, integers, e, wide_by, shore, su, edges[:0], w, es)
+                # Velocities differ by no more than the wave speed: next to a thin fast cell, a linear field would
+                # reverse the flow.
+                put_sides(sides_done, floats, integers, u, wide_by, c[o:], su, here, w, us)
+                put_sides(sides_done, floats, integers, v, wide_by, c[o:], sv, here, w, vs)
+            sides_done += 1
         clear(w)
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
         for k in range(slots):

@@ -1,15 +1,15 @@
-"""Shallow water on a grid of rectangles: rates of depth and flow. Knows rows of cells; knows no patch and no network.
+"""Shallow water on a grid of rectangles: rates of depth and flow.
 
 h_t + (q_x)_x + (q_y)_y = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed). Depth h, surface e = h + bed and
-velocities are reconstructed; both sides of a face see its higher bed (hydrostatic reconstruction, Audusse et al. 2004).
-The pressure of a cell on its faces and the push of its bed are one term, g h (rise of e), so a lake at rest stays at
-rest to the bit, with dry islands too. Flux of Harten, Lax and van Leer with the contact (HLLC, Toro 2001): what moves
-along a face goes with the mass. The speeds that bound its waves are those of the cells on either side, between which
-limited values lie, so that no depth falls below zero.
+velocities are reconstructed; both sides of a face use the higher bed (hydrostatic reconstruction, Audusse et al. 2004).
+The pressure of a cell on its faces and the force of its bed are combined in g h (rise of e). So a lake at rest stays at
+rest to the bit, with dry islands too. The flux is that of Harten, Lax and van Leer with the contact wave (HLLC, Toro
+2001): tangential momentum is carried with the mass. The bounds of wave speeds are those of the cells on either side,
+which bound limited values too, so that no depth falls below zero.
 
-Fifth order (`LINEAR`, `WENO5`) reconstructs unit flows in place of velocities, wherever the shallowest of five cells
-has half the depth of the deepest, and limited values elsewhere. It is of that order along one direction and on even
-cells; in the plane of second order, since a flux of mean values is not the mean flux.
+Fifth order (`LINEAR`, `WENO5`) reconstructs unit flows instead of velocities where the shallowest of five cells has
+half the depth of the deepest, and uses limited values elsewhere. It has that order along one direction on uniform
+cells; in two dimensions it is of second order, because the flux of mean values is not the mean flux.
 """
 
 from fvsolve.basins.free_surface.rows import (
@@ -45,10 +45,10 @@ from fvsolve.kernels.records import LINEAR, WENO5
 __all__ = ["PLANS", "WORK", "grid_rates"]
 
 PLANS = 2  # rows of `plan`: depth and surface of the profile
-RING = 8  # rows of cells at hand
-REACH = 3  # rows beside a cell that its rates look at, at most
+RING = 8  # stored rows of cells
+REACH = 3  # greatest stencil radius of the rates, in rows
 BLOCK, SIDE, FLUX = FIELDS * STRIDE, SIDES * STRIDE, FLUXES * STRIDE
-WORK = RING * BLOCK + 3 * SIDE + 3 * FLUX + 2 * STRIDE  # floats that `grid_rates` works in
+WORK = RING * BLOCK + 3 * SIDE + 3 * FLUX + 2 * STRIDE  # length of the work array of `grid_rates`
 MOVING = WORK + 3 * STRIDE
 
 
@@ -61,25 +61,28 @@ def copy(source, target):
 
 @njit
 def place(j, i):
-    """Where cell i of row j is in the ring."""
+    """Offset of cell i of row j in the ring."""
     return (j & (RING - 1)) * BLOCK + GHOSTS + i
 
 
 @njit
-def factors_of(j, left, right, moves, room):
-    """(wide, narrow) of columns of row j, see `basins.stretch`."""
+def factors_of(j, left, right, moves, scratch):
+    """(wide, narrow) of columns of row j, see `basins.cell_stretching`."""
     wide, narrow = moves[3], moves[4]
     if moves[0].size > 0:
         return wide[left:right], narrow[left:right]
-    one, other = room[: right - left], room[STRIDE : STRIDE + right - left]
-    fill(wide[j], one)
-    fill(narrow[j], other)
-    return one, other
+    row_wide, row_narrow = scratch[: right - left], scratch[STRIDE : STRIDE + right - left]
+    fill(wide[j], row_wide)
+    fill(narrow[j], row_narrow)
+    return row_wide, row_narrow
 
 
 @njit
 def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy, work, top, moves):
-    """Columns `first` to `last` of row j of cells and their ghosts; also one beyond the grid, from those before it."""
+    """Columns `first` to `last` of row j of cells with ghost cells.
+
+    A row beyond the grid is computed from earlier rows.
+    """
     ring = work[: RING * BLOCK]
     fields, left, right = FIELDS if fifth else FLOW_EAST // STRIDE, max(first - GHOSTS, 0), min(last + GHOSTS, nx)
     cells, walls = ring[place(j, left - first) :], reflect.size > 0
@@ -118,7 +121,10 @@ def put_row(g, j, fifth, nx, ny, first, last, kx, ky, reflect, plan, dh, qx, qy,
 
 @njit
 def push_walls(g, speed, rest, side, f, thrust):
-    """Let nothing pass a row of faces of the boundary that moves; thrust less that of the depth at rest there."""
+    """Set the mass flow through a row of moving boundary faces to zero.
+
+    Write the thrust minus that of the depth at rest.
+    """
     for i in range(thrust.size):
         if speed != 0.0:
             f[i], f[i + ALONG] = 0.0, 0.0
@@ -132,18 +138,19 @@ def grid_rates(
 ):  # fmt: skip
     """Rates of the cells of rows `begin` to `stop`; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
-    Rows are those of the whole grid, whose neighbours as far as the scheme reaches are looked at too.
+    Rows are those of the whole grid; neighbours within the stencil of the scheme are read too.
     scheme : UPWIND, MUSCL, LINEAR (upwind5) or WENO5
     kx float64[nx], ky float64[ny] : 1 / widths of columns and rows [1/m]
     reflect : float64[2 (nx + ny)], 1 a wall and 0 open, west, east, south, north; or empty, walls all around
-    plan : float64[PLANS, n], depth of the profile at rest and its surface less the level [m]
-    dh, qx, qy : float64[n] depth less the profile's [m], unit flows [m2/s]; where lines move what cells contain of both
+    plan : float64[PLANS, n], depth of the profile at rest and its surface above the level [m]
+    dh, qx, qy : float64[n] deviation of depth from the profile [m], unit flows [m2/s]; their contents if lines move
     flow_x : float64[ny (nx + 1)], flow_y : float64[(ny + 1) nx] flows of depth through faces [m2/s], or empty
-    through : float64[2 (nx + ny)]  flows inward through faces of the boundary [m3/s], in the order of reflect, or empty
-    work : float64[WORK], fastest where it begins at a cache line; float64[MOVING] where lines move
-    moves : None, or speeds of lines along x and along y [m/s], float64[nx + 9] and float64[ny + 9], empty where they
-    stand still, what they find: thrust on faces of the boundary less that at rest, over density [m2/s2],
-    float64[2 (nx + ny)]; and of columns or rows that stretch `wide` and `narrow`, see `basins.stretch`
+    through : float64[2 (nx + ny)]  inward flows through boundary faces [m3/s], in the order of reflect, or empty
+    work : float64[WORK], fastest if aligned to a cache line; float64[MOVING] if lines move
+    moves : None, or a tuple: speeds of lines along x and along y [m/s], float64[nx + 9] and float64[ny + 9], empty if
+    they
+    do not move; array float64[2 (nx + ny)] for the thrust on boundary faces minus that at rest, over density [m2/s2];
+    stretching `wide` of columns or rows and its reciprocal `narrow`, see `basins.cell_stretching`
     """
     most = 0.0
     for first in range(0, nx, MOST):
@@ -161,15 +168,15 @@ def column_rates(
     g, scheme, limiter, nx, ny, begin, stop, fresh, first, last, kx, ky, reflect, plan, dh, qx, qy, flow_x, flow_y,
     through, work, rate_h, rate_x, rate_y, moves,
 ):  # fmt: skip
-    """The same of columns `first` to `last`, no more than MOST of them, row by row.
+    """Rates of columns `first` to `last`, at most MOST, row by row; arguments as in `grid_rates`.
 
-    fresh : whether it does not go on where it has ended last, at `begin`
+    fresh : False if the last call ended at `begin` with the same work; then its results are reused
     """
     n, fifth = last - first, scheme == LINEAR or scheme == WENO5
     ring, at = work[: RING * BLOCK], RING * BLOCK
     sides, at = work[at : at + 3 * SIDE], at + 3 * SIDE
     fluxes, deep, top = work[at : at + 3 * FLUX], work[at + 3 * FLUX :], work[at + 3 * FLUX + STRIDE :]
-    ends, along = sides[2 * SIDE :], fluxes[2 * FLUX :]  # of a row, from one cell before it on
+    ends, along = sides[2 * SIDE :], fluxes[2 * FLUX :]  # of a row, starting one cell before it
     reach = 3 if fifth else 2
     ahead = begin + reach
     if fresh:
@@ -198,14 +205,14 @@ def column_rates(
             continue
         # faces between rows j - 1 and j
         south, north, under = fluxes[was * FLUX :], fluxes[now * FLUX :], sides[was * SIDE + HIGH :]
-        l, r = (under, low) if fifth else (before, here)  # where speeds are looked at
+        l, r = (under, low) if fifth else (before, here)  # cells that bound wave speeds
         if moves is None or moves[1].size == 0:
             put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, None)
         else:
-            even = work[WORK : WORK + STRIDE]
+            uniform_speed = work[WORK : WORK + STRIDE]
             for i in range(n):
-                even[i] = moves[1][j]
-            put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, even)
+                uniform_speed[i] = moves[1][j]
+            put_fluxes(g, n, NORTH, EAST, under, low, l, r, north, uniform_speed)
             if j == 0 or j == ny:
                 at = 2 * ny + first + (nx if j > 0 else 0)
                 rest = plan[0, (0 if j == 0 else (ny - 1) * nx) + first :]
@@ -218,13 +225,13 @@ def column_rates(
         if j == begin:
             continue
         # row j - 1 : faces along it, and its rates
-        whole = (n + 9) // 8 * 8  # more than is looked at, so that nothing is left over of a vector
+        padded_count = (n + 9) // 8 * 8  # padded to whole vectors
         cell = ring[place(j - 1, -1) :]
-        put_limited(scheme, limiter, whole, ring[place(j - 1, -2) :], cell, before, ends)
+        put_limited(scheme, limiter, padded_count, ring[place(j - 1, -2) :], cell, before, ends)
         if fifth:
             put_smooth(
                 g, scheme, ring[place(j - 1, -3) :], ring[place(j - 1, -2) :], cell, before, ring[place(j - 1, 1) :],
-                ends, deep[:whole],
+                ends, deep[:padded_count],
             )  # fmt: skip
         left, right = ends[HIGH:], ends[1:]
         l, r = (left, right) if fifth else (cell, before)
@@ -245,14 +252,14 @@ def column_rates(
         if through.size > 0 and last == nx:
             through[ny + j - 1] = -along[n] / ky[j - 1]
         a, z = (j - 1) * nx + first, (j - 1) * nx + last
-        one, other = kx[first:last], ky[j - 1]
+        spacing_x, spacing_y = kx[first:last], ky[j - 1]
         push_x, push_y = ends[PUSH + 1 :], sides[was * SIDE + PUSH :]
         to_h, to_x, to_y = rate_h[a:z], rate_x[a:z], rate_y[a:z]
         if moves is None:
-            put_rates(g, one, other, push_x, push_y, along, south, north, None, to_h, to_x, to_y)
+            put_rates(g, spacing_x, spacing_y, push_x, push_y, along, south, north, None, to_h, to_x, to_y)
         else:
             wide, _ = factors_of(j - 1, first, last, moves, work[WORK + STRIDE :])
-            put_rates(g, one, other, push_x, push_y, along, south, north, wide, to_h, to_x, to_y)
+            put_rates(g, spacing_x, spacing_y, push_x, push_y, along, south, north, wide, to_h, to_x, to_y)
     most = 0.0
     for i in range(STRIDE):
         most = max(most, top[i])

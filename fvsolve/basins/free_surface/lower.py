@@ -1,4 +1,4 @@
-"""A free surface over a bed: the lake at rest about which its states deviate. Knows no network."""
+"""Rows of tables for a free surface over a bed: the lake at rest, from which its states deviate."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ WATER = Pieces(
     power="energy: add_power", stored="energy: add_stored",
 )  # fmt: skip
 SCALE = 0.1  # [m] of depth
-ROUNDING = 1e-12  # of levels and beds, less than which is no water
+ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
-UNBOUND = 1e100  # rate of friction [1/s] that none exceeds
-UNSPLIT = 2.0  # Courant numbers of water count half cells, so that no depth falls below zero at one,
-SHORES = 6.0  # and sixths of cells under fifth order where there is a shore
+UNBOUND = 1e100  # rate of friction [1/s] above all possible rates
+UNSPLIT = 2.0  # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
+SHORES = 6.0  # and to sixths of cells under fifth order with a shore
 
 
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
-    """Mean depth of water over cells whose bed is its mean, from `samples` of both : float64[n] [m].
+    """Mean depth of water over cells with a uniform bed at its mean, from `samples` of both : float64[n] [m].
 
-    The mean of max(level - bed, 0). Water of one level that a bank cuts off in the cell stands at that level over the
-    mean of the bed in its place, for so it rests; the less, the more the level follows the bed.
+    The mean of max(level - bed, 0). Water of uniform level that a bank cuts off in the cell gets that level over the
+    mean bed instead, because so it stays at rest. This correction decreases as the level follows the bed.
     """
     deep = level - bed
     wet = deep > ROUNDING * (np.abs(level) + np.abs(bed))
@@ -101,9 +101,9 @@ class FreeSurfaceRows(BasinRows):
             self.lower_faces(draft, row)
         row["plan"] = draft.to_plane(plan)
         if not (self.depth + self.start()[0]).max() > 0.0:
-            told = draft.case.amount
-            text = f"basin {self.name} starts dry: level {told(part.level, 'level')} is not above its bed, lowest at "
-            text += told(float(self.bed.min()), "level")
+            amount = draft.case.amount
+            text = f"basin {self.name} starts dry: level {amount(part.level, 'level')} is not above its bed, lowest at "
+            text += amount(float(self.bed.min()), "level")
             draft.warnings.append(Notice("start", f"nodes.{self.name}", text, "level", part.level, self.bed.min()))
 
     @property
@@ -113,10 +113,10 @@ class FreeSurfaceRows(BasinRows):
 
     @property
     def damped(self) -> bool:
-        """True if stages of steps are divided by friction: not where a body feels the rates of the flow."""
+        """True if stages of steps are divided by friction; not if the body depends on the rates of the flow."""
         method, on = METHODS.get(self.case.numerics.method), self.part.on
-        felt = on is not None and any(free_joints(on, self.case.nodes))
-        return self.rubs and method is not None and in_euler_steps(method) and not felt
+        is_moved_by_forces = on is not None and any(free_joints(on, self.case.nodes))
+        return self.rubs and method is not None and in_euler_steps(method) and not is_moved_by_forces
 
     @property
     def capped(self) -> bool:
@@ -126,7 +126,7 @@ class FreeSurfaceRows(BasinRows):
 
     @property
     def greatest_rate(self) -> float:
-        """Bound of the rate of friction [1/s]; infinity where no step has to follow it either."""
+        """Cap of the rate of friction [1/s]; infinite where steps need not follow it."""
         if self.capped:
             return FASTEST
         return UNBOUND if self.case.numerics.method == AUTO else math.inf
@@ -141,19 +141,19 @@ class FreeSurfaceRows(BasinRows):
         row["work"] = draft.to_work(faces.work_size(self.integers))
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
-        found, given = np.zeros((3, self.n)), self.part.start
+        states, given = np.zeros((3, self.n)), self.part.start
         depth = self.depth
         if self.part.on is not None:
             from fvsolve.basins.lower_frames import level_at_start
 
             depth = level_at_start(self, attitude)
-            found[0] = depth - self.depth
+            states[0] = depth - self.depth
         if given is not None and given.level is not None:
             depth = depth_at_start(samples(given.level, self.mesh), samples(self.part.bed, self.mesh))
-            found[0] = depth - self.depth
+            states[0] = depth - self.depth
         if given is not None:
-            found[1], found[2] = depth * self.formula(given.u), depth * self.formula(given.v)
-        return found
+            states[1], states[2] = depth * self.formula(given.u), depth * self.formula(given.v)
+        return states
 
     def fields(self, y: np.ndarray) -> dict[str, np.ndarray]:
         depth = np.maximum(self.depth + y[0], 0.0)

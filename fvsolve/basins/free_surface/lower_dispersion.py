@@ -1,8 +1,9 @@
-"""Whether the waves of a free surface are long: shallow water knows no others. Knows surfaces; knows no run.
+"""Check that waves of a free surface are long enough for shallow-water theory.
 
-Waves of wavenumber k run at sqrt(g tanh(k h) / k), in shallow water at sqrt(g h). Of a surface e over that at rest,
-less its mean, k is that of a single wave with the same ratio of e^2 to |grad psi|^2, -div grad psi = e and no slope at
-walls: the mean of 1 / k^2 over its waves, each as its square counts, so that a steep front is no short wave.
+Waves of wavenumber k have the speed sqrt(g tanh(k h) / k), in shallow water sqrt(g h). e is the surface above that at
+rest, minus its mean. Its k is that of a single wave with the same ratio of e^2 to |grad psi|^2, where -div grad psi =
+e, with zero normal slope at walls. That is the mean of 1 / k^2 over its waves, weighted by their squares, so a steep
+front does not count as a short wave.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from fvsolve.basins.free_surface.lower_watch import Watch
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import Notice
 
-WRONG = 0.01  # share of the speed from which a word is due
-SEEN, MATTERS = 1e-6, 1e-3  # of the depth, root mean square of a surface: given at the start, come about in a run
+WRONG = 0.01  # relative error of the speed above which there is a notice
+SEEN, MATTERS = 1e-6, 1e-3  # least root mean square of the surface over depth: at the start, during a run
 
 
 class SurfaceWaves(NamedTuple):
-    """Of a surface: share by which real waves run slower, wavenumber [1/m], mean depth of wet cells [m]."""
+    """Fraction by which real waves are slower, wavenumber [1/m], mean depth of wet cells [m]."""
 
     wrong: float
     k: float
@@ -32,14 +33,17 @@ NONE = SurfaceWaves(0.0, math.nan, math.nan)
 
 
 def waves(basin, y: np.ndarray, seen: float = SEEN) -> SurfaceWaves:
-    """Waves of a basin at deviations y; `NONE` where the root mean square of the surface is below a share of depth."""
+    """Waves of a basin at deviations y.
+
+    `NONE` if the root mean square of the surface is below `seen` times the depth.
+    """
     depth, area = basin.depth + y[0], basin.mesh.area
     wet = depth > 0.0
     if not wet.any():
         return NONE
     mean, reached = float(np.average(depth[wet], weights=area[wet])), wet | (basin.depth > 0.0)
     surface = np.where(reached, y[0] - np.average(y[0][reached], weights=area[reached]), 0.0)
-    with np.errstate(over="ignore"):  # of a run that blows up
+    with np.errstate(over="ignore"):  # in an unstable run
         square = float(np.average(surface**2, weights=area))
     if not seen * mean < math.sqrt(square) < math.inf:
         return NONE
@@ -49,37 +53,37 @@ def waves(basin, y: np.ndarray, seen: float = SEEN) -> SurfaceWaves:
 
 
 def waves_in_run(basin, y: np.ndarray) -> SurfaceWaves:
-    """Waves of a basin that come about in a run."""
+    """Waves of a basin during a run."""
     return waves(basin, y, MATTERS)
 
 
 def is_even(basin) -> bool:
-    """Whether its cells are a grid of equal rectangles."""
+    """True if the cells are a grid of equal rectangles."""
     grid = basin.mesh.grid
-    return basin.is_grid and all(np.ptp(np.diff(one)) < 1e-9 * (one[-1] - one[0]) for one in (grid.x, grid.y))
+    return basin.is_grid and all(np.ptp(np.diff(lines)) < 1e-9 * (lines[-1] - lines[0]) for lines in (grid.x, grid.y))
 
 
 def on_grid(basin, surface: np.ndarray) -> float:
-    """Mean of |grad psi|^2, by cosines."""
+    """Mean of |grad psi|^2 on a uniform grid, by a cosine transform."""
     from scipy.fft import dctn
 
     grid = basin.mesh.grid
     square = dctn(surface.reshape(grid.ny, grid.nx), norm="ortho") ** 2 / surface.size
-    kx, ky = (np.pi * np.arange(n) / (one[-1] - one[0]) for n, one in ((grid.nx, grid.x), (grid.ny, grid.y)))
+    kx, ky = (np.pi * np.arange(n) / (lines[-1] - lines[0]) for n, lines in ((grid.nx, grid.x), (grid.ny, grid.y)))
     k = kx**2 + ky[:, None] ** 2
     square[0, 0], k[0, 0] = 0.0, 1.0
     return float(np.sum(square / k))
 
 
 def on_mesh(basin, surface: np.ndarray) -> float:
-    """The same on any mesh, by differences across faces."""
+    """Mean of |grad psi|^2 on any mesh, by differences across faces."""
     from scipy.sparse import coo_array
     from scipy.sparse.linalg import spsolve
 
     mesh, inner = basin.mesh, basin.mesh.inner
     left, right, n = mesh.left[:inner], mesh.right[:inner], basin.n
-    apart = np.abs(np.sum((mesh.centre[right] - mesh.centre[left]) * mesh.normal[:inner], axis=1))
-    per = mesh.length[:inner] / apart
+    distance = np.abs(np.sum((mesh.centre[right] - mesh.centre[left]) * mesh.normal[:inner], axis=1))
+    per = mesh.length[:inner] / distance
     rows, columns = np.concatenate([left, right, left, right]), np.concatenate([left, right, right, left])
     matrix = coo_array((np.concatenate([per, per, -per, -per]), (rows, columns)), shape=(n, n)).tocsc()
     own = mesh.area * (surface - np.average(surface, weights=mesh.area))
@@ -88,35 +92,35 @@ def on_mesh(basin, surface: np.ndarray) -> float:
     return float(own @ psi / mesh.area.sum())
 
 
-def notice(basin, found: tuple[float, float, float], when: str = "") -> Notice:
-    """Notice that waves are too short, with the time; found : as `SurfaceWaves`."""
-    wrong, k, depth = found
-    long, deep = (basin.case.amount(one, "length", 3) for one in (2.0 * math.pi / k, depth))
+def notice(basin, waves: tuple[float, float, float], when: str = "") -> Notice:
+    """Notice that waves are too short, with the time. waves : values of `SurfaceWaves`"""
+    wrong, k, depth = waves
+    long, deep = (basin.case.amount(value, "length", 3) for value in (2.0 * math.pi / k, depth))
     text = (
-        f"{basin.name}: waves about {long} long in {deep} of water (k h = {k * depth:.2g}): real ones run "
-        f"{100.0 * wrong:.2g} % slower than shallow water has them{when and ','}{when}"
+        f"{basin.name}: waves about {long} long in {deep} of water (k h = {k * depth:.2g}): real waves are "
+        f"{100.0 * wrong:.2g} % slower than in shallow-water theory{when and ','}{when}"
     )
     return Notice("dispersion", f"nodes.{basin.name}", text, None, wrong, WRONG)
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
-    """Notice that waves of a basin are too short at deviations y."""
-    found = waves(basin, y)
-    return [notice(basin, found)] if found.wrong > WRONG else []
+    """Notice if waves of a basin are too short at deviations y."""
+    state = waves(basin, y)
+    return [notice(basin, state)] if state.wrong > WRONG else []
 
 
 def watches(basin, y: np.ndarray) -> list[Watch]:
-    """Watch of a run for waves that are too short; none where those at deviations y are."""
+    """Check of a run for waves that are too short; none if those at deviations y are."""
     return [] if notices(basin, y) else [Watch(basin, waves_in_run, notice, WRONG)]
 
 
 def deep(basin) -> list[Notice]:
-    """That water which rides on a body is too deep for shallow water, and which rung knows better."""
-    found = slowest(basin.part, basin.mesh) if basin.part.on else None
-    if found is None or found.fast <= 100.0 * WRONG:
+    """Notice if water in a basin on a body is too deep for shallow-water theory, with the better model."""
+    mode = slowest(basin.part, basin.mesh) if basin.part.on else None
+    if mode is None or mode.fast <= 100.0 * WRONG:
         return []
     text = (
-        f"{basin.name}: shallow water has its slowest wave {found.fast:.2g} % too fast (k h = {found.deep:.2g}); "
-        'sloshing = "modes" has it right while waves are small'
+        f"{basin.name}: in shallow-water theory the slowest wave is {mode.fast:.2g} % too fast "
+        f'(k h = {mode.deep:.2g}); sloshing = "modes" is correct for small waves'
     )
-    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * found.fast, WRONG)]
+    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * mode.fast, WRONG)]

@@ -1,4 +1,4 @@
-"""Films of water that run at a wrong speed: under `upwind` down steep beds, under a cap on friction. Knows surfaces."""
+"""Thin films of water with a wrong speed: under `upwind` on steep beds, or under a cap on friction."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from fvsolve.basins.free_surface.lower_watch import Watch
 from fvsolve.errors import Notice
 from fvsolve.kernels.records import DARCY, MANNING
 
-DRY = 1e-4  # depth [m] below which water counts for nothing here
-WRONG = 0.005  # share of the speed from which a word is due
-WORSE = 1.2  # times what was wrong at the start: said once more
+DRY = 1e-4  # depth [m] below which water is ignored here
+WRONG = 0.005  # relative error of the speed above which there is a notice
+WORSE = 1.2  # factor on the error at the start above which a run gives another notice
 
 
 def too_slow(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """(1 less speed over the right one, depth, fall of the bed between cells [m]) of the deepest film at deviations y.
+    """(1 - speed over the correct speed, depth, fall of the bed between cells [m]) of the deepest film at deviations y.
 
-    Both sides of a face see the higher bed, so that a film of depth h above a fall d > h is pushed by g h^2 / 2 in
-    place of g h d: its speed is sqrt(h / (2 d)) of the right one (Delestre et al. 2012, arXiv 1206.4986).
+    Both sides of a face use the higher bed. So the force on a film of depth h above a fall d > h is g h^2 / 2 instead
+    of g h d. Its speed is sqrt(h / (2 d)) of the correct one (Delestre et al. 2012, arXiv 1206.4986).
     """
     mesh, depth = basin.mesh, basin.depth_of(y)
-    one, other = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
-    down = basin.bed[one] > basin.bed[other]
-    upper, lower = np.where(down, one, other), np.where(down, other, one)
+    left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]
+    down = basin.bed[left] > basin.bed[right]
+    upper, lower = np.where(down, left, right), np.where(down, right, left)
     fall, deep = basin.bed[upper] - basin.bed[lower], depth[upper]
     film = (deep > DRY) & (depth[lower] > DRY) & (fall > deep) & (fall + deep - depth[lower] > deep)
     if not film.any():
@@ -35,9 +35,9 @@ def too_slow(basin, y: np.ndarray) -> tuple[float, float, float]:
 
 
 def too_fast(basin, y: np.ndarray) -> tuple[float, float, float]:
-    """(speed over the right one less 1, mean over the flow; its mean depth [m] and rate of friction [1/s]).
+    """(speed over the correct speed - 1, mean depth [m], mean rate of friction [1/s]), all means over the flow.
 
-    Friction that balances a slope at r (u) = C u is held to r / (1 + r / FASTEST): u^2 is 1 + r / FASTEST times too
+    Friction that balances a slope at r (u) = C u is capped at r / (1 + r / FASTEST): u^2 is 1 + r / FASTEST times too
     great.
     """
     depth, part = basin.depth_of(y), basin.part
@@ -45,45 +45,45 @@ def too_fast(basin, y: np.ndarray) -> tuple[float, float, float]:
     if not flow.any():
         return 0.0, math.nan, math.nan
     law, value = (DARCY, part.factor) if part.manning is None else (MANNING, part.manning)
-    rate, none, gravity = np.zeros(depth.size), np.zeros(depth.size), basin.case.gravity
-    add_friction(law, gravity, np.array([value]), depth, none, y[1], y[2], none - 1.0, none, rate, none)
+    rate, zeros, gravity = np.zeros(depth.size), np.zeros(depth.size), basin.case.gravity
+    add_friction(law, gravity, np.array([value]), depth, zeros, y[1], y[2], zeros - 1.0, zeros, rate, zeros)
     error = np.sqrt(1.0 + rate / FASTEST) - 1.0
-    return tuple(float(np.average(one, weights=flow)) for one in (error, depth, rate))
+    return tuple(float(np.average(values, weights=flow)) for values in (error, depth, rate))
 
 
-def film(basin, found: tuple[float, float, float], when: str = "") -> Notice:
+def film(basin, error: tuple[float, float, float], when: str = "") -> Notice:
     """Notice that films are too slow, with the time."""
-    deep, fall = (basin.case.amount(one, "length", 3) for one in found[1:])
+    deep, fall = (basin.case.amount(value, "length", 3) for value in error[1:])
     text = (
         f"{basin.name}: films down a slope{when}: under upwind {deep} of water, where the bed falls by {fall} from "
-        f'cell to cell, runs {100.0 * found[0]:.2g} % too slowly; give scheme = "muscl", or cells so small that '
+        f'cell to cell, runs {100.0 * error[0]:.2g} % too slowly; use scheme = "muscl", or cells so small that '
         "the bed falls by less than the depth"
     )
-    return Notice("film", f"nodes.{basin.name}", text, "scheme", found[0], WRONG)
+    return Notice("film", f"nodes.{basin.name}", text, "scheme", error[0], WRONG)
 
 
-def friction(basin, found: tuple[float, float, float], when: str = "") -> Notice:
+def friction(basin, error: tuple[float, float, float], when: str = "") -> Notice:
     """Notice that films are too fast, with the time."""
     remedy = 'method = "rodas-5p"' if basin.part.on is not None else 'method = "ssp-rk3" or "ssp-rk2"'
-    deep, method = basin.case.amount(found[1], "length", 3), basin.case.numerics.method
+    deep, method = basin.case.amount(error[1], "length", 3), basin.case.numerics.method
     text = (
-        f"{basin.name}: water runs {100.0 * found[0]:.2g} % too fast{when}: {method} holds the rate of friction, "
-        f"{found[2]:.2g} 1/s in {deep} of water, below {FASTEST:g} 1/s; give {remedy}, which does not"
+        f"{basin.name}: water runs {100.0 * error[0]:.2g} % too fast{when}: with {method} the rate of friction, "
+        f"{error[2]:.2g} 1/s in {deep} of water, is capped below {FASTEST:g} 1/s; use {remedy}, without a cap"
     )
-    return Notice("friction", f"nodes.{basin.name}", text, "method", found[0], WRONG)
+    return Notice("friction", f"nodes.{basin.name}", text, "method", error[0], WRONG)
 
 
 def watches(basin, y: np.ndarray) -> list[Watch]:
-    """Watches of a run for films that are worse than at the deviations y."""
+    """Checks of a run for films with greater errors than at the deviations y."""
     return [Watch(basin, look, notice, max(WRONG, WORSE * look(basin, y)[0])) for look, notice in kinds(basin)]
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
     """Notices of films at deviations y."""
-    return [notice(basin, found) for look, notice in kinds(basin) if (found := look(basin, y))[0] > WRONG]
+    return [notice(basin, error) for look, notice in kinds(basin) if (error := look(basin, y))[0] > WRONG]
 
 
 def kinds(basin) -> list[tuple]:
-    """Kinds of films at a wrong speed in a basin: (function that finds the worst, function that makes its notice)."""
-    found = [(too_slow, film)] if basin.scheme == "upwind" else []
-    return [*found, (too_fast, friction)] if basin.capped else found
+    """Kinds of films with a wrong speed in a basin: (function for the greatest error, function for its notice)."""
+    pairs = [(too_slow, film)] if basin.scheme == "upwind" else []
+    return [*pairs, (too_fast, friction)] if basin.capped else pairs

@@ -1,4 +1,4 @@
-"""The worst of an error of the model that a run of a basin shows, with its time. Knows states; knows no error."""
+"""Greatest error of the model during a run of a basin, with its time."""
 
 from __future__ import annotations
 
@@ -8,25 +8,25 @@ from fvsolve.errors import Notice
 
 
 class Watch:
-    """The worst error of a kind in a run of a basin.
+    """Greatest error of one kind during a run of a basin.
 
-    by(basin, y) : its size and two facts about it; notice(basin, found, when) : its notice
-    least : size up to which no notice is due
-    kept : float64[4]  time and what was found then; nan before any error
+    by(basin, y) : size of the error and two related values; notice(basin, values, when) : its notice
+    least : size up to which there is no notice
+    kept : float64[4]  time, size and both values of the greatest error; nan before any error
     """
 
     def __init__(self, basin, by, notice, least: float) -> None:
         self.basin, self.by, self.notice, self.least, self.kept = basin, by, notice, least, np.full(4, np.nan)
 
     def look(self, t: float, y: np.ndarray) -> None:
-        """At a model's state."""
-        found = self.by(self.basin, self.basin.of(y))
-        if found[0] > 0.0 and not found[0] <= self.kept[1]:
-            self.kept[:] = t, *found
+        """Check a model's state."""
+        error = self.by(self.basin, self.basin.of(y))
+        if error[0] > 0.0 and not error[0] <= self.kept[1]:
+            self.kept[:] = t, *error
 
     def notices(self) -> list[Notice]:
-        """Notices of the worst error."""
-        t, *found = self.kept.tolist()
-        if not found[0] > self.least:
+        """Notices of the greatest error."""
+        t, *error = self.kept.tolist()
+        if not error[0] > self.least:
             return []
-        return [self.notice(self.basin, found, f" at {self.basin.case.amount(t, 'time')}")]
+        return [self.notice(self.basin, error, f" at {self.basin.case.amount(t, 'time')}")]

@@ -1,4 +1,4 @@
-"""Water between walls that move: rates of cells, and its energy as areas change. Knows the tables; knows no flux."""
+"""Water between moving walls: rates of cells, and its energy as areas change."""
 
 from fvsolve.basins import moving_meshes
 from fvsolve.basins.energy import at_rest, row_of
@@ -10,7 +10,7 @@ from fvsolve.kernels.handle import open_tables
 
 @njit(forceinline=True)
 def is_moving(basin):
-    """Whether it is water between walls that move."""
+    """True for water between moving walls."""
     return basin["kind"] == MINE and basin["walls"] > 0
 
 
@@ -34,7 +34,7 @@ def rates_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Of the rate of storage what areas that change take: - rho g h^2 / 2 dA/dt."""
+    """Subtract from the rate of storage the part due to changing areas, rho g h^2 / 2 dA/dt."""
     tables = open_tables(handle)
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):
@@ -47,7 +47,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """What areas that have changed hold of the profile's energy."""
+    """Add the energy of the profile over the changes of areas."""
     tables = open_tables(handle)
     st, plane, first = tables.settings[0], tables.plane, stored.size - tables.basins.size
     weight = st["rho"] * st["gravity"]
@@ -55,5 +55,5 @@ def add_stored(t, y, dydt, out, handle, stored):
         basin = tables.basins[b]
         for i in range(basin["n"] if is_moving(basin) else 0):
             depth, surface = plane[basin["plan"] + i], plane[basin["plan"] + basin["n"] + i]
-            held = depth * (at_rest(st, basin) + weight * (surface - 0.5 * depth))
-            stored[first + b] += (plane[basin["area"] + i] - plane[basin["drawn"] + i]) * held
+            rest_energy = depth * (at_rest(st, basin) + weight * (surface - 0.5 * depth))
+            stored[first + b] += (plane[basin["area"] + i] - plane[basin["drawn"] + i]) * rest_energy

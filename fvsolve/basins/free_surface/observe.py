@@ -1,4 +1,4 @@
-"""What probes read of water with a free surface. Knows the tables; changes no state."""
+"""Probes of water with a free surface."""
 
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.kinds import kind_of
@@ -13,7 +13,7 @@ DEPTH = OWN
 
 @njit
 def observe_water(t, y, out, handle, values):
-    """values[k] of the probes that read cells: scale * depth + offset, or velocities."""
+    """Write values[k] of the probes of cells: scale * depth + offset, or velocities."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
@@ -25,7 +25,7 @@ def observe_water(t, y, out, handle, values):
 
 @njit
 def read(tables, probe, y):
-    """Weighted sums of depths [m] and of velocities along x and y, which fade where water is thin [m/s]."""
+    """Weighted sums of depths [m] and of velocities along x and y [m/s]; velocities fade to zero in thin water."""
     basin, total, u, v = tables.basins[probe["index"]], 0.0, 0.0, 0.0
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):

@@ -1,4 +1,4 @@
-"""Water with a free surface. Knows its keys and what can be read of it; computes nothing."""
+"""Keys and fields of water with a free surface."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from fvsolve.parts.value import VALUE, Quantity, Usual, anything, nonnegative
 
 
 class SurfaceStart(MovingStart):
-    """What it starts from where that is not rest."""
+    """Start of water that is not at rest."""
 
-    level: Annotated[Formula | None, Shaped("length", "of the free surface above the elevation [m]")] = None
+    level: Annotated[Formula | None, Shaped("length", "level of the free surface above the elevation [m]")] = None
 
 
 class FreeSurface(Physics, name="free-surface"):
@@ -33,22 +33,23 @@ class FreeSurface(Physics, name="free-surface"):
     steep: ClassVar[bool] = True
 
     level: Annotated[
-        float, Quantity("level", anything, "of the water at rest, above the elevation [m]; free surface, needed there")
+        float,
+        Quantity("level", anything, "level of the water at rest above the elevation [m]; required for a free surface"),
     ]
-    bed: Annotated[Formula | None, Shaped("length", "height above the elevation [m], free surface; 0 if left out")] = (
-        None
-    )
+    bed: Annotated[
+        Formula | None, Shaped("length", "height of the bed above the elevation [m], free surface; default 0")
+    ] = None
     manning: Annotated[
         float | None,
         Quantity(
-            "number", nonnegative, "Manning's n [s/m^(1/3)], free surface; no friction if left out",
+            "number", nonnegative, "Manning's n [s/m^(1/3)], free surface; default: no friction",
             Usual(0.005, 0.5, "glass to dense brush"), VALUE,
         ),
     ] = None  # fmt: skip
     factor: Annotated[
         float | None,
         Quantity(
-            "number", nonnegative, "Darcy's, in place of manning [-], free surface; no friction if left out",
+            "number", nonnegative, "Darcy friction factor, instead of manning [-], free surface; default: no friction",
             Usual(0.002, 3.0, "glass to boulders"), VALUE,
         ),
     ] = None  # fmt: skip
@@ -59,7 +60,7 @@ class FreeSurface(Physics, name="free-surface"):
 
     @classmethod
     def rest(cls, basin, mean, cells, area) -> dict[str, Any]:
-        """At the mean height of the bed that is under water, or of the lowest of it."""
+        """Profile at a patch: mean height of the bed under water there, or of its lowest cells if all are dry."""
         bed = mean(basin.bed)
         cells = cells[bed[cells] <= max(bed[cells].min(), np.nextafter(basin.level, -np.inf))]
         height = float(np.average(bed[cells], weights=area[cells]))

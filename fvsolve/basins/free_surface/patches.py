@@ -1,4 +1,4 @@
-"""Patches of water with a free surface: what the network finds there, and what it brings or takes. Knows the tables."""
+"""Patches of water with a free surface: their pressures, and the flows of links in the cells next to them."""
 
 from math import inf, sqrt
 
@@ -28,10 +28,11 @@ MINE = kind_of(__package__)
 
 @njit
 def water_behind(tables, patch, y):
-    """(rise of the surface, depth, volume, sum of area times weight squared) of the cells behind a patch.
+    """(rise of the surface, depth, volume, sum of area times weight squared) of the cells at a patch.
 
-    Cells count by their area times `weight_out`, so that a dry bank is no water; the volume is the sum. The rise is
-    from the surface at rest, where all is dry from the lowest bed; in a basin that rides from the level, phi with it.
+    The weight of a cell is its area times `outflow_weight`, so that a dry bank does not count; the volume is the sum.
+    The rise is from the surface at rest (of a dry patch, from its lowest bed); in a basin on a body, from the level,
+    including phi.
     """
     basin, plane = tables.basins[patch["basin"]], tables.plane
     n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
@@ -48,16 +49,16 @@ def water_behind(tables, patch, y):
         volume, squares = volume + part, squares + part * weight_out(h)
         rise += part * (plane[plan + n + i] + y[basin["y"] + i] - rest)
         depth += part * h
-    hardly = max(HARDLY * area_of(tables, patch) - volume, 0.0)
-    total = volume + hardly
-    return (rise + hardly * (lowest - rest)) / total, depth / total, volume, squares
+    filling = max(HARDLY * area_of(tables, patch) - volume, 0.0)
+    total = volume + filling
+    return (rise + filling * (lowest - rest)) / total, depth / total, volume, squares
 
 
 @njit
 def weight_beyond(plane, basin, patch, rise, depth):
-    """What water weighs on the place of a patch that rides, less that of the profile [J/kg], as it rests in its frame.
+    """Bottom pressure over density at a patch on a body, minus that of the profile [J/kg], at rest in its frame.
 
-    A surface of one potential stands over each place as phi has it there; a place that is bare or dry bears nothing.
+    The surface is an equipotential, so its height over each position follows from phi. A dry position has no pressure.
     """
     at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential(plane, basin["frame"], 1.0)
     x, y, z, profile = plane[at], plane[at + 1], plane[at + 2], plane[at + 3]
@@ -67,7 +68,7 @@ def weight_beyond(plane, basin, patch, rise, depth):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
+    """Deviation of the pressure at every patch from the profile, and its slope with mass [Pa/kg]."""
     tables = open_tables(handle)
     st, layout = tables.settings[0], tables.layout[0]
     for k in range(tables.patches.size):
@@ -91,31 +92,33 @@ def patch_pressures(t, y, dydt, out, handle):
 
 @njit
 def patch_flows(t, y, dydt, out, handle):
-    """Add what the patches bring or take to the rates of the cells behind them."""
+    """Add the flows through patches to the rates of the cells next to them."""
     tables = open_tables(handle)
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
         if basin["kind"] == MINE:
-            asked, seen = out[tables.layout[0]["net"] + patch["node"]], seen_of(basin, tables.seen, y)
-            pass_patch(tables, patch, asked, seen, dydt, out)
+            inflow, seen = out[tables.layout[0]["net"] + patch["node"]], seen_of(basin, tables.seen, y)
+            pass_patch(tables, patch, inflow, seen, dydt, out)
 
 
 @njit
-def pass_patch(tables, patch, asked, y, dydt, out):
-    """What a patch brings or takes; where water is thin, what is asked may not be had."""
+def pass_patch(tables, patch, demand, y, dydt, out):
+    """Add the flow through a patch to rates; in thin water the outflow may be smaller than the demand."""
     st, layout, integers, plane = tables.settings[0], tables.layout[0], tables.integers, tables.plane
     basin, rho = tables.basins[patch["basin"]], st["rho"]
     n, o, first = basin["n"], basin["y"], patch["first"]
     _, depth, volume, _ = water_behind(tables, patch, y)
-    leaves, had = asked < 0.0, 1.0
+    leaves, available = demand < 0.0, 1.0
     total = counted(tables, patch, leaves, y)
     if leaves:
-        had = to_be_had(depth)  # the rest comes from outside
-        slope = -2.0 * asked * had * min(depth / SHALLOW, 1.0) / (rho * total)  # 2, more than that of `weight_out`
+        available = to_be_had(depth)  # the rest comes from outside
+        slope = (
+            -2.0 * demand * available * min(depth / SHALLOW, 1.0) / (rho * total)
+        )  # 2: more than the slope of `outflow_weight`
         out[RATE] = max(out[RATE], slope)
-        out[layout["supply"] + patch["node"]] += (had * volume / total - 1.0) * asked
-    flow = had * asked / (rho * total)  # of depth, over weights [1/s]
+        out[layout["supply"] + patch["node"]] += (available * volume / total - 1.0) * demand
+    flow = available * demand / (rho * total)  # of depth, over weights [1/s]
     for m in range(patch["count"] if dydt.size > 0 else 0):
         i = integers[first + m]
         dydt[o + i] += flow * weight(plane, basin, leaves, i, y) * stretched(plane, basin, i)
@@ -124,28 +127,28 @@ def pass_patch(tables, patch, asked, y, dydt, out):
         k = integers[patch["ring"] + patch["faces"] + m]
         out_per_width = per_width * weight(plane, basin, leaves, k, y)
         h = depth_behind(plane, basin, k, y)
-        i, at, many = o + k, patch["normals"], patch["faces"]
+        i, at, count = o + k, patch["normals"], patch["faces"]
         share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))
-        along_x, along_y = plane[at + m], plane[at + many + m]
+        along_x, along_y = plane[at + m], plane[at + count + m]
         u = share * (y[i + n] * along_x + y[i + 2 * n] * along_y)
         give_way(
             plane, patch, m, (abs(u) + sqrt(weight_of(st, plane, basin) * h)) * out_per_width, dydt, i + n, i + 2 * n
         )
-        if out_per_width > 0.0:  # water that leaves takes along what it has across
-            across, taken = share * (y[i + 2 * n] * along_x - y[i + n] * along_y), plane[at + 2 * many + m]
-            dydt[i + n] += out_per_width * taken * across * along_y
-            dydt[i + 2 * n] -= out_per_width * taken * across * along_x
+        if out_per_width > 0.0:  # outflow takes its tangential momentum along
+            across, per_area = share * (y[i + 2 * n] * along_x - y[i + n] * along_y), plane[at + 2 * count + m]
+            dydt[i + n] += out_per_width * per_area * across * along_y
+            dydt[i + 2 * n] -= out_per_width * per_area * across * along_x
 
 
 @njit
 def quickest_inflow(t, y, dydt, out, handle):
-    """Let steps see what is about to come: waves as quick as the head before a gate makes them, over a dry bed too."""
+    """Limit the step by waves that valves may start: with the speed of the head across a valve, over a dry bed too."""
     tables = open_tables(handle)
     st, valves, patches = tables.settings[0], tables.valves, tables.patches
     for k in range(valves.size):
         drop = head_drop(tables, out, k)[1]
-        taker = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
-        for p in range(patches.size if tables.nodes[taker]["kind"] == PATCH else 0):
-            if patches[p]["node"] == taker and tables.basins[patches[p]["basin"]]["kind"] == MINE:
+        receiver = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
+        for p in range(patches.size if tables.nodes[receiver]["kind"] == PATCH else 0):
+            if patches[p]["node"] == receiver and tables.basins[patches[p]["basin"]]["kind"] == MINE:
                 wide = sqrt(area_of(tables, patches[p]) / patches[p]["count"])
                 out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)

@@ -1,4 +1,4 @@
-"""Rates of the cells of water with a free surface. Knows the tables; knows no flux."""
+"""Rates of the cells of water with a free surface."""
 
 from math import inf
 
@@ -18,7 +18,7 @@ MINE = kind_of(__package__)
 
 @njit
 def through_faces(begin, stop, kx, ky, flow_x, flow_y):
-    """Make flows per width of faces of rows `begin` to `stop` flows through them."""
+    """Convert flows per width to flows through faces of rows `begin` to `stop`."""
     nx = kx.size
     for j in range(begin, stop):
         high = 1.0 / ky[j]
@@ -32,7 +32,7 @@ def through_faces(begin, stop, kx, ky, flow_x, flow_y):
 
 @njit
 def rub(tables, b, a, z, y, rates, out):
-    """Add friction to rates of cells `a` to `z` of water, and let steps follow it where it is held."""
+    """Add friction to rates of cells `a` to `z` of water; where friction is capped, it limits the step."""
     basin = tables.basins[b]
     n, o, seen, roughness = (
         basin["n"],
@@ -43,13 +43,15 @@ def rub(tables, b, a, z, y, rates, out):
     east, north = o + n, o + 2 * n
     law, g, depths = basin["friction"], tables.settings[0]["gravity"], tables.plane[basin["plan"] + a :]
     dh, qx, qy = seen[o + a : o + z], seen[east + a : east + z], seen[north + a : north + z]
-    held_x, held_y = y[east + a : east + z], y[north + a : north + z]
+    content_x, content_y = y[east + a : east + z], y[north + a : north + z]
     rate_x, rate_y = rates[n + a : n + z], rates[2 * n + a : 2 * n + z]
     if basin["held"] == inf:
-        add_friction(law, g, roughness, depths, dh, qx, qy, held_x, held_y, rate_x, rate_y)
+        add_friction(law, g, roughness, depths, dh, qx, qy, content_x, content_y, rate_x, rate_y)
     else:
-        fades = add_held_friction(law, g, roughness, basin["held"], depths, dh, qx, qy, held_x, held_y, rate_x, rate_y)
-        out[RATE] = max(out[RATE], fades)
+        friction_rate = add_held_friction(
+            law, g, roughness, basin["held"], depths, dh, qx, qy, content_x, content_y, rate_x, rate_y
+        )
+        out[RATE] = max(out[RATE], friction_rate)
 
 
 @njit
@@ -72,49 +74,50 @@ def damp_stages(h, y, rates, quick, handle):
 
 @njit
 def finish_water(tables, b, rate, out):
-    """Book what passes an open boundary, and let steps follow the waves."""
+    """Record flows through an open boundary, and the rate that limits the step."""
     book_open(tables, b, tables.settings[0]["rho"], out)
     out[RATE] = max(out[RATE], tables.basins[b]["unsplit"] * rate)
 
 
 @njit
-def finish_block(tables, b, row, until, first, last, y, rates, out):
-    """Add friction to rates of columns `first` to `last` of these rows, form their end, or look at them."""
+def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
+    """Add friction to rates of columns `first` to `last` of these rows; then form the end of the step, or check it."""
     basin, sums, nx = tables.basins[b], tables.sums, tables.basins[b]["nx"]
     if basin["friction"] != NO_DRAG:
         if first == 0 and last == nx:
-            rub(tables, b, nx * row, nx * until, y, rates, out)
-        for j in range(row, until if last - first < nx else row):
+            rub(tables, b, nx * row, nx * block_stop, y, rates, out)
+        for j in range(row, block_stop if last - first < nx else row):
             rub(tables, b, nx * j + first, nx * j + last, y, rates, out)
     for q in range(3):
         at = basin["y"] + q * basin["n"]
         if sums[MODE] == LOOK:
-            look(sums, y, at, nx, row, until, first, last)
-        elif sums[MODE] == BOTH:  # ghosts of columns before these were seen as the stage has them
-            form(sums, True, at, nx, row, until, max(first - grid.GHOSTS, 0), last)
+            look(sums, y, at, nx, row, block_stop, first, last)
+        elif sums[MODE] == BOTH:  # ghosts of the previous columns were read from the stage
+            form(sums, True, at, nx, row, block_stop, max(first - grid.GHOSTS, 0), last)
 
 
 @njit
 def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y, rates, out):
-    """`grid.grid_rates` block by block, with friction, and the stages that are asked for formed beside them."""
-    basin, none, most = tables.basins[b], tables.work[:0], 0.0
+    """Compute `surface_grid.grid_rates` block by block, with friction; form the requested stages in the same pass."""
+    basin, empty, most = tables.basins[b], tables.work[:0], 0.0
     nx, ny, n, begin, stop = basin["nx"], basin["ny"], basin["n"], tables.bands[2 * b], tables.bands[2 * b + 1]
     for first in range(0, nx, grid.MOST):
         last = min(first + grid.MOST, nx)
-        left, right, known = max(first - grid.GHOSTS, 0), min(last + grid.GHOSTS, nx), begin
+        left, right, formed_ahead = max(first - grid.GHOSTS, 0), min(last + grid.GHOSTS, nx), begin
         rows = max(tables.sums[CELLS] // (last - first), 1)
         for row in range(begin, stop, rows):
-            until = min(row + rows, stop)
-            ahead = min(until + grid.REACH, stop)
+            block_stop = min(row + rows, stop)
+            ahead = min(block_stop + grid.REACH, stop)
             for q in range(3 if tables.sums[MODE] != LOOK else 0):
-                form(tables.sums, False, basin["y"] + q * n, nx, known, ahead, left, right)
-            known = ahead
+                form(tables.sums, False, basin["y"] + q * n, nx, formed_ahead, ahead, left, right)
+            formed_ahead = ahead
             rate = grid.column_rates(
-                g, basin["scheme"], basin["limiter"], nx, ny, row, until, row == begin, first, last, kx, ky, reflect,
-                plan, dh, qx, qy, none, none, through, work, rates[:n], rates[n : 2 * n], rates[2 * n :], None,
+                g, basin["scheme"], basin["limiter"], nx, ny, row, block_stop, row == begin, first, last, kx, ky,
+                reflect, plan, dh, qx, qy, empty, empty, through, work, rates[:n], rates[n : 2 * n], rates[2 * n :],
+                None,
             )  # fmt: skip
             most = max(most, rate)
-            finish_block(tables, b, row, until, first, last, y, rates, out)
+            finish_block(tables, b, row, block_stop, first, last, y, rates, out)
     if tables.sums[MODE] == BOTH:
         form_looked_at(tables.sums)
     return most
@@ -122,26 +125,26 @@ def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y,
 
 @njit
 def on_grid(tables, b, y, dydt, out, moves):
-    """Rates of cells of a rectangle, of contents where it moves; moves : None, or as `grid.grid_rates` has it."""
+    """Rates of cells of a rectangle, of contents if walls move. moves : None, or as in `surface_grid.grid_rates`"""
     st, plane, work, basin = tables.settings[0], tables.plane, tables.work, tables.basins[b]
     n, o, at, k, f = basin["n"], basin["y"], basin["plan"], basin["spacing"], basin["flows"]
     nx, ny, through, g = basin["nx"], basin["ny"], basin["through"], weight_of(st, plane, basin)
-    plan, many = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n)), ny * (nx + 1)
+    plan, count = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n)), ny * (nx + 1)
     flow_x, flow_y = work[:0], work[:0]
-    if f >= 0:  # scalars are carried by them
-        flow_x, flow_y = work[f : f + many], work[f + many : f + many + (ny + 1) * nx]
+    if f >= 0:  # needed for scalars
+        flow_x, flow_y = work[f : f + count], work[f + count : f + count + (ny + 1) * nx]
     dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
     to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
     rates = to[first : first + 3 * n]
     kx, ky, passing = plane[k : k + nx], plane[k + nx : k + nx + ny], work[through : through + basin["outer_given"]]
-    reflect, toil = plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], work[basin["work"] :]
+    reflect, scratch = plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], work[basin["work"] :]
     if moves is None and asked(tables, b) != OFF:
-        rate = by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, passing, toil, y, rates, out)
+        rate = by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, passing, scratch, y, rates, out)
         finish_water(tables, b, rate, out)
         return
     rate = grid.grid_rates(
         g, basin["scheme"], basin["limiter"], nx, ny, tables.bands[2 * b], tables.bands[2 * b + 1], kx, ky, reflect,
-        plan, dh, qx, qy, flow_x, flow_y, passing, toil, rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
+        plan, dh, qx, qy, flow_x, flow_y, passing, scratch, rates[:n], rates[n : 2 * n], rates[2 * n :], moves,
     )  # fmt: skip
     if f >= 0:
         through_faces(
@@ -155,7 +158,7 @@ def on_grid(tables, b, y, dydt, out, moves):
 
 @njit
 def rates_on_grids(t, y, dydt, out, handle):
-    """Rates of cells of rectangles that stand still."""
+    """Rates of cells of rectangles without moving walls."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -165,7 +168,7 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 @njit
 def on_mesh(tables, b, y, dydt, out, moves):
-    """Rates of cells of any mesh, of contents where it moves; moves : None, or as `faces.shallow_rates` has it."""
+    """Rates of cells of any mesh, of contents if walls move. moves : None, or as in `surface_mesh.shallow_rates`"""
     st, plane, work, integers = tables.settings[0], tables.plane, tables.work, tables.integers
     basin = tables.basins[b]
     n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
@@ -174,7 +177,7 @@ def on_mesh(tables, b, y, dydt, out, moves):
     to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
     rates = to[first : first + 3 * n]
     flow = work[:0]
-    if f >= 0:  # scalars are carried by them
+    if f >= 0:  # needed for scalars
         flow = work[f : f + basin["faces"]]
     rate = faces.shallow_rates(
         weight_of(st, plane, basin), basin["scheme"], basin["wide"], plane[basin["mesh"] :], integers[basin["links"] :],
@@ -190,7 +193,7 @@ def on_mesh(tables, b, y, dydt, out, moves):
 
 @njit
 def rates_on_meshes(t, y, dydt, out, handle):
-    """Rates of cells of any mesh that stands still."""
+    """Rates of cells of any mesh without moving walls."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]

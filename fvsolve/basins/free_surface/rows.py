@@ -1,9 +1,9 @@
-"""Rows of shallow water: cells with their ghosts, limited values at faces, fluxes, rates. Knows no grid.
+"""Rows of shallow water: cells with ghost cells, limited values at faces, fluxes, rates.
 
-A block is the view of rows that lie STRIDE apart, a constant: so the compiler sees that they do not overlap. Of cells:
-depth, surface, both velocities, wave speed and unit flows; of sides the first five of these at the faces before and
-after, and depth times what the surface rises across the cell [m2]; of fluxes that of depth, of normal momentum less the
-pressure on the side before and after, of momentum along the faces.
+A block is a set of rows at the constant distance STRIDE, so that the compiler knows that they do not overlap. Cells
+have depth, surface, both velocities, wave speed and unit flows. Sides have the first five of these at the faces before
+and after a cell, and depth times the rise of the surface across the cell [m2]. Fluxes are those of depth, of normal
+momentum minus the pressure on the side before and on the side after, and of tangential momentum.
 """
 
 from math import sqrt
@@ -12,11 +12,11 @@ from fvsolve.jit import inner, njit
 from fvsolve.kernels.limiters import by_limiter, halves
 from fvsolve.kernels.records import UPWIND
 
-THIN = 1e-6  # depth below which velocities fade [m]
+THIN = 1e-6  # depth below which velocities fade to zero [m]
 TINY = 1e-300
-MOST = 1024  # cells of a row at a time
-GHOSTS = 8  # three are needed; with eight the cells of a row begin where a cache line does
-STRIDE = 1048  # an odd number of cache lines, so that rows do not push each other out
+MOST = 1024  # greatest number of cells of a row in one pass
+GHOSTS = 8  # three are needed; with eight the cells of a row begin at a cache line
+STRIDE = 1048  # an odd number of cache lines, so that rows do not evict each other from the cache
 DEPTH, SURFACE, EAST, NORTH, WAVE, FLOW_EAST, FLOW_NORTH = (k * STRIDE for k in range(7))
 LOW, HIGH, PUSH = (k * STRIDE for k in (0, 5, 10))
 MASS, BEFORE, AFTER, ALONG = (k * STRIDE for k in range(4))
@@ -27,8 +27,8 @@ FIELDS, SIDES, FLUXES = 7, 11, 4  # rows of a block
 def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
     """Depth, surface, velocities and wave speed of a row; top[i] becomes the greatest rate of its column so far.
 
-    Velocity is q / h, which fades as 2 h q / (h^2 + THIN^2) below THIN.
-    factors : None, or (wide, narrow) of cells whose contents dh, qx and qy are, see `basins.stretch`
+    Velocity is q / h, replaced by 2 h q / (h^2 + THIN^2) below THIN.
+    factors : None, or (wide, narrow) of stretching cells, for contents dh, qx and qy; see `basins.cell_stretching`
     """
     for i in range(dh.size):
         rise = dh[i]
@@ -48,29 +48,29 @@ def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
 
 @njit
 def put_flows(qx, qy, factors, cells):
-    """The unit flows of a row; factors : as in `put_cells`."""
+    """Unit flows of a row. factors : as in `put_cells`"""
     for i in range(qx.size):
         per = 1.0 if factors is None else factors[1][i]
         cells[i + FLOW_EAST], cells[i + FLOW_NORTH] = qx[i] * per, qy[i] * per
 
 
 @njit
-def put_end(fields, reach, wall, cells, first, step, deep):
-    """Ghosts beyond cell `first` of a row, `step` away from it: mirrored by a wall, 1, or that cell again, 0.
+def put_end(fields, reach, wall, cells, first, step, cell_count):
+    """Ghost cells beyond cell `first` of a row, in direction `step`.
 
-    deep : number of cells that a mirror finds
+    wall : 1 for mirror images, 0 for copies of that cell; cell_count : number of cells available to the mirror
     """
     for f in range(fields):
         at = f * STRIDE + first
-        turn = -1.0 if f * STRIDE == EAST or f * STRIDE == FLOW_EAST else 1.0
+        sign = -1.0 if f * STRIDE == EAST or f * STRIDE == FLOW_EAST else 1.0
         for k in range(reach):
-            image = cells[at - step * min(k, deep - 1)]
-            cells[at + step * (k + 1)] = wall * turn * image + (1.0 - wall) * cells[at]
+            image = cells[at - step * min(k, cell_count - 1)]
+            cells[at + step * (k + 1)] = wall * sign * image + (1.0 - wall) * cells[at]
 
 
 @njit
 def drive_end(fields, reach, speed, cells, first, step):
-    """Let ghosts beyond cell `first` be seen in a wall that moves along the row: u is mirrored to 2 speed - u."""
+    """Correct ghost cells beyond cell `first` for a wall that moves along the row: u becomes 2 speed - u."""
     for k in range(reach):
         at = first + step * (k + 1)
         cells[at + EAST] += 2.0 * speed
@@ -80,7 +80,7 @@ def drive_end(fields, reach, speed, cells, first, step):
 
 @njit
 def drive_beyond(n, fields, speed, cells):
-    """The same of a row of ghosts beyond a wall that moves across it."""
+    """Correct a row of ghost cells for a wall that moves across it."""
     for i in range(n):
         cells[i + NORTH] += 2.0 * speed
         if fields * STRIDE > FLOW_NORTH:
@@ -89,22 +89,22 @@ def drive_beyond(n, fields, speed, cells):
 
 @njit
 def put_beyond(n, fields, walls, last, mirror, cells):
-    """A row beyond the last one, from that and its mirror image; walls : float64[n] or empty, as in `put_end`."""
+    """Row of ghost cells, from the last row and its mirror row. walls : float64[n] or empty, as in `put_end`"""
     for f in range(fields):
         at = f * STRIDE
         a, b, p = last[at:], mirror[at:], cells[at:]
-        turn = -1.0 if at == NORTH or at == FLOW_NORTH else 1.0
+        sign = -1.0 if at == NORTH or at == FLOW_NORTH else 1.0
         if walls.size == 0:
             for i in range(n):
-                p[i] = turn * b[i]
+                p[i] = sign * b[i]
         else:
             for i in range(n):
-                p[i] = walls[i] * turn * b[i] + (1.0 - walls[i]) * a[i]
+                p[i] = walls[i] * sign * b[i] + (1.0 - walls[i]) * a[i]
 
 
 @inner
 def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
-    """Values at both faces of cell i and what its surface rises."""
+    """Values at both faces of cell i and depth times the rise of its surface."""
     sides[i], sides[i + SURFACE], sides[i + EAST], sides[i + NORTH] = hl, el, ul, vl
     sides[i + HIGH], sides[i + (HIGH + SURFACE)], sides[i + (HIGH + EAST)], sides[i + (HIGH + NORTH)] = hr, er, ur, vr
     sides[i + PUSH] = push
@@ -112,7 +112,7 @@ def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
 
 @inner
 def put_sloped(limiter, n, before, here, after, sides):
-    """`put_limited` by a limiter."""
+    """`put_limited` with a limiter."""
     for i in range(n):
         h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
         a, b = halves(limiter, h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
@@ -122,7 +122,7 @@ def put_sloped(limiter, n, before, here, after, sides):
 
 @njit
 def put_limited(scheme, limiter, n, before, here, after, sides):
-    """Sides of n cells, from these and their neighbours: themselves, or limited."""
+    """Values at the sides of n cells from these and their neighbours: cell values, or with a limiter."""
     if scheme == UPWIND:
         for i in range(n):
             h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
@@ -133,11 +133,11 @@ def put_limited(scheme, limiter, n, before, here, after, sides):
 
 @inner
 def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
-    """Through a row of n faces (HLLC); momentum along them goes with the mass, as the contact carries it.
+    """Fluxes through a row of n faces (HLLC); tangential momentum is carried with the mass by the contact wave.
 
-    normal, along : EAST and NORTH, or the other way round
-    left, right : values on either side; l, r : cells between whose velocities and wave speeds those of the face lie
-    moves : speeds of the faces [m/s], None where they stand still: F(U) - w U, found in axes that move along
+    normal, along : EAST and NORTH, or the reverse
+    left, right : values on either side; l, r : cells whose velocities and wave speeds bound those of the face
+    moves : speeds of the faces [m/s], None if they do not move: the flux F(U) - w U is computed in moving axes
     """
     half = 0.5 * g
     for i in range(n):
@@ -149,8 +149,8 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
         if moves is not None:
             nl, nr, ua, ub = nl - moves[i], nr - moves[i], ua - moves[i], ub - moves[i]
         low, high = min(min(ua, ub) - wave, 0.0), max(max(ua, ub) + wave, 0.0)
-        both = 1.0 / (high - low + TINY)
-        wa, wb, mix = high * both, -(low * both), high * low * both
+        per_width = 1.0 / (high - low + TINY)
+        wa, wb, mix = high * per_width, -(low * per_width), high * low * per_width
         qa, qb = a * nl, b * nr
         mass = (wa * qa + wb * qb) + mix * (b - a)
         flow = (wa * (qa * nl) + wb * (qb * nr)) + mix * (qb - qa)
@@ -163,9 +163,9 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
 
 @inner
 def put_rates(g, kx, ky, push_x, push_y, x, south, north, wide, dh, dx, dy):
-    """Rates of a row: what comes in less what goes out, and the push of surface and pressure.
+    """Rates of a row: fluxes in minus fluxes out, and the force of surface and pressure.
 
-    wide : None, or of cells that are stretched, for rates of what these contain; see `basins.stretch`
+    wide : None, or stretching of cells, for rates of contents; see `basins.cell_stretching`
     """
     for i in range(dh.size):
         along, across = kx[i], ky

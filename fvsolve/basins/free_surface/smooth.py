@@ -1,8 +1,8 @@
-"""Fifth-order values of shallow water at faces, where it is deep enough. Knows rows of cells; knows no grid.
+"""Fifth-order values of shallow water at faces, where it is deep enough.
 
-Depth, surface and unit flows are reconstructed from cell means, velocities are their quotients. The integral of
-h de/dx over a cell is exact for cubics: the product of the parabolas through both faces and the mean, and what the
-third differences of either add to it with the second of the other.
+Depth, surface and unit flows are reconstructed from cell means; velocities are their quotients. The integral of h de/dx
+over a cell is exact for cubics: the product of the parabolas through both face values and the mean, plus the products
+of third differences with second differences.
 """
 
 from math import sqrt
@@ -12,8 +12,8 @@ from fvsolve.jit import njit
 from fvsolve.kernels.reconstruction import value_weno5
 from fvsolve.kernels.records import WENO5
 
-SMALL = 1e-20  # squares of differences below which WENO's weights are its linear ones [m2, m4/s2]
-STEEP = 0.5  # shallowest of five depths over the deepest, below which values are limited ones
+SMALL = 1e-20  # squares of differences below which WENO's weights are its linear weights [m2, m4/s2]
+STEEP = 0.5  # shallowest of five depths over the deepest, below which values are limited
 
 
 @njit
@@ -24,7 +24,7 @@ def value_upwind5(a, b, c, d, e):
 
 @njit
 def put_deep(p, q, r, s, t, deep):
-    """Where the shallowest of five cells has the share STEEP of the deepest."""
+    """Set `deep` to 1 where the shallowest of five cells has more than the fraction STEEP of the deepest, else to 0."""
     for i in range(deep.size):
         least = min(min(min(p[i], q[i]), min(s[i], t[i])), r[i])
         most = max(max(max(p[i], q[i]), max(s[i], t[i])), r[i])
@@ -33,7 +33,7 @@ def put_deep(p, q, r, s, t, deep):
 
 @njit
 def put_fifth(scheme, p, q, r, s, t, deep, low, high):
-    """Values at both faces of a row of cells r, where it is deep."""
+    """Values at both faces of a row of cells r, where `deep` is 1."""
     if scheme == WENO5:
         for i in range(deep.size):
             a = value_weno5(t[i], s[i], r[i], q[i], p[i], SMALL)
@@ -48,7 +48,7 @@ def put_fifth(scheme, p, q, r, s, t, deep, low, high):
 
 @njit
 def put_velocities(g, deep, side):
-    """Velocities from unit flows where it is deep, and wave speeds."""
+    """Velocities from unit flows where `deep` is 1, and wave speeds."""
     for i in range(deep.size):
         depth = max(side[i], 0.0)
         wet = max(depth, THIN)
@@ -58,17 +58,17 @@ def put_velocities(g, deep, side):
 
 @njit
 def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
-    """Integral of h de/dx over cells where it is deep, from values at both faces and the means of five cells."""
+    """Integral of h de/dx over cells where `deep` is 1, from values at both faces and the means of five cells."""
     for i in range(push.size):
         h2, e2 = 3.0 * ((hl[i] + hr[i]) - 2.0 * h[i]), 3.0 * ((el[i] + er[i]) - 2.0 * re[i])
         h3, e3 = 0.5 * ((th[i] - ph[i]) - 2.0 * (sh[i] - qh[i])), 0.5 * ((te[i] - pe[i]) - 2.0 * (se[i] - qe[i]))
-        whole = h[i] * (er[i] - el[i]) + (hr[i] - hl[i]) * e2 / 6.0 + (h2 * e3 - e2 * h3) / 360.0
-        push[i] = whole if deep[i] > 0.0 else push[i]
+        integral = h[i] * (er[i] - el[i]) + (hr[i] - hl[i]) * e2 / 6.0 + (h2 * e3 - e2 * h3) / 360.0
+        push[i] = integral if deep[i] > 0.0 else push[i]
 
 
 @njit
 def put_smooth(g, scheme, p, q, r, s, t, sides, deep):
-    """Fifth-order values at both faces of a row of cells r over limited ones, from two on either side."""
+    """Replace limited values at both faces of a row of cells r by fifth-order values, from two cells on either side."""
     low, high = sides, sides[HIGH:]
     put_deep(p, q, r, s, t, deep)
     for f in range(4):

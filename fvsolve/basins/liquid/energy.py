@@ -1,6 +1,7 @@
-"""Power and stored energy of a liquid under the linear law. Knows the tables; adds nothing up over time.
+"""Power and stored energy of a liquid under the linear law.
 
-It stores per volume P r / rho + a^2 r^2 / (2 rho) + |m|^2 / (2 rho), P its potential at rest; rows: `basins.energy`.
+The stored energy per volume is P r / rho + a^2 r^2 / (2 rho) + |m|^2 / (2 rho), P the potential at rest. For the rows
+see `basin_energy`.
 """
 
 from fvsolve.basins.energy import at_rest, row_of
@@ -13,7 +14,7 @@ MINE = kind_of(__package__)
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Rows of its basins."""
+    """Write the rate of storage of all liquids to `power`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if tables.basins[b]["kind"] == MINE:
@@ -27,14 +28,14 @@ def liquid_power(st, basin, plane, y, dydt, rows):
     n, o, rest, area = basin["n"], basin["y"], at_rest(st, basin), plane[basin["drawn"] :]
     rate, square = 0.0, basin["speed"] * basin["speed"]
     for i in range(n):
-        moves = y[o + n + i] * dydt[o + n + i] + y[o + 2 * n + i] * dydt[o + 2 * n + i]
-        rate += area[i] * ((rest + square * y[o + i]) * dydt[o + i] + moves)
+        kinetic = y[o + n + i] * dydt[o + n + i] + y[o + 2 * n + i] * dydt[o + 2 * n + i]
+        rate += area[i] * ((rest + square * y[o + i]) * dydt[o + i] + kinetic)
     rows[3] = basin["thickness"] * rate / st["rho"]
 
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Rows of its basins."""
+    """Write the stored energy of all liquids."""
     tables = open_tables(handle)
     st, basins = tables.settings[0], tables.basins
     for b in range(basins.size):

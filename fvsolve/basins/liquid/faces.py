@@ -1,8 +1,8 @@
-"""Pressure waves of a liquid on any mesh, under all its laws. Knows cells and their sides; knows no patch.
+"""Pressure waves of a liquid on any mesh, under all its laws.
 
-States, waves and their fluxes are those of the grid (see `liquid` and `liquid_log`): across a side (w + u) / 2 comes
-from inside and (w - u) / 2 from beyond, with w = c r, u = m under `linear`, u = m / rho under `log`, where
-w = 2 (c0 - c), and `table`, where it is read.
+States, waves and their fluxes are those of the grid (`grid_linear` and `grid_nonlinear`): across a side (w + u) / 2
+comes from inside and (w - u) / 2 from beyond. Under `linear` w = c r and u = m; under `log` u = m / rho and w = 2 (c0 -
+c); under `table` w is read from the table.
 """
 
 from math import sqrt
@@ -33,17 +33,17 @@ from fvsolve.basins.stretch import swell
 from fvsolve.jit import njit
 from fvsolve.kernels.records import LAW_LOG, UPWIND
 
-# rows of BLOCK in the scratch of a block: what lies beyond, rates, sum for the step, flow through the side
+# Rows of BLOCK in the scratch of a block: values beyond, rates, sum for the step, flow through the side.
 _U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE, _MASS = (k * BLOCK for k in range(1, 11))
 _NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
-_PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of what moves: pressure at the side, energy that is lost beside it
-_PER, _BULK, _PHI = (k * BLOCK for k in range(13, 16))  # of what a potential pulls: see `grid_full.stiffness`
+_PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of moving sides: pressure at the side, energy lost there
+_PER, _BULK, _PHI = (k * BLOCK for k in range(13, 16))  # with a potential: see `grid_nonlinear.stiffness`
 ROWS = 16
 
 
 @njit
 def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
-    """w, both velocities (mass-flow densities) and wave speed of a block of cells."""
+    """w, both velocities (mass-flow densities under law linear) and wave speed of a block of cells."""
     if table is not None:
         for i in range(r.size):
             w[i], slope = invariant(table, r[i])
@@ -64,7 +64,7 @@ def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
 
 @njit
 def show(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v, moves):
-    """What the boundary shows of the cells inside: a mirror at 1 and -1, and the same again where waves leave, at 0."""
+    """Values beyond the boundary: mirror images with reflection coefficients 1 and -1, equal values at 0 (open)."""
     for q in range(edges.size):
         i = place(edges[q], ring)
         r = reflect[number[q]] if reflect.size > 0 else 1.0
@@ -81,9 +81,9 @@ def show(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, sho
 
 @njit
 def show_sides(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul, vl, w, moves):
-    """Put beyond sides of the boundary the wave that comes back: w - u beyond is `reflect` times w + u inside.
+    """Write the reflected wave beyond boundary sides: w - u beyond is `reflect` times w + u inside.
 
-    A wall that moves sends back what makes u at it that of the wall.
+    A moving wall reflects waves so that u at the wall is its own.
     """
     for q in range(edges.size):
         i = edges[q] % BLOCK
@@ -97,7 +97,10 @@ def show_sides(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul, vl, 
 
 @njit
 def settle_linear(c0, wl, ul, vl, geo, w):
-    """Take from the rates of a block of cells what leaves through one side of each, from the values inside it."""
+    """Subtract from the rates of a block of cells the outflow through one side of each.
+
+    wl, ul, vl : values at the side from inside; those from beyond are in w
+    """
     for i in range(BLOCK):
         nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
@@ -112,7 +115,10 @@ def settle_linear(c0, wl, ul, vl, geo, w):
 
 @njit
 def settle_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
-    """The same of sides that move, F(U) - speed U; what is along a side stays where it is while the side passes."""
+    """Subtract the outflow through moving sides, F(U) - speed U.
+
+    Tangential momentum is not carried by a moving side.
+    """
     for i in range(BLOCK):
         nx, ny, reach, speed = geo[_NX + i], geo[_NY + i], geo[_REACH + i], speeds[i]
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
@@ -132,9 +138,10 @@ def settle_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
 
 @njit
 def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds, phi):
-    """The same, the full momentum flux; u0, v0, c : of the cells, for the step; speeds : of the sides, or None.
+    """Subtract the outflow through one side of each cell with the full momentum flux.
 
-    phi : None, or a potential at the sides, taken off the waves, which pulls cells by `hold_side`
+    u0, v0, c : of the cells, for the step; speeds : of the sides, or None
+    phi : None, or a potential at the sides, subtracted from the waves; its force on cells is that of `hold_side`
     """
     bulk, per = rho * c0 * c0, 0.5 / c0
     for i in range(BLOCK):
@@ -142,17 +149,17 @@ def settle_log(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds, phi):
         forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
         backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
         u = forward - backward
-        through, own, x = u, u0[i] * nx + v0[i] * ny, forward + backward
+        through, own, invariant_sum = u, u0[i] * nx + v0[i] * ny, forward + backward
         if phi is not None:
-            x = lowered(c0, rho, table, x, phi[i])
+            invariant_sum = lowered(c0, rho, table, invariant_sum, phi[i])
         if speeds is not None:
             through, own = u - speeds[i], own - speeds[i]
         if table is not None:
-            r, p = state(table, x)
+            r, p = state(table, invariant_sum)
             mass = (rho + r) * through
             push = mass * u + p
         else:
-            y = -per * x  # c = c0 (1 + y)
+            y = -per * invariant_sum  # c = c0 (1 + y)
             mass = rho * through / ((1.0 + y) * (1.0 + y))
             p = -2.0 * bulk * log_sum(y)
             push = mass * u + p
@@ -176,7 +183,7 @@ def stiffen(c0, rho, table, r, phi, w):
 
 @njit
 def hold_side(phi, geo, w):
-    """What a potential does to a block of cells: less pressures that would hold them at rest, at one side of each."""
+    """Subtract from the rates of a block of cells the pressures that would keep them at rest, at one side of each."""
     for i in range(BLOCK):
         push = geo[_REACH + i] * w[_BULK + i] * log_near(w[_PER + i] * (phi[i] - w[_PHI + i]))
         w[_RX + i] -= push * geo[_NX + i]
@@ -185,11 +192,11 @@ def hold_side(phi, geo, w):
 
 @njit
 def push_walls(edges, number, reflect, geo, w, thrust):
-    """Let nothing pass walls; pressure on them, and what their way takes of the energy that the law knows."""
-    many = thrust.size // 2
+    """Set the mass flow through walls to zero; write the pressure on them, and the energy lost by their motion."""
+    count = thrust.size // 2
     for q in range(edges.size):
         i = edges[q] % BLOCK
-        thrust[number[q]], thrust[many + number[q]] = w[_PUSH + i], w[_LOSS + i]
+        thrust[number[q]], thrust[count + number[q]] = w[_PUSH + i], w[_LOSS + i]
         if reflect.size == 0 or reflect[number[q]] == 1.0:
             w[_RR + i] += geo[_REACH + i] * w[_MASS + i]
             w[_MASS + i] = 0.0
@@ -197,7 +204,7 @@ def push_walls(edges, number, reflect, geo, w, thrust):
 
 @njit
 def clear(w):
-    """No rates and no sum yet."""
+    """Set rates and sum to zero."""
     for i in range(BLOCK):
         w[_RR + i], w[_RX + i], w[_RY + i], w[_FAST + i] = 0.0, 0.0, 0.0, 0.0
 
@@ -213,7 +220,7 @@ def put_rates(w, rate_r, rate_x, rate_y):
 
 @njit
 def work_size(integers):
-    """Floats that `liquid_rates` works in."""
+    """Length of the work array of `liquid_rates`."""
     return 16 * integers[4] * BLOCK + 3 * integers[3] + ROWS * BLOCK
 
 
@@ -225,16 +232,16 @@ def liquid_rates(
     """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
 
     law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
-    table : of `waves` in place of a law, or None
-    scheme : UPWIND or MUSCL; wide_by : how far values at sides may go beyond those around, 1 for not at all
-    reflect : float64[b]  share of a wave that comes back, -1 to 1, empty for walls
+    table : of `riemann_invariants` in place of a law, or None
+    scheme : UPWIND or MUSCL; wide_by : allowed excess of values at sides over the range of neighbours, 1 for none
+    reflect : float64[b]  reflection coefficients, -1 to 1, empty for walls
     r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
-    through : float64[b]  what comes in through the boundary [kg/(m s)], or empty
+    through : float64[b]  inward flows through the boundary [kg/(m s)], or empty
     work : float64[work_size(integers)]
-    moves : None, or speeds of sides along their normals [m/s] and what they find, see `moving_meshes`: on faces of the
-    boundary pressure over that at rest [Pa], then what law linear loses beside them, speed (c^2 r^2 - m^2)
-    [kg^2/(m3 s3)], float64[2 b]; and `wide`, see `basins.stretch`
-    phi : None, or under laws of the full momentum flux a potential [J/kg] of cells, filled up, and of sides
+    moves : None, or a tuple: speeds of sides along their normals [m/s], see `moving_meshes`; array float64[2 b] for
+    pressures above that at rest on boundary faces [Pa], then for energy lost there by law linear,
+    speed (c^2 r^2 - m^2) [kg^2/(m3 s3)]; stretching `wide`, see `basins.cell_stretching`
+    phi : None, or under laws with the full momentum flux a potential [J/kg] of cells, padded, and of sides
     """
     slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
     count, first_order = blocks(integers), scheme == UPWIND
@@ -253,26 +260,31 @@ def liquid_rates(
     free = w[_FREE:]
     for i in range(BLOCK):
         w[_TOP + i], free[i] = 0.0, HUGE
-    known, sided, wall, edge = 0, 0, 0, 0  # blocks whose cells, whose sides are known; boundary so far in both loops
+    cells_done, sides_done, wall, edge = (
+        0,
+        0,
+        0,
+        0,
+    )  # blocks with computed cells and sides; boundary sides done in both loops
     for j in range(count):
-        while sided < need[j]:
-            while known < need[sided]:
-                i, k, o = known * BLOCK, min((known + 1) * BLOCK, n), (known % ring) * BLOCK
+        while sides_done < need[j]:
+            while cells_done < need[sides_done]:
+                i, k, o = cells_done * BLOCK, min((cells_done + 1) * BLOCK, n), (cells_done % ring) * BLOCK
                 put_primitives(law, c0, rho, table, r[i:k], mx[i:k], my[i:k], p[o:], u[o:], v[o:], c[o:])
                 if phi is not None and (table is not None or law == LAW_LOG):
                     raise_row(c0, rho, table, phi[0][i:k], p[o : o + k - i])
-                known += 1
+                cells_done += 1
             if not first_order:
-                k, wall = wall, edges_before(edges, wall, 4 * (sided + 1) * BLOCK)
+                k, wall = wall, edges_before(edges, wall, 4 * (sides_done + 1) * BLOCK)
                 here, sp, su, sv = edges[k:wall], shown[k:], shown[b + k :], shown[2 * b + k :]
                 show(
                     law, c0, rho, table, here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, p, u, v,
                     sp, su, sv, moves,
                 )  # fmt: skip
-                put_sides(sided, floats, integers, p, wide_by, free, sp, here, w, ps)
-                put_sides(sided, floats, integers, u, wide_by, free, su, here, w, us)
-                put_sides(sided, floats, integers, v, wide_by, free, sv, here, w, vs)
-            sided += 1
+                put_sides(sides_done, floats, integers, p, wide_by, free, sp, here, w, ps)
+                put_sides(sides_done, floats, integers, u, wide_by, free, su, here, w, us)
+                put_sides(sides_done, floats, integers, v, wide_by, free, sv, here, w, vs)
+            sides_done += 1
         clear(w)
         first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
         if phi is not None:

@@ -1,9 +1,10 @@
-"""Pressure waves of a liquid on a grid, law `linear`. Knows rows of cells and sides; knows no patch and no network.
+"""Pressure waves of a liquid on a grid, law `linear`.
 
 r_t + div m = 0, m_t + c^2 grad r = 0: deviation of density r [kg/m3], whose pressure is c^2 r, and mass-flow densities
-m [kg/(m2 s)]. Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are carried by their own sides, which is
-Godunov's flux; the system is linear, so that one direction at a time has the full order of the scheme. A row of cells
-is read once: its own faces, then those towards the rows before it, whose waves go round in `RING` slots.
+m [kg/(m2 s)]. Along each direction the waves (c r + m) / 2 and (c r - m) / 2 are reconstructed upwind, which is
+Godunov's flux. The system is linear, so one direction at a time has the full order of the scheme. A row of cells is
+read once: for its own faces, then for those towards the rows before it; the waves of rows are stored in a ring of
+`RING` slots.
 """
 
 from fvsolve.basins.liquid import driven
@@ -16,10 +17,10 @@ from fvsolve.kernels.reconstruction import value_muscl, value_weno5
 from fvsolve.kernels.records import LINEAR, MUSCL, UPWIND, WENO5
 
 WALLS, MIRRORS, OPEN = 0, 1, 2  # kinds of sides
-RING = 8  # rows of waves that are kept: six that a row of faces looks at, and room for all three beyond a side
-EDGE = 5  # cells that a side looks at
+RING = 8  # stored rows of waves: the six of the stencil of a row of faces, and space for all three beyond a side
+EDGE = 5  # cells read by the closure of a side
 NEAR = BEYOND + EDGE
-SPARE = 2 * NEAR + 2 * EDGE + BEYOND  # floats that a side works in
+SPARE = 2 * NEAR + 2 * EDGE + BEYOND  # length of the work array of a side
 
 
 @njit
@@ -30,7 +31,7 @@ def value_upwind5(a, b, c, d, e):
 
 @inner
 def faces_limited(limiter, b, c, d, f):
-    """Values at faces after cells c by a limiter."""
+    """Values at faces after cells c with a limiter."""
     for i in range(f.size):
         f[i] = c[i] + 0.5 * slope(limiter, c[i] - b[i], d[i] - c[i])
 
@@ -52,14 +53,14 @@ def faces(scheme, limiter, small, a, b, c, d, e, f):
 
 
 @njit
-def bears(scheme, n, one, other):
-    """The scheme that n cells between two kinds of sides bear: but for walls, these want five for the fifth order."""
-    return scheme if (one == WALLS and other == WALLS) or n >= EDGE or scheme == UPWIND else MUSCL
+def bears(scheme, n, first, second):
+    """Scheme for n cells between two kinds of sides: muscl for fewer than five cells, except between walls."""
+    return scheme if (first == WALLS and second == WALLS) or n >= EDGE or scheme == UPWIND else MUSCL
 
 
 @njit
 def side_of(reflect):
-    """WALLS, which every face of a side is; MIRRORS, which send all back, some turned; else OPEN."""
+    """Kind of a side: WALLS, all faces walls; MIRRORS, full reflection, some with reversed sign; else OPEN."""
     kind = WALLS
     for k in range(reflect.size):
         if abs(reflect[k]) != 1.0:
@@ -71,20 +72,20 @@ def side_of(reflect):
 
 @njit
 def fold(j, n):
-    """Cell seen at j between mirrors at 0 and n."""
+    """Index of the cell whose mirror image is at j, with mirrors at 0 and n."""
     q = j % (2 * n)
     return q if q < n else 2 * n - 1 - q
 
 
 @njit
 def image(j, n):
-    """Whether that cell is seen the wrong way round."""
+    """True if the image at j is reversed."""
     return j % (2 * n) >= n
 
 
 @inner
 def mirror(n, forward, backward):
-    """Fill three values beyond either end of [3 : n + 3] of two waves: each becomes the other."""
+    """Fill three values beyond either end of [3 : n + 3] of two waves: each mirrors the opposite wave."""
     for k in range(BEYOND):
         forward[2 - k], backward[2 - k] = backward[3 + k], forward[3 + k]
         forward[n + 3 + k], backward[n + 3 + k] = backward[n + 2 - k], forward[n + 2 - k]
@@ -92,23 +93,26 @@ def mirror(n, forward, backward):
 
 @njit
 def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
-    """Three values beyond a side of n cells, at `first`, `first + step`, ..., which sends `reflect` of a wave back.
+    """Write three values beyond a side of n cells, which start at `first` with `step`.
 
-    On OPEN sides the wave that leaves goes on as a polynomial, and the one that enters has its own value at the side
-    for a datum, as at the ends of pipes. Kinds go by sides: mixed on one, `upwind5` would grow by 1e-4 a cell time.
+    `reflect` is its reflection coefficient.
+
+    On OPEN sides the outgoing wave is extrapolated by a polynomial. The incoming wave has its own value at the side as
+    datum, as at the ends of pipes. Kinds are those of whole sides: mixed on one side, `upwind5` would grow by 1e-4 per
+    cell travel time.
     """
-    near_in, near_out, ghosts = spare[:EDGE], spare[EDGE : 2 * EDGE], spare[2 * EDGE : 2 * EDGE + BEYOND]
+    incoming, outgoing, ghosts = spare[:EDGE], spare[EDGE : 2 * EDGE], spare[2 * EDGE : 2 * EDGE + BEYOND]
     for k in range(EDGE):
         at = first + step * min(k, n - 1)
-        near_in[k], near_out[k] = entering[at], leaving[at]
+        incoming[k], outgoing[k] = entering[at], leaving[at]
     if kind == MIRRORS:
         for k in range(BEYOND):
             at = first - step * (k + 1)
-            entering[at], leaving[at] = reflect * near_out[k], reflect * near_in[k]
+            entering[at], leaving[at] = reflect * outgoing[k], reflect * incoming[k]
         return
     degree = 0 if scheme == UPWIND else 4
-    a, b, c = near_out[2], near_out[1], near_out[0]
-    leaving_cells(near_out, n, scheme, degree, limiter, small, ghosts)
+    a, b, c = outgoing[2], outgoing[1], outgoing[0]
+    leaving_cells(outgoing, n, scheme, degree, limiter, small, ghosts)
     for k in range(BEYOND):
         leaving[first - step * (k + 1)] = ghosts[k]
     datum = c
@@ -118,43 +122,43 @@ def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, firs
         datum = value_weno5(a, b, c, ghosts[0], ghosts[1], small)
     elif scheme == MUSCL:
         datum = value_muscl(limiter, b, c, ghosts[0])
-    entering_cells(near_in, n, scheme, degree, reflect * datum, small, ghosts)
+    entering_cells(incoming, n, scheme, degree, reflect * datum, small, ghosts)
     for k in range(BEYOND):
         entering[first - step * (k + 1)] = ghosts[k]
 
 
 @njit
 def close_row(kind, scheme, limiter, small, reflect, n, entering, leaving, first, step, spare):
-    """Close the southern or northern side of n rows of waves, in slots of a ring; `first` is the row next to it."""
-    near_in, near_out, rest = spare[:NEAR], spare[NEAR : 2 * NEAR], spare[2 * NEAR :]
+    """Close the southern or northern side of n rows of waves in the ring; `first` is the row next to the side."""
+    incoming, outgoing, rest = spare[:NEAR], spare[NEAR : 2 * NEAR], spare[2 * NEAR :]
     wide = reflect.size
     for i in range(wide):
         for k in range(min(n, EDGE)):
             at = ((first + step * k) % RING) * wide + i
-            near_in[BEYOND + k], near_out[BEYOND + k] = entering[at], leaving[at]
-        close_side(kind, scheme, limiter, small, reflect[i], n, near_in, near_out, BEYOND, 1, rest)
+            incoming[BEYOND + k], outgoing[BEYOND + k] = entering[at], leaving[at]
+        close_side(kind, scheme, limiter, small, reflect[i], n, incoming, outgoing, BEYOND, 1, rest)
         for k in range(BEYOND):
             at = ((first - step * (k + 1)) % RING) * wide + i
-            entering[at], leaving[at] = near_in[BEYOND - 1 - k], near_out[BEYOND - 1 - k]
+            entering[at], leaving[at] = incoming[BEYOND - 1 - k], outgoing[BEYOND - 1 - k]
 
 
 @inner
 def send_back(reflect, leaving, entering):
-    """What enters at a side's faces is what leaves there, times `reflect`."""
+    """Incoming waves at the faces of a side: outgoing waves times the reflection coefficients."""
     for i in range(entering.size):
         entering[i] = reflect[i] * leaving[i]
 
 
 @inner
 def put_inward(k, entering, leaving, inward):
-    """What comes in through a side's faces, of waves; k : 1 / lengths of faces."""
+    """Inward flows through the faces of a side, from waves. k : 1 / lengths of faces"""
     for i in range(inward.size):
         inward[i] = (entering[i] - leaving[i]) / k[i]
 
 
 @inner
 def put_waves(half, r, m, forward, backward):
-    """Both waves of a row of cells; half : c / 2."""
+    """Both waves of a row of cells. half : c / 2"""
     for i in range(r.size):
         a, b = half * r[i], 0.5 * m[i]
         forward[i], backward[i] = a + b, a - b
@@ -172,7 +176,7 @@ def settle_row(c, k, forward, backward, rate_r, rate_m, rate_t):
 
 @inner
 def settle_column(c, k, f0, b0, f1, b1, rate_r, rate_m):
-    """The same, added, of a row of cells between two rows of faces."""
+    """Add the rates of a row of cells between two rows of faces."""
     ck = c * k
     for i in range(rate_r.size):
         rate_r[i] += k * ((f0[i] - b0[i]) - (f1[i] - b1[i]))
@@ -192,30 +196,30 @@ def steepest(kx, ky):
 
 @njit
 def first_row(begin, ny):
-    """The first row that faces of a band look at."""
+    """First row read for the faces of a band."""
     return max(min(begin - BEYOND, ny - EDGE), 0)
 
 
 @njit
 def row_known(j, ny):
-    """One beyond the last row that is looked at when faces before row j are found."""
+    """Last row + 1 read for the faces before row j."""
     return min(max(j + BEYOND, EDGE), ny)
 
 
 @njit
 def work_size(nx, ny):
-    """Floats that `grid_rates` works in."""
+    """Length of the work array of `grid_rates`."""
     return (2 * RING + 4) * nx + 2 * (nx + 2 * BEYOND) + 2 * (nx + 1) + SPARE
 
 
 @njit
 def turn_row(c, ny, j, up, down, along, moves):
-    """Waves at a row of faces that move become fluxes; walls feel them."""
-    nx, many = up.size, moves[2].size // 2
+    """Convert waves at a row of moving faces to fluxes; write the pressures on walls."""
+    nx, count = up.size, moves[2].size // 2
     if j == 0 or j == ny:
         at, speed = 2 * ny + (nx if j > 0 else 0), moves[1][j]
-        beside = along[(ny - 1) * nx if j > 0 else 0 :]
-        feel(c, speed if j > 0 else -speed, up, down, beside, nx, moves[2][at:], moves[2][many + at :])
+        tangential = along[(ny - 1) * nx if j > 0 else 0 :]
+        feel(c, speed if j > 0 else -speed, up, down, tangential, nx, moves[2][at:], moves[2][count + at :])
     sweep(c, moves[3], moves[1][j:], 0, up, down)
 
 
@@ -224,17 +228,18 @@ def grid_rates(
     c, small, scheme, limiter, nx, ny, begin, stop, kx, ky, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
     moves,
 ):  # fmt: skip
-    """Rates of the cells of rows `begin` to `stop`; returns the greatest c (kx + ky) of all [1/s].
+    """Rates of the cells of rows `begin` to `stop`; returns the greatest c (kx + ky) of all cells [1/s].
 
-    Rows are those of the whole grid; beside a side, and beyond the band, the next `EDGE` of them are looked at too.
-    c : wave speed [m/s]; small : a flow density too small to mean anything, squared [kg2/(m4 s2)]
+    Rows are those of the whole grid; the next `EDGE` rows beyond a side and beyond the band are read too.
+    c : wave speed [m/s]; small : square of a negligible flow density [kg2/(m4 s2)]
     kx, ky : float64[nx], float64[ny]  1/width of columns, 1/height of rows [1/m]
-    reflect : float64[2 (nx + ny)]  share of a wave that a side sends back: west, east, south, north; empty: walls
-    through : float64[2 (nx + ny)]  what comes in through faces of the boundary [kg/(m s)], in that order, or empty
+    reflect : float64[2 (nx + ny)]  reflection coefficients of sides: west, east, south, north; empty: walls
+    through : float64[2 (nx + ny)]  inward flows through boundary faces [kg/(m s)], in that order, or empty
     work : float64[work_size(nx, ny)]
-    moves : None, or speeds of lines along x and along y [m/s], float64[nx + 1] and float64[ny + 1], empty where they
-    stand still; what they find on faces of the boundary, as `faces.liquid_rates` has it; density at rest [kg/m3]; and
-    of columns or rows that stretch `wide`, see `basins.stretch`
+    moves : None, or a tuple: speeds of lines along x and along y [m/s], float64[nx + 1] and float64[ny + 1], empty if
+    they
+    do not move; array for pressures on boundary faces, as in `liquid_mesh.liquid_rates`; density at rest [kg/m3];
+    stretching `wide` of columns or rows, see `basins.cell_stretching`
     """
     row_rates(
         c, small, scheme, limiter, nx, ny, begin, stop, begin, stop, kx, ky, reflect, sides_of(reflect, nx, ny), r, mx,
@@ -252,12 +257,12 @@ def sides_of(reflect, nx, ny):
 
 @njit
 def row_rates(
-    c, small, scheme, limiter, nx, ny, begin, stop, row, until, kx, ky, reflect, kinds, r, mx, my, through, work,
+    c, small, scheme, limiter, nx, ny, begin, stop, row, until, kx, ky, reflect, side_kinds, r, mx, my, through, work,
     rate_r, rate_x, rate_y, moves,
 ):  # fmt: skip
-    """Rates of rows `row` to `until` of a band, from `begin` on in turn; those behind these may be half done.
+    """Rates of rows `row` to `until` of a band, from `begin` on in order; the next row may be incomplete.
 
-    kinds : of sides, see `sides_of`; all else as `grid_rates` has it
+    side_kinds : see `sides_of`; other arguments as in `grid_rates`
     """
     wide, f = nx + 2 * BEYOND, nx + 1
     up, down, work = work[: RING * nx], work[RING * nx : 2 * RING * nx], work[2 * RING * nx :]
@@ -268,7 +273,7 @@ def row_rates(
     if row > begin:
         rows = max(rows, row_known(row, ny))
     south, north = reflect[2 * ny : 2 * ny + nx], reflect[2 * ny + nx :]
-    to_w, to_e, to_s, to_n = kinds
+    to_w, to_e, to_s, to_n = side_kinds
     along, across = bears(scheme, nx, to_w, to_e), bears(scheme, ny, to_s, to_n)
     for j in range(row if row == begin else row + 1, until + 1):  # faces between rows j - 1 and j
         while rows < row_known(j, ny):
@@ -301,10 +306,17 @@ def row_rates(
             if moves is None or moves[0].size == 0:
                 settle_row(c, kx, fe, fw, rate_r[a:z], rate_x[a:z], rate_y[a:z])
             else:
-                speeds, many = moves[0], moves[2].size // 2
-                feel(c, -speeds[0], fe, fw, my[a:], 1, moves[2][rows:], moves[2][many + rows :])
+                speeds, count = moves[0], moves[2].size // 2
+                feel(c, -speeds[0], fe, fw, my[a:], 1, moves[2][rows:], moves[2][count + rows :])
                 feel(
-                    c, speeds[nx], fe[nx:], fw[nx:], my[z - 1 :], 1, moves[2][ny + rows :], moves[2][many + ny + rows :]
+                    c,
+                    speeds[nx],
+                    fe[nx:],
+                    fw[nx:],
+                    my[z - 1 :],
+                    1,
+                    moves[2][ny + rows :],
+                    moves[2][count + ny + rows :],
                 )
                 sweep(c, moves[3], speeds, 1, fe, fw)
                 fe[0], fe[nx] = 0.0 if to_w == WALLS else fe[0], 0.0 if to_e == WALLS else fe[nx]
@@ -319,8 +331,8 @@ def row_rates(
             for k in range(BEYOND):
                 beyond = ny + k if side == 1 else -1 - k
                 a, at = fold(beyond, ny) * nx, (beyond % RING) * nx
-                one, other = (down, up) if image(beyond, ny) else (up, down)
-                put_waves(half, r[a : a + nx], my[a : a + nx], one[at : at + nx], other[at : at + nx])
+                ahead, back = (down, up) if image(beyond, ny) else (up, down)
+                put_waves(half, r[a : a + nx], my[a : a + nx], ahead[at : at + nx], back[at : at + nx])
                 if moves is not None and moves[1].size > 0 and image(beyond, ny):
                     out = -moves[1][0] if side == 0 else moves[1][ny]
                     drive_row(

@@ -1,14 +1,14 @@
-"""Pressure waves of a liquid on a grid, laws `log` and `table`: the full momentum flux. Knows rows of cells; no patch.
+"""Pressure waves of a liquid on a grid, laws `log` and `table`, with the full momentum flux.
 
 r_t + div m = 0, m_t + div(m m / rho) + grad p = 0, p = rho0 c0^2 ln(rho / rho0), c = c0 sqrt(rho0 / rho): deviation of
-density r = rho - rho0 [kg/m3], mass-flow densities m [kg/(m2 s)]. With w = 2 (c0 - c), u - 2 c is carried along u + c
-and u + 2 c along u - c: the waves (w + u) / 2 and (w - u) / 2 are reconstructed from their own sides, and the state
-that both make at a face is the Riemann problem's with two simple waves (Osher and Solomon 1982), below the speed of
-sound; the velocity along a face comes from the side that the flow comes from. Fifth order is that of the waves:
-products of averages are of second order, with the Mach number for a factor. Sides, rows and slots: see `liquid`.
+density r = rho - rho0 [kg/m3], mass-flow densities m [kg/(m2 s)]. With w = 2 (c0 - c), u - 2 c is constant along u + c
+and u + 2 c along u - c. The waves (w + u) / 2 and (w - u) / 2 are reconstructed upwind. The state that both give at a
+face solves the Riemann problem with two simple waves (Osher and Solomon 1982), for subsonic flow. The velocity along a
+face is reconstructed from the upwind side of the flow. Fifth order is that of the waves: products of averages are of
+second order, with an error proportional to the Mach number. Sides, rows and slots: see `grid_linear`.
 
-Under `table` p, c and w = integral of c / rho are read (see `waves`). Whether a table is None is known when a kernel is
-compiled, so that neither law compiles or runs anything of the other's.
+Under `table`, p, c and w = integral of c / rho are read (see `riemann_invariants`). A table of None is known at
+compile time, so that each law compiles and runs only its own code.
 """
 
 from math import sqrt
@@ -42,7 +42,10 @@ from fvsolve.kernels.records import LINEAR, UPWIND, WENO5
 
 @njit(forceinline=True)
 def log_sum(y):
-    """ln(1 + y) by its fourth root's artanh, to round-off for y from -1/2 to 1; no call, so that loops are vectors."""
+    """ln(1 + y) by the artanh of its fourth root, to round-off for y from -1/2 to 1.
+
+    Without a call, so that loops vectorise.
+    """
     s = sqrt(1.0 + y)
     q = 1.0 + sqrt(s)
     t = y / ((1.0 + s) * (q * q))
@@ -78,21 +81,21 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
 
 @inner
 def raise_row(c0, rho, table, phi, w):
-    """Invariants of a row where a potential is taken off: those of what rests are the same everywhere."""
+    """Subtract a potential from the invariants of a row: those of a liquid at rest are then uniform."""
     for i in range(w.size):
         w[i] = lowered(c0, rho, table, w[i], -phi[i])
 
 
 @njit(forceinline=True)
 def log_near(q):
-    """ln(1 + q) where q is small, as of a potential between a cell and its sides over c^2: all but q^9 / 9."""
+    """ln(1 + q) to q^9 / 9, for small q such as the potential between a cell and its sides over c^2."""
     high = 1.0 / 5.0 - q * (1.0 / 6.0 - q * (1.0 / 7.0 - q * (1.0 / 8.0)))
     return q * (1.0 - q * (1.0 / 2.0 - q * (1.0 / 3.0 - q * (1.0 / 4.0 - q * high))))
 
 
 @njit(forceinline=True)
 def stiffness(c0, rho, table, r):
-    """(1 / c^2, rho c^2) of a cell: where it rests, pressure falls by rho c^2 ln(1 + phi / c^2) over a small height."""
+    """(1 / c^2, rho c^2) of a cell: at rest, the pressure falls by rho c^2 ln(1 + phi / c^2) over a small height."""
     if table is None:
         bulk = rho * c0 * c0
         return (rho + r) / bulk, bulk
@@ -102,9 +105,9 @@ def stiffness(c0, rho, table, r):
 
 @inner
 def hold_row(c0, rho, table, k, step, r, phi, low, high, rate):
-    """What a potential does to a row of cells: less pressures that would hold them at rest, at both of their faces.
+    """Subtract from the rates of a row of cells the pressures that would keep them at rest, at both faces.
 
-    phi, low, high : potential of cells and of faces before and after; k : every `step`-th is that of a cell
+    phi, low, high : potential of cells and of faces before and after; k : every `step`-th value is that of a cell
     """
     for i in range(rate.size):
         per, bulk = stiffness(c0, rho, table, r[i])
@@ -113,7 +116,7 @@ def hold_row(c0, rho, table, k, step, r, phi, low, high, rate):
 
 @inner
 def carried_limited(limiter, forward, backward, b, c, d, e, f):
-    """`faces_carried` by a limiter."""
+    """`faces_carried` with a limiter."""
     for i in range(f.size):
         on, jump = forward[i] > backward[i], d[i] - c[i]
         rise = c[i] - b[i] if on else e[i] - d[i]
@@ -123,7 +126,7 @@ def carried_limited(limiter, forward, backward, b, c, d, e, f):
 
 @njit
 def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f):
-    """Values at faces between c and d from the side that the flow, forward less backward wave, comes from."""
+    """Values at faces between c and d, upwind by the flow (forward minus backward wave)."""
     if scheme == UPWIND:
         for i in range(f.size):
             f[i] = c[i] if forward[i] > backward[i] else d[i]
@@ -143,10 +146,10 @@ def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f
 
 @inner
 def fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
-    """Waves and velocity along the faces become fluxes: of mass, of momentum across the faces and along them.
+    """Convert waves and tangential velocity at faces to fluxes of mass, of normal and of tangential momentum.
 
-    speeds : None, or every `step`-th is that of a face, which sweeps what it passes
-    phi : None, or a potential at the faces, taken off the waves; under law log c^2 is c0^2 (1 + y)^2 + phi there
+    speeds : None, or every `step`-th value is the speed of a face, which sweeps the content it passes
+    phi : None, or a potential at the faces, subtracted from the waves; under law log c^2 is c0^2 (1 + y)^2 + phi there
     """
     if table is not None:
         for i in range(forward.size):
@@ -173,7 +176,7 @@ def fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
 
 @inner
 def follow(speeds, step, forward, seen):
-    """Forward waves as faces that move see them: less what is as quick as these, none is carried through."""
+    """Forward waves minus the speeds of moving faces, for the upwind side relative to the face."""
     for i in range(seen.size):
         seen[i] = forward[i] - speeds[step * i]
 
@@ -190,7 +193,7 @@ def settle_row(k, mass, push, along, rate_r, rate_m, rate_t):
 
 @inner
 def settle_column(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
-    """The same, added, of a row of cells between two rows of faces."""
+    """Add the rates of a row of cells between two rows of faces."""
     for i in range(rate_r.size):
         rate_r[i] += k * (m0[i] - m1[i])
         rate_m[i] += k * (p0[i] - p1[i])
@@ -199,7 +202,7 @@ def settle_column(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
 
 @njit
 def work_size(nx, ny):
-    """Floats that `grid_rates` works in."""
+    """Length of the work array of `grid_rates`."""
     return (3 * RING + 6 + 3) * nx + 3 * (nx + 2 * BEYOND) + 3 * (nx + 1) + SPARE
 
 
@@ -211,9 +214,9 @@ def grid_rates(
     """Rates of the cells of rows `begin` to `stop`; returns the greatest (|u| + c) kx + (|v| + c) ky [1/s].
 
     c0, rho : wave speed [m/s] and density [kg/m3] at rest
-    table : of `waves`, or None for law `log`; small : a velocity too small to mean anything, squared
-    The others are those of `liquid.grid_rates`; work : float64[work_size(nx, ny)], where lines move nx + 1 more
-    phi : None, or a potential [J/kg] of cells, of faces between columns and of those between rows
+    table : of `riemann_invariants`, or None for law `log`; small : square of a negligible velocity
+    Other arguments are those of `grid_linear.grid_rates`; work : float64[work_size(nx, ny)], nx + 1 more if lines move
+    phi : None, or a potential [J/kg] of cells, of faces between columns and of faces between rows
     """
     wide, f, size = nx + 2 * BEYOND, nx + 1, RING * nx
     up, down, aside, work = work[:size], work[size : 2 * size], work[2 * size : 3 * size], work[3 * size :]
@@ -289,11 +292,11 @@ def grid_rates(
                 row = ny + k if side == 1 else -1 - k
                 q, at = fold(row, ny), (row % RING) * nx
                 a, z, u = q * nx, (q + 1) * nx, aside[at : at + nx]
-                one, other = (down, up) if image(row, ny) else (up, down)
+                ahead, back = (down, up) if image(row, ny) else (up, down)
                 put_primitives(c0, rho, table, kx, ky[q], r[a:z], mx[a:z], my[a:z], w, u, v, top)
                 if phi is not None:
                     raise_row(c0, rho, table, phi[0][a:z], w)
-                put_waves(0.5, w, v, one[at : at + nx], other[at : at + nx])
+                put_waves(0.5, w, v, ahead[at : at + nx], back[at : at + nx])
                 if moves is not None and moves[1].size > 0 and image(row, ny):
                     out = -moves[1][0] if side == 0 else moves[1][ny]
                     drive_row(

@@ -1,4 +1,4 @@
-"""A liquid between two plates: waves about rest at a pressure. Knows no network."""
+"""Rows of tables for a liquid between two plates: waves about rest at a pressure."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ LIQUID = Pieces(
     power="energy: add_power", stored="energy: add_stored",
 )  # fmt: skip
 SCALE = 1e5  # [Pa]
-STEPS = 8  # up to the height of a cell; each errs by the cube of its strain
-SMALL = 1e-9  # of a velocity over that of waves, too small to mean anything
+STEPS = 8  # midpoint steps up to the height of a cell; the error of each is the cube of its strain
+SMALL = 1e-9  # negligible velocity over the wave speed
 
 
 class LiquidRows(BasinRows):
     """Mass and momentum with bulk modulus, states density [kg/m3] and mass flows per area [kg/(m2 s)].
 
-    law linear: p = a^2 (rho - rho0); laws log, p = K ln(rho / rho0), and table with the full momentum flux.
+    Law linear: p = a^2 (rho - rho0). Laws log, p = K ln(rho / rho0), and table have the full momentum flux.
     """
 
     units = {"pressure": "Pa", "velocity": "m/s"}
@@ -58,14 +58,14 @@ class LiquidRows(BasinRows):
             yield Pieces(home=HOME, prepare="table: patch_pressures", observe="table: observe_pressures")
 
     def rates(self) -> str:
-        """The piece that finds rates of its cells."""
-        kind = "grids" if self.is_grid else "meshes"
+        """Term of the rates of its cells."""
+        shape = "grids" if self.is_grid else "meshes"
         if self.moves or self.part.on is not None:
-            how = "moving" if self.moves else "riding"
-            what = "table" if self.waves is not None else "waves" if self.linear and self.is_grid else "rates"
-            return f"{how}: {what}_on_{how}_{kind}"
-        what = "waves" if self.linear and self.is_grid else "rates"
-        return f"{'table' if self.waves is not None else 'rates'}: {what}_on_{kind}"
+            motion = "moving" if self.moves else "riding"
+            function = "table" if self.waves is not None else "waves" if self.linear and self.is_grid else "rates"
+            return f"{motion}: {function}_on_{motion}_{shape}"
+        function = "waves" if self.linear and self.is_grid else "rates"
+        return f"{'table' if self.waves is not None else 'rates'}: {function}_on_{shape}"
 
     @property
     def even_paced(self) -> bool:
@@ -101,15 +101,15 @@ class LiquidRows(BasinRows):
             row["work"] = draft.to_work(faces.work_size(self.integers))
 
     def lower_waves(self, draft, row) -> None:
-        """The table of its waves; a wall cannot make them quicker than the fluid's own."""
+        """Table of its waves. A wall cannot make the wave speed greater than that of the fluid."""
         if self.waves.speed > (1.0 + 1e-9) * self.waves.own_speed:
-            speed, sound = (draft.case.amount(one, "velocity", 6) for one in (self.speed, self.waves.own_speed))
+            speed, sound = (draft.case.amount(value, "velocity", 6) for value in (self.speed, self.waves.own_speed))
             draft.fault(f"nodes.{self.name}.wave_speed", f"{speed} is faster than sound in the fluid, {sound}; "
-                        "wanted at most that, or another law")  # fmt: skip
+                        "expected at most that, or another law")  # fmt: skip
         row["table"] = draft.to_plane(self.waves.table())
 
     def pressure(self, deviation: np.ndarray) -> np.ndarray:
-        """Pressure above that at rest [Pa], of deviations of the density."""
+        """Pressure above that at rest [Pa] at deviations of the density."""
         if self.linear:
             return self.speed**2 * deviation
         if self.waves is not None:
@@ -117,7 +117,7 @@ class LiquidRows(BasinRows):
         return self.density * self.speed**2 * np.log1p(deviation / self.density)
 
     def deviation(self, pressure: np.ndarray) -> np.ndarray:
-        """Deviations of the density, of pressures above that at rest [Pa]."""
+        """Deviations of the density at pressures above that at rest [Pa]."""
         if self.linear:
             return pressure / self.speed**2
         if self.waves is not None:
@@ -125,17 +125,17 @@ class LiquidRows(BasinRows):
         return self.density * np.expm1(pressure / (self.density * self.speed**2))
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
-        found, given = np.zeros((3, self.n)), self.part.start
+        states, given = np.zeros((3, self.n)), self.part.start
         rest = 0.0 if self.part.on is None else self.pressure_at_start()
         if given is not None or self.part.on is not None:
-            found[0] = self.deviation(rest + (0.0 if given is None else self.formula(given.pressure)))
+            states[0] = self.deviation(rest + (0.0 if given is None else self.formula(given.pressure)))
         if given is not None:
-            density = self.density + (0.0 if self.linear else found[0])
-            found[1], found[2] = density * self.formula(given.u), density * self.formula(given.v)
-        return found
+            density = self.density + (0.0 if self.linear else states[0])
+            states[1], states[2] = density * self.formula(given.u), density * self.formula(given.v)
+        return states
 
     def pressure_at_start(self) -> np.ndarray:
-        """Pressure above that at rest at the middle where its body stands still: dp / rho = - d(phi) [Pa]."""
+        """Pressure above that at rest at the middle while its body does not accelerate: dp / rho = - d(phi) [Pa]."""
         from fvsolve.basins.lower_frames import potential_at_start
 
         phi = potential_at_start(self)
@@ -155,7 +155,7 @@ class LiquidRows(BasinRows):
         return {"pressure": self.part.pressure + self.pressure(y[0]), "velocity": velocity}
 
     def speeds(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        moved = 0.0 if self.linear else 1.0  # law linear has no velocity beside that of its waves
+        moved = 0.0 if self.linear else 1.0  # law linear has no advection velocity
         return moved * self.fields(y)["velocity"], np.full(self.n, self.speed)
 
     def ranges(self) -> dict[str, tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""A liquid between walls that move: rates of cells, and its energy as areas change. Knows the tables; knows no flux."""
+"""A liquid between moving walls: rates of cells, and its energy as areas change."""
 
 from fvsolve.basins import moving_meshes, walls
 from fvsolve.basins.energy import at_rest, row_of
@@ -10,25 +10,25 @@ from fvsolve.kernels.handle import open_tables
 
 @njit(forceinline=True)
 def is_moving(basin):
-    """Whether it is a liquid between walls that move."""
+    """True for a liquid between moving walls."""
     return basin["kind"] == MINE and basin["walls"] > 0
 
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """Whether it is one in a rectangle."""
+    """True for a liquid between moving walls on a rectangle."""
     return is_moving(basin) and basin["nx"] > 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """Whether it is one on any other mesh."""
+    """True for a liquid between moving walls on any other mesh."""
     return is_moving(basin) and basin["nx"] == 0
 
 
 @njit(forceinline=True)
 def lines_of(tables, basin):
-    """What lines of a grid do, as kernels of liquids want it."""
+    """Motion of grid lines in the form for kernels of liquids."""
     along, across, thrust, wide, _ = walls.moves_of(tables, basin)
     return along, across, thrust, basin["density"], wide
 
@@ -53,7 +53,7 @@ def rates_on_moving_grids(t, y, dydt, out, handle):
 
 @njit
 def table_on_moving_grids(t, y, dydt, out, handle):
-    """The same under law table."""
+    """Rates under law table on grids."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_grid(tables.basins[b]):
@@ -72,7 +72,7 @@ def rates_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def table_on_moving_meshes(t, y, dydt, out, handle):
-    """The same under law table."""
+    """Rates under law table on meshes."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_mesh(tables.basins[b]):
@@ -82,7 +82,7 @@ def table_on_moving_meshes(t, y, dydt, out, handle):
 
 @njit
 def lifted(tables, wall):
-    """What a wall sweeps, outward per travel, of potential that is no pressure: rho g z of what stays inside [N]."""
+    """Outward force of the potential other than pressure in the volume swept by a wall: rho g z of the contents [N]."""
     basin, length = tables.basins[wall["basin"]], 0.0
     for m in range(wall["count"]):
         length += tables.plane[wall["lengths"] + m]
@@ -91,7 +91,7 @@ def lifted(tables, wall):
 
 @njit
 def add_power(t, y, dydt, out, handle, power):
-    """Of the rate of storage what areas that change take: with less room the same mass is denser."""
+    """Correct the rate of storage for changing areas: in less space the same mass has a higher density."""
     tables = open_tables(handle)
     st, plane = tables.settings[0], tables.plane
     for b in range(tables.basins.size):
@@ -99,8 +99,8 @@ def add_power(t, y, dydt, out, handle, power):
         n, o, rest, square = basin["n"], basin["y"], at_rest(st, basin), basin["speed"] * basin["speed"]
         for i in range(n if is_moving(basin) else 0):
             r, m2 = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
-            held = basin["density"] * (rest + square * r) + 0.5 * (square * r * r + m2)
-            total += plane[basin["drawn"] + i] * widening(t, tables, basin, y, i) * held
+            content_energy = basin["density"] * (rest + square * r) + 0.5 * (square * r * r + m2)
+            total += plane[basin["drawn"] + i] * widening(t, tables, basin, y, i) * content_energy
         if is_moving(basin):
             power[row_of(tables, power, b) + 3] -= basin["thickness"] / st["rho"] * total
     for k in range(tables.walls.size):
@@ -111,7 +111,7 @@ def add_power(t, y, dydt, out, handle, power):
 
 @njit
 def add_stored(t, y, dydt, out, handle, stored):
-    """Potential that stays with the mass, where areas have changed."""
+    """Add the potential energy of the mass displaced by walls."""
     tables = open_tables(handle)
     first = stored.size - tables.basins.size
     for k in range(tables.walls.size):

@@ -1,4 +1,4 @@
-"""What probes read of a liquid. Knows the tables; changes no state."""
+"""Probes of a liquid."""
 
 from math import log1p
 
@@ -14,7 +14,7 @@ PRESSURE = OWN
 
 @njit
 def observe_liquid(t, y, out, handle, values):
-    """values[k] of the probes that read cells: scale * pressure over its slope at rest + offset, or velocities."""
+    """Write values[k] of the probes of cells: scale * pressure over its slope at rest + offset, or velocities."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
@@ -26,7 +26,7 @@ def observe_liquid(t, y, out, handle, values):
 
 @njit
 def read(tables, probe, y):
-    """Weighted sums of deviations of the density, as the law makes pressures of them, and of velocities [m/s]."""
+    """Weighted sums of density deviations (under law log c0^2-scaled pressure), and of velocities [m/s]."""
     basin, law, total, u, v = tables.basins[probe["index"]], tables.settings[0]["law"], 0.0, 0.0, 0.0
     n, o = basin["n"], basin["y"]
     for m in range(probe["count"]):

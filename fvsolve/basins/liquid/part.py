@@ -1,4 +1,4 @@
-"""A liquid between two plates. Knows its keys and what can be read of it; computes nothing."""
+"""Keys and fields of a liquid between two plates."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from fvsolve.parts.value import Quantity, positive
 
 
 class LiquidStart(MovingStart):
-    """What it starts from where that is not rest."""
+    """Start of a liquid that is not at rest."""
 
-    pressure: Annotated[Formula | None, Shaped("pressure_drop", "of a liquid above that at rest [Pa]")] = None
+    pressure: Annotated[
+        Formula | None, Shaped("pressure_drop", "pressure of a liquid above the pressure at rest [Pa]")
+    ] = None
 
 
 class Liquid(Physics, name="liquid"):
@@ -28,13 +30,16 @@ class Liquid(Physics, name="liquid"):
     echoes: ClassVar[bool] = True
 
     pressure: Annotated[
-        float, Quantity("pressure", positive, "at rest [Pa], on a body that at its middle; liquid, needed there")
+        float,
+        Quantity(
+            "pressure", positive, "pressure at rest [Pa], of a basin on a body at its middle; required for a liquid"
+        ),
     ]
     thickness: Annotated[
-        float, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")
+        float, Quantity("length", positive, "thickness normal to the plane [m]; required for a liquid, else default 1")
     ]
     wave_speed: Annotated[
-        float | None, Quantity("velocity", positive, "of a liquid [m/s]; the fluid's own if left out")
+        float | None, Quantity("velocity", positive, "wave speed of a liquid [m/s]; default: that of the fluid")
     ] = None
 
     @classmethod

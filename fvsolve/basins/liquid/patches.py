@@ -1,4 +1,4 @@
-"""Patches of a liquid: what the network finds there, and what it brings or takes. Knows the tables."""
+"""Patches of a liquid: their pressures, and the flows of links in the cells next to them."""
 
 from math import log1p
 
@@ -15,7 +15,7 @@ MINE = kind_of(__package__)
 
 @njit
 def mean_deviation(tables, patch, y):
-    """Of what is stored in the cells behind a patch, per area of these."""
+    """Mean deviation of density in the cells next to a patch, by area."""
     basin, total = tables.basins[patch["basin"]], 0.0
     for m in range(patch["count"]):
         i = tables.integers[patch["first"] + m]
@@ -25,7 +25,7 @@ def mean_deviation(tables, patch, y):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
+    """Deviation of the pressure at every patch from the profile, and its slope with mass [Pa/kg]."""
     tables = open_tables(handle)
     layout = tables.layout[0]
     for k in range(tables.patches.size):
@@ -46,19 +46,19 @@ def patch_pressures(t, y, dydt, out, handle):
 
 @njit
 def patch_flows(t, y, dydt, out, handle):
-    """Add what the patches bring or take to the rates of the cells behind them."""
+    """Add the flows through patches to the rates of the cells next to them."""
     tables = open_tables(handle)
     for k in range(tables.patches.size if dydt.size > 0 else 0):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
         if basin["kind"] != MINE:
             continue
-        asked = out[tables.layout[0]["net"] + patch["node"]]
-        n, flow = basin["n"], asked / (basin["thickness"] * area_of(tables, patch))
+        inflow = out[tables.layout[0]["net"] + patch["node"]]
+        n, flow = basin["n"], inflow / (basin["thickness"] * area_of(tables, patch))
         for m in range(patch["count"]):
             i = tables.integers[patch["first"] + m]
             dydt[basin["y"] + i] += flow * stretched(tables.plane, basin, i)
         for m in range(patch["faces"]):
             i = basin["y"] + tables.integers[patch["ring"] + patch["faces"] + m]
-            push = -basin["speed"] * asked / (basin["thickness"] * length_of(tables, patch))
+            push = -basin["speed"] * inflow / (basin["thickness"] * length_of(tables, patch))
             give_way(tables.plane, patch, m, push, dydt, i + n, i + 2 * n)

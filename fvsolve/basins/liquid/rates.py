@@ -1,4 +1,4 @@
-"""Rates of the cells of a liquid under laws linear and log. Knows the tables; knows no flux."""
+"""Rates of the cells of a liquid under laws linear and log."""
 
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.liquid import faces, grid, grid_full
@@ -14,13 +14,13 @@ MINE = kind_of(__package__)
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """Whether it is a rectangle of liquid that stands still."""
+    """True for a rectangle of liquid without moving walls that is not on a body."""
     return basin["kind"] == MINE and basin["nx"] > 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """Whether it is a liquid on any other mesh that stands still."""
+    """True for a liquid on any other mesh without moving walls that is not on a body."""
     return basin["kind"] == MINE and basin["nx"] == 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
@@ -33,14 +33,14 @@ def states_of(tables, basin, y):
 
 @njit(forceinline=True)
 def rates_of(tables, basin, dydt):
-    """Where their rates go, of contents where walls move; where none are asked for, room that nobody reads."""
+    """Arrays for the rates of cells (of contents if walls move); unused work arrays if no rates are needed."""
     n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["unused"])
     return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]
 
 
 @njit(forceinline=True)
 def outside_of(tables, basin):
-    """What the boundary sends back, room for what passes it, and room to work in."""
+    """Reflection coefficients of the boundary, array for flows through it, and work array."""
     plane, work, outer, through = tables.plane, tables.work, basin["outer_given"], basin["through"]
     reflect = plane[basin["reflect"] : basin["reflect"] + outer]
     return reflect, work[through : through + outer], work[basin["work"] :]
@@ -55,32 +55,32 @@ def spacing_of(plane, basin):
 
 @njit
 def finish_liquid(tables, b, rate, out):
-    """Book what passes an open boundary, and let steps follow the waves."""
+    """Record flows through an open boundary, and the rate that limits the step."""
     book_open(tables, b, tables.basins[b]["thickness"], out)
     out[RATE] = max(out[RATE], rate)
 
 
 @njit
 def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, rate_x, rate_y):
-    """`grid.grid_rates` block by block, and the stages that are asked for formed beside them."""
+    """Compute `grid_linear.grid_rates` block by block, with the requested stages formed in the same pass."""
     basin, sums, nx, ny = tables.basins[b], tables.sums, tables.basins[b]["nx"], tables.basins[b]["ny"]
     begin, stop = tables.bands[2 * b], tables.bands[2 * b + 1]
-    known, rows, kinds = begin, max(sums[CELLS] // nx, 1), grid.sides_of(reflect, nx, ny)
+    formed_ahead, rows, side_kinds = begin, max(sums[CELLS] // nx, 1), grid.sides_of(reflect, nx, ny)
     for row in range(begin, stop, rows):
-        until = min(row + rows, stop)
-        ahead = min(grid.row_known(until, ny), stop)
+        block_stop = min(row + rows, stop)
+        ahead = min(grid.row_known(block_stop, ny), stop)
         for q in range(3 if sums[MODE] != LOOK else 0):
-            form(sums, False, basin["y"] + q * basin["n"], nx, known, ahead, 0, nx)
-        known = ahead
+            form(sums, False, basin["y"] + q * basin["n"], nx, formed_ahead, ahead, 0, nx)
+        formed_ahead = ahead
         grid.row_rates(
-            basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, begin, stop, row, until, kx, ky,
-            reflect, kinds, r, mx, my, through, work, rate_r, rate_x, rate_y, None,
+            basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, begin, stop, row, block_stop, kx,
+            ky, reflect, side_kinds, r, mx, my, through, work, rate_r, rate_x, rate_y, None,
         )  # fmt: skip
         for q in range(3):
             if sums[MODE] == LOOK:
-                look(sums, y, basin["y"] + q * basin["n"], nx, row, until, 0, nx)
+                look(sums, y, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx)
             elif sums[MODE] == BOTH:
-                form(sums, True, basin["y"] + q * basin["n"], nx, row, until, 0, nx)
+                form(sums, True, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx)
     if sums[MODE] == BOTH:
         form_looked_at(sums)
     return basin["speed"] * grid.steepest(kx, ky)
@@ -88,7 +88,10 @@ def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, r
 
 @njit
 def linear_grid(tables, b, y, dydt, out, moves, raised):
-    """Rates under law linear on a grid; moves : as in `grid.grid_rates`; raised : None, or densities in their place."""
+    """Rates under law linear on a grid. moves : as in `grid_linear.grid_rates`.
+
+    raised : None, or densities to use instead
+    """
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
@@ -118,7 +121,7 @@ def waves_on_grids(t, y, dydt, out, handle):
 
 @njit
 def full_grid(tables, b, table, y, dydt, out, moves, phi):
-    """Rates with the full momentum flux on a grid, of its waves or, with no table, under law log."""
+    """Rates with the full momentum flux on a grid, from a table of its waves or, without table, under law log."""
     basin = tables.basins[b]
     kx, ky = spacing_of(tables.plane, basin)
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
@@ -142,9 +145,9 @@ def rates_on_grids(t, y, dydt, out, handle):
 
 @njit
 def any_mesh(tables, b, table, y, dydt, out, moves, raised, phi):
-    """Rates on a mesh, of its waves or, with no table, under laws linear and log.
+    """Rates on a mesh, from a table of its waves or, without table, under laws linear and log.
 
-    moves, phi : as in `liquid_rates`; raised : None, or densities in place of the states
+    moves, phi : as in `liquid_rates`; raised : None, or densities to use instead of the states
     """
     basin = tables.basins[b]
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)

@@ -1,9 +1,9 @@
-"""A liquid that rides on a body: what its axes do joins the pressure. Knows the tables; knows no flux.
+"""Rates of a liquid in a basin on a body, in its accelerated frame.
 
-Under law linear p + rho phi is reconstructed in place of p (`frames`), so that rates are those of a liquid that stands
-still. Where the full momentum flux is, invariants are those where phi is taken off; at faces they are lowered again,
-and a cell feels the pressures there besides that would hold it at rest. What lies beyond an open side rests in the same
-axes, its pressure at rest that at their origin.
+Under law linear, p + rho phi is reconstructed instead of p (`basin_frames`), so the rates are those of a liquid without
+acceleration. With the full momentum flux, the invariants are reduced by phi. At faces phi is added again, and the
+pressures that would keep a cell at rest are subtracted from the forces on it. Beyond an open side the liquid rests in
+the same axes, with its pressure at rest at their origin.
 """
 
 from fvsolve.basins.faces import BLOCK, blocks
@@ -16,19 +16,19 @@ from fvsolve.kernels.records import LAW_LINEAR
 
 @njit(forceinline=True)
 def on_grid(basin):
-    """Whether it is a rectangle of liquid that rides."""
+    """True for a rectangle of liquid on a body."""
     return basin["kind"] == MINE and basin["nx"] > 0 and basin["frame"] >= 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
-    """Whether it is a liquid on any other mesh that rides."""
+    """True for a liquid on any other mesh on a body."""
     return basin["kind"] == MINE and basin["nx"] == 0 and basin["frame"] >= 0
 
 
 @njit
 def raise_densities(tables, basin, y):
-    """Deviations of density with those that rho phi would make, into `work`; returns where there."""
+    """Deviations of density plus those equivalent to rho phi, in `work`; returns their offset."""
     at, n, o = int(tables.plane[basin["frame"] + PHI]), basin["n"], basin["y"]
     per = basin["density"] / (basin["speed"] * basin["speed"])
     lift(tables.plane, basin, per, y[o : o + n], tables.work[at : at + n])
@@ -37,12 +37,12 @@ def raise_densities(tables, basin, y):
 
 @njit
 def over_grid(tables, basin):
-    """phi [J/kg] of cells, of faces between columns and of those between rows: in `work`."""
+    """phi [J/kg] of cells, of faces between columns and of faces between rows, in `work`."""
     plane, at, nx, ny = tables.plane, int(tables.plane[basin["frame"] + PLACES]), basin["nx"], basin["ny"]
     x, y, lines = plane[at : at + nx], plane[at + nx : at + nx + ny], at + nx + ny
     across, along = plane[lines : lines + nx + 1], plane[lines + nx + 1 : lines + nx + ny + 2]
-    work, n, many = tables.work[int(plane[basin["frame"] + PHI]) :], nx * ny, (nx + 1) * ny
-    cells, columns, rows = work[:n], work[n : n + many], work[n + many : n + many + nx * (ny + 1)]
+    work, n, face_count = tables.work[int(plane[basin["frame"] + PHI]) :], nx * ny, (nx + 1) * ny
+    cells, columns, rows = work[:n], work[n : n + face_count], work[n + face_count : n + face_count + nx * (ny + 1)]
     phi = potential(plane, basin["frame"], 1.0)
     lift_rows(phi, x, y, None, cells)
     lift_rows(phi, across, y, None, columns)
@@ -52,14 +52,14 @@ def over_grid(tables, basin):
 
 @njit
 def over_mesh(tables, basin):
-    """phi [J/kg] of cells and of sides: in `work`."""
+    """phi [J/kg] of cells and of sides, in `work`."""
     plane, at, n = tables.plane, int(tables.plane[basin["frame"] + PLACES]), basin["n"]
     integers = tables.integers[basin["links"] :]
-    many, work = blocks(integers) * integers[0] * BLOCK, tables.work[int(plane[basin["frame"] + PHI]) :]
-    cells, sides, phi = work[:n], work[n : n + many], potential(plane, basin["frame"], 1.0)
+    side_count, work = blocks(integers) * integers[0] * BLOCK, tables.work[int(plane[basin["frame"] + PHI]) :]
+    cells, sides, phi = work[:n], work[n : n + side_count], potential(plane, basin["frame"], 1.0)
     lift_points(phi, plane[at : at + n], plane[at + n : at + 2 * n], None, cells)
     at += 2 * n
-    lift_points(phi, plane[at : at + many], plane[at + many : at + 2 * many], None, sides)
+    lift_points(phi, plane[at : at + side_count], plane[at + side_count : at + 2 * side_count], None, sides)
     return cells, sides
 
 
@@ -84,7 +84,7 @@ def rates_on_riding_grids(t, y, dydt, out, handle):
 
 @njit
 def table_on_riding_grids(t, y, dydt, out, handle):
-    """The same under law table."""
+    """Rates under law table on grids."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
@@ -107,7 +107,7 @@ def rates_on_riding_meshes(t, y, dydt, out, handle):
 
 @njit
 def table_on_riding_meshes(t, y, dydt, out, handle):
-    """The same under law table."""
+    """Rates under law table on meshes."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]

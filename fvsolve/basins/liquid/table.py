@@ -1,4 +1,4 @@
-"""Liquids under law `table`: rates, pressures of patches, probes. Knows the tables; knows no flux."""
+"""Liquids under law `table`: rates, pressures at patches, probes."""
 
 from fvsolve.basins.behind import area_of
 from fvsolve.basins.kinds import kind_of
@@ -37,7 +37,7 @@ def rates_on_meshes(t, y, dydt, out, handle):
 
 @njit
 def patch_pressures(t, y, dydt, out, handle):
-    """Deviations of the pressure at every patch from the profile's, and its rise with mass [Pa/kg]."""
+    """Deviation of the pressure at every patch from the profile, and its slope with mass [Pa/kg]."""
     tables = open_tables(handle)
     layout = tables.layout[0]
     for k in range(tables.patches.size):
@@ -46,8 +46,10 @@ def patch_pressures(t, y, dydt, out, handle):
         if basin["kind"] != MINE:
             continue
         table = tables.plane[basin["table"] :]
-        found, slope = pressure(table, basin["density"], mean_deviation(tables, patch, seen_of(basin, tables.seen, y)))
-        out[layout["pressure"] + patch["node"]] = found
+        deviation, slope = pressure(
+            table, basin["density"], mean_deviation(tables, patch, seen_of(basin, tables.seen, y))
+        )
+        out[layout["pressure"] + patch["node"]] = deviation
         out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * area_of(tables, patch))
 
 

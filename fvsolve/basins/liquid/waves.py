@@ -1,9 +1,10 @@
-"""Riemann invariants of a liquid of any density law, by cubics on uniform grids. Knows one cell; knows no row of them.
+"""Riemann invariants of a liquid of any density law, by cubics on uniform grids.
 
-w = integral of c / rho over the density from rest on; r [kg/m3] and p [Pa] are deviations from rest. A table is
-    1/dr, first interval, how many follow, offset, 1/dw, first interval, how many follow, offset
-and four coefficients of s in [0, 1] an interval: of w over r, then of r and of p over w. Intervals are counted from
-rest, where all is 0 to the bit; the first and the last are straight and have no end. `lower_waves` makes it.
+w = integral of c / rho over the density from rest; r [kg/m3] and p [Pa] are deviations from rest. A table contains
+    1/dr, first interval, number of further intervals, offset, 1/dw, first interval, number of further intervals, offset
+and four coefficients of s in [0, 1] per interval: of w over r, then of r and of p over w. Intervals are counted from
+rest, where all values are 0 to the bit. The first and the last are straight and have no end. Built by
+`lower_invariants`.
 """
 
 from math import sqrt
@@ -11,12 +12,15 @@ from math import sqrt
 from fvsolve.jit import njit
 
 HEAD = 8  # floats before the cubics
-W_OF_R, OF_W = 0, 4  # where in it the two grids are said
+W_OF_R, OF_W = 0, 4  # places of both grids in it
 
 
 @njit(forceinline=True)
 def locate(table, grid, x, size):
-    """(offset of the cubics of the interval, of `size` floats, that x lies in, place there); of NaN the first, NaN."""
+    """(offset of the cubics of the interval of x, each `size` floats, position s in it).
+
+    NaN gives the first interval and NaN.
+    """
     z, first, last = x * table[grid], table[grid + 1], table[grid + 2]
     k = z - first
     k = k if k > 0.0 else 0.0
@@ -35,7 +39,7 @@ def invariant(table, r):
 
 @njit(forceinline=True)
 def state(table, w):
-    """(r, p) where the invariant is w."""
+    """(r, p) at the invariant w."""
     k, s = locate(table, OF_W, w, 8)
     r = table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
     return r, table[k + 4] + s * (table[k + 5] + s * (table[k + 6] + s * table[k + 7]))
@@ -43,7 +47,7 @@ def state(table, w):
 
 @njit(forceinline=True)
 def speed(table, rho, w):
-    """c where the invariant is w."""
+    """Wave speed c at the invariant w."""
     k, s = locate(table, OF_W, w, 8)
     b, c, d = table[k + 1], table[k + 2], table[k + 3]
     dense = rho + table[k] + s * (b + s * (c + s * d))
@@ -52,9 +56,9 @@ def speed(table, rho, w):
 
 @njit(forceinline=True)
 def lowered(c0, rho, table, w, phi):
-    """The invariant of what rests at w where it is raised by a potential [J/kg]: dp / rho = c dw = -d(phi).
+    """Invariant of a liquid at rest, w, after its potential is raised by phi [J/kg]: dp / rho = c dw = -d(phi).
 
-    With no table that of law log, c^2 = c0^2 less what is raised; else by a midpoint, to (phi / c^2)^3.
+    Without table, law log: the new c^2 is the old c^2 plus phi. Else a midpoint rule, with an error of (phi / c^2)^3.
     """
     if table is None:
         c = c0 - 0.5 * w

@@ -1,4 +1,4 @@
-"""Scalars carried by a given velocity. Knows flows through faces; knows no network."""
+"""Rows of tables for scalars in a given velocity."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.kernels.phases import Pieces
 
 
 class TransportRows(BasinRows):
-    """Nothing moves but what is carried; depth 1."""
+    """A basin with a given velocity, which has only scalars as states; depth 1."""
 
     given = banded = True
 
@@ -53,10 +53,10 @@ class TransportRows(BasinRows):
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
             speed = np.abs(flows[own]) / mesh.length[own]
-            around = around_outside(mesh)[own - mesh.inner]  # else a hole is blamed for what a wall lets in
+            around = around_outside(mesh)[own - mesh.inner]  # report the outer outline, before the outlines of holes
             at = mesh.middle[own[np.argmax(np.where(around, speed, 0.0) if speed[around].any() else speed)]]
-            what = f"it passes the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where no patch is named"
-            draft.fault(f"nodes.{self.name}.velocity", f"{what}; name one there")
+            text = f"it crosses the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where there is no named patch"
+            draft.fault(f"nodes.{self.name}.velocity", f"{text}. Expected a patch with a name there")
             draft.check()
         row["unsplit"] = self.unsplit(row, passing)
         if passing:
@@ -64,7 +64,7 @@ class TransportRows(BasinRows):
             row["through"] = draft.to_plane(inward[self.ring()] if self.is_grid else inward)
 
     def unsplit(self, row, passing: list[str]) -> float:
-        """What counts as rate over what leaves a cell, so that Euler steps of Courant number 1 keep bounds."""
+        """Factor of the outflow of a cell in the rate, so that Euler steps of Courant number 1 keep bounds."""
         if row["scheme"] in (rec.UPWIND, rec.LINEAR):
             return 1.0
         return 3.0 if row["scheme"] == rec.MUSCL and self.is_grid and passing else 2.0

@@ -1,4 +1,4 @@
-"""Flows through the faces of a mesh from velocities: by name, from stream functions, from files. Knows no scalars."""
+"""Flows through the faces of a mesh from given velocities: expressions, stream functions, files."""
 
 from __future__ import annotations
 
@@ -17,73 +17,72 @@ if TYPE_CHECKING:
 
 COLUMNS = (("x", "y", "u", "v"), ("x", "y", "psi"))  # of a file
 DIMENSIONS = {"x": "length", "y": "length", "u": "velocity", "v": "velocity", "psi": "diffusivity"}
-EXACT_BITS = 50  # of a stream function that are kept, so that sums of its differences are exact
-ROUNDING = 64 * np.finfo(float).eps  # of a stream function and of the places where it is taken
-SLANT = 1e-9  # of the greatest velocity: what is less across the outline runs along it
+EXACT_BITS = 50  # bits of a stream function after rounding, so that sums of its differences are exact
+ROUNDING = 64 * np.finfo(float).eps  # relative error of a stream function and of the positions of corners
+SLANT = 1e-9  # of the greatest velocity: smaller velocities across the outline are rounding, and set to zero
 
 
 def constant(x, y, u, v):
-    """The same everywhere; u, v [m/s]."""
+    """Uniform velocity; u, v [m/s]."""
     return u * y - v * x
 
 
 def rotation(x, y, centre, angular_velocity):
-    """A solid body's, anticlockwise about centre [m]; angular_velocity [rad/s]."""
+    """Solid-body rotation, anticlockwise about centre [m]; angular_velocity [rad/s]."""
     return -0.5 * angular_velocity * ((x - centre[0]) ** 2 + (y - centre[1]) ** 2)
 
 
 def swirl(x, y, speed=1.0, origin=(0.0, 0.0), size=1.0):
-    """LeVeque's (1996): psi = speed size / pi sin^2(pi x / size) sin^2(pi y / size); speed [m/s], size [m]."""
+    """Swirl of LeVeque (1996): psi = speed size / pi sin^2(pi x / size) sin^2(pi y / size); speed [m/s], size [m]."""
     x, y = np.pi * (x - origin[0]) / size, np.pi * (y - origin[1]) / size
     return speed * size / np.pi * np.sin(x) ** 2 * np.sin(y) ** 2
 
 
 def shear(x, y, rate, y0=0.0, u=0.0):
-    """Along x, u + rate (y - y0); rate [1/s], u [m/s]."""
+    """Shear flow along x, u + rate (y - y0); rate [1/s], u [m/s]."""
     return u * y + 0.5 * rate * (y - y0) ** 2
 
 
 def parabolic(x, y, speed, south, north):
-    """Along a channel between two walls at y = south, north [m]; speed [m/s] is the mean."""
+    """Parabolic flow along a channel between two walls at y = south, north [m]; speed [m/s] is the mean."""
     s = (y - south) / (north - south)
     return speed * (north - south) * s * s * (3.0 - 2.0 * s)
 
 
 def cellular(x, y, speed, width, height, origin=(0.0, 0.0)):
-    """Vortices of width by height [m] that turn against their neighbours, anticlockwise first; speed [m/s] along x."""
+    """Vortices of width by height [m], alternately anticlockwise (first) and clockwise; speed [m/s] along x."""
     s = np.sin(np.pi * (x - origin[0]) / width) * np.sin(np.pi * (y - origin[1]) / height)
     return speed * height / np.pi * s
 
 
-# Stream functions psi(x, y, parameters) [m2/s] with u = psi_y, v = -psi_x: a new one is a function and its name here.
+# Stream functions psi(x, y, parameters) [m2/s] with u = psi_y, v = -psi_x. To add an expression, add a function here.
 EXPRESSIONS: dict[str, Callable[..., np.ndarray]] = {
     function.__name__: function for function in (constant, rotation, swirl, shear, parabolic, cellular)
 }
 
 
 def face_flows(mesh: Mesh, velocity: Mapping) -> np.ndarray:
-    """float64[f]: flow through every face per depth, along its normal [m2/s].
+    """Flow through every face per depth, along its normal : float64[f] [m2/s].
 
     velocity : one of {"expression": name, its parameters}, {"stream": float64[p] at the corners [m2/s]},
-    {"file": CSV with a header x, y, u, v or x, y, psi, with units or in SI, interpolated linearly}; all but those of u
-    and v have no divergence in any cell, to the bit
-    Raises ValueError for an expression, MeshError for a file.
+    {"file": CSV with a header x, y, u, v or x, y, psi, with units or in SI, interpolated linearly}. All but those of u
+    and v have no divergence in any cell, to the bit. Raises ValueError for an expression, MeshError for a file.
     """
     kinds = {"expression": _by_name, "stream": _by_corners, "file": _by_file}
     given = [kind for kind in kinds if kind in velocity]
     if len(given) != 1:
-        raise ValueError(f"velocity has {listing(velocity) or 'nothing'}; wanted one of {listing(kinds)}")
+        raise ValueError(f"velocity has {listing(velocity) or 'nothing'}; expected one of {listing(kinds)}")
     return kinds[given[0]](mesh, **velocity)
 
 
 def grid_flows(mesh: Mesh, flows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(float64[ny (nx + 1)] east, float64[(ny + 1) nx] north): the flows of a rectangle's faces, row by row.
+    """(float64[ny (nx + 1)] east, float64[(ny + 1) nx] north): flows through the faces of a rectangle, row by row.
 
-    Raises ValueError for a mesh that is no full rectangle.
+    Raises ValueError for a mesh that is not a full rectangle.
     """
     grid = mesh.grid
     if grid is None or (grid.index < 0).any():
-        raise ValueError("the mesh is no full rectangle; wanted one without holes")
+        raise ValueError("the mesh is not a full rectangle; expected a rectangle without holes")
     j, i = np.divmod(mesh.left, grid.nx)
     flow_x, flow_y = np.zeros(grid.ny * (grid.nx + 1)), np.zeros((grid.ny + 1) * grid.nx)
     for to, part, first, step in ((flow_x, 0, j * (grid.nx + 1) + i, 1), (flow_y, 1, j * grid.nx + i, grid.nx)):
@@ -96,24 +95,24 @@ def grid_flows(mesh: Mesh, flows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _by_name(mesh: Mesh, expression: str, **parameters) -> np.ndarray:
     if expression not in EXPRESSIONS:
         close = did_you_mean(str(expression), EXPRESSIONS)
-        raise ValueError(f'"{expression}" is no velocity; there are {listing(EXPRESSIONS)}{close}')
+        raise ValueError(f'unknown velocity "{expression}"; expected {listing(EXPRESSIONS)}{close}')
     function = EXPRESSIONS[expression]
     known = dict(list(inspect.signature(function).parameters.items())[2:])
     for name in parameters:
         if name not in known:
             close = did_you_mean(name, known)
-            raise ValueError(f'velocity "{expression}" has no {name}; it takes {listing(known)}{close}')
+            raise ValueError(f'velocity "{expression}" has no parameter {name}; expected {listing(known)}{close}')
     missing = [name for name, p in known.items() if p.default is p.empty and name not in parameters]
     if missing:
-        raise ValueError(f'velocity "{expression}" wants {listing(missing)} as well')
+        raise ValueError(f'velocity "{expression}" needs {listing(missing)} as well')
     return _by_corners(mesh, function(mesh.points[:, 0], mesh.points[:, 1], **parameters))
 
 
 def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
-    """Differences of a stream function along faces, first rounded so that they are exact."""
+    """Differences of a stream function along faces, after rounding it so that they are exact."""
     stream = np.asarray(stream, float)
     if stream.shape != (len(mesh.points),):
-        raise ValueError(f"stream has shape {stream.shape}; wanted a value for each of {len(mesh.points)} corners")
+        raise ValueError(f"stream has shape {stream.shape}; expected a value for each of {len(mesh.points)} corners")
     if not np.isfinite(stream).all():
         x, y = mesh.points[np.flatnonzero(~np.isfinite(stream))[0]]
         raise ValueError(f"the stream function is not finite at ({x:.6g}, {y:.6g}) m")
@@ -123,31 +122,31 @@ def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
 
 
 def along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
-    """A stream function, made one along stretches of the outline where it differs by rounding alone : float64[p]."""
+    """Stream function made constant along stretches of the outline where it differs by rounding only : float64[p]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     steps = np.abs(np.diff(stream[mesh.ends], axis=1)[:, 0])
-    reach = (steps / mesh.length).max() * np.abs(mesh.points).max()  # what an error of places makes
-    one, other = mesh.ends[mesh.inner :][steps[mesh.inner :] <= ROUNDING * (np.abs(stream).max() + reach)].T
-    joined = coo_array((np.ones(one.size), (one, other)), shape=(stream.size, stream.size))
-    _, first, stretch = np.unique(connected_components(joined)[1], return_index=True, return_inverse=True)
+    reach = (steps / mesh.length).max() * np.abs(mesh.points).max()  # effect of rounding errors of positions
+    start, stop = mesh.ends[mesh.inner :][steps[mesh.inner :] <= ROUNDING * (np.abs(stream).max() + reach)].T
+    graph = coo_array((np.ones(start.size), (start, stop)), shape=(stream.size, stream.size))
+    _, first, stretch = np.unique(connected_components(graph)[1], return_index=True, return_inverse=True)
     return stream[first[stretch]]
 
 
 def around_outside(mesh: Mesh) -> np.ndarray:
-    """True of faces of the outline that lie around all cells, not around a hole : bool[faces of the outline]."""
+    """True for outline faces of the outer loop, False for those around holes : bool[outline faces]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    one, other = mesh.ends[mesh.inner :].T
-    many = len(mesh.points)
-    loop = connected_components(coo_array((np.ones(one.size), (one, other)), shape=(many, many)))[1]
-    return loop[one] == loop[np.argmin(mesh.points[:, 0])]
+    start, stop = mesh.ends[mesh.inner :].T
+    count = len(mesh.points)
+    loop = connected_components(coo_array((np.ones(start.size), (start, stop)), shape=(count, count)))[1]
+    return loop[start] == loop[np.argmin(mesh.points[:, 0])]
 
 
 def velocity_flows(mesh: Mesh, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Flows of velocities at the middles of faces : float64[f]; none across the outline but for rounding."""
+    """Flows from velocities at the middles of faces : float64[f]; zero across the outline where it is rounding."""
     normal = u * mesh.normal[:, 0] + v * mesh.normal[:, 1]
     still = np.abs(normal) <= SLANT * np.hypot(u, v).max()
     still[: mesh.inner] = False
@@ -160,39 +159,41 @@ def _by_file(mesh: Mesh, file: str | Path) -> np.ndarray:
     if "psi" in columns:
         return _by_corners(mesh, _interpolated(file, places, columns["psi"], mesh.points))
     velocity = np.stack([columns["u"], columns["v"]], axis=1)
-    found = _interpolated(file, places, velocity, mesh.middle)
-    return velocity_flows(mesh, *found.T)
+    velocities = _interpolated(file, places, velocity, mesh.middle)
+    return velocity_flows(mesh, *velocities.T)
 
 
 def _columns(path: Path) -> dict[str, np.ndarray]:
-    """The columns of a CSV file by name."""
+    """Columns of a CSV file by name."""
     try:
         rows = read_rows(path)
         if set(rows.names) not in map(set, COLUMNS) or len(rows.names) not in map(len, COLUMNS):
-            raise Misread(path.name, f"its header is {', '.join(rows.header)}; wanted x, y, u, v or x, y, psi", 1)
-        found = {name: rows.numbers(k, DIMENSIONS[name]) for k, name in enumerate(rows.names)}
+            raise Misread(path.name, f"its header is {', '.join(rows.header)}; expected x, y, u, v or x, y, psi", 1)
+        columns = {name: rows.numbers(k, DIMENSIONS[name]) for k, name in enumerate(rows.names)}
     except Misread as error:
         raise MeshError([Fault("", error.message, error.line)], str(path)) from None
     except ValueError as error:
         raise MeshError([Fault("", str(error))], str(path)) from None
     if len(rows.lines) < 3:
-        text = f"it has {len(rows.lines)} points; wanted at least three, around the mesh"
+        text = f"it has {len(rows.lines)} points; expected at least three, around the mesh"
         raise MeshError([Fault("", text)], str(path))
-    return found
+    return columns
 
 
-def _interpolated(file: str | Path, places: np.ndarray, values: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _interpolated(file: str | Path, places: np.ndarray, values: np.ndarray, positions: np.ndarray) -> np.ndarray:
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
 
     try:
-        found = LinearNDInterpolator(places, values)(wanted)
+        result = LinearNDInterpolator(places, values)(positions)
     except QhullError as error:
-        raise MeshError([Fault("", "its points lie on one line; wanted them around the mesh")], str(file)) from error
-    outside = np.isnan(found).reshape(len(wanted), -1).any(axis=1)
+        raise MeshError(
+            [Fault("", "its points lie on one line; expected points around the mesh")], str(file)
+        ) from error
+    outside = np.isnan(result).reshape(len(positions), -1).any(axis=1)
     if outside.any():
-        (x, y), (low, high) = wanted[outside][0], (places.min(axis=0), places.max(axis=0))
-        text = f"its points do not reach around {outside.sum()} of {len(wanted)} places of the mesh, the first "
+        (x, y), (low, high) = positions[outside][0], (places.min(axis=0), places.max(axis=0))
+        text = f"its points do not enclose {outside.sum()} of {len(positions)} positions of the mesh, the first "
         text += f"({x:.6g}, {y:.6g}) m; they span ({low[0]:.6g}, {low[1]:.6g}) to ({high[0]:.6g}, {high[1]:.6g}) m"
         raise MeshError([Fault("", text)], str(file))
-    return found
+    return result

@@ -1,4 +1,4 @@
-"""What probes read of a given velocity. Knows the tables; changes no state."""
+"""Probes of a given velocity."""
 
 from fvsolve.basins.behind import through_patch
 from fvsolve.basins.carried import turned
@@ -9,7 +9,7 @@ from fvsolve.kernels.records import GIVEN_FLOW
 
 @njit
 def observe_given_flows(t, y, out, handle, values):
-    """values[k] of every probe of what a given velocity brings in through a patch [m3/s]."""
+    """Write values[k] of the probes of the inflow through a patch by a given velocity [m3/s]."""
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         if tables.probes[k]["kind"] == GIVEN_FLOW:

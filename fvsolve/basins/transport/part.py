@@ -1,4 +1,4 @@
-"""Scalars in a velocity that is given. Knows how it is said; computes nothing."""
+"""Keys and fields of scalars in a given velocity."""
 
 from __future__ import annotations
 
@@ -18,9 +18,11 @@ from fvsolve.units import show
 
 @dataclass(frozen=True)
 class Velocity:
-    """A given velocity: `way` "u, v" | "stream" | "expression" | "file", what it takes, and when it turns back [s].
+    """A given velocity, in one of the forms `way`: "u, v" | "stream" | "expression" | "file".
 
     given : {"u": Formula, "v": Formula} | {"stream": Formula} | {"expression": name, its parameters} | {"file": path}
+    period : time after which it returns to its initial direction, cos(pi t / period) [s]
+    said : the table of the case
     """
 
     way: str
@@ -29,7 +31,7 @@ class Velocity:
     said: dict[str, Any]
 
     def table(self) -> dict[str, Any]:
-        """What the file would say."""
+        """Table of the case file."""
         return self.said
 
 
@@ -44,7 +46,7 @@ PARAMETERS: dict[str, Value] = {  # of velocities by name
 
 
 class Flowing(Value):
-    """A velocity: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
+    """Value of the key `velocity`: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
 
     about = "{ u, v } or { stream }, formulas of x and y in SI, { expression, its parameters } or { file }; and period"
     takes = "`{ u, v }`, `{ stream }`, `{ expression, ... }` or `{ file }`, and `period`"
@@ -53,31 +55,33 @@ class Flowing(Value):
     def read(self, given: Any, setting: Setting) -> Velocity:
         if isinstance(given, Velocity):
             return given
-        ways = [way for way in ("u", "v", "stream", "expression", "file") if isinstance(given, dict) and way in given]
-        if "expression" in ways and not {"stream", "file"} & {*ways}:
-            ways = ["expression"]  # which may have parameters u and v
-        if not ways or (len(ways) > 1 and ways != ["u", "v"]):
-            has = f"has {listing(given) or 'nothing'}" if isinstance(given, dict) else f"{show(given)} is no velocity"
-            raise ValueError(f"{has}; wanted {self.about}")
-        found = {key: value for key, value in given.items() if key != "period"}
-        period, said = None, dict(given)
+        forms = [way for way in ("u", "v", "stream", "expression", "file") if isinstance(given, dict) and way in given]
+        if "expression" in forms and not {"stream", "file"} & {*forms}:
+            forms = ["expression"]  # which may have parameters u and v
+        if not forms or (len(forms) > 1 and forms != ["u", "v"]):
+            has = (
+                f"has {listing(given) or 'nothing'}" if isinstance(given, dict) else f"{show(given)} is not a velocity"
+            )
+            raise ValueError(f"{has}; expected {self.about}")
+        keys = {key: value for key, value in given.items() if key != "period"}
+        period, stated = None, dict(given)
         if "period" in given:
-            period = said["period"] = Quantity("time", positive).read(given["period"], setting)
-        way = "u, v" if ways[0] in "uv" else ways[0]
-        known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file",)}.get(way, tuple(found))
-        faults = [((key,), f"unknown key; wanted {listing([*known, 'period'])}") for key in found if key not in known]
+            period = stated["period"] = Quantity("time", positive).read(given["period"], setting)
+        way = "u, v" if forms[0] in "uv" else forms[0]
+        known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file",)}.get(way, tuple(keys))
+        faults = [((key,), f"unknown key; expected {listing([*known, 'period'])}") for key in keys if key not in known]
         if faults:
             raise Misfit(faults)
         if way in ("u, v", "stream"):
             of = "number" if way == "stream" else "velocity"
-            found = {key: Shaped(of).read(found.get(key, 0.0), setting) for key in known}
+            keys = {key: Shaped(of).read(keys.get(key, 0.0), setting) for key in known}
         elif way == "expression":
-            own = {key: one for key, one in found.items() if key in PARAMETERS}
-            found |= read_keys(own, {key: (PARAMETERS[key], None) for key in own}, setting)
+            own = {key: entry for key, entry in keys.items() if key in PARAMETERS}
+            keys |= read_keys(own, {key: (PARAMETERS[key], None) for key in own}, setting)
         elif way == "file":
-            said["file"] = File("").read(found["file"], setting)
-            found = {"file": setting.files[said["file"]]}
-        return Velocity(way, found, period, said)
+            stated["file"] = File("").read(keys["file"], setting)
+            keys = {"file": setting.files[stated["file"]]}
+        return Velocity(way, keys, period, stated)
 
 
 class Transport(Physics, name="transport"):
@@ -87,11 +91,12 @@ class Transport(Physics, name="transport"):
 
     velocity: Annotated[Any, Flowing()]
     thickness: Annotated[
-        float | None, Quantity("length", positive, "across the plane [m]; needed by a liquid, in transport 1")
+        float | None,
+        Quantity("length", positive, "thickness normal to the plane [m]; required for a liquid, else default 1"),
     ] = None
 
     @classmethod
     def shapes(cls, basin, mesh) -> Iterator[tuple[tuple[str, ...], Formula, np.ndarray]]:
-        for what, shape in basin.velocity.given.items():
-            if isinstance(shape, Formula):
-                yield ("velocity", what), shape, mesh.points if what == "stream" else mesh.middle
+        for key, formula in basin.velocity.given.items():
+            if isinstance(formula, Formula):
+                yield ("velocity", key), formula, mesh.points if key == "stream" else mesh.middle

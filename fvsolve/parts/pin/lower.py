@@ -8,7 +8,7 @@ from fvsolve.model.mechanism import point_row
 
 
 class PinRows(Lowering, kind="pin"):
-    """Rows that hold one point at another."""
+    """Rows of loop constraints between two points."""
 
     table = "pin"
 

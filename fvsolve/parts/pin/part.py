@@ -1,4 +1,4 @@
-"""A pin that closes a loop of bodies. Knows its points and its axis; computes no force."""
+"""Pins that close a loop of bodies: keys and constrained directions."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from fvsolve.parts.value import VALUE, Quantity, Rows, positive
 
 
 class Pin(TwoPort, kind="pin"):
-    """Holds point `to` at point `from`, across `axis` where one is given: a loop in a plane closes by those two rows.
+    """Joint that keeps point `to` at point `from`; with `axis`, only in the two directions normal to it (plane loop).
 
-    Ports: from, to. Stored and dissipated energy: none, but for what its pull takes out of a gap. The forces are
-    multipliers of d2(gap)/dt2 = -2 pull d(gap)/dt - pull^2 gap (Baumgarte, 1972).
+    Ports: from, to. Stored and dissipated energy: none, except the energy by which `pull` closes a gap. The forces are
+    Lagrange multipliers of d2(gap)/dt2 = -2 pull d(gap)/dt - pull^2 gap (Baumgarte, 1972).
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
@@ -25,19 +25,23 @@ class Pin(TwoPort, kind="pin"):
 
     axis: Annotated[
         tuple[float, ...] | None,
-        Rows("number", length=3, about="in the axes of `from`, along which it holds nothing; a ball if left out"),
+        Rows(
+            "number",
+            length=3,
+            about="free direction, in the axes of `from`; if left out it constrains all three directions",
+        ),
     ] = None
-    pull: Annotated[float, Quantity("rate", positive, "at which a gap closes [1/s]", changes=VALUE)] = 10.0
+    pull: Annotated[float, Quantity("rate", positive, "rate at which a gap closes [1/s]", changes=VALUE)] = 10.0
 
     def faults(self, name: str, around: Around) -> Faults:
         if no_direction(self.axis):
-            yield ("axis",), "is all zeros; wanted for example [0, 1, 0]"
+            yield ("axis",), "is all zeros; expected for example [0, 1, 0]"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from uneven("axis", self.axis)
 
     def directions(self) -> np.ndarray:
-        """Along which it holds, in the axes of `from` : float64[rows, 3]."""
+        """Constrained directions in the axes of `from` : float64[rows, 3]."""
         if self.axis is None:
             return np.eye(3)
         axis = np.array(self.axis) / np.linalg.norm(self.axis)

@@ -1,6 +1,6 @@
-"""A pipe's material and class turned into bore, wall, roughness and allowable pressure. Knows keys; computes no wave.
+"""Bore, wall, roughness and allowable pressure of a pipe from its material and class.
 
-What the file says itself stands; `source` gathers whose figures the others are.
+Values of the case file take precedence; `source` lists the sources of all others.
 """
 
 from __future__ import annotations
@@ -19,111 +19,111 @@ OF_WALL = ("youngs_modulus", "poisson_ratio")
 
 
 def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
-    """The table of a pipe with what its material and class stand for, where it does not say it; Misfit with faults."""
+    """Table of a pipe, completed with the values of its material and class; raises Misfit with the faults."""
     name = given.get("material")
     material = materials().get(name) if isinstance(name, str) else None
     if material is None and "class" not in given and "lining" not in given:
         return given
-    found, said = {**given}, []
-    if name is not None and material is None:  # blamed where it is read; nothing follows from it
-        if isinstance(found.get("class"), str) and (text := no_class(found["class"])) is not None:
+    table, sources = {**given}, []
+    if name is not None and material is None:  # reported where the key is read; nothing can be derived from it
+        if isinstance(table.get("class"), str) and (text := no_class(table["class"])) is not None:
             raise Misfit([(("class",), text)])
-        return {key: one for key, one in stood_in(found).items() if key not in ("class", "nominal")}
-    if not all(isinstance(found.get(key, ""), str) for key in ("class", "nominal")):
-        return stood_in(found)  # likewise
-    if isinstance(found.get("class"), str):
-        _add_class(found, said, name if isinstance(name, str) else None)
-    if isinstance(found.get("nominal"), str) and "diameter" not in found:
-        _add_schedule(found, material)
+        return {key: value for key, value in stood_in(table).items() if key not in ("class", "nominal")}
+    if not all(isinstance(table.get(key, ""), str) for key in ("class", "nominal")):
+        return stood_in(table)  # reported where the keys are read
+    if isinstance(table.get("class"), str):
+        _add_class(table, sources, name if isinstance(name, str) else None)
+    if isinstance(table.get("nominal"), str) and "diameter" not in table:
+        _add_schedule(table, material)
     if material is not None:
-        _add_wall(found, said, material)
-        _add_roughness(found, said, material)
-    if said:
-        found.setdefault("source", "; ".join(said))
-    return found
+        _add_wall(table, sources, material)
+        _add_roughness(table, sources, material)
+    if sources:
+        table.setdefault("source", "; ".join(sources))
+    return table
 
 
 def stood_in(given: dict[str, Any]) -> dict[str, Any]:
-    """A table with a bore, wall and roughness in place of those that a name at fault would stand for."""
-    found = {**given}
+    """Table with placeholder bore, wall and roughness where a wrong name gives none, so that other faults are found."""
+    table = {**given}
     if not {"class", "nominal"}.isdisjoint(given):
-        found["diameter"] = 1.0
+        table["diameter"] = 1.0
     if isinstance(given.get("wall"), dict):
-        found["wall"] = {OF_WALL[0]: 1e11, "thickness": 0.01, **given["wall"]}
+        table["wall"] = {OF_WALL[0]: 1e11, "thickness": 0.01, **given["wall"]}
     friction = given.get("friction")
     if isinstance(friction, dict) and DARCY[0] in KEYS.get(str(friction.get("model")), ()):
-        found["friction"] = friction if any(key in friction for key in DARCY) else {**friction, DARCY[0]: 1e-4}
-    return found
+        table["friction"] = friction if any(key in friction for key in DARCY) else {**friction, DARCY[0]: 1e-4}
+    return table
 
 
-def _add_class(found: dict[str, Any], said: list[str], material: str | None) -> None:
-    """Bore, wall and allowable pressure of a class; a schedule stays one."""
-    name, nominal = found["class"], found.get("nominal")
+def _add_class(table: dict[str, Any], sources: list[str], material: str | None) -> None:
+    """Bore, wall and allowable pressure of a class; a class that names a schedule becomes `schedule`."""
+    name, nominal = table["class"], table.get("nominal")
     if (schedule := SCHEDULE.fullmatch(name.strip())) is not None:
-        del found["class"]
-        found["schedule"] = schedule[1]
+        del table["class"]
+        table["schedule"] = schedule[1]
         return
     if not isinstance(nominal, str):
-        raise Misfit([(("class",), f'{show(name)} is of a nominal size; give one too, nominal = "DN300"')])
+        raise Misfit([(("class",), f'{show(name)} needs a nominal size; give one, for example nominal = "DN300"')])
     try:
-        one = rated(name, nominal, material)
+        size = rated(name, nominal, material)
     except ValueError as error:
         raise Misfit([(("nominal" if isinstance(error, NoSize) else "class",), str(error))]) from None
-    del found["class"], found["nominal"]
-    _size(found, one.diameter, one.thickness)
-    if one.pressure is not None:
-        found.setdefault("allowable_pressure", one.pressure)
-    said.append(one.source)
+    del table["class"], table["nominal"]
+    _size(table, size.diameter, size.thickness)
+    if size.pressure is not None:
+        table.setdefault("allowable_pressure", size.pressure)
+    sources.append(size.source)
 
 
-def _add_schedule(found: dict[str, Any], material: Material | None) -> None:
-    """Bore and wall of steel by its nominal size."""
+def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
+    """Add bore and wall of a steel pipe from its nominal size."""
     if material is not None and material.name not in STEELS:
-        raise Misfit([(("nominal",), f"is a schedule of steel; a size of {material.name} wants a class")])
+        raise Misfit([(("nominal",), f"is a steel size without class; expected a class for {material.name}")])
     try:
-        bore, thickness = sized(found["nominal"], found.get("schedule", "40"))
+        bore, thickness = sized(table["nominal"], table.get("schedule", "40"))
     except Misfit:
-        return  # blamed where it is read
-    del found["nominal"]
-    found.pop("schedule", None)
-    _size(found, bore, thickness)
+        return  # reported where the key is read
+    del table["nominal"]
+    table.pop("schedule", None)
+    _size(table, bore, thickness)
 
 
-def _size(found: dict[str, Any], bore: float, thickness: float) -> None:
-    """The bore within the lining, and the wall where the waves are to follow from it."""
+def _size(table: dict[str, Any], bore: float, thickness: float) -> None:
+    """Add the bore inside the lining, and the wall thickness where the wave speed follows from the wall."""
     try:
-        lining = parse(found["lining"]["thickness"], "length")
-    except (KeyError, TypeError, ValueError):  # none, or blamed where it is read
+        lining = parse(table["lining"]["thickness"], "length")
+    except (KeyError, TypeError, ValueError):  # no lining, or reported where the key is read
         lining = 0.0
-    found["diameter"] = bore - 2.0 * lining
-    wall = found.get("wall", {} if "material" in found and "wave_speed" not in found else None)
+    table["diameter"] = bore - 2.0 * lining
+    wall = table.get("wall", {} if "material" in table and "wave_speed" not in table else None)
     if isinstance(wall, dict):
-        found["wall"] = {"thickness": thickness, **wall}
+        table["wall"] = {"thickness": thickness, **wall}
 
 
-def _add_wall(found: dict[str, Any], said: list[str], material: Material) -> None:
-    """Modulus and Poisson's ratio of a wall that states none."""
-    wall = found.get("wall", {})
-    if "wave_speed" in found or not isinstance(wall, dict):
+def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> None:
+    """Add modulus and Poisson's ratio to a wall without them."""
+    wall = table.get("wall", {})
+    if "wave_speed" in table or not isinstance(wall, dict):
         return
     if "thickness" not in wall:
-        text = (f'{material.name} of which thickness? give a class or schedule with nominal, wall = {{ thickness = '
-                '"8 mm" }, or wave_speed')  # fmt: skip
+        text = (f'wall thickness of {material.name} is missing. Give a class or schedule with nominal, wall = '
+                '{ thickness = "8 mm" }, or wave_speed')  # fmt: skip
         raise Misfit([(("material",), text)])
-    found["wall"] = {**wall}
+    table["wall"] = {**wall}
     for key in OF_WALL:
         if key not in wall and (figure := material.figures.get(key)) is not None:
-            found["wall"][key] = figure.used
-            said.append(f"{material.name}: {figure.said}" if key == OF_WALL[0] else figure.said)
+            table["wall"][key] = figure.used
+            sources.append(f"{material.name}: {figure.said}" if key == OF_WALL[0] else figure.said)
 
 
-def _add_roughness(found: dict[str, Any], said: list[str], material: Material) -> None:
-    """Roughness of a wall that the flow touches, where friction asks for one and has none."""
-    friction = found.get("friction")
-    if not isinstance(friction, dict) or "lining" in found or any(key in friction for key in DARCY):
+def _add_roughness(table: dict[str, Any], sources: list[str], material: Material) -> None:
+    """Add the roughness of an unlined wall where the friction model needs one and the file has none."""
+    friction = table.get("friction")
+    if not isinstance(friction, dict) or "lining" in table or any(key in friction for key in DARCY):
         return
     model = friction.get("model")
     if isinstance(model, str) and DARCY[0] in KEYS.get(model, ()) and "roughness" in material.figures:
         figure = material.figures["roughness"]
-        found["friction"] = {**friction, "roughness": figure.used}
-        said.append(figure.said)
+        table["friction"] = {**friction, "roughness": figure.used}
+        sources.append(figure.said)

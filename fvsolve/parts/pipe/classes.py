@@ -1,9 +1,10 @@
-"""What the class of a pipe stands for: wall, bore and allowable pressure by its nominal size. Knows no case.
+"""Wall, bore and allowable pressure of pipe classes by nominal size.
 
-Ductile iron, K: e = K (0.5 + 0.001 DN) mm, 6 mm at least, and e - (1.3 + 0.001 DN) mm at least stands. C: the least
-walls of EN 545:2010, and 1.3 + 0.001 DN mm more as a rule. Both bear 20 e R / (D S) bar, D = DE - e with the least
-wall, R = 420 MPa, S = 3; K classes 64 bar at most; a C class the pressure it is named for. Polyethylene by SDR: e = d /
-SDR, d the outer diameter, bears 20 MRS / (C (SDR - 1)) bar; by PN the wall that bears it.
+Ductile iron, class K: nominal wall e = K (0.5 + 0.001 DN) mm, at least 6 mm; least wall e - (1.3 + 0.001 DN) mm.
+Class C: least walls of EN 545:2010; the nominal wall is 1.3 + 0.001 DN mm more. Allowable pressure of K classes:
+20 e R / (D S) bar, at most 64 bar, with e the least wall, D = DE - e, R = 420 MPa, S = 3. A C class has the pressure
+of its name. Polyethylene by SDR: e = d / SDR, d the outer diameter, allowable pressure 20 MRS / (C (SDR - 1)) bar; by
+PN: the wall with that allowable pressure.
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from fvsolve.units import show
 EN_545 = "EN 545:2010, brochure of Duktus"
 K_SOURCES = "ISO 2531, EN 545: Winsen DCI, Dimensions and pressure ratings; Aquaflo and SLR Pipeline, tables of K9"
 PE_SOURCES = "ISO 4427: PE100+ Association, SDR; Firat, PE pipe technical informations (MRS, C = 1.25 for water)"
-STRENGTH, SAFETY = 420.0, 3.0  # of ductile iron [MPa], and the factor of EN 545
-HIGHEST = 64.0  # bar, of K classes
-MRS, DESIGN = {"PE80": 8.0, "PE100": 10.0}, 1.25  # least required strength [MPa] and C for water
-SERIES = (6.0, 41.0)  # SDR of thick and of thin pipes
+STRENGTH, SAFETY = 420.0, 3.0  # tensile strength of ductile iron [MPa], and safety factor of EN 545
+HIGHEST = 64.0  # greatest allowable pressure of K classes [bar]
+MRS, DESIGN = {"PE80": 8.0, "PE100": 10.0}, 1.25  # minimum required strength [MPa], and design coefficient C for water
+SERIES = (6.0, 41.0)  # least and greatest SDR
 BAR = 1e5
 
-# DN, outer diameter and least walls of class 25, 30, 40, 50, 64, 100 [mm]; - is none that the brochure has
+# DN, outer diameter and least walls of class 25, 30, 40, 50, 64, 100 [mm]; - is a size that is not in the brochure
 DUCTILE = """
   80    98   -    -    3.0  3.5  4.0  4.7
  100   118   -    -    3.0  3.5  4.0  4.7
@@ -46,7 +47,7 @@ PRESSURES = (25, 30, 40, 50, 64, 100)
 
 
 class Rated(NamedTuple):
-    """What a class stands for: bore and wall [m], allowable pressure [Pa, gauge] where known, and whose words it is."""
+    """Bore and wall [m], allowable pressure [Pa, gauge] where known, and source of a class at a nominal size."""
 
     diameter: float
     thickness: float
@@ -55,18 +56,18 @@ class Rated(NamedTuple):
 
 
 class NoSize(ValueError):
-    """A nominal size that is none of a class."""
+    """Unknown nominal size of a class."""
 
 
 @functools.cache
 def ductile() -> dict[int, tuple[float, dict[int, float]]]:
     """DN -> (outer diameter, class -> least wall) [mm]."""
-    found = {}
+    sizes = {}
     for line in DUCTILE.strip().splitlines():
         size, outer, *walls = line.split()
-        least = {pressure: float(one) for pressure, one in zip(PRESSURES, walls, strict=True) if one != "-"}
-        found[int(size)] = float(outer), least
-    return found
+        least = {pressure: float(wall) for pressure, wall in zip(PRESSURES, walls, strict=True) if wall != "-"}
+        sizes[int(size)] = float(outer), least
+    return sizes
 
 
 IRON, PLASTIC = re.compile(r"(K|C|CLASS)(\d+)"), re.compile(r"(SDR|PN)(\d+(?:\.\d+)?)")
@@ -74,66 +75,66 @@ SCHEDULE = re.compile(r"(?:schedule|sch\.?)\s*(\w+)", re.IGNORECASE)
 
 
 def rated(name: str, nominal: str, material: str | None) -> Rated:
-    """What a class is at a nominal size; ValueError for what is not made or was not read."""
+    """Size data of a class at a nominal size; ValueError for an unknown class or a size without data."""
     text = name.strip().upper().replace(" ", "")
-    if found := IRON.fullmatch(text):
+    if match := IRON.fullmatch(text):
         if material != "ductile-iron":
-            raise ValueError(f'{name} is a class of ductile iron; wanted material = "ductile-iron"')
-        return _ductile(found[1][0], int(found[2]), name, _size(nominal))
-    if found := PLASTIC.fullmatch(text):
-        return _plastic(found[1], float(found[2]), name, _size(nominal), material)
+            raise ValueError(f'{name} is a class of ductile iron; expected material = "ductile-iron"')
+        return _ductile(match[1][0], int(match[2]), name, _size(nominal))
+    if match := PLASTIC.fullmatch(text):
+        return _plastic(match[1], float(match[2]), name, _size(nominal), material)
     raise ValueError(no_class(name))
 
 
 def no_class(name: str) -> str | None:
-    """What is said of a name that is that of no class, whatever the material; None of others."""
+    """Fault text of a name that is not a class of any material; None for a known class."""
     text = name.strip().upper().replace(" ", "")
     if IRON.fullmatch(text) or PLASTIC.fullmatch(text) or SCHEDULE.fullmatch(name.strip()):
         return None
     known = ("K9", "C40", "SDR11", "PN16", "schedule 40")
-    return f"no class named {show(name)}{did_you_mean(name, known)}; wanted one such as {listing(known)}"
+    return f"unknown class {show(name)}{did_you_mean(name, known)}; expected for example {listing(known)}"
 
 
 def _size(nominal: str) -> float:
-    found = re.fullmatch(r"D[NE]?\s*(\d+(?:\.\d+)?)", nominal.strip(), re.IGNORECASE)
-    if found is None:
-        raise NoSize(f'{show(nominal)} is no nominal size of a class; wanted for example "DN300"')
-    return float(found[1])
+    match = re.fullmatch(r"D[NE]?\s*(\d+(?:\.\d+)?)", nominal.strip(), re.IGNORECASE)
+    if match is None:
+        raise NoSize(f'{show(nominal)} is not a nominal size of a class; expected for example "DN300"')
+    return float(match[1])
 
 
-def _ductile(sort: str, number: int, name: str, size: float) -> Rated:
+def _ductile(series: str, number: int, name: str, size: float) -> Rated:
     if size not in ductile():
-        near = sorted(ductile(), key=lambda one: abs(one - size))[:3]
+        nearest = sorted(ductile(), key=lambda dn: abs(dn - size))[:3]
         raise ValueError(
-            f"DN{size:g} of ductile iron was not read; the nearest are {listing([f'DN{x}' for x in near])}"
+            f"no data for DN{size:g} of ductile iron; the nearest sizes are {listing([f'DN{x}' for x in nearest])}"
         )
     (outer, walls), spare = ductile()[int(size)], 1.3 + 0.001 * size
-    if sort == "K":
+    if series == "K":
         if not 7 <= number <= 14:
-            raise ValueError(f"no class {show(name)}; K goes from 7 to 14")
+            raise ValueError(f"unknown class {show(name)}; expected K7 to K14")
         wall = max(number * (0.5 + 0.001 * size), 6.0)
         least = wall - spare
-        bears = min(20.0 * least * STRENGTH / ((outer - least) * SAFETY), HIGHEST)
-        said = f"K{number} DN{size:g}: wall {wall:g} mm, K (0.5 + 0.001 DN), 6 at least; {K_SOURCES}"
+        allowable = min(20.0 * least * STRENGTH / ((outer - least) * SAFETY), HIGHEST)
+        source = f"K{number} DN{size:g}: wall {wall:g} mm, K (0.5 + 0.001 DN), at least 6 mm; {K_SOURCES}"
     elif number not in walls:
-        made = [f"C{one}" for one in walls]
-        raise ValueError(f"no class {show(name)} of DN{size:g} was read; there are {listing(made)}")
+        available = [f"C{pressure}" for pressure in walls]
+        raise ValueError(f"no class {show(name)} of DN{size:g} in the catalogue; available are {listing(available)}")
     else:
-        wall, bears = walls[number] + spare, float(number)
-        said = f"C{number} DN{size:g}: wall {walls[number]:g} mm at least, {spare:g} mm more as a rule; {EN_545}"
-    return Rated(1e-3 * (outer - 2.0 * wall), 1e-3 * wall, BAR * bears, said)
+        wall, allowable = walls[number] + spare, float(number)
+        source = f"C{number} DN{size:g}: wall at least {walls[number]:g} mm, nominal wall {spare:g} mm more; {EN_545}"
+    return Rated(1e-3 * (outer - 2.0 * wall), 1e-3 * wall, BAR * allowable, source)
 
 
-def _plastic(sort: str, number: float, name: str, size: float, material: str | None) -> Rated:
+def _plastic(series: str, number: float, name: str, size: float, material: str | None) -> Rated:
     strength = MRS.get(material or "")
-    if sort == "PN" and strength is None:
-        raise ValueError(f"what wall bears {name} was read of {listing(list(MRS))} alone; wanted such a material, or "
+    if series == "PN" and strength is None:
+        raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}. Expected such a material, or "
                          "the SDR and allowable_pressure")  # fmt: skip
-    ratio = number if sort == "SDR" else 1.0 + 20.0 * strength / (DESIGN * number)
+    ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN * number)
     if not SERIES[0] <= ratio <= SERIES[1]:
-        raise ValueError(f"{name} is an outer diameter of {ratio:g} walls; wanted {SERIES[0]:g} to {SERIES[1]:g}")
+        raise ValueError(f"{name} has SDR {ratio:g} (diameter over wall). Expected {SERIES[0]:g} to {SERIES[1]:g}")
     wall = size / ratio
-    bears = None if strength is None else BAR * 20.0 * strength / (DESIGN * (ratio - 1.0))
-    said = f"{name} of {size:g} mm outside: wall d / SDR, SDR {ratio:.4g}"
-    said += f"; {PE_SOURCES}" if strength else "; of what it bears no source was read"
-    return Rated(1e-3 * (size - 2.0 * wall), 1e-3 * wall, bears, said)
+    allowable = None if strength is None else BAR * 20.0 * strength / (DESIGN * (ratio - 1.0))
+    source = f"{name} of {size:g} mm outer diameter: wall d / SDR, SDR {ratio:.4g}"
+    source += f"; {PE_SOURCES}" if strength else "; no source for its allowable pressure"
+    return Rated(1e-3 * (size - 2.0 * wall), 1e-3 * wall, allowable, source)

@@ -1,4 +1,4 @@
-"""Kelvin-Voigt elements of a wall: what a case may say of them. Knows lists of numbers; computes nothing."""
+"""Keys of the Kelvin-Voigt elements of a viscoelastic wall."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from fvsolve.units import parse, show
 
 @dataclass(frozen=True)
 class Creep:
-    """Kelvin-Voigt elements: strain J (1 - exp(-t / tau)) each under a unit of hoop stress, beside the elastic one.
+    """Kelvin-Voigt elements: each adds a strain J (1 - exp(-t / tau)) per unit of hoop stress to the elastic strain.
 
-    compliance : J of each [1/Pa]; time : tau of each [s]
+    compliance : J of each element [1/Pa]; time : retardation time tau of each [s]
     """
 
     compliance: tuple[float, ...]
     time: tuple[float, ...]
 
     def table(self) -> dict[str, list[float]]:
-        """What the file would say."""
+        """The table as in a case file."""
         return {"compliance": list(self.compliance), "time": list(self.time)}
 
 
 @dataclass(frozen=True)
 class Positives(Value):
-    """A list of numbers above 0, one an element."""
+    """A list of numbers above 0, one for each element."""
 
     dimension: str
     changes: str = VALUE
 
     def read(self, given: Any, setting: Setting) -> tuple[float, ...]:
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f"{show(given)} is no list of numbers; wanted one an element")
-        found = tuple(float(parse(one, self.dimension)) for one in given)
-        for one, value in zip(given, found, strict=True):
-            positive.check(value, one)
-        return found
+            raise ValueError(f"{show(given)} is not a list of numbers; expected one number for each element")
+        values = tuple(float(parse(raw, self.dimension)) for raw in given)
+        for raw, value in zip(given, values, strict=True):
+            positive.check(value, raw)
+        return values
 
     def json(self) -> dict[str, Any]:
         return {"type": "array", "items": {"type": ["number", "string"]}}
@@ -50,7 +50,7 @@ LISTS = {"compliance": (Positives("compliance"), NEEDED), "time": (Positives("ti
 class Elements(Value):
     """The table of Kelvin-Voigt elements: as many compliances as times, all above 0."""
 
-    about = "what the wall gives way by in time, Kelvin-Voigt elements"
+    about = "Kelvin-Voigt elements of a viscoelastic wall"
     takes = "`{ compliance, time }`, lists of 1/Pa and s"
     changes = SHAPE
 
@@ -58,12 +58,12 @@ class Elements(Value):
         if isinstance(given, Creep):
             return given
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table; wanted {{ compliance = [1e-10], time = [0.05] }}, 1/Pa and s")
-        found = Creep(**read_keys(given, LISTS, setting))
-        if len(found.compliance) != len(found.time):
-            sizes = f"{len(found.compliance)} of compliance and {len(found.time)} of time"
-            raise ValueError(f"{sizes}; wanted one of each an element")
-        return found
+            raise ValueError(f"{show(given)} is not a table; expected {{ compliance = [1e-10], time = [0.05] }}")
+        creep = Creep(**read_keys(given, LISTS, setting))
+        if len(creep.compliance) != len(creep.time):
+            sizes = f"{len(creep.compliance)} of compliance and {len(creep.time)} of time"
+            raise ValueError(f"{sizes}; expected one compliance and one time for each element")
+        return creep
 
     def below(self, key: str) -> Value | None:
         return LISTS[key][0]

@@ -16,7 +16,7 @@ from fvsolve.schemes import quicker
 
 
 class PipeRows(Lowering, kind="pipe"):
-    """Cells of two waves."""
+    """Rows of a pipe: cells with a forward and a backward wave, or a delay line."""
 
     table = "pipe"
 
@@ -47,22 +47,24 @@ class PipeRows(Lowering, kind="pipe"):
             row["y"] = draft.states(names, 0.5e5 * row["admittance"])
             add_creep(draft, name, link, row)
         x = (np.arange(n) + 0.5) * (link.length / n)
-        along_it = z[0] + row["slope"] * x if link.profile is None else link.profile.at(x)
+        elevation = z[0] + row["slope"] * x if link.profile is None else link.profile.at(x)
         draft.meshes.append(
             PipeMesh(
                 name, link.from_, link.to, link.length, link.diameter, n, speed, x,
-                np.linspace(0.0, link.length, n + 1), along_it, link.profile, (float(z[0]), float(z[1])),
+                np.linspace(0.0, link.length, n + 1), elevation, link.profile, (float(z[0]), float(z[1])),
             )
         )  # fmt: skip
 
     def force(self, draft, name, row) -> None:
-        """A probe of the force on a whole pipe."""
+        """Set a probe of the force on a pipe."""
         row["kind"] = rec.PIPE_FORCE
         pipe = draft.pipe_table[row["index"]]
         if pipe["delay"] >= 0:
-            draft.fault(f"links.{name}", 'a delay line does not tell the force on it; give it line = "cells"')
+            draft.fault(f"links.{name}", 'a delay line has no force probe; set line = "cells"')
         elif pipe["ride"] >= 0:
-            draft.fault(f"links.{name}", "it rides on a body, whose joints tell the forces; leave its own out")
+            draft.fault(
+                f"links.{name}", "a pipe on a body has no force probe; use the forces of the joints of the body"
+            )
 
     def probe(self, draft, name, probe, row) -> None:
         row["index"] = draft.pipe_names.index(name)

@@ -1,7 +1,7 @@
-"""What pipes are made of: moduli, roughness and density, each with the page it was read on. Knows no pipe.
+"""Pipe materials: moduli, roughness and density, each with its source.
 
-A row holds what was read and nothing else: a figure without a source is left out, and the user's to give. Of a range
-the modulus that is used is the greatest (the quickest wave, the greatest jump), the roughness and the rest the mean.
+Figures without a source are left out; the user gives them. Of a range, the greatest modulus is used (fastest wave,
+greatest pressure jump), and the mean of roughness and all other figures.
 """
 
 from __future__ import annotations
@@ -61,60 +61,60 @@ GRP                   rho  1800   1800   adpf
 KEYS = {"E": "youngs_modulus", "nu": "poisson_ratio", "k": "roughness", "rho": "density"}
 SI = {"youngs_modulus": 1e9, "poisson_ratio": 1.0, "roughness": 1e-3, "density": 1.0}
 UNITS = {"youngs_modulus": " GPa", "poisson_ratio": "", "roughness": " mm", "density": " kg/m3"}
-UNREAD = ("PVC-O", "PEX", "hydraulic-hose")  # pipes are made of them, and no figure of theirs was read
+UNREAD = ("PVC-O", "PEX", "hydraulic-hose")  # pipe materials without a source for their figures
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One number of a material, SI: least and greatest of its sources, and the one that is used."""
+    """Number of a material, SI: least and greatest of its sources, and the value used."""
 
     key: str
     least: float
     greatest: float
     sources: tuple[str, ...]
-    what: str = ""  # it was read of
+    what: str = ""  # form of the material in the source
 
     @property
     def used(self) -> float:
         return self.greatest if self.key == "youngs_modulus" else 0.5 * (self.least + self.greatest)
 
     def span(self, between: str) -> str:
-        """Least and greatest, in the unit of the table; one number where they are the same."""
+        """Least and greatest, in the unit of the table; one number where they are equal."""
         low, high = (f"{x / SI[self.key]:.4g}" for x in (self.least, self.greatest))
         return low if low == high else f"{low}{between}{high}"
 
     @property
     def said(self) -> str:
-        """The number, its range and where both were read."""
-        which = "the greatest" if self.key == "youngs_modulus" else "the mean"
-        span = "" if self.least == self.greatest else f", {which} of {self.span(' to ')}"
-        what = f" ({self.what})" if self.what else ""
-        read = "; ".join(SOURCES[one] for one in self.sources)
-        return f"{self.key.replace('_', ' ')} {self.used / SI[self.key]:.4g}{UNITS[self.key]}{span}{what}: {read}"
+        """Text with the number, its range and its sources."""
+        choice = "the greatest" if self.key == "youngs_modulus" else "the mean"
+        span = "" if self.least == self.greatest else f", {choice} of {self.span(' to ')}"
+        form = f" ({self.what})" if self.what else ""
+        sources = "; ".join(SOURCES[key] for key in self.sources)
+        return f"{self.key.replace('_', ' ')} {self.used / SI[self.key]:.4g}{UNITS[self.key]}{span}{form}: {sources}"
 
 
 @dataclass(frozen=True)
 class Material:
-    """The figures of a material that were read."""
+    """Figures of a material by key."""
 
     name: str
     figures: dict[str, Figure] = field(default_factory=dict)
 
     @property
     def unread(self) -> list[str]:
-        """Keys of which no source was read."""
+        """Keys without a source."""
         return [key for key in KEYS.values() if key not in self.figures]
 
 
 @functools.cache
 def materials() -> dict[str, Material]:
     """The catalogue by name."""
-    found: dict[str, Material] = {}
+    catalogue: dict[str, Material] = {}
     for line in TABLE.strip().splitlines():
         name, short, least, greatest, *rest = line.split(maxsplit=4)
         words, key = rest[0].split("  "), KEYS[short]
-        sources = tuple(one.strip() for one in words[0].split(","))
+        sources = tuple(entry.strip() for entry in words[0].split(","))
         low, high = (float(x) * SI[key] for x in (least, greatest))
-        one = Figure(key, low, high, sources, words[-1].strip() if len(words) > 1 else "")
-        found.setdefault(name, Material(name)).figures[key] = one
-    return found
+        entry = Figure(key, low, high, sources, words[-1].strip() if len(words) > 1 else "")
+        catalogue.setdefault(name, Material(name)).figures[key] = entry
+    return catalogue

@@ -1,4 +1,4 @@
-"""The line of a pipe over its chainage. Knows points; knows no fluid."""
+"""Elevation profile of a pipe over its chainage."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ AXES = "x, y, z"
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """Elevation over chainage, straight between its points.
+    """Elevation over chainage, linear between points.
 
-    chainage : float64[n]  counted along the axis, rising [m]; elevation : float64[n]  of the axis above datum [m];
-    plan : float64[n, 2]  x and y, of one that has them [m]; said : as the file has it, in SI
+    chainage : float64[n]  distance along the axis, ascending [m]; elevation : float64[n]  of the axis above datum [m];
+    said : table of the case file, in SI; plan : float64[n, 2]  x and y [m], or None
     """
 
     chainage: np.ndarray
@@ -31,33 +31,33 @@ class Profile:
 
     @property
     def length(self) -> float:
-        """Along its axis [m]."""
+        """Length along the axis [m]."""
         return float(self.chainage[-1] - self.chainage[0])
 
     @property
     def distance(self) -> np.ndarray:
-        """Of its points from its begin [m] : float64[n]."""
+        """Distances of the points from the start [m] : float64[n]."""
         return self.chainage - self.chainage[0]
 
     def at(self, distance: Any) -> Any:
-        """Elevation at distances from its begin [m]."""
+        """Elevation at distances from the start [m]."""
         return np.interp(distance, self.distance, self.elevation)
 
     def seen(self, distance: np.ndarray) -> np.ndarray:
-        """x and y at distances from its begin : float64[m, 2] [m]."""
-        return np.column_stack([np.interp(distance, self.distance, one) for one in self.plan.T])
+        """x and y at distances from the start : float64[m, 2] [m]."""
+        return np.column_stack([np.interp(distance, self.distance, axis) for axis in self.plan.T])
 
     def part(self, begin: float, end: float) -> Profile:
-        """The profile between two distances from its begin [m], in the same chainage."""
+        """Profile between two distances from the start [m], with unchanged chainages."""
         d = self.distance
         inside = (d > begin) & (d < end)
         cut = np.concatenate([[begin], d[inside], [end]])
         chainage, elevation = cut + self.chainage[0], self.at(cut)
-        said = {"chainage": chainage.tolist(), "elevation": elevation.tolist()}
-        return Profile(chainage, elevation, said, None if self.plan is None else self.seen(cut))
+        table = {"chainage": chainage.tolist(), "elevation": elevation.tolist()}
+        return Profile(chainage, elevation, table, None if self.plan is None else self.seen(cut))
 
     def table(self) -> dict[str, Any]:
-        """What the file would say."""
+        """The table as in a case file."""
         return self.said
 
     def __eq__(self, other: object) -> bool:
@@ -69,90 +69,92 @@ class Profile:
 class ProfileValue(Value):
     """Points of a pipe's axis: chainage and elevation, or x, y and z, as lists or columns of a CSV file."""
 
-    about = "elevation along it, straight between points; straight from end to end if left out"
+    about = "elevation along the axis, linear between points; straight from end to end if left out"
     takes = "`{ chainage, elevation }` or `{ x, y, z }`, lists of m, or `{ file }` with such columns"
 
     def read(self, given: Any, setting: Setting) -> Profile:
         if isinstance(given, Profile):
             return given
         if not isinstance(given, dict):
-            wanted = '{ chainage = [0, 900], elevation = [12, 31] }, or { file = "profile.csv" }'
-            raise ValueError(f"{show(given)} is no table; wanted one such as {wanted}")
-        columns, said = from_file(given, setting) if "file" in given else from_lists(given, setting)
+            example = '{ chainage = [0, 900], elevation = [12, 31] }, or { file = "profile.csv" }'
+            raise ValueError(f"{show(given)} is not a table; expected for example {example}")
+        columns, table = from_file(given, setting) if "file" in given else from_lists(given, setting)
         if len(columns) == 3:
-            steps = np.sqrt(sum(np.diff(one) ** 2 for one in columns.values()))
-            still = np.flatnonzero(steps <= 0.0)
-            if still.size:
-                raise ValueError(
-                    f"points {still[0] + 1} and {still[0] + 2} are one; wanted a way from each to the next"
-                )
+            steps = np.sqrt(sum(np.diff(values) ** 2 for values in columns.values()))
+            repeated = np.flatnonzero(steps <= 0.0)
+            if repeated.size:
+                raise ValueError(f"points {repeated[0] + 1} and {repeated[0] + 2} coincide; expected different points")
             plan = np.column_stack([columns["x"], columns["y"]])
-            found = Profile(np.concatenate([[0.0], np.cumsum(steps)]), columns["z"], said, plan)
+            profile = Profile(np.concatenate([[0.0], np.cumsum(steps)]), columns["z"], table, plan)
         else:
-            found = Profile(columns["chainage"], columns["elevation"], said)
-            steep(found)
-        return found
+            profile = Profile(columns["chainage"], columns["elevation"], table)
+            steep(profile)
+        return profile
 
     def json(self) -> dict[str, Any]:
         return {"type": "object"}
 
 
 def steep(profile: Profile) -> None:
-    """ValueError where a way rises more than it is long."""
-    ways, rises = np.diff(profile.chainage), np.abs(np.diff(profile.elevation))
-    if (rises > ways * (1.0 + 1e-9)).any():
-        k = int(np.argmax(rises - ways))
-        text = f"{ways[k]:g} m from chainage {profile.chainage[k]:g} m are too short to rise or fall by {rises[k]:g} m"
+    """Raise ValueError where a section rises more than its length."""
+    lengths, rises = np.diff(profile.chainage), np.abs(np.diff(profile.elevation))
+    if (rises > lengths * (1.0 + 1e-9)).any():
+        k = int(np.argmax(rises - lengths))
+        text = (
+            f"{lengths[k]:g} m from chainage {profile.chainage[k]:g} m is too short to rise or fall by {rises[k]:g} m"
+        )
         raise ValueError(f"{text}; chainage counts along the axis")
 
 
 def from_lists(given: dict[str, Any], setting: Setting) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Columns [m] of lists, as many values in each."""
+    """Columns [m] from lists of equal length, and the table of the case file."""
     keys = form_of(list(given), "keys")
-    found, faults = {}, [((key,), f"unknown key; wanted {' and '.join(keys)}") for key in given if key not in keys]
+    columns, faults = {}, [((key,), f"unknown key; expected {' and '.join(keys)}") for key in given if key not in keys]
     for key in keys:
         try:
-            found[key] = Rows("length", rising=key == "chainage").read(given[key], setting)
+            columns[key] = Rows("length", rising=key == "chainage").read(given[key], setting)
         except Misfit as error:
             faults += [((key, *below), text) for below, text in error.faults]
         except ValueError as error:
             faults.append(((key,), str(error)))
-    if not faults and len({len(one) for one in found.values()}) > 1:
-        counts = ", ".join(f"{len(one)} of {key}" for key, one in found.items())
-        faults.append(((), f"values are not as many in each list: {counts}"))
-    if not faults and len(found[keys[0]]) < 2:
-        faults.append(((), "has one point; wanted two at least"))
+    if not faults and len({len(values) for values in columns.values()}) > 1:
+        counts = ", ".join(f"{len(values)} of {key}" for key, values in columns.items())
+        faults.append(((), f"lists have different lengths: {counts}"))
+    if not faults and len(columns[keys[0]]) < 2:
+        faults.append(((), "has one point; expected at least two"))
     if faults:
         raise Misfit(faults)
-    return {key: np.array(one) for key, one in found.items()}, {key: list(one) for key, one in found.items()}
+    return {key: np.array(values) for key, values in columns.items()}, {
+        key: list(values) for key, values in columns.items()
+    }
 
 
 def from_file(given: dict[str, Any], setting: Setting) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Columns [m] of a CSV file, by their headers."""
-    unknown = [((key,), "unknown key; beside file there is none") for key in given if key != "file"]
+    """Columns [m] of a CSV file by header, and the table of the case file."""
+    unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown:
         raise Misfit(unknown)
     if not isinstance(given["file"], str):
-        raise Misfit([(("file",), f"{show(given['file'])} is no text")])
+        raise Misfit([(("file",), f"{show(given['file'])} is not a text")])
     try:
         path = find_file(given["file"], setting)
         rows = read_rows(path)
         keys = form_of([name.casefold() for name in rows.names], f"columns of {path.name}")
         names = {name.casefold(): name for name in rows.names}
-        found = {key: rows.numbers(rows.column(names[key], 0), "length") for key in keys}
-        if len(found[keys[0]]) < 2:
-            raise ValueError(f"{path.name} has one point; wanted two at least")
-        if "chainage" in found:
-            check_rising(found["chainage"].tolist(), [f"{one:g}" for one in found["chainage"]],
+        columns = {key: rows.numbers(rows.column(names[key], 0), "length") for key in keys}
+        if len(columns[keys[0]]) < 2:
+            raise ValueError(f"{path.name} has one point; expected at least two")
+        if "chainage" in columns:
+            check_rising(columns["chainage"].tolist(), [f"{value:g}" for value in columns["chainage"]],
                          f"{path.name}: chainages")  # fmt: skip
     except ValueError as error:
         raise Misfit([(("file",), str(error))]) from None
-    return found, {"file": copy_name(path, setting)}
+    return columns, {"file": copy_name(path, setting)}
 
 
-def form_of(names: list[str], what: str) -> tuple[str, ...]:
-    """Which of the two forms the names make; ValueError where neither."""
+def form_of(names: list[str], source: str) -> tuple[str, ...]:
+    """Names of the columns, chainage and elevation or x, y, z; ValueError where neither set is complete."""
     for keys in FORMS:
         if set(keys) <= set(names):
             return keys
-    raise ValueError(f"{what} are {', '.join(names) or 'none'}; wanted chainage and elevation, or {AXES}")
+    raise ValueError(f"{source} are {', '.join(names) or 'none'}; expected chainage and elevation, or {AXES}")

@@ -1,4 +1,4 @@
-"""The wall of a pipe: how far it gives way to pressure, at once and in time. Knows no fluid and no file."""
+"""Pipe walls: keys, restraint factor, elastic and viscoelastic compliance."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from fvsolve.units import parse, show
 
 MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
 THICKNESS = Usual(1e-6, 2.0, "foils to lined rock")
-THIN = 25.0  # bores over walls from which on a wall counts as thin, Wylie, Streeter and Suo 1993
+THIN = 25.0  # least bore over wall of a thin wall, Wylie, Streeter and Suo 1993
 RESTRAINTS = ("joints", "upstream", "anchored")
 POISSON = "poisson_ratio"
 
 
 class Wall(Table):
-    """An elastic wall: 1/K = 1/beta + c diameter / (youngs_modulus thickness), c of its restraint."""
+    """An elastic wall: 1/K = 1/beta + c diameter / (youngs_modulus thickness), c the factor of `restraint`."""
 
     youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]", MODULI, COUNTED)]
     thickness: Annotated[float, Quantity("length", positive, "of the wall [m]", THICKNESS, COUNTED)]
@@ -30,21 +30,21 @@ class Wall(Table):
 
 
 class Lining(Table):
-    """A second layer within the wall, such as cement mortar: it shares the hoop strain, E e + E' e' in place of E e."""
+    """An inner layer of the wall, such as cement mortar, with the same hoop strain: E e + E' e' instead of E e."""
 
     youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the lining [Pa]", MODULI, COUNTED)]
     thickness: Annotated[float, Quantity("length", positive, "of the lining [m]", THICKNESS, COUNTED)]
 
 
 class OfCatalogue(Value):
-    """The name of a material whose figures were read."""
+    """Name of a material of the catalogue."""
 
-    about = "of the wall: modulus, Poisson's ratio and roughness, where their source was read"
+    about = "material of the wall: sets modulus, Poisson's ratio and roughness, where a source is known"
     changes = COUNTED
 
     @property
     def names(self) -> list[str]:
-        from fvsolve.parts.pipe.materials import materials  # read by pipes that name one
+        from fvsolve.parts.pipe.materials import materials  # imported only for pipes with a material
 
         return list(materials())
 
@@ -54,12 +54,12 @@ class OfCatalogue(Value):
         if isinstance(given, str) and given in self.names:
             return given
         if not isinstance(given, str):
-            raise ValueError(f"{show(given)} is no text; wanted one of {', '.join(self.names)}")
+            raise ValueError(f"{show(given)} is not a text; expected one of {', '.join(self.names)}")
         wall = "give wall = { youngs_modulus, thickness }"
         if given in UNREAD:
-            raise ValueError(f"no source of the figures of {given} was read; {wall}")
-        raise ValueError(f"no material named {show(given)}{did_you_mean(given, self.names)}; materials are "
-                         f"{', '.join(self.names)}; of any other {wall}")  # fmt: skip
+            raise ValueError(f"the catalogue has no data of {given}; {wall}")
+        raise ValueError(f"unknown material {show(given)}{did_you_mean(given, self.names)}; expected "
+                         f"{', '.join(self.names)}; for any other material {wall}")  # fmt: skip
 
     @property
     def takes(self) -> str:
@@ -70,9 +70,9 @@ class OfCatalogue(Value):
 
 
 class WallOrStiff(Value):
-    """The text "stiff" or the table of an elastic wall."""
+    """Text "stiff" or table of an elastic wall."""
 
-    about = 'elastic or stiff; "stiff" if left out'
+    about = 'wall, elastic or stiff; "stiff" if left out'
     takes = '`"stiff"`, or `{ youngs_modulus, thickness, poisson_ratio, creep }`, Pa and m'
     changes = COUNTED
 
@@ -80,22 +80,22 @@ class WallOrStiff(Value):
         if isinstance(given, Wall) or given == "stiff":
             return given
         if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is no wall; wanted "stiff" or {{ youngs_modulus, thickness }}')
+            raise ValueError(f'{show(given)} is not a wall; expected "stiff" or {{ youngs_modulus, thickness }}')
         return Wall.model_validate(given, context=setting)
 
     def below(self, key: str) -> Value | None:
         return Wall.values()[key]
 
     def json(self) -> dict[str, Any]:
-        made = Wall.model_json_schema()
-        del made["required"]  # a material or a size may say it
-        return {"anyOf": [{"const": "stiff"}, made]}
+        schema = Wall.model_json_schema()
+        del schema["required"]  # a material or a nominal size may give them
+        return {"anyOf": [{"const": "stiff"}, schema]}
 
 
 class Restraint(Value):
-    """How a pipe is held along its axis: a word, or the factor itself."""
+    """Axial restraint of a pipe: a word, or the factor c itself."""
 
-    about = "how it is held along its axis; 1, a thin wall between expansion joints, if left out"
+    about = "axial restraint; 1, a thin wall between expansion joints, if left out"
     takes = "`joints`, `upstream`, `anchored`, or a number, above 0"
     changes = COUNTED
 
@@ -103,7 +103,7 @@ class Restraint(Value):
         if isinstance(given, str):
             if given in RESTRAINTS:
                 return given
-            raise ValueError(f"no restraint named {show(given)}; wanted one of {', '.join(RESTRAINTS)}, or a number")
+            raise ValueError(f"unknown restraint {show(given)}; expected one of {', '.join(RESTRAINTS)}, or a number")
         value = parse(given, "number")
         positive.check(value, given)
         return value
@@ -113,39 +113,41 @@ class Restraint(Value):
 
 
 def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> float:
-    """c of the growth of area c D / (E e) dp / p: 1 where nothing is said.
+    """Factor c of the area growth dA / A = c D / (E e) dp; 1 without restraint.
 
-    Thin walls, D/e from 25 on: 1 between expansion joints, 1 - nu/2 held upstream alone, 1 - nu^2 anchored throughout.
-    Thick ones, of Lame's stresses: that times D / (D + e), and 2 (e/D) (1 + nu) more; as in Wylie and Streeter 1993.
+    Thin walls (D/e >= 25): 1 with expansion joints, 1 - nu/2 anchored upstream only, 1 - nu^2 anchored throughout.
+    Thick walls (Lame): that factor times D / (D + e), plus 2 (e/D) (1 + nu); Wylie and Streeter 1993.
     """
     if restraint is None:
         return 1.0
     if not isinstance(restraint, str):
         return restraint
     nu = wall.poisson_ratio or 0.0
-    held = {"joints": 1.0, "upstream": 1.0 - 0.5 * nu, "anchored": 1.0 - nu * nu}[restraint]
+    thin = {"joints": 1.0, "upstream": 1.0 - 0.5 * nu, "anchored": 1.0 - nu * nu}[restraint]
     ratio = wall.thickness / bore
     if ratio * THIN <= 1.0:
-        return held
-    return held / (1.0 + ratio) + 2.0 * ratio * (1.0 + nu)
+        return thin
+    return thin / (1.0 + ratio) + 2.0 * ratio * (1.0 + nu)
 
 
 def wants_poisson(restraint: str | float | None, bore: float, wall: Wall) -> bool:
-    """Whether the factor depends on Poisson's ratio."""
+    """True if the factor depends on Poisson's ratio."""
     return restraint in ("upstream", "anchored") or (restraint == "joints" and wall.thickness * THIN > bore)
 
 
 def yielding(pipe: Any) -> tuple[tuple[float, float], ...]:
-    """(growth of its bore with pressure in the end, dA / (A dp) [1/Pa], time tau [s]) of each element of its wall."""
+    """(final growth of the bore with pressure, dA / (A dp) [1/Pa], time tau [s]) of each creep element of the wall."""
     wall = pipe.wall
     if not isinstance(wall, Wall) or wall.creep is None:
         return ()
     factor = restraint_factor(pipe.restraint, pipe.diameter, wall) * pipe.diameter / wall.thickness
-    return tuple((factor * one, time) for one, time in zip(wall.creep.compliance, wall.creep.time, strict=True))
+    return tuple(
+        (factor * compliance, time) for compliance, time in zip(wall.creep.compliance, wall.creep.time, strict=True)
+    )
 
 
 def softness(pipe: Any) -> float:
-    """Growth of a pipe's bore with pressure at once, dA / (A dp) [1/Pa]; 0 of a stiff wall."""
+    """Elastic growth of the bore of a pipe with pressure, dA / (A dp) [1/Pa]; 0 for a stiff wall."""
     wall = pipe.wall
     if not isinstance(wall, Wall):
         return 0.0
@@ -158,13 +160,13 @@ def softness(pipe: Any) -> float:
 
 
 def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
-    """What is wrong of a pipe's wall beside its restraint and lining: (keys, text)."""
+    """Faults (keys, text) of a wall with respect to restraint and lining."""
     wall = pipe.wall
     if not isinstance(wall, Wall):
         return
     if wall.poisson_ratio is None and wants_poisson(pipe.restraint, pipe.diameter, wall):
-        why = f"no source of that of {pipe.material} was read" if pipe.material else "it has none"
-        text = f"{show(pipe.restraint)} wants Poisson's ratio of the wall, and {why}; give it in wall as poisson_ratio"
+        reason = f"the catalogue has none of {pipe.material}" if pipe.material else "none is given"
+        text = f"{show(pipe.restraint)} needs Poisson's ratio of the wall, and {reason}; give wall.poisson_ratio"
         yield ("restraint",), text
     if wall.creep is not None and pipe.lining is not None:
-        yield ("wall", "creep"), "is not known of a lined wall; keep one of creep and lining"
+        yield ("wall", "creep"), "is not available for a lined wall; keep creep or lining"

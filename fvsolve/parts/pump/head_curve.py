@@ -1,4 +1,4 @@
-"""Head and efficiency of a pump over its flow, as a file may say them. Knows points; evaluates none of them."""
+"""Head, efficiency, power and Suter tables of a pump in a case file."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import show
 
-ROUNDING = 1e-6  # share of the greatest value by which the ends of a table of Suter form may differ
+ROUNDING = 1e-6  # allowed difference of first and last value of a Suter table, over the greatest value
 
 
 @dataclass(frozen=True)
 class CurvePoints:
-    """What a pump does at flows [m3/s]; the file's words for both are the names of the fields.
+    """Values of a pump over flow [m3/s].
 
-    flow, value : points; word : what the values are; coefficients : of a polynomial in their place
+    flow, value : points; word : key of the values; coefficients : of a polynomial, instead of points
     """
 
     flow: tuple[float, ...] = ()
@@ -51,12 +51,12 @@ class CurvePoints:
 def points(
     given: dict[str, Any], word: str, dimension: str, setting: Setting, range=nonnegative, faults_of=lambda *_: []
 ) -> CurvePoints:
-    """Points of a table { flow, WORD }; Misfit where flows do not rise, the lists differ in length, or `faults_of`."""
-    found = read_keys(given, keys_of(word, dimension, range), setting)
-    flow, value = found["flow"], found[word]
+    """Points of a table { flow, WORD }; Misfit if flows do not rise, lengths differ, or `faults_of` finds faults."""
+    lists = read_keys(given, keys_of(word, dimension, range), setting)
+    flow, value = lists["flow"], lists[word]
     faults = faults_of(given, flow, value)
     if len(flow) != len(value):
-        faults.append(((word,), f"{len(value)} values for {len(flow)} flows; wanted as many of both"))
+        faults.append(((word,), f"{len(value)} values for {len(flow)} flows; expected equal numbers"))
     try:
         check_rising(flow, given["flow"], "flows")
     except ValueError as error:
@@ -81,31 +81,33 @@ class HeadCurve(Value):
         if isinstance(given, CurvePoints):
             return given
         if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is no table; wanted one such as {{ flow = ["50 l/s"], head = ["40 m"] }}')
+            raise ValueError(
+                f'{show(given)} is not a table; expected for example {{ flow = ["50 l/s"], head = ["40 m"] }}'
+            )
         if "coefficients" in given:
-            found = read_keys(given, self.polynomial, setting)["coefficients"]
-            self.check_polynomial(found)
-            return CurvePoints(coefficients=found)
+            coefficients = read_keys(given, self.polynomial, setting)["coefficients"]
+            self.check_polynomial(coefficients)
+            return CurvePoints(coefficients=coefficients)
         return points(given, "head", "head", setting, nonnegative, self.faults_of)
 
     def faults_of(self, given: dict[str, Any], flow: tuple[float, ...], head: tuple[float, ...]) -> list:
-        """Faults of one point that cannot make a curve, and of heads that do not fall from each to the next."""
+        """Faults of a single point without positive flow and head, and of heads that do not fall."""
         faults = []
         if len(flow) == 1 and not (flow[0] > 0 and head[0] > 0):
             faults.append(((), "one point must have a flow and a head above 0, or give two points or more"))
         for k, (before, after) in enumerate(zip(head, head[1:], strict=False)):
             if not after < before:
-                said = f"{show(given['head'][k + 1])} comes after {show(given['head'][k])}"
-                faults.append((("head", k + 1), f"{said}; the head must fall as the flow rises"))
+                text = f"{show(given['head'][k + 1])} comes after {show(given['head'][k])}"
+                faults.append((("head", k + 1), f"{text}; the head must fall as the flow rises"))
         return faults
 
-    def check_polynomial(self, found: tuple[float, ...]) -> None:
-        """Misfit where there is no flow without head, or the head rises before it."""
-        end = first_root(found)
-        if found[0] <= 0.0 or end is None:
+    def check_polynomial(self, coefficients: tuple[float, ...]) -> None:
+        """Misfit if the head never falls to zero, or rises before that flow."""
+        end = first_root(coefficients)
+        if coefficients[0] <= 0.0 or end is None:
             raise Misfit([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
                                               "[60.0, 0.0, -900.0], 60 m less 900 m at 1 m3/s")])  # fmt: skip
-        slope = np.polynomial.polynomial.polyder(found)
+        slope = np.polynomial.polynomial.polyder(coefficients)
         flows = np.linspace(0.0, end, 1001)
         rises = np.flatnonzero(np.polynomial.polynomial.polyval(flows, slope) > 0.0)
         if rises.size:
@@ -117,16 +119,16 @@ class HeadCurve(Value):
 
 
 def first_root(coefficients: tuple[float, ...]) -> float | None:
-    """The least flow above 0 at which a polynomial is 0."""
+    """Least positive root of a polynomial of the flow; None without such a root."""
     roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b")) if any(coefficients) else []
     real = [float(root.real) for root in roots if abs(root.imag) <= 1e-12 * abs(root) and root.real > 0.0]
     return min(real, default=None)
 
 
 class Efficiency(Value):
-    """A number, or points { flow, efficiency }."""
+    """Efficiency of a pump: a number, or points { flow, efficiency }."""
 
-    about = "hydraulic power over power at the shaft: at the rated point, or over flow; 0.75 if left out"
+    about = "efficiency, hydraulic power over shaft power: at the rated point, or over flow; 0.75 if left out"
     takes = "-, or `{ flow = [...], efficiency = [...] }`"
     changes = PROFILE
     number = Number(between(0, 1, open=True))
@@ -135,10 +137,10 @@ class Efficiency(Value):
         if isinstance(given, CurvePoints):
             return given
         if isinstance(given, dict):
-            found = points(given, "efficiency", "number", setting, between(0, 1))
-            if not any(q > 0.0 and eta > 0.0 for q, eta in zip(found.flow, found.value, strict=True)):
-                raise Misfit([(("efficiency",), "wanted one above 0 at a flow above 0")])
-            return found
+            curve = points(given, "efficiency", "number", setting, between(0, 1))
+            if not any(q > 0.0 and eta > 0.0 for q, eta in zip(curve.flow, curve.value, strict=True)):
+                raise Misfit([(("efficiency",), "expected a value above 0 at a flow above 0")])
+            return curve
         return self.number.read(given, setting)
 
     def json(self) -> dict[str, Any]:
@@ -146,9 +148,9 @@ class Efficiency(Value):
 
 
 class ShaftPower(Value):
-    """Points { flow, power }."""
+    """Shaft power of a pump: points { flow, power }."""
 
-    about = "power at the shaft [W] over flow, at relative speed 1, in place of efficiency"
+    about = "power at the shaft [W] over flow, at relative speed 1, instead of efficiency"
     takes = "`{ flow = [...], power = [...] }`"
     changes = PROFILE
 
@@ -156,7 +158,9 @@ class ShaftPower(Value):
         if isinstance(given, CurvePoints):
             return given
         if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is no table; wanted one such as {{ flow = [0, "50 l/s"], power = [...] }}')
+            raise ValueError(
+                f'{show(given)} is not a table; expected for example {{ flow = [0, "50 l/s"], power = [...] }}'
+            )
         return points(given, "power", "power", setting)
 
     def json(self) -> dict[str, Any]:
@@ -165,10 +169,10 @@ class ShaftPower(Value):
 
 @dataclass(frozen=True)
 class SuterTable:
-    """A pump in all four quadrants, H = rated_head (n^2 + v^2) WH(x), T = T_rated (n^2 + v^2) WB(x).
+    """Four-quadrant characteristic of a pump, H = rated_head (n^2 + v^2) WH(x), T = T_rated (n^2 + v^2) WB(x).
 
-    x = pi + atan2(v, n) at equal distances from 0 to 2 pi, v = q / rated_flow, n = speed / rated speed.
-    head, torque : WH and WB
+    x = pi + atan2(v, n) at equal intervals from 0 to 2 pi, v = q / rated_flow, n = speed / rated speed.
+    head, torque : values of WH and WB
     """
 
     rated_flow: float
@@ -178,19 +182,19 @@ class SuterTable:
 
     def table(self) -> dict[str, Any]:
         """What the file would say."""
-        made = {one.name: getattr(self, one.name) for one in fields(self)}
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in made.items()}
+        table = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in table.items()}
 
 
 class Suter(Value):
-    """A table of Suter form."""
+    """A Suter table in a case file."""
 
-    about = "all four quadrants: WH and WB at equal distances of x = pi + atan2(flow / rated, speed / rated)"
+    about = "four-quadrant characteristic: WH and WB at equal intervals of x = pi + atan2(flow / rated, speed / rated)"
     takes = "`{ rated_flow, rated_head, table }`, or `{ rated_flow, rated_head, head = [...], torque = [...] }`"
     keys = {
         "rated_flow": (Quantity("flow", positive), NEEDED),
         "rated_head": (Quantity("head", positive), NEEDED),
-        "table": (Choice("table", SUTER_TABLES, "a published one"), None),
+        "table": (Choice("table", SUTER_TABLES, "a published table"), None),
         "head": (Rows("number"), ()),
         "torque": (Rows("number"), ()),
     }
@@ -199,27 +203,32 @@ class Suter(Value):
         if isinstance(given, SuterTable):
             return given
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table; wanted one with keys {', '.join(self.keys)}")
-        found = read_keys(given, self.keys, setting)
-        table = found.pop("table")
+            raise ValueError(f"{show(given)} is not a table; expected keys {', '.join(self.keys)}")
+        values = read_keys(given, self.keys, setting)
+        table = values.pop("table")
         if table is not None and ("head" in given or "torque" in given):
-            raise Misfit([(("table",), "says head and torque; leave one or the other out")])
+            raise Misfit([(("table",), "gives head and torque; remove table, or head and torque")])
         if table is not None:
-            found["head"], found["torque"] = SUTER_TABLES[table]
-        head, torque, faults = found["head"], found["torque"], []
+            values["head"], values["torque"] = SUTER_TABLES[table]
+        head, torque, faults = values["head"], values["torque"], []
         if len(head) != len(torque):
-            faults.append((("torque",), f"{len(torque)} values for {len(head)} of head; wanted as many of both"))
+            faults.append((("torque",), f"{len(torque)} values for {len(head)} of head; expected equal numbers"))
         if not head and not torque:
-            raise Misfit([((), f"wanted table, or head and torque; tables are {', '.join(SUTER_TABLES)}")])
-        for key, row in (("head", head), ("torque", torque)):
-            if len(row) < 9:
-                faults.append(((key,), f"{len(row)} values; wanted 9 or more, from x = 0 to x = 2 pi"))
-            elif abs(row[0] - row[-1]) > ROUNDING * max(map(abs, row)):
-                faults.append(((key,), f"ends at {row[-1]:g} and begins at {row[0]:g}; x = 2 pi is x = 0 again"))
+            raise Misfit([((), f"table, or head and torque, is missing; tables are {', '.join(SUTER_TABLES)}")])
+        for key, series in (("head", head), ("torque", torque)):
+            if len(series) < 9:
+                faults.append(((key,), f"{len(series)} values; expected at least 9, from x = 0 to x = 2 pi"))
+            elif abs(series[0] - series[-1]) > ROUNDING * max(map(abs, series)):
+                faults.append(
+                    (
+                        (key,),
+                        f"ends at {series[-1]:g} and begins at {series[0]:g}; x = 2 pi is x = 0 again",
+                    )
+                )
         if faults:
             raise Misfit(faults)
-        found["head"], found["torque"] = ((*row[:-1], row[0]) for row in (head, torque))
-        return SuterTable(**found)
+        values["head"], values["torque"] = ((*series[:-1], series[0]) for series in (head, torque))
+        return SuterTable(**values)
 
     def json(self) -> dict[str, Any]:
         return keys_json(self.keys)

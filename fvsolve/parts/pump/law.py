@@ -1,8 +1,8 @@
-"""A pump: its speed, the torque of the fluid on its shaft, its check valve. Knows one pump; knows no network.
+"""Pump: speed, torque of the fluid on the shaft, and check valve.
 
-While its motor holds the speed, that is a schedule; once tripped, or where given torques turn the shaft from the
-start, J d(omega)/dt = motor torque - torque of the fluid, in relative speed n = omega / rated speed. The fluid's
-torque is n^2 P(q / n) / rated speed with P the shaft's power at rated speed, or that of a Suter table.
+While the motor holds the speed, the speed follows a schedule. After a trip, or with given torques from the start,
+J d(omega)/dt = motor torque - torque of the fluid, in relative speed n = omega / rated speed. The torque of the fluid
+is n^2 P(q / n) / rated speed, P the shaft power at rated speed, or that of a Suter table.
 """
 
 from math import sqrt
@@ -31,28 +31,27 @@ from fvsolve.parts.pump.law_curve import (
     suter_value,
 )
 
-# Numbers of a pump: how its speed comes about, whether it has a check valve, the schedule of its trip, the relative
-# speed from which the shaft then runs free, J times rated speed [N m s], torque that is not balanced at the start and
-# the fluid's there [N m], rated speed [rad/s], points of P or a Suter table's rated torque, how many given torques,
-# whether its power at the shaft is known; then pairs of schedule and value at the start of given torques, then the
-# points of P (flows, then powers) or WB. Where a table is joined, behind P stand its rated torque, what WB lacks at the
-# last flow, and WB.
+# Numbers of a pump: mode of its speed; 1 with a check valve; schedule of the trip; relative speed at which the shaft
+# begins to run free; J times rated speed [N m s]; unbalanced torque and torque of the fluid at the start [N m]; rated
+# speed [rad/s]; number of points of P, or rated torque of a Suter table; number of given torques; 1 if the shaft power
+# is known. Then pairs (schedule, value at the start) of given torques, then the points of P (flows, then powers) or WB.
+# With a joined table, these follow P: rated torque, correction of WB at the last flow, and WB.
 MODE, CHECK, TRIP, HELD, INERTIA, OFFSET, TORQUE, RATED, COUNT_OR_TORQUE, GIVEN, KNOWN, OWN_NUMBERS = range(12)
 HELD_SPEED, TRIPPING, TURNED = 0, 1, 2  # modes
-STEEPEST = 8.0  # d(torque) / d(speed) of a Suter table, over rated and over n + v, at most
-BAR, STILL = 1e5, 1e-9  # a flow, over that at one bar, that is none yet
-OUTSIDE = 1e-6  # share of a flow that is not yet outside the curve
+STEEPEST = 8.0  # bound of d(torque) / d(speed) of a Suter table, over the rated torque and n + v
+BAR, STILL = 1e5, 1e-9  # flow regarded as zero, over the flow at 1 bar
+OUTSIDE = 1e-6  # tolerance of the range of the curve, over its flow scale
 
 
 @njit
 def tripped(t, tables, device):
-    """Whether the motor no longer holds the speed; a step that ends at the trip has not yet tripped."""
+    """True if the motor no longer holds the speed; false in a step that ends at the trip."""
     return schedule_value(tables, int(tables.floats[device["data"] + TRIP]), t) > 0.0
 
 
 @njit
 def pump_speed(t, y, tables, device):
-    """Relative speed."""
+    """Relative speed of the shaft."""
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     if mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device)):
@@ -62,7 +61,7 @@ def pump_speed(t, y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Its speed, and whether its check valve lets anything pass."""
+    """Write the speed and the conductance, which is 0 behind a shut check valve."""
     layout, k, floats = tables.layout[0], device["valve"], tables.floats
     shut = floats[device["data"] + CHECK] > 0.0 and tables.armed[device["event"]] > 0.0
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
@@ -71,7 +70,7 @@ def set(t, y, out, tables, device):
 
 @njit
 def pump_point(out, tables, device):
-    """(relative speed, flow [m3/s], density [kg/m3]) of a pump whose nodes are closed."""
+    """(relative speed, flow [m3/s], density [kg/m3]) of a pump after the nodes are solved."""
     layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
     return out[layout["drive"] + k], out[layout["valve"] + k] / rho, rho
@@ -79,7 +78,7 @@ def pump_point(out, tables, device):
 
 @njit
 def pump_torque(out, tables, device):
-    """Torque that the fluid asks of the shaft [N m]."""
+    """Torque of the fluid on the shaft, against the rotation [N m]."""
     n, q, rho = pump_point(out, tables, device)
     curve, dense = tables.valves[device["valve"]]["data"], rho / tables.settings[0]["rho"]
     return fluid_torque(tables.floats, device["data"], curve, n, q, dense)
@@ -87,7 +86,7 @@ def pump_torque(out, tables, device):
 
 @njit
 def fluid_torque(floats, at, curve, n, q, dense):
-    """The same at a relative speed, a flow [m3/s] and a density over that of the case."""
+    """Torque of the fluid [N m] at a relative speed, a flow [m3/s] and a density over that of the case."""
     table = at + OWN_NUMBERS + 2 * int(floats[at + GIVEN])
     if floats[curve + LAW] == SUTER:
         rated = dense * floats[at + COUNT_OR_TORQUE]
@@ -104,7 +103,7 @@ def fluid_torque(floats, at, curve, n, q, dense):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """d/dt of the relative speed of a shaft that runs free, and its rate."""
+    """Write d/dt of the relative speed of a free shaft, and its rate limit."""
     floats, at = tables.floats, device["data"]
     mode = floats[at + MODE]
     if mode == HELD_SPEED:
@@ -125,7 +124,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def given_torque(t, tables, device, change):
-    """Sum of the torques given to the shaft, or its `change` since the start [N m]."""
+    """Sum of the given torques on the shaft, or its `change` since the start [N m]."""
     floats, total = tables.floats, 0.0
     for k in range(int(floats[device["data"] + GIVEN])):
         own = device["data"] + OWN_NUMBERS + 2 * k
@@ -135,7 +134,7 @@ def given_torque(t, tables, device, change):
 
 @njit
 def shaft_rate(out, tables, device, torque):
-    """Greatest rate at which the fluid brakes a free shaft [1/s]."""
+    """Upper bound of the rate at which the fluid brakes a free shaft [1/s]."""
     floats, at, curve = tables.floats, device["data"], tables.valves[device["valve"]]["data"]
     n, q, _ = pump_point(out, tables, device)
     if floats[curve + LAW] == SUTER or floats[curve + JOIN] > 0.0:
@@ -148,7 +147,7 @@ def shaft_rate(out, tables, device, torque):
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power given to the shaft, rate of what it stores, power that the fluid takes from it [W]."""
+    """Power given to the shaft, rate of its kinetic energy, and power taken from it by the fluid [W]."""
     floats, at = tables.floats, device["data"]
     if floats[at + KNOWN] == 0.0:
         return 0.0, 0.0, 0.0
@@ -163,7 +162,7 @@ def power(t, y, dydt, out, tables, device):
 
 @njit
 def stored(y, tables, device):
-    """Energy of a free shaft, change since it was let go [J]."""
+    """Change of the kinetic energy of a free shaft since it began to run free [J]."""
     floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
         return 0.0
@@ -173,13 +172,13 @@ def stored(y, tables, device):
 
 @njit
 def unreversed(valve):
-    """Flow backwards that is none yet [kg/s]: behind another that is shut, an open one stays open without flow."""
+    """Reverse flow below which the check valve stays open [kg/s]: next to a shut valve it stays open without flow."""
     return STILL * sqrt(BAR * valve["conductance"])
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g of its check valve: flow left while open [kg/s], drop that opens it while shut [Pa]; and the same negative."""
+    """g of the check valve: flow above the margin if open [kg/s], opening drop if shut [Pa]; then its negative."""
     layout, k, at = tables.layout[0], device["valve"], device["event"]
     valve, floats = tables.valves[k], tables.floats
     g[at], g[at + 1] = 1.0, 1.0
@@ -194,24 +193,24 @@ def events(t, y, out, tables, device, g):
 
 
 @njit
-def value(t, y, out, tables, device, which):
-    """Its head [m], relative speed, torque of the fluid [N m], power at the shaft [W]."""
+def value(t, y, out, tables, device, quantity):
+    """Head [m], relative speed, torque of the fluid [N m] or power at the shaft [W], by number."""
     floats = tables.floats
     n, q, _ = pump_point(out, tables, device)
-    if which == 0:
+    if quantity == 0:
         return curve_head(floats, tables.valves[device["valve"]]["data"], n, q)[0]
-    if which == 1:
+    if quantity == 1:
         return n
     torque = pump_torque(out, tables, device)
-    return torque if which == 2 else torque * n * floats[device["data"] + RATED]
+    return torque if quantity == 2 else torque * n * floats[device["data"] + RATED]
 
 
 @njit
 def outside(out, tables, device):
-    """1 where it works outside its curve, backwards or beyond the last flow; a Suter table has no outside.
+    """1 where the pump works outside its curve, at reverse flow or beyond the last flow; 0 for a Suter table.
 
-    PASSING where a table is joined to it, and where it runs down behind a check valve: slower than at the start,
-    forward, by a flow its curve then held.
+    PASSING with a joined table, and while the pump runs down with a check valve: slower than at the start, with a
+    forward flow that was within the curve at the initial speed.
     """
     floats, curve = tables.floats, tables.valves[device["valve"]]["data"]
     if floats[curve + LAW] == SUTER:
@@ -232,20 +231,20 @@ def outside(out, tables, device):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s by its curve, which asks for the drop of heads at the density before it."""
+    """a, s of the Newton step, from the drop of heads at the upstream density."""
     rho, fall = head_drop(tables, out, k)
     return pump_step(tables, out, k, rho, g, m, fall)
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """d flow / d drop [kg/s/Pa]; none behind its shut check valve."""
+    """d flow / d drop [kg/s/Pa]; 0 with a shut check valve."""
     m = out[tables.layout[0]["valve"] + k]
     return pump_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
 
 
 @njit
 def pump_step(tables, out, k, rho, g, m, drop):
-    """`curve_step` of a pump whose fluid has the density rho [kg/m3], at the speed that it has."""
+    """`curve_step` of a pump at its present speed, for fluid of density rho [kg/m3]."""
     at, speed = tables.valves[k]["data"], out[tables.layout[0]["drive"] + k]
     return curve_step(tables.floats, at, speed, rho, rho * tables.settings[0]["gravity"], g, m, drop)

@@ -1,13 +1,13 @@
-"""Head curves of pumps at any speed. Knows one curve and its numbers; knows no network and no pressure.
+"""Head curves of pumps at any speed.
 
-H = n^2 f(q / n), n the relative speed (affinity). f is a law between two flows `first` and `last` [m3/s] at n = 1:
-a - b q^c, straight lines between points, a polynomial. Beyond them it goes on with its slope, before `first` along a
-line and beyond `last` along a parabola a' - b' q^2, which is what a pump at rest is too; flow backwards adds b' q^2,
-and where `first` is above 0, as it is for a curve that is flat at no flow, the line ends at as much flow backwards.
-With a table of Suter form, H = (n^2 + v^2) WH(pi + atan2(v, n)) [rated heads], v the flow over the rated one.
-A curve may have such a table joined to it in place of line and parabolas: outside of 0 <= q <= n `last`, n > 0, where
-WH gets what it lacks at either end of the curve, less and less of it until the pump stands, x = pi / 2 (this by the
-values of the table already) and 3 pi / 2.
+H = n^2 f(q / n), n the relative speed (affinity). Between two flows `first` and `last` [m3/s] at n = 1, f is
+a - b q^c, linear between points, or a polynomial. It continues with equal slope: below `first` as a line, beyond
+`last` as a parabola a' - b' q^2, which also holds for a pump at rest. Reverse flow adds b' q^2. Where `first` is above
+0 (a curve that is flat at no flow), the line ends at the reverse flow -`first`.
+With a Suter table, H = (n^2 + v^2) WH(pi + atan2(v, n)) [rated heads], v the flow over the rated flow.
+A Suter table may be joined to a curve instead of line and parabolas. It holds outside of 0 <= q <= n `last`, n > 0.
+There WH is corrected so that it agrees with both ends of the curve; the corrections fade to zero at standstill,
+x = pi / 2 (already in the values of the table) and x = 3 pi / 2.
 """
 
 from math import atan2, pi, sqrt
@@ -15,21 +15,20 @@ from math import atan2, pi, sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.valves import LEAST
 
-NEAR = 1e-9  # change of flow, relative, over which a chord is a tangent
+NEAR = 1e-9  # relative change of flow below which the tangent replaces the chord
 
 POWER, POINTS, POLYNOMIAL, SUTER = 0, 1, 2, 3  # laws of head curves
-# Numbers of a curve: law, how many, first, last, a', b', scale of flows, at which of them those of what is joined
-# begin, 0 where nothing is, then a, b, c | flows, heads | coefficients | rated head, rated flow and WH. Those of a law
-# begin at OWN.
+# Numbers of a curve: law, count, first, last, a', b', scale of flows, offset of the joined table (0 without a table).
+# Then, from OWN on: a, b, c | flows, heads | coefficients | rated head, rated flow and WH.
 LAW, COUNT, FIRST, LAST, TAIL_HEAD, TAIL, SCALE, JOIN, OWN = 0, 1, 2, 3, 4, 5, 6, 7, 8
-# Numbers of what is joined: rated head, rated flow, values of the table, atan2(v, n) of the last flow, then what WH
-# lacks there, and WH. WB has these two likewise.
+# Numbers of a joined table: rated head, rated flow, count of values, atan2(v, n) of the last flow, then the correction
+# of WH there, and WH. The numbers of WB have the last two as well.
 RATED_HEAD, RATED_FLOW, VALUES, EDGE, LACKS = 0, 1, 2, 3, 4
 
 
 @njit
 def piecewise(floats, at, count, x):
-    """(value, slope) of straight lines between points : count places, then count values."""
+    """(value, slope) of a piecewise linear function : count abscissas, then count values."""
     k = 1
     while k < count - 1 and x > floats[at + k]:
         k += 1
@@ -55,7 +54,7 @@ def base_head(floats, at, x):
 
 @njit
 def suter_value(floats, at, count, speed, flow):
-    """(value, d/d flow) of a Suter function times (speed^2 + flow^2), both over rated; its table covers 0 to 2 pi."""
+    """(value, d/d flow) of a Suter function times (speed^2 + flow^2), relative to rated; x from 0 to 2 pi."""
     square, place = speed * speed + flow * flow, (pi + atan2(flow, speed)) / (2.0 * pi) * (count - 1)
     k = min(int(place), count - 2)
     rise = floats[at + k + 1] - floats[at + k]
@@ -65,17 +64,17 @@ def suter_value(floats, at, count, speed, flow):
 
 @njit
 def leaves(floats, at, speed, flow):
-    """Whether a pump is outside its curve where a table is joined to it."""
+    """True if a pump with a joined table works outside its curve."""
     return floats[at + JOIN] > 0.0 and not (speed > 0.0 and 0.0 <= flow <= speed * floats[at + LAST])
 
 
 @njit
-def joined_value(floats, join, lacks, speed, flow):
-    """`suter_value`, at a flow over the rated one, of what stands at `lacks`: a lack at the last flow, and a table."""
-    value, slope = suter_value(floats, lacks + 1, int(floats[join + VALUES]), speed, flow)
+def joined_value(floats, join, correction_at, speed, flow):
+    """`suter_value` of a joined table with its correction; `correction_at` : index of correction, then table."""
+    value, slope = suter_value(floats, correction_at + 1, int(floats[join + VALUES]), speed, flow)
     angle, edge, fade, steep = atan2(flow, speed), floats[join + EDGE], 0.0, 0.0
     if edge <= angle < 0.5 * pi:
-        steep = -floats[lacks] / (0.5 * pi - edge)
+        steep = -floats[correction_at] / (0.5 * pi - edge)
         fade = steep * (angle - 0.5 * pi)
     return value + (speed * speed + flow * flow) * fade, slope + 2.0 * flow * fade + speed * steep
 
@@ -100,14 +99,14 @@ def curve_head(floats, at, speed, flow):
     head, slope = n * n * head, n * slope
     if flow >= first:
         return head, slope
-    if first > 0.0 and flow < -first:  # a line that only softens the curve near no flow ends there
+    if first > 0.0 and flow < -first:  # the line only smooths the curve near no flow
         return head - 2.0 * slope * first + tail * flow * flow, 2.0 * tail * flow
     return head + slope * (flow - first) + tail * min(flow, 0.0) ** 2, slope - 2.0 * tail * abs(min(flow, 0.0))
 
 
 @njit
 def curve_flow(floats, at, speed, head, flow):
-    """The flow [m3/s] at which the curve has a head [m], by safeguarded Newton from `flow`."""
+    """Flow [m3/s] at which the curve has a head [m], by safeguarded Newton from `flow`."""
     low, high, scale = -1e300, 1e300, floats[at + SCALE]
     for _ in range(200):
         value, slope = curve_head(floats, at, speed, flow)
@@ -119,12 +118,12 @@ def curve_flow(floats, at, speed, head, flow):
             high = flow
         reach = 4.0 * (abs(flow) + scale)
         step = max(-reach, min(reach, (value - head) / -slope)) if slope < 0.0 else (reach if value > head else -reach)
-        new = flow + step
+        next_flow = flow + step
         if min(abs(step), high - low) <= 2e-16 * (abs(flow) + 1e-6 * scale):
-            return new
-        if not low < new < high:
-            new = 0.5 * (low + high)
-        flow = new
+            return next_flow
+        if not low < next_flow < high:
+            next_flow = 0.5 * (low + high)
+        flow = next_flow
     return flow
 
 
@@ -132,14 +131,14 @@ def curve_flow(floats, at, speed, head, flow):
 def curve_step(floats, at, speed, rho, weight, g, m, drop):
     """a, s with dM = a + s d(drop) for the next Newton step of a pump that carries m [kg/s] at a drop [Pa].
 
-    The chord of its curve between the flow now and the flow that the drop asks for stands for its slope, and is no
-    flatter than that of a restriction of conductance g. rho, weight : density and rho g there.
+    Instead of the slope it takes the chord of the curve between the present flow and the flow at the drop. The chord
+    is at least as steep as that of a restriction of conductance g. rho, weight : density and rho g of the fluid.
     """
     head, slope = curve_head(floats, at, speed, m / rho)
-    rest = drop + weight * head
+    residual = drop + weight * head
     chord = -slope * weight / rho
     change = rho * curve_flow(floats, at, speed, -drop / weight, m / rho) - m
     if abs(change) > NEAR * (abs(m) + rho * floats[at + SCALE]):
-        chord = rest / change
+        chord = residual / change
     chord = max(chord, LEAST / sqrt(g))
-    return rest / chord, 1.0 / chord
+    return residual / chord, 1.0 / chord

@@ -1,4 +1,4 @@
-"""Pumps in the tables of a scene, and how they start. Knows one pump at a time; the curve's numbers are its own."""
+"""Pumps in the tables of a model, and their steady state at the start."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from fvsolve.parts.pump.lower_shaft import inertia, shaft_points
 from fvsolve.parts.pump.lower_turning import Turning, numbers_of
 from fvsolve.steady import Edge
 
-SMALL_FLOW = 1e-9  # share of the flows of a scene below which a reversed one is rounding
-FEW, MANY = 20.0, 320.0  # specific speeds that the tables are near
+SMALL_FLOW = 1e-9  # reverse flow regarded as rounding, over the flow scale of the model
+FEW, MANY = 20.0, 320.0  # range of specific speeds that the published tables cover
 
 
 class PumpRows(Turning, Device, kind="pump"):
-    """A restriction that follows its curve; its steady state is that in which no flow passes its check valve back."""
+    """A restriction with a head curve; in the steady state no flow passes its check valve backward."""
 
     law = law
     quantities = ("head", "speed", "torque", "power")
     events = ("check valve shuts", "check valve opens")
     small = 0.01  # relative speed
-    remedy = "give it a check-valve with a time_constant behind it, in place of its own"
+    remedy = "replace its check_valve by a check-valve link with a time_constant"
 
     def inputs(self, model, name, part):
         return {"speed": Input(SPEED, int(self.row_of(model, name)["schedule"]))}
@@ -43,12 +43,12 @@ class PumpRows(Turning, Device, kind="pump"):
 
     def numbers(self, draft, name, part) -> list[float]:
         rated, weight = part.rated_speed or 1.0, draft.fluid.density * draft.case.gravity
-        found, own = self.turning(draft, name, part), shaft_points(part, weight)
-        found |= {
+        numbers, own = self.turning(draft, name, part), shaft_points(part, weight)
+        numbers |= {
             law.CHECK: part.check_valve, law.INERTIA: (inertia(part, weight) or np.inf) * rated, law.RATED: rated,
             law.COUNT_OR_TORQUE: own[0], law.KNOWN: self.resists(part),
         }  # fmt: skip
-        return numbers_of(found, self.given(draft, name), own[1:])
+        return numbers_of(numbers, self.given(draft, name), own[1:])
 
     def resists(self, part) -> bool:
         return not part.inertia is part.trip is part.efficiency is part.shaft_power is part.suter is None
@@ -63,18 +63,18 @@ class PumpRows(Turning, Device, kind="pump"):
         return 0.5 * inertia(part, weight_of(model)) * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
 
     def passing(self, model, name, part, time) -> Notice:
-        """What is to be known of a pump that left its curve, and may have."""
-        when = model.case.amount(time, "time", 6)
+        """Notice of a pump that left its curve in an allowed way."""
+        moment = model.case.amount(time, "time", 6)
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
-            text = (f"{name}: it runs down, from {when} on beyond its curve's last flow, where its head is "
-                    "that of a parabola; with rated_speed a Suter table would tell it")  # fmt: skip
+            text = (f"{name}: it runs down, from {moment} on beyond the last flow of its curve, where its head is "
+                    "that of a parabola; give rated_speed to use a Suter table there")  # fmt: skip
             return Notice("range", f"links.{name}", text, "curve")
         speed = specific_speed(part, *rated)
-        near = table.words if FEW <= speed <= MANY else f"{table.words}, the nearest"
-        text = (f"{name}: it leaves its curve at {when}; outside of it head and torque are those of the Suter "
-                f"table {near}, joined to it, by its specific speed of {speed:.4g} (rpm, m3/s, m); "
-                "of a pump of several stages or inlets suter says it better")  # fmt: skip
+        source = table.words if FEW <= speed <= MANY else f"{table.words}, the nearest"
+        text = (f"{name}: it leaves its curve at {moment}; outside of it head and torque are those of the Suter "
+                f"table {source}, joined to it, by its specific speed of {speed:.4g} (rpm, m3/s, m); "
+                "for a pump of several stages or inlets give suter")  # fmt: skip
         return Notice("range", f"links.{name}", text, "outside", speed)
 
     def edge(self, start, k: int):
@@ -99,10 +99,10 @@ class PumpRows(Turning, Device, kind="pump"):
         return Edge(i, j, newton, float(first), drives=True)
 
     def follow(self, start, k) -> None:
-        """Nothing: `begin` sees to it."""
+        """Do nothing: `begin` sets the drop."""
 
     def lift(self, start, row, flow: float) -> float:
-        """What a pump adds at a mass flow [Pa]."""
+        """Pressure rise of a pump at a mass flow [Pa]."""
         floats, rho = start.draft.tables.floats, start.density_at(int(row["from_node"]))
         at, speed = int(row["data"]), float(row["drive"])
         return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])
@@ -126,13 +126,13 @@ class PumpRows(Turning, Device, kind="pump"):
         ratio = start.density_at(int(valve["from_node"])) / draft.fluid.density
         if valve["open"] > 0.0:
             drop = -self.lift(start, valve, float(valve["flow"]))
-            near = 1e-6 * (abs(drop) + abs(self.lift(start, valve, 0.0))) + 1e-3
-            if abs(drop - valve["drop"] * ratio) > near:
+            tolerance = 1e-6 * (abs(drop) + abs(self.lift(start, valve, 0.0))) + 1e-3
+            if abs(drop - valve["drop"] * ratio) > tolerance:
                 valve["open"] = 0.0
             elif draft.case.law.linear:
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
-            moving.append(f"pump {name}: turns at {valve['drive']:.4g} of its speed without the flow for it")
+            moving.append(f"pump {name}: runs at {valve['drive']:.4g} of its rated speed without the flow of its curve")
         draft.warnings += [
             *drawn_backwards(start, name, part, valve), *off_scale(draft, name, part), *estimated(draft, name, part),
             *at_odds(draft, name, part),
@@ -146,6 +146,6 @@ class PumpRows(Turning, Device, kind="pump"):
 
 
 def weight_of(model) -> float:
-    """rho g of a model's fluid [N/m3]."""
+    """rho g of the fluid of a model [N/m3]."""
     settings = model.tables.settings[0]
     return float(settings["rho"] * settings["gravity"])

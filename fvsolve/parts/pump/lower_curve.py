@@ -1,4 +1,4 @@
-"""Head curves of pumps as the numbers that kernels read. Knows the curves; knows no shaft and no scene."""
+"""Head curves of pumps as numbers for the kernels."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.head_curve import CurvePoints, first_root
 from fvsolve.parts.pump.lower_join import joined_numbers
 
-LEAST_FLOW = 1e-5  # share of the last flow below which a curve that is flat there is a straight line
-HIGHEST, LOWEST = 1000.0, 0.1  # heads between which a pump of constant power keeps it [m]
+LEAST_FLOW = 1e-5  # flow over the last flow, below which a curve that is flat at no flow is replaced by a line
+HIGHEST, LOWEST = 1000.0, 0.1  # range of heads of the curve of a constant-power pump [m]
 
 
 def curve_numbers(part, weight: float) -> list[float]:
-    """Numbers of a pump's head curve, in the order that `law_curve` states; weight = rho g [N/m3]."""
+    """Numbers of the head curve of a pump, in the order of `law_curve`; weight = rho g [N/m3]."""
     if part.suter is not None:
         one = part.suter
         return [
@@ -43,7 +43,7 @@ def curve_numbers(part, weight: float) -> list[float]:
 
 
 def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
-    """(law, how many, first and last flow, own numbers) of a curve that is no Suter table."""
+    """(law, count, first and last flow, own numbers) of a curve that is not a Suter table."""
     if part.power is not None:
         product = part.power / weight
         return curves.POWER, 3, product / HIGHEST, product / LOWEST, [0.0, -product, -1.0]
@@ -74,7 +74,7 @@ def power_law(curve: CurvePoints) -> tuple[float, float, float] | None:
 
 
 def rated_point(part, weight: float) -> tuple[float, float]:
-    """(flow [m3/s], head [m]) where a pump is meant to work: its point, the middle of three, or the greatest q H."""
+    """(flow [m3/s], head [m]) of the rated point: the single point, the middle of three, or the greatest q H."""
     if part.suter is not None:
         return part.suter.rated_flow, part.suter.rated_head
     if part.power is not None:

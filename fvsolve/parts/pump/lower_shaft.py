@@ -1,4 +1,4 @@
-"""Powers at the shafts of pumps, their efficiency and inertia, as kernels read them. Knows curves; knows no scene."""
+"""Shaft power, efficiency and inertia of pumps as numbers for the kernels."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from fvsolve.parts.pump.lower_curve import base_law, curve_numbers, rated_point
 from fvsolve.parts.pump.lower_join import fitted, joined_table
 from fvsolve.parts.pump.part import EFFICIENCY
 
-EVEN = 65  # points of a power by a table over the angle, and as many over the flow
+EVEN = 65  # number of points of a power by a Suter table over the angle, and also over the flow
 
 
 def shaft_points(part, weight: float) -> list[float]:
-    """[how many, flows, powers at the shaft [W]] at relative speed 1; of a Suter table [rated torque, WB].
+    """[count, flows, powers at the shaft [W]] at relative speed 1; for a Suter table [rated torque, WB].
 
     Where a table is joined to the curve its rated torque, what WB lacks at the last flow and WB follow.
     """
@@ -41,7 +41,7 @@ def shaft_points(part, weight: float) -> list[float]:
 
 
 def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[np.ndarray, np.ndarray]:
-    """(flows, powers over the rated one) of a curve by WB, but nowhere less than the rated efficiency asks for."""
+    """(flows, powers over the rated power) of a curve by WB, nowhere below that of the rated efficiency."""
     flows = flow * np.tan(np.linspace(0.0, math.atan2(last, flow), EVEN)[:-1])
     flows = np.unique([*flows, *np.linspace(0.0, last, EVEN), *([flow] if last > flow else [])])
     lifts = np.array([curves.curve_head(numbers, 0, 1.0, float(q))[0] for q in flows]) / head
@@ -51,7 +51,7 @@ def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[
 
 
 def rated_efficiency(part) -> float:
-    """The number that a pump has at its rated point."""
+    """Efficiency of a pump at its rated point."""
     return EFFICIENCY if part.efficiency is None or isinstance(part.efficiency, CurvePoints) else part.efficiency
 
 
@@ -71,7 +71,7 @@ def shaft_power(part, weight: float, flow: float, rated: float) -> tuple[Sequenc
 
 
 def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
-    """Powers at the points of an efficiency over flow, rho g q H / eta; at no flow that of the first one above it."""
+    """Powers at the points of an efficiency over flow, rho g q H / eta; at no flow, the power of the next point."""
     numbers = np.array(curve_numbers(part, weight))
     points = [(q, e) for q, e in zip(part.efficiency.flow, part.efficiency.value, strict=True) if q > 0.0 and e > 0.0]
     flows = [q for q, _ in points]
@@ -81,14 +81,14 @@ def by_efficiency(part, weight: float) -> tuple[list[float], list[float]]:
 
 
 def inertia(part, weight: float) -> float | None:
-    """Of all that turns with the shaft [kg m2]: as given; where a pump that trips has none, as power and speed say."""
+    """Inertia of all rotating masses [kg m2]: as given, or estimated from power and speed for a pump that trips."""
     if part.inertia is not None or part.trip is None:
         return part.inertia
     return usual_inertia(rated_power(part, weight), part.rated_speed)
 
 
 def rated_power(part, weight: float) -> float:
-    """At the shaft, at the rated point [W]."""
+    """Shaft power at the rated point [W]."""
     flow, head = rated_point(part, weight)
     if part.shaft_power is not None:
         return float(np.interp(flow, *shaft_power(part, weight, flow, 0.0)))
@@ -96,7 +96,7 @@ def rated_power(part, weight: float) -> float:
 
 
 def usual_inertia(power: float, speed: float) -> float:
-    """Of impeller, its water and motor, by power at the shaft [W] and speed [rad/s] : [kg m2].
+    """Usual inertia of impeller, its water and motor [kg m2], from shaft power [W] and speed [rad/s].
 
     0.03768 (P / N^3)^0.9556 + 0.0043 (P / N)^1.48, P the power at the shaft at the rated point [kW], N its speed in
     1000 rpm. Regressions that go back to Thorley (Fluid Transients in Pipeline Systems, 1991), read as an open program

@@ -1,4 +1,4 @@
-"""Published tables of Suter form, as printed. Knows numbers and where they stand."""
+"""Published Suter tables of pumps, as printed, with their sources."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from dataclasses import dataclass
 # Double-suction radial pump, specific speed 35 (rpm, m3/s, m; 1800 in US units): R. M. Donsky, "Complete pump
 # characteristics and the effects of specific speeds on hydraulic transients", J. Basic Eng. 83 (1961) 685, as 89 values
 # at x = 0, pi / 44, ..., 2 pi in E. B. Wylie and V. L. Streeter, Fluid Transients (1978). Taken from two programs that
-# carry that table, the Modelica library ThermoSysPro (CentrifugalPump, F_t and G_t) and opensd (HPump); they agree but
-# for the 24th value of WB, 0.883 in the one and 0.882 in the other.
+# carry that table, the Modelica library ThermoSysPro (CentrifugalPump, F_t and G_t) and opensd (HPump); they agree
+# except in the 24th value of WB, 0.883 in the first and 0.882 in the second.
 HEAD_35 = """
  0.634  0.643  0.646  0.640  0.629  0.613  0.595  0.575  0.552  0.533  0.516  0.505
  0.504  0.510  0.512  0.522  0.539  0.559  0.580  0.601  0.630  0.662  0.692  0.722
@@ -33,10 +33,10 @@ TORQUE_35 = """
 # Four more, from diagrams of four quadrants (Karman-Knapp): curves of 100 % of the rated head and torque over flow and
 # speed, so that WH = 1 / (n^2 + v^2) at each of their points and 0 where they go off. The points are those that
 # WHAMO_NETWORKV30 (GitHub, ANIKETPROJECTS; client/src/lib/pump-curves.ts at 89b4e0f) carries from a file
-# QuadrantCurvesPredefined_Pumps.txt, for specific speeds of 1280, 4850, 7500 and 13 500 in US units; which tests they
-# go back to it does not say. Here straight lines between them over the angle, times what makes the rated point 1 / 2
-# (0.951 to 1.009). Its fifth diagram, of 1800, lies within 0.034 of Donsky's WH and 0.039 of his WB in the mean square
-# (0.09 and 0.18 at most), which is how closely these can be believed.
+# QuadrantCurvesPredefined_Pumps.txt, for specific speeds of 1280, 4850, 7500 and 13 500 in US units; the file
+# does not name their tests. Here they are interpolated linearly over the angle and scaled to 1 / 2 at the rated point
+# (factors 0.951 to 1.009). Its fifth diagram, of 1800, is within 0.034 of Donsky's WH and 0.039 of his WB in the mean
+# square (0.09 and 0.18 at most), an estimate of the accuracy of these tables.
 HEAD_25 = """
  0.503  0.580  0.624  0.636  0.624  0.615  0.607  0.589  0.567  0.550  0.532  0.515
  0.504  0.511  0.514  0.525  0.538  0.550  0.562  0.583  0.622  0.656  0.684  0.706
@@ -121,7 +121,7 @@ TORQUE_260 = """
 
 @dataclass(frozen=True)
 class Quadrants:
-    """WH and WB at equal distances of x from 0 to 2 pi, and in words whose they are."""
+    """WH and WB at equal intervals of x from 0 to 2 pi, and the names of their tables."""
 
     head: tuple[float, ...]
     torque: tuple[float, ...]
@@ -142,8 +142,8 @@ SUTER_TABLES = {
 
 
 def quadrants(speed: float) -> Quadrants:
-    """The table of a specific speed (rpm, m3/s, m): between two in the logarithm of it, or the nearest beyond them."""
-    names, logs = list(SPEEDS), [math.log(one) for one in SPEEDS.values()]
+    """Table of a specific speed (rpm, m3/s, m): interpolated over its logarithm; the nearest table out of range."""
+    names, logs = list(SPEEDS), [math.log(value) for value in SPEEDS.values()]
     place = min(max(math.log(speed), logs[0]), logs[-1])
     k = max(j for j in range(len(logs) - 1) if logs[j] <= place)
     share = (place - logs[k]) / (logs[k + 1] - logs[k])

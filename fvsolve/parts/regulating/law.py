@@ -1,8 +1,8 @@
-"""A valve that moves until what it senses is as set. Knows one valve; knows no network.
+"""Control valve that moves until the sensed quantity has its set value.
 
-dx/dt = error / (band T), 0 <= x <= 1, M |M| = G x^2 dP. armed[event] says that it holds back reversed flow,
-armed[event + 2] that it stands fully open, armed[event + 4] that it stands on its seat: these change on accepted
-states alone. Where it alone holds a rigid column, it leads that from its seat (armed[event + 6]): `devices.lead`.
+dx/dt = error / (band T), 0 <= x <= 1, M |M| = G x^2 dP. armed[event] : shut against reverse flow;
+armed[event + 2] : fully open; armed[event + 4] : on its seat. These flags change on accepted states only. If it is the
+only valve at a rigid column, it controls the flow of the column near its seat (armed[event + 6]).
 """
 
 from math import sqrt
@@ -17,22 +17,22 @@ from fvsolve.kernels.schedules import schedule_value
 
 REDUCING, SUSTAINING, FLOW_CONTROL = 0, 1, 2  # modes
 OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys
-AT_REST = 1e-10  # error, as a share of the band, that does not lift it off a stop: rounding must not
-SETTLED = 0.5 * AT_REST  # by which it comes to rest sooner than it leaves
+AT_REST = 1e-10  # error over the band below which it stays at a stop, so that rounding does not move it
+SETTLED = 0.5 * AT_REST  # margin by which it reaches a stop earlier than it leaves it
 ALMOST_SHUT = 1e-6  # opening below which its flow may be rounding
-RETURNS = 0.5  # share of the lift up to which it leads its column, below which it takes the lead again
-RELUCTANCE = 1e-3  # drop below which it stays shut against reversed flow [Pa]
+RETURNS = 0.5  # fraction of the control lift below which it controls its column again
+RELUCTANCE = 1e-3  # drop below which it stays shut against reverse flow [Pa]
 
 
 @njit
 def regulator_opening(y, tables, device):
-    """Stem position x, beyond its stops by rounding at most."""
+    """Stem position x; it may exceed its stops by rounding."""
     return tables.floats[device["data"] + OPENING] + y[device["y"]]
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Its conductance G x^2; none while it holds back reversed flow."""
+    """Write the conductance G x^2; 0 while shut against reverse flow."""
     k, x = device["valve"], min(max(regulator_opening(y, tables, device), 0.0), 1.0)
     back = tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if back else tables.valves[k]["conductance"] * x * x
@@ -58,7 +58,7 @@ def stroke(tables, device):
 
 @njit
 def regulator_error(t, out, tables, device):
-    """What asks it to open, as a share of its band: set less sensed, but sensed less set where it sustains."""
+    """Control error over the band, positive to open: set minus sensed value; sensed minus set if it sustains."""
     layout, floats, data = tables.layout[0], tables.floats, device["data"]
     valve = tables.valves[device["valve"]]
     change = schedule_value(tables, device["schedule"], t) - floats[data + SET]
@@ -73,7 +73,7 @@ def regulator_error(t, out, tables, device):
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """dx/dt, none against a stop; and its greatest rate."""
+    """Write dx/dt, 0 at a stop, and the rate limit."""
     out[RATE] = max(out[RATE], regulator_rate(y, out, tables, device))
     if dydt.size == 0:
         return
@@ -84,7 +84,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def regulator_rate(y, out, tables, device):
-    """How fast the loop through what it senses can be [1/s]; where a column sets its flow, d dP / dx = -2 dP / x."""
+    """Rate of the control loop [1/s]; if a column sets the flow, d dP / dx = -2 dP / x."""
     k, speed = device["valve"], 1.0 / stroke(tables, device)
     drop = abs(head_drop(tables, out, k)[1])
     if device["mode"] == FLOW_CONTROL:
@@ -97,7 +97,7 @@ def regulator_rate(y, out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: flow that is left or drop beyond what opens it, way to full opening, way to its seat; each both ways."""
+    """g: flow, or drop above the opening margin; distance to full opening; distance to the seat; each both ways."""
     layout, armed = tables.layout[0], tables.armed
     at, x, error = device["event"], regulator_opening(y, tables, device), regulator_error(t, out, tables, device)
     drop, back = head_drop(tables, out, device["valve"])[1], 1.0
@@ -110,7 +110,7 @@ def events(t, y, out, tables, device, g):
     full, seat = -error - AT_REST, error - AT_REST
     if armed[at + 2] == 0.0:
         full = max(full + SETTLED, 1.0 - x)
-    if armed[at + 4] == 0.0:  # a column that it leads holds it back, as it did not on its seat
+    if armed[at + 4] == 0.0:  # a controlled column delays it, unlike on the seat
         seat = max(error + (AT_REST if leads(tables, device["valve"]) else -SETTLED), x)
     either(tables, g, at, back)
     either(tables, g, at + 2, full)
@@ -121,6 +121,6 @@ def events(t, y, out, tables, device, g):
 
 
 @njit
-def value(t, y, out, tables, device, which):
-    """Its opening, 0 to 1."""
+def value(t, y, out, tables, device, quantity):
+    """Opening, 0 to 1."""
     return min(max(regulator_opening(y, tables, device), 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""Valves that regulate by themselves in the tables of a scene, and how they stand in its steady state."""
+"""Control valves in the tables of a model, and their state in the steady solution."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from fvsolve.model.inputs import FLOW, SET_PRESSURE, Input
 from fvsolve.parts.regulating import law
 from fvsolve.steady import Edge
 
-SMALL_FLOW = 1e-9  # share of the flows of a scene below which one is rounding
-SMALL_PRESSURE = 1e-3  # likewise [Pa]
+SMALL_FLOW = 1e-9  # flow regarded as rounding, over the flow scale of the model
+SMALL_PRESSURE = 1e-3  # pressure regarded as rounding [Pa]
 OPEN, ACTIVE = "open", "active"  # as EPANET calls them; in `start.shut`, closed
 
 
 class Here(NamedTuple):
-    """One of them in a steady solution: potentials at its ends and as set [Pa], flow, its loss at full opening [Pa]."""
+    """A valve in a steady solution: potentials at its ends and set potential [Pa], flow, loss at full opening [Pa]."""
 
     start: object
     k: int
@@ -34,7 +34,7 @@ class Here(NamedTuple):
 
 
 class Regulator(Device, kind=""):
-    """Active, it keeps what it senses as set; else it stands open or shut. Its stem is a state."""
+    """Active, it keeps the sensed quantity at its set value; else it is open or shut. Its opening is a state."""
 
     law, leads = law, 6
     states = ("opening",)
@@ -42,7 +42,7 @@ class Regulator(Device, kind=""):
     events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening", "is shut",
               "leaves its seat", "", "")  # fmt: skip
     remedy = "give it a longer time_constant"
-    key, end, verb = "set_pressure", "", ""  # what is set, at which end it is sensed, what it does
+    key, end, verb = "set_pressure", "", ""  # key of the set value, end at which it is sensed, verb for messages
 
     def numbers(self, draft, name, part) -> list[float]:
         scale = 1.0 if self.end else draft.fluid.density
@@ -55,7 +55,7 @@ class Regulator(Device, kind=""):
         return [0.0, 0.0, 0.0, band, part.time_constant]
 
     def reach(self, draft, name, part) -> None:
-        """A fault where no source can bring the pressure that is set."""
+        """Report a fault if no source can supply the set pressure."""
         nodes, case = draft.case.nodes.values(), draft.case
         if any(node.kind not in ("reservoir", "tank", "junction") for node in nodes) or "pump" in kinds_of(case):
             return  # pressure comes from elsewhere too
@@ -64,10 +64,10 @@ class Regulator(Device, kind=""):
         least = float(np.min(part.set_pressure.value))
         head = (least - case.ambient_pressure) / weight + (case.elevation(place) or 0.0)
         if head > best:
-            told = case.amount
-            what = (f"{told(least, 'pressure', 6)} at {place} is a head of {told(head, 'head')}, above every source: "
-                    f"{source} has {told(best, 'head')}")  # fmt: skip
-            draft.fault(f"links.{name}.set_pressure", f"{what}; it would never {self.verb}, set it lower")
+            amount = case.amount
+            text = (f"{amount(least, 'pressure', 6)} at {place} is a head of {amount(head, 'head')}, above every "
+                    f"source: {source} has {amount(best, 'head')}")  # fmt: skip
+            draft.fault(f"links.{name}.set_pressure", f"{text}; the valve would never {self.verb}; set it lower")
 
     def inputs(self, model, name, part):
         schedule = int(self.row_of(model, name)["schedule"])
@@ -79,12 +79,12 @@ class Regulator(Device, kind=""):
         return [0.1]
 
     def given(self, start, k: int) -> float:
-        """What is set at the start: a pressure [Pa], or a mass flow [kg/s]."""
+        """Set value at the start: pressure [Pa] or mass flow [kg/s]."""
         row = start.draft.device_table[start.valves[k]["device"]]
         return start.given(row["schedule"])
 
     def target(self, start, k: int) -> float:
-        """The same, of a pressure as a potential [Pa]."""
+        """Set value at the start, a pressure as potential [Pa]."""
         if not self.end:
             return self.given(start, k)
         return start.law.potential_of(self.given(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
@@ -93,7 +93,7 @@ class Regulator(Device, kind=""):
         return int(start.valves[k][f"{self.end}_node"])
 
     def free(self, start, k: int) -> bool:
-        """Whether the flow through it can set what it senses."""
+        """True if the flow through the valve can change the sensed quantity."""
         return not self.end or bool(np.isnan(start.held[self.sensed(start, k)]))
 
     def stands(self, start, k: int) -> str:
@@ -125,7 +125,7 @@ class Regulator(Device, kind=""):
         return after != before
 
     def next(self, here: Here, now: str) -> str:
-        """As what it should stand in the next solution, by EPANET's rules."""
+        """State of the valve in the next solution, by the rules of EPANET."""
         raise NotImplementedError
 
     def begin(self, start, part, row) -> list[str]:
@@ -145,7 +145,7 @@ class Regulator(Device, kind=""):
         return []
 
     def error(self, start, k: int) -> float:
-        """What asks it to open at the start, in the unit of what it senses."""
+        """Control error at the start, positive to open, in the unit of the sensed quantity."""
         given = self.given(start, k)
         if not self.end:
             return given - float(start.valves[k]["flow"])
@@ -153,14 +153,14 @@ class Regulator(Device, kind=""):
         return given - pressure if self.end == "to" else pressure - given
 
     def refuse(self, start, k: int) -> None:
-        """A fault: nothing that it could do keeps what it senses as set."""
+        """Report a fault: no opening keeps the sensed quantity at its set value."""
         name = start.draft.valve_names[k]
-        start.draft.fault(f"links.{name}.{self.key}", "no steady state: what is drawn beyond it hangs on it alone, "
-                          'and leaves it nothing to set; change the demand, or use initial = "rest"')  # fmt: skip
+        start.draft.fault(f"links.{name}.{self.key}", "no steady state: the valve alone supplies a given demand, "
+                          'so it cannot set its quantity; change the demand, or use initial = "rest"')  # fmt: skip
 
 
 class PressureReducingRows(Regulator, kind="pressure-reducing"):
-    """Keeps the pressure at `to` down: open where even full opening leaves less, shut where others bring more."""
+    """Limits the pressure at `to`: open if it is lower even at full opening, shut if other sources keep it higher."""
 
     mode, end, verb = law.REDUCING, "to", "reduce"
 
@@ -176,7 +176,7 @@ class PressureReducingRows(Regulator, kind="pressure-reducing"):
 
 
 class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
-    """Keeps the pressure at `from` up: open where even full opening leaves more, shut where there is less."""
+    """Keeps the pressure at `from` up: open if it is higher even at full opening, shut if it is lower."""
 
     mode, end, verb = law.SUSTAINING, "from", "open"
 
@@ -192,7 +192,7 @@ class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
 
 
 class FlowControlRows(Regulator, kind="flow-control"):
-    """Keeps the flow down: open where even full opening lets less pass."""
+    """Limits the flow: open if even full opening passes less."""
 
     mode, key = law.FLOW_CONTROL, "set_flow"
 

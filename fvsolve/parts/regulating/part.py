@@ -1,4 +1,4 @@
-"""Valves that regulate a pressure or a flow by themselves. Knows their set points; moves nothing."""
+"""Control valves (pressure reducing, pressure sustaining, flow control): keys."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ BANDS = Usual(20.0, 1e8, "millimetres of water to servo valves")
 
 
 class Regulating(Sized, TwoPort):
-    """A restriction whose stem moves by itself: time_constant dx/dt = error / band, between its stops 0 and 1."""
+    """A self-acting control valve: time_constant dx/dt = error / band, 0 <= x <= 1."""
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
     time_constant: Annotated[
-        float, Quantity("time", positive, "time in which an error of one band moves it fully [s]", STROKES, VALUE)
+        float,
+        Quantity("time", positive, "time in which an error of one band moves it from shut to open [s]", STROKES, VALUE),
     ]
 
 
@@ -29,7 +30,7 @@ class PressureReducing(Regulating, kind="pressure-reducing"):
     Ports: from, to; p_to is taken at the elevation of `to`. Stored energy: none. Dissipated power: dp q [W].
     """
 
-    set_pressure: Annotated[Schedule, Scheduled("pressure", about="that it keeps at `to` [Pa]")]
+    set_pressure: Annotated[Schedule, Scheduled("pressure", about="set pressure at `to` [Pa]")]
     band: Annotated[
         float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant", BANDS)
     ] = 1e5
@@ -41,7 +42,7 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
     Ports: from, to; p_from is taken at the elevation of `from`. Stored energy: none. Dissipated power: dp q [W].
     """
 
-    set_pressure: Annotated[Schedule, Scheduled("pressure", about="that it keeps at `from` [Pa]")]
+    set_pressure: Annotated[Schedule, Scheduled("pressure", about="set pressure at `from` [Pa]")]
     band: Annotated[
         float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant", BANDS)
     ] = 1e5
@@ -50,10 +51,8 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
 class FlowControl(Regulating, kind="flow-control"):
     """q = x Cd A sqrt(2 |dp| / rho) sign(dp), time_constant dx/dt = (set_flow - q) / set_flow, 0 <= x <= 1.
 
-    It limits the flow from `from` to `to`; backwards it stands open. Ports: from, to. Stored energy: none. Dissipated
-    power: dp q [W].
+    It limits the flow from `from` to `to`; for reverse flow it is open. Ports: from, to. Stored energy: none.
+    Dissipated power: dp q [W].
     """
 
-    set_flow: Annotated[
-        Schedule, Scheduled("flow", positive, "greatest flow that it lets pass, of the reference density [m3/s]")
-    ]
+    set_flow: Annotated[Schedule, Scheduled("flow", positive, "greatest flow, at the reference density [m3/s]")]

@@ -1,7 +1,7 @@
-"""A relief valve that follows the pressure before it at once. Knows one valve; knows no network.
+"""Relief valve whose lift follows the upstream pressure at once.
 
-Lifting, M |M| = G x^2 dP with x = (p - set) / span, which is solved with the nodes; armed[event] says that it is shut,
-armed[event + 2] that it is fully open: these change on accepted states alone, so that each has a smooth law.
+Partly open: M |M| = G x^2 dP with x = (p - set) / span, solved with the nodes. armed[event] : the valve is shut;
+armed[event + 2] : it is fully open. Both flags change on accepted states only, so that each mode has a smooth law.
 """
 
 from math import sqrt
@@ -11,27 +11,28 @@ from fvsolve.kernels.either import either
 from fvsolve.kernels.restrictions import lifts, root_slope, root_step
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of
 
-RELUCTANCE = 1e-10  # of lift, beyond which it changes: rounding must not open it
+RELUCTANCE = 1e-10  # margin of lift at events, so that rounding does not open the valve
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Its conductance G, of which x^2 is used; none where it is shut."""
+    """Write the conductance G at full opening; 0 if shut."""
     k, shut = device["valve"], tables.armed[device["event"]] > 0.0
     out[tables.layout[0]["conductance"] + k] = 0.0 if shut else tables.valves[k]["conductance"]
 
 
 @njit
-def value(t, y, out, tables, device, which):
-    """Its lift between 0 and 1."""
+def value(t, y, out, tables, device, quantity):
+    """Lift, 0 to 1."""
     return min(max(pressure_lift(tables, out, device["valve"]), 0.0), 1.0)
 
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: lift that is left, or beyond what opens it while shut; lift that is missing; each both ways.
+    """g: lift above the seat (or above the opening margin if shut), and lift below full opening; each both ways.
 
-    From shut to fully open it lifts first: a jump may ask for either end in the law of the other, and not stay there.
+    Between shut and fully open it always becomes partly open first: after a jump, a direct change to the opposite stop
+    might not be consistent with the law of that stop.
     """
     armed, at, x = tables.armed, device["event"], pressure_lift(tables, out, device["valve"])
     left, missing = x, 1.0 - x
@@ -45,7 +46,7 @@ def events(t, y, out, tables, device, g):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s of the flow x `full`; of the root where it does not lift."""
+    """a, s of the flow x `full`; by the square-root law unless the valve is partly open."""
     if not lifts(tables, k):
         return root_step(tables, k, g, m, drop, denser)
     dense = g * denser
@@ -55,7 +56,7 @@ def step(out, tables, k, g, m, drop, denser, wide):
 
 @njit
 def slope(out, tables, k, g, drop):
-    """d flow / d drop [kg/s/Pa], with what lifts it."""
+    """d flow / d drop [kg/s/Pa], with the change of lift."""
     if not lifts(tables, k):
         return root_slope(tables, k, g, drop)
     transition = transition_of(tables.valves[k], g)
@@ -65,14 +66,14 @@ def slope(out, tables, k, g, drop):
 
 @njit
 def lift(out, tables, k, g, drop, denser, wide):
-    """What the pressure before it adds to its flow by its lift [kg/s/Pa]."""
+    """d flow / d (upstream pressure) through the lift [kg/s/Pa]."""
     dense = g * denser
     return lifting_slope(tables, out, k, flow_at_drop(dense, transition_of(tables.valves[k], dense), drop), wide)
 
 
 @njit
 def pressure_lift(tables, out, k):
-    """Lift x of such a valve, linear in the pressure before it and not held between 0 and 1."""
+    """Lift x, linear in the upstream pressure and not limited to 0 to 1."""
     floats, valve = tables.floats, tables.valves[k]
     change = out[tables.layout[0]["pressure"] + valve["from_node"]]
     return floats[valve["data"]] + change / floats[valve["data"] + 1]
@@ -80,16 +81,16 @@ def pressure_lift(tables, out, k):
 
 @njit
 def lift_rise(tables, k):
-    """Lift of such a valve over the pressure before it [1/Pa]."""
+    """d lift / d (upstream pressure) [1/Pa]."""
     return 1.0 / tables.floats[tables.valves[k]["data"] + 1]
 
 
 @njit
 def lift_of(tables, out, k, full, wide):
-    """Lift that counts in the nodes; `full` is the flow at full opening [kg/s].
+    """Lift used in the node equations; `full` is the flow at full opening [kg/s].
 
-    Flow that comes back raises the pressure that lifts, so a lift is held between 0 and 1, and there may be two: the
-    greater one is stable. Newton comes to it from above, from where all of these are `wide` open.
+    Reverse flow raises the pressure that lifts the disc. The lift is then limited to 0 to 1, and two solutions may
+    exist; the greater lift is stable. Newton reaches it from above, starting with all such valves `wide` open.
     """
     x = pressure_lift(tables, out, k)
     if full >= 0.0:
@@ -99,12 +100,12 @@ def lift_of(tables, out, k, full, wide):
 
 @njit
 def lifting_step(tables, out, k, full, g, m, wide):
-    """a, s of the flow x `full` of a lifting valve: of the root the chord as in `valve_step`, backwards its slope."""
+    """a, s of the flow x `full` of a partly open valve: chord as in `valve_step`, for reverse flow the slope."""
     x, transition = lift_of(tables, out, k, full, wide), transition_of(tables.valves[k], g)
     if x <= 0.0:
         return x * full - m, 0.0
-    near = x * abs(full) if full < 0.0 and not wide else abs(m)
-    s = x * x * g / max(x * abs(full) + near, x * LEAST * sqrt(g))
+    size = x * abs(full) if full < 0.0 and not wide else abs(m)
+    s = x * x * g / max(x * abs(full) + size, x * LEAST * sqrt(g))
     if transition > 0.0:
         s = min(s, 45.0 / 32.0 * x * g / transition)
     return x * full - m, s
@@ -112,7 +113,7 @@ def lifting_step(tables, out, k, full, g, m, wide):
 
 @njit
 def lifting_slope(tables, out, k, full, wide):
-    """What the pressure before a lifting valve adds to its flow by its lift [kg/s/Pa]; backwards it takes."""
+    """d flow / d (upstream pressure) through the lift of a partly open valve [kg/s/Pa]; negative for reverse flow."""
     if full < 0.0 and (wide or not 0.0 < pressure_lift(tables, out, k) < 1.0):
         return 0.0
     return full * lift_rise(tables, k)

@@ -1,4 +1,4 @@
-"""Relief valves in the tables of a scene, at once or with a disc that takes its time."""
+"""Relief valves in the tables of a model, without or with disc dynamics."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.relief_valve import law
 
 
 class ReliefDisc(Lifting, kind=""):
-    """A relief valve whose disc takes its time."""
+    """A relief valve with disc dynamics."""
 
     mode = RELIEF
 
@@ -24,33 +24,33 @@ class ReliefDisc(Lifting, kind=""):
 
         def newton(flow, drop, potential):
             x = (start.law.pressure_of(potential, z) - part.set_pressure) / part.overpressure
-            asked, slope, rise = self.flow_at(start, k, drop, x)
+            target, slope, rise = self.flow_at(start, k, drop, x)
             rise /= part.overpressure
             size = max(slope + rise, 1e-12 * start.flow_scale)
-            return 1.0 / size, slope / size, (asked - flow) / size, rise / size
+            return 1.0 / size, slope / size, (target - flow) / size, rise / size
 
         return newton
 
     def tell(self, start, name, x):
         if x > 0.0:
-            text = f"{name}: the relief valve is open at the start, lifted {x:.3g} of 1"
+            text = f"{name}: the relief valve is open at the start, lift {x:.3g} of 1"
             start.draft.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
 
 
 class ReliefSwing(ReliefDisc, kind=""):
-    """The same with inertia."""
+    """A relief valve with an oscillating disc (mass, spring, damper)."""
 
     states = ("opening", "speed")
 
 
 class ReliefLag(ReliefDisc, kind=""):
-    """The same without."""
+    """A relief valve with a disc of first-order lag."""
 
     states = ("opening",)
 
 
 class Relief(ReliefDisc, kind="relief-valve"):
-    """A relief valve that opens at once."""
+    """A relief valve whose lift follows the pressure at once."""
 
     law, leads = law, -1
     events = ("is shut", "opens", "is fully open", "leaves full opening")

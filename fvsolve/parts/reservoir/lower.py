@@ -1,4 +1,4 @@
-"""Places of given pressure or head in the tables of a model."""
+"""Reservoirs in the tables of a model."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class ReservoirRows(Lowering, kind="reservoir"):
-    """A place whose pressure is a schedule's."""
+    """A node whose pressure or head follows a schedule."""
 
     books = "reservoir"
 
@@ -23,12 +23,12 @@ class ReservoirRows(Lowering, kind="reservoir"):
         value = start.given(row["schedule"])
         return start.law.pressure_under(value - row["elevation"]) if row["head_given"] else value
 
-    def moves(self, name, node, row, inflow, flow, told) -> str:
+    def moves(self, name, node, row, inflow, flow, amount) -> str:
         return ""
 
     def inputs(self, model, name, part):
         i, weight = model.node_names.index(name), model.case.properties.density * model.case.gravity
         row = model.tables.nodes[i]
         index, ground = int(row["schedule"]), model.case.ambient_pressure - weight * float(row["elevation"])
-        found = {"pressure": Input(PRESSURE, index, node=i), "head": Input(HEAD, index, weight, ground, node=i)}
-        return found | values_in(model, name)
+        inputs = {"pressure": Input(PRESSURE, index, node=i), "head": Input(HEAD, index, weight, ground, node=i)}
+        return inputs | values_in(model, name)

@@ -1,4 +1,4 @@
-"""A node whose pressure or head is given. Knows nothing of who draws from it."""
+"""Reservoirs: nodes of given pressure or head."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from fvsolve.parts.schedule import Schedule, Scheduled
 class Reservoir(Rider, kind="reservoir"):
     """A place of given pressure, p = pressure(t) or p = ambient + rho g (head(t) - elevation) [Pa].
 
-    Ports: any number; it takes or gives whatever flow they ask. Stored energy: none of its own; what passes
-    its ports enters the ledger as work done on the network. Dissipated energy: none.
+    Ports: any number, with any flow. Stored energy: none; energy through its ports is work done on the network in the
+    ledger. Dissipated energy: none.
     """
 
     driven: ClassVar[tuple[str, float]] = "pressure", 0.0
@@ -23,8 +23,10 @@ class Reservoir(Rider, kind="reservoir"):
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("pressure", "head"),)
     fixes_pressure: ClassVar[bool] = True
 
-    pressure: Annotated[Schedule | None, Scheduled("pressure", about="at its elevation [Pa]")] = None
-    head: Annotated[Schedule | None, Scheduled("head", about="of the fluid above datum, from ambient [m]")] = None
+    pressure: Annotated[Schedule | None, Scheduled("pressure", about="pressure at its elevation [Pa]")] = None
+    head: Annotated[Schedule | None, Scheduled("head", about="head above datum, relative to ambient pressure [m]")] = (
+        None
+    )
 
     def faults(self, name: str, around: Around) -> Faults:
         if self.pressure is not None:

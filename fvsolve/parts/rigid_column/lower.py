@@ -9,7 +9,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class RigidColumnRows(Lowering, kind="rigid-column"):
-    """One flow."""
+    """Row of a rigid column: one state, its flow."""
 
     table = "column"
 

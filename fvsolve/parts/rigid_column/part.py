@@ -1,4 +1,4 @@
-"""A conduit whose fluid moves as one body. Knows its size and friction; computes nothing."""
+"""Rigid columns: keys and faults."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.units import show
 
 
 class Way(Value):
-    """Points in space, in order."""
+    """A list of points in space."""
 
     takes = "list of [x, y, z], m"
 
@@ -19,18 +19,18 @@ class Way(Value):
 
     def read(self, given: Any, setting: Setting) -> list[tuple[float, ...]]:
         if not isinstance(given, (list, tuple)):
-            raise ValueError(f"{show(given)} is no list of points; wanted [[x, y, z], ...]")
-        found, faults = [], []
-        for index, one in enumerate(given):
+            raise ValueError(f"{show(given)} is not a list of points; expected [[x, y, z], ...]")
+        points, faults = [], []
+        for index, point in enumerate(given):
             try:
-                found.append(Rows("position", length=3).read(one, setting))
+                points.append(Rows("position", length=3).read(point, setting))
             except Misfit as error:
                 faults += [((index, *below), text) for below, text in error.faults]
             except ValueError as error:
                 faults.append(((index,), str(error)))
         if faults:
             raise Misfit(faults)
-        return found
+        return points
 
     def json(self) -> dict[str, Any]:
         return {"type": "array", "items": Rows("position", length=3).json()}
@@ -45,7 +45,7 @@ class RigidColumn(Conduit, kind="rigid-column"):
 
     route: Annotated[
         list[tuple[float, ...]],
-        Way("on its way between ends that ride on a body, in axes of that [m]; straight if left out"),
+        Way("points between its ends on a body, in the axes of the body [m]; straight if left out"),
     ] = []
     no_scalars: ClassVar[str] = "it has no cells to carry scalars; use a pipe"
 
@@ -53,6 +53,6 @@ class RigidColumn(Conduit, kind="rigid-column"):
     def key_faults(cls, given: dict[str, Any]) -> list:
         law = given.get("friction")
         if isinstance(law, dict) and law.get("model") == "unsteady":
-            message = 'no "unsteady" friction in a rigid column; wanted "quasi-steady", or a pipe'
+            message = '"unsteady" friction is not available in a rigid column; expected "quasi-steady", or use a pipe'
             return [*super().key_faults(given), (("friction", "model"), message)]
         return super().key_faults(given)

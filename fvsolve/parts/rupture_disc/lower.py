@@ -1,4 +1,4 @@
-"""Rupture discs in the tables of a scene: whole at the start."""
+"""Rupture discs in the tables of a model, intact at the start."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fvsolve.parts.rupture_disc import law, law_outside
 
 
 class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
-    """Between two places."""
+    """A rupture disc between two nodes."""
 
     law, sudden = law, True
     events = ("bursts",)
@@ -25,13 +25,13 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
         drop, name = start.drive_of(k)[0], start.draft.valve_names[k]
         if drop >= part.burst_pressure:
             across = start.case.amount(drop, "pressure", 6, span=True)
-            what = f"{across} across it at the start; it would have burst, set it higher or leave the disc out"
-            start.draft.fault(f"links.{name}.burst_pressure", what)
+            text = f"{across} across it at the start, so it would have burst; set it higher or remove the disc"
+            start.draft.fault(f"links.{name}.burst_pressure", text)
         return []
 
 
 class DiscToAmbient(RuptureDiscRows, kind=""):
-    """To ambient."""
+    """A rupture disc to ambient."""
 
     law, mode = law_outside, EVENTS
     events = ("",) * EVENTS + ("bursts",)

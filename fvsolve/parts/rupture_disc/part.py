@@ -1,4 +1,4 @@
-"""A disc that bursts once and stays open. Knows its size and strength; evaluates no flow."""
+"""Rupture discs: keys."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from fvsolve.parts.value import Quantity, positive
 
 
 class RuptureDisc(Relieving, kind="rupture-disc"):
-    """Shut until p_from - p_to passes burst_pressure, then for good q = Cd A sqrt(2 |dp| / rho) sign(dp).
+    """Shut until p_from - p_to exceeds burst_pressure, then always q = Cd A sqrt(2 |dp| / rho) sign(dp).
 
-    Without `to` it opens to ambient on the level of its place, from where nothing comes back. Ports: from, to. Stored
+    Without `to` it opens to ambient at the elevation of its place, without backflow. Ports: from, to. Stored
     energy: none. Dissipated power: dp q [W].
     """
 
-    burst_pressure: Annotated[
-        float, Quantity("pressure_drop", positive, "of `from` over what lies behind it, above which it bursts", DROPS)
-    ]
+    burst_pressure: Annotated[float, Quantity("pressure_drop", positive, "pressure drop above which it bursts", DROPS)]

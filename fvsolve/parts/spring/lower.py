@@ -6,7 +6,7 @@ from fvsolve.model.masses import Push, join
 
 
 class SpringRows(Push, kind="spring"):
-    """A force by the distance of two bodies."""
+    """Rows of springs: a force by the distance of two bodies."""
 
     books = "stored"
     table, rank = "brace", 0

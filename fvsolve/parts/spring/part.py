@@ -1,4 +1,4 @@
-"""A linear spring between two masses or points. Knows its stiffness and where it is slack; computes no force."""
+"""Linear springs between two masses or points: keys and faults."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.value import VALUE, Quantity, nonnegative, positive
 
 
 class Spring(Coupling, kind="spring"):
-    """force = -stiffness (x_to - x_from - free_length) (81), or preload - stiffness (what the start's length grew by).
+    """force = -stiffness (x_to - x_from - free_length) (81), or preload - stiffness (length - length at the start).
 
     Ports: from, to; the force pushes `to` forward. Stored energy: force^2 / (2 stiffness) [J] (82). Dissipated: none.
     """
@@ -21,11 +21,11 @@ class Spring(Coupling, kind="spring"):
     free_length: Annotated[
         float | None,
         Quantity(
-            "length", nonnegative, "x_to - x_from without load [m]; 0 (none with preload) if left out", changes=VALUE
+            "length", nonnegative, "x_to - x_from without load [m]; 0 if left out, without preload", changes=VALUE
         ),
     ] = None
     preload: Annotated[
-        float | None, Quantity("force", about="at the start, positive: compressed [N]", changes=VALUE)
+        float | None, Quantity("force", about="force at the start, positive in compression [N]", changes=VALUE)
     ] = None
 
     def model_post_init(self, _: Any) -> None:
@@ -33,6 +33,6 @@ class Spring(Coupling, kind="spring"):
             object.__setattr__(self, "free_length", 0.0)
 
     def faults(self, name: str, around: Around) -> Faults:
-        apart = around.ahead(self, "from", "to")
-        if apart is not None and apart < 0.0 and (self.free_length or self.preload):
-            yield ("to",), f"{self.to} lies behind {self.from_} at the start; exchange from and to"
+        distance = around.ahead(self, "from", "to")
+        if distance is not None and distance < 0.0 and (self.free_length or self.preload):
+            yield ("to",), f"{self.to} is behind {self.from_} at the start; exchange from and to"

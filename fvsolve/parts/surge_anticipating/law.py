@@ -19,7 +19,7 @@ LEAST = 1e-300
 
 @njit
 def stands(y, tables, device):
-    """SHUT, OPENING, OPEN or CLOSING."""
+    """Stage of the valve: SHUT, OPENING, OPEN or CLOSING."""
     armed, at, o = tables.armed, device["event"] + device["mode"], device["y"]
     for which in range(BY_HIGH):
         if armed[at + which] > 0.0:
@@ -31,14 +31,14 @@ def stands(y, tables, device):
 
 @njit
 def set(t, y, out, tables, device):
-    """Its conductance G x^2."""
+    """Write the conductance G x^2."""
     k, x = device["valve"], min(max(y[device["y"]], 0.0), 1.0)
     out[tables.layout[0]["conductance"] + k] = tables.valves[k]["conductance"] * x * x
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """Rates of its opening, and of how long it has been open."""
+    """Write the rates of the opening and of the time spent open."""
     if dydt.size == 0:
         return
     floats, at, o, stage = tables.floats, device["data"] + device["mode"], device["y"], stands(y, tables, device)
@@ -49,7 +49,7 @@ def move(t, y, dydt, out, tables, device):
 
 @njit
 def pilots(t, y, out, tables, device):
-    """What is left until a low pressure opens it, a high one [Pa], its trip [s]; and the pressure that it senses."""
+    """Margins to opening by low pressure, by high pressure [Pa] and by trip [s]; and the sensed pressure [Pa]."""
     floats, armed, layout = tables.floats, tables.armed, tables.layout[0]
     at, flags = device["data"] + device["mode"], device["event"] + device["mode"]
     i = int(floats[at + PLACE])
@@ -99,6 +99,6 @@ def follow(g, flags, stage, later, left):
 
 
 @njit
-def value(t, y, out, tables, device, which):
-    """Its opening, 0 to 1."""
+def value(t, y, out, tables, device, quantity):
+    """Opening, 0 to 1."""
     return min(max(y[device["y"]], 0.0), 1.0)

@@ -1,4 +1,4 @@
-"""A surge-anticipating valve to ambient. Knows where its functions stand."""
+"""Surge-anticipating valve to ambient: functions of the valve and of the outlet law."""
 
 from fvsolve.parts.outlet.law_root import bends, slope, step
 from fvsolve.parts.surge_anticipating.law import events, move, set, value

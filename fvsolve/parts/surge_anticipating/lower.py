@@ -1,4 +1,4 @@
-"""Surge-anticipating valves in the tables of a scene: shut at the start."""
+"""Surge-anticipating valves in the tables of a model, shut at the start."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fvsolve.parts.surge_anticipating import law, law_outside
 
 
 class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
-    """Between two places."""
+    """A surge-anticipating valve between two nodes."""
 
     law = law
     states = ("opening", "held")
@@ -57,7 +57,7 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
 
 
 class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
-    """To ambient."""
+    """A surge-anticipating valve to ambient."""
 
     law, mode = law_outside, EVENTS
     events = ("",) * EVENTS + SurgeAnticipatingRows.events

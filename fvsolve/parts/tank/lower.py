@@ -9,7 +9,7 @@ from fvsolve.model.lowering import Lowering
 
 
 class TankRows(Lowering, kind="tank"):
-    """A place whose pressure is that under the level of what it holds."""
+    """A node with the hydrostatic pressure under the level of its water."""
 
     books = "over the rim"
 
@@ -41,9 +41,9 @@ class TankRows(Lowering, kind="tank"):
         upright = 1.0 if node.on is None else start.case.poses[node.on].attitude[2, 2]
         return start.law.pressure_under(row["level"] * upright)
 
-    def moves(self, name, node, row, inflow, flow, told) -> str:
-        what = "rises" if flow > 0 else "falls"
-        return f"tank {name} {what} at {told(abs(flow) / row['area'], 'velocity', silent='mm/s')}"
+    def moves(self, name, node, row, inflow, flow, amount) -> str:
+        direction = "rises" if flow > 0 else "falls"
+        return f"tank {name} {direction} at {amount(abs(flow) / row['area'], 'velocity', silent='mm/s')}"
 
     def probe(self, draft, name, probe, row) -> None:
         if probe.quantity != "level":
@@ -52,7 +52,7 @@ class TankRows(Lowering, kind="tank"):
 
 
 def shaped_volume(level, area, volume, z: float) -> float:
-    """Volume below level z [m3] of a tank whose areas are linear between levels and held above the last."""
+    """Volume below level z [m3] of a tank whose areas are linear between levels and constant above the last."""
     if z >= level[-1]:
         return float(volume[-1] + (z - level[-1]) * area[-1])
     k = int(np.searchsorted(level, z, side="right")) - 1

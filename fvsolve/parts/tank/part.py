@@ -1,4 +1,4 @@
-"""An open vessel with a level. Knows its shape; knows nothing of who fills it."""
+"""Open tanks: keys and faults."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ LEVELS = Usual(0.0, 2000.0, "tanks to lakes and shafts")
 
 @dataclass(frozen=True, eq=False)
 class AreaTable:
-    """Free surface over level, linear between entries and held outside them.
+    """Free surface over level, linear between entries and constant outside them.
 
-    level, area : float64[n]  level above the bottom, rising from 0 [m], and surface there [m2]
+    level, area : float64[n]  level above the bottom, ascending from 0 [m], and surface at that level [m2]
     """
 
     level: np.ndarray
@@ -48,14 +48,14 @@ class AreaTable:
         return hash((self.level.tobytes(), self.area.tobytes()))
 
     def table(self) -> dict[str, list[float]]:
-        """What the file would say."""
+        """The table as in a case file."""
         return {"level": self.level.tolist(), "area": self.area.tolist()}
 
 
 class Surface(Value):
     """A free surface: one area, or a table of areas over levels."""
 
-    about = "free surface, linear between levels and held above the last [m2]"
+    about = "free surface, linear between levels and constant above the last [m2]"
     takes = "m2, or `{ level = [0, ...], area = [...] }`"
     usual = Usual(1e-6, 1e10, "tubes to lakes")
     dimension = "area"
@@ -67,13 +67,13 @@ class Surface(Value):
             return given
         if not isinstance(given, dict):
             return Quantity("area", positive).read(given, setting)
-        found = read_keys(given, self.keys, setting)
-        level, area = found["level"], found["area"]
+        values = read_keys(given, self.keys, setting)
+        level, area = values["level"], values["area"]
         faults = []
         if len(level) != len(area):
-            faults.append((("area",), f"{len(area)} areas for {len(level)} levels; wanted as many of both"))
+            faults.append((("area",), f"{len(area)} areas for {len(level)} levels; expected equal numbers"))
         if level[0] != 0:
-            faults.append((("level",), "levels count from the bottom; the first must be 0"))
+            faults.append((("level",), "levels are measured from the bottom; the first must be 0"))
         try:
             check_rising(level, given["level"], "levels")
         except ValueError as error:
@@ -87,11 +87,11 @@ class Surface(Value):
 
 
 class Tank(Rider, kind="tank"):
-    """An open tank, d(level)/dt = net flow / area(level), p = ambient + rho g level at its bottom.
+    """An open tank, d(level)/dt = net flow / area(level), p = ambient + rho g level at the bottom.
 
-    Ports: any number, all at the bottom, before its `connection` if it has one (the throttle of a surge tank). Stored
-    energy: rho g times the integral of (elevation + level) area over the level [J]. Dissipated energy: what spills over
-    `height` leaves with its potential energy.
+    Ports: any number, all at the bottom, or outside its `connection` (the throttle of a surge tank). Stored
+    energy: rho g times the integral of (elevation + level) area over the level [J]. Dissipated energy: the
+    potential energy of water that spills over `height`.
     """
 
     own_scalars: ClassVar[str] = "start"
@@ -99,10 +99,10 @@ class Tank(Rider, kind="tank"):
     fixes_pressure: ClassVar[bool] = True
 
     area: Annotated[Any, Surface()]
-    level: Annotated[float, Quantity("level", nonnegative, "at the start, above its bottom [m]", LEVELS)]
+    level: Annotated[float, Quantity("level", nonnegative, "level above its bottom at the start [m]", LEVELS)]
     height: Annotated[
         float | None,
-        Quantity("level", positive, "above its bottom, where it spills [m]; never if left out", LEVELS, VALUE),
+        Quantity("level", positive, "level above its bottom at which it spills [m]; never if left out", LEVELS, VALUE),
     ] = None
     connection: Annotated[Connection | None, Joined()] = None
 

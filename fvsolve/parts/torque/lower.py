@@ -1,4 +1,4 @@
-"""Torques in the tables of a model: on shafts among the numbers of what has one, on bodies pushes like others."""
+"""Torques on shafts and bodies in the tables of a model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.parts.pump.lower_turning import torques_on
 
 
 class TorqueRows(Lowering, kind="torque"):
-    """What its pump or turbine adds up."""
+    """A torque on a shaft; its pump or turbine has the numbers."""
 
     def of(self, part):
         return self if part.axis is None else ON_BODIES
@@ -22,20 +22,20 @@ class TorqueRows(Lowering, kind="torque"):
     def inputs(self, model, name, part):
         turned = part.to.removesuffix(".shaft")
         row = lowering_of(type(model.case.links[turned])).row_of(model, turned)
-        place = [one is part for one in torques_on(model.case, turned)].index(True)
+        place = [torque is part for torque in torques_on(model.case, turned)].index(True)
         return {"torque": Input(TORQUE, int(model.tables.floats[row["data"] + OWN_NUMBERS + 2 * place]))}
 
 
 class BodyTorqueRows(Push):
-    """A torque by a schedule, about an axis of the body that it turns."""
+    """A torque by a schedule about an axis of a body."""
 
     books = "supplied"
     table, rank = "brace", 3
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        how = rec.ABOUT, link.axis / np.linalg.norm(link.axis)
-        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *how)
+        axis = rec.ABOUT, link.axis / np.linalg.norm(link.axis)
+        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *axis)
         row["schedule"] = draft.schedules.add(link.torque)
 
     def inputs(self, model, name, part):

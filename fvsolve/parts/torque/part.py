@@ -1,4 +1,4 @@
-"""A torque from outside on a shaft or a body. Knows its course; knows no shaft."""
+"""External torques on shafts and bodies: keys and faults."""
 
 from __future__ import annotations
 
@@ -15,21 +15,22 @@ from fvsolve.parts.value import Rows, Text
 
 
 class Torque(Link, kind="torque"):
-    """torque(t) on the shaft `to`, which then turns as it and the fluid have it; or on a body about `axis`.
+    """torque(t) on the shaft `to`, whose speed follows from it and the fluid; or on a body about `axis`.
 
-    Ports: to; of bodies from, which it turns back. Stored and dissipated energy: none; it brings torque times angular
-    velocity [W], of bodies that of `to` less that of `from` about the axis.
+    Ports: to; for bodies also from, which gets the reaction. Stored and dissipated energy: none. It supplies torque
+    times angular velocity [W]; for bodies the velocity of `to` relative to `from` about the axis.
     """
 
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "rotational or spatial"}
     may_lack: ClassVar[tuple[str, ...]] = ("from",)
     quantities: ClassVar[dict[str, str]] = {}
 
-    from_: Annotated[str | None, Text("the body that it turns back, if any"), Field(alias="from")] = None
-    to: Annotated[str, Text("the shaft it turns, PUMP.shaft or TURBINE.shaft, or a body")]
-    torque: Annotated[Schedule, Scheduled("torque", about="in the direction in which a pump is driven [N m]")]
+    from_: Annotated[str | None, Text("body that gets the reaction, if any"), Field(alias="from")] = None
+    to: Annotated[str, Text("shaft, PUMP.shaft or TURBINE.shaft, or body")]
+    torque: Annotated[Schedule, Scheduled("torque", about="torque in the direction in which a pump is driven [N m]")]
     axis: Annotated[
-        tuple[float, ...] | None, Rows("number", length=3, about="that it turns a body about, in the body's axes")
+        tuple[float, ...] | None,
+        Rows("number", length=3, about="axis of the torque on a body, in the axes of the body"),
     ] = None
 
     @property
@@ -39,19 +40,19 @@ class Torque(Link, kind="torque"):
 
     def faults(self, name: str, around: Around) -> Faults:
         if no_direction(self.axis):
-            yield ("axis",), "is all zeros; wanted for example [0, 1, 0]"
+            yield ("axis",), "is all zeros; expected for example [0, 1, 0]"
         turned = around.links.get(self.to.removesuffix(".shaft"))
         if around.spatial(self.to) and self.axis is None:
-            yield (), "axis is missing: a body is turned about one, in its own axes, for example [0, 1, 0]"
+            yield (), "axis is missing: expected the axis of the torque in the axes of the body, for example [0, 1, 0]"
         if "shaft" not in getattr(turned, "owns", {}) or around.spatial(self.to):
             return
         for key, given in (("from", self.from_), ("axis", self.axis)):
             if given is not None:
-                yield (key,), f"goes with bodies; {self.to} is a shaft"
+                yield (key,), f"is a key for bodies, but {self.to} is a shaft; remove it"
         if turned.inertia is None:
             yield ("to",), f"{self.to} has no inertia, so no torque can turn it; give the {turned.kind} inertia"
         if turned.trip is not None:
-            text = "is held by its motor until it trips; leave trip out, and let the torque fall to 0 in its place"
+            text = "is held by its motor until it trips; remove trip, and let the torque fall to 0 at that time"
             yield ("to",), f"{self.to} {text}"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:

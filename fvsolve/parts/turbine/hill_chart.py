@@ -1,4 +1,4 @@
-"""Hill charts of turbines as a file may say them. Knows points of openings; evaluates none of them."""
+"""Hill charts of turbines in a case file or CSV file."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ EXAMPLE = "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], eff
 
 
 class OpeningCurve(NamedTuple):
-    """Points of one opening in their order: n11 = N D / sqrt(H), Q11 = Q / (D^2 sqrt(H)), and efficiency or T11.
+    """Points of an opening in order: n11 = N D / sqrt(H), Q11 = Q / (D^2 sqrt(H)), and efficiency or T11.
 
-    speed [rpm m^(1/2)]; flow [m^(1/2)/s]; value : efficiency [-], or T11 = T / (D^3 H) [N/m3]; word : which
+    speed [rpm m^(1/2)]; flow [m^(1/2)/s]; value : efficiency [-], or T11 = T / (D^3 H) [N/m3]; word : key of `value`
     """
 
     opening: float
@@ -30,7 +30,7 @@ class OpeningCurve(NamedTuple):
     word: str
 
     def table(self) -> dict[str, Any]:
-        """What the file would say."""
+        """The table as in a case file."""
         return {"opening": self.opening, SPEED: list(self.speed), FLOW: list(self.flow), self.word: list(self.value)}
 
     def torques(self, weight: float) -> list[float]:
@@ -42,14 +42,14 @@ class OpeningCurve(NamedTuple):
 
 
 class HillChart(NamedTuple):
-    """Curves by rising openings above 0; still : (n11, T11) that brakes the runner behind shut vanes, or none."""
+    """Curves by ascending opening above 0; still : (n11, T11) of the braking torque with shut vanes, or None."""
 
     curves: tuple[OpeningCurve, ...]
     still: tuple[float, float] | None
     said: Any
 
     def table(self) -> Any:
-        """What the file would say."""
+        """The table as in a case file."""
         return self.said
 
 
@@ -75,7 +75,7 @@ class HillChartValue(Value):
         if isinstance(given, dict) and "file" in given:
             return from_file(given, setting)
         if not isinstance(given, (list, tuple)) or not given:
-            raise ValueError(f"{show(given)} is no list of curves; wanted [{EXAMPLE}, ...] or {{ file }}")
+            raise ValueError(f"{show(given)} is not a list of curves; expected [{EXAMPLE}, ...] or {{ file }}")
         curves, faults = {}, []
         for k, one in enumerate(given):
             try:
@@ -88,13 +88,13 @@ class HillChartValue(Value):
         return chart_of(curves, found, faults, [one.table() for one in curves.values()])
 
     def curve(self, given: Any, setting: Setting) -> OpeningCurve:
-        """One of the list."""
+        """Read the curve of an opening."""
         if not isinstance(given, dict):
-            raise ValueError(f"{show(given)} is no table; wanted one such as {EXAMPLE}")
+            raise ValueError(f"{show(given)} is not a table; expected for example {EXAMPLE}")
         found = read_keys(given, self.keys, setting)
         words = [word for word in (EFFICIENCY, TORQUE) if found[word] is not None]
         if len(words) != 1:
-            said = f"{EFFICIENCY} and {TORQUE} are given; keep one" if words else f"wanted {EFFICIENCY} or {TORQUE}"
+            said = f"{EFFICIENCY} and {TORQUE} are given; keep one" if words else f"{EFFICIENCY} or {TORQUE} is missing"
             raise Misfit([(tuple(words[1:]), said)])
         return OpeningCurve(found["opening"], found[SPEED], found[FLOW], found[words[0]], words[0])
 
@@ -103,10 +103,10 @@ class HillChartValue(Value):
 
 
 def from_file(given: dict[str, Any], setting: Setting) -> HillChart:
-    """Columns opening, unit_speed, unit_flow and efficiency or unit_torque; points of an opening in their order."""
-    unknown = [((key,), "unknown key; beside file there is none") for key in given if key != "file"]
+    """Chart from CSV columns opening, unit_speed, unit_flow and efficiency or unit_torque, points in order."""
+    unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
-        raise Misfit(unknown or [(("file",), f"{show(given['file'])} is no text")])
+        raise Misfit(unknown or [(("file",), f"{show(given['file'])} is not a text")])
     try:
         path = find_file(given["file"], setting)
         columns, word = columns_of(read_rows(path))
@@ -129,29 +129,32 @@ def from_file(given: dict[str, Any], setting: Setting) -> HillChart:
 
 
 def columns_of(rows) -> tuple[list, str]:
-    """(opening, n11, Q11 and efficiency or T11 of every row, which of the two), by their headers."""
+    """(columns opening, n11, Q11 and efficiency or T11, key of the last column) by header."""
     words = [word for word in (EFFICIENCY, TORQUE) if word in rows.names]
     if len(words) != 1:
         said = "has both; keep one" if words else "has neither"
-        raise ValueError(f"{rows.file}: wanted a column {EFFICIENCY} or {TORQUE}, and it {said}")
+        raise ValueError(f"{rows.file}: expected a column {EFFICIENCY} or {TORQUE}; the file {said}")
     found = []
     for name in ("opening", SPEED, FLOW, words[0]):
         column = rows.column(name, 0)
         unit = split(rows.header[column])[1]
         if name in UNITS and unit not in ("", UNITS[name]):
-            raise Misread(rows.file, f"column {show(rows.header[column])}: wanted {name} in {UNITS[name]}")
+            raise Misread(rows.file, f"column {show(rows.header[column])}: expected {name} in {UNITS[name]}")
         found.append(rows.plain(column) if name in UNITS else rows.numbers(column, "number").tolist())
     return found, words[0]
 
 
 def chart_of(curves: dict, places: dict, faults: list, said: Any, file: str = "") -> HillChart:
-    """The chart of curves, each with the keys of its place; Misfit with all that is wrong with them."""
+    """Chart of curves; places : keys of each curve for messages; Misfit with all faults."""
     seen: dict[float, Any] = {}
     for k, one in curves.items():
         if one.opening in seen:
             first = seen[one.opening] + 1
             faults.append(
-                ((*places[k], "opening"), f"{one.opening:g} is that of curve {first} already; one curve each")
+                (
+                    (*places[k], "opening"),
+                    f"{one.opening:g} is already the opening of curve {first}; give one for each opening",
+                )
             )
         seen.setdefault(one.opening, k)
         keys, name = places[k], f"{file}opening {one.opening:g}: "

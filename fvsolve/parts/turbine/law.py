@@ -1,7 +1,7 @@
-"""A turbine: its vanes, its speed, what its shaft gets. Knows one turbine; knows no network.
+"""Turbine: guide vanes, speed and shaft torque.
 
-While its generator holds the speed, that is a schedule; once it has let go, or where given torques turn the shaft from
-the start, J d(omega)/dt = torque of the water and given ones. Its numbers are those of a pump, at a rated speed of 1.
+While the generator holds the speed, it follows a schedule. After load rejection, or with given torques from the start,
+J d(omega)/dt = torque of the water + given torques. Its numbers are those of a pump with a rated speed of 1.
 """
 
 from math import sqrt
@@ -27,12 +27,12 @@ from fvsolve.parts.pump.law import (
 from fvsolve.parts.pump.law import stored as stored
 from fvsolve.parts.turbine.law_chart import chart_at, chart_head, chart_step, chart_torque, is_outside
 
-SHUT = 1e-12  # square of an opening that is none
+SHUT = 1e-12  # square of an opening regarded as zero
 
 
 @njit
 def set(t, y, out, tables, device):
-    """Its speed, and how far its vanes are open."""
+    """Write the speed and the conductance of the vane opening."""
     layout, k = tables.layout[0], device["valve"]
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
     g = valve_conductance(tables, k, t)
@@ -47,7 +47,7 @@ def vanes(tables, k, g):
 
 @njit
 def point(out, tables, device):
-    """(opening, speed [rad/s], flow [m3/s], density over that of the case) of a turbine whose nodes are closed."""
+    """(opening, speed [rad/s], flow [m3/s], density over that of the case) of a turbine after the nodes are solved."""
     layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
     opening = vanes(tables, k, out[layout["conductance"] + k])
@@ -63,14 +63,14 @@ def torque_now(out, tables, device):
 
 @njit
 def holds(t, tables, device):
-    """Whether the generator holds the speed."""
+    """True if the generator holds the speed."""
     mode = tables.floats[device["data"] + MODE]
     return mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device))
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
-    """d/dt of the speed of a shaft that runs free, and its rate."""
+    """Write d/dt of the speed of a free shaft, and its rate limit."""
     floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
         return
@@ -100,7 +100,7 @@ def shaft_rate(out, tables, device):
 
 @njit
 def power(t, y, dydt, out, tables, device):
-    """Power given to the shaft, rate of what it stores, what of drop times flow the shaft has got, below 0 [W]."""
+    """Power given to the shaft, rate of its kinetic energy, and minus the power taken from the water [W]."""
     floats, at = tables.floats, device["data"]
     omega = out[tables.layout[0]["drive"] + device["valve"]]
     taken = -torque_now(out, tables, device) * omega
@@ -111,26 +111,26 @@ def power(t, y, dydt, out, tables, device):
 
 
 @njit
-def value(t, y, out, tables, device, which):
-    """Its head [m], speed [rad/s], torque [N m], power at the shaft [W], opening."""
+def value(t, y, out, tables, device, quantity):
+    """Head [m], speed [rad/s], torque [N m], power at the shaft [W] or opening, by number."""
     st, k = tables.settings[0], device["valve"]
     opening, omega, q, _ = point(out, tables, device)
-    if which == 0:
+    if quantity == 0:
         if opening > 0.0:
             return chart_head(tables.floats, tables.valves[k]["data"], opening, omega, q)[0]
         rho, drop = head_drop(tables, out, k)
         return drop / (rho * st["gravity"])
-    if which == 1:
+    if quantity == 1:
         return omega
-    if which == 4:
+    if quantity == 4:
         return opening
     torque = torque_now(out, tables, device)
-    return torque if which == 2 else torque * omega
+    return torque if quantity == 2 else torque * omega
 
 
 @njit
 def outside(out, tables, device):
-    """PASSING where it works at an angle that its chart does not give."""
+    """PASSING if it works at an angle outside its chart, else 0."""
     opening, omega, q, _ = point(out, tables, device)
     beyond = is_outside(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
     return PASSING if beyond else 0
@@ -138,7 +138,7 @@ def outside(out, tables, device):
 
 @njit
 def stiffness(tables, k):
-    """What the drop across turbine k falls by as it takes more, by the pipes beside it [Pa s/kg]."""
+    """Decrease of the drop across turbine k per flow, by the adjacent pipes [Pa s/kg]."""
     nodes, total = tables.nodes, 0.0
     for i in (tables.valves[k]["from_node"], tables.valves[k]["to_node"]):
         if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
@@ -148,21 +148,21 @@ def stiffness(tables, k):
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
-    """a, s by its chart, which asks for the drop of heads at the density before it."""
+    """a, s of the Newton step, from the drop of heads at the upstream density."""
     rho, fall = head_drop(tables, out, k)
     return turbine_step(tables, out, k, rho, g, m, fall)
 
 
 @njit
 def slope(out, tables, k, g, drop):
-    """d flow / d drop [kg/s/Pa]; none through shut vanes."""
+    """d flow / d drop [kg/s/Pa]; 0 with shut vanes."""
     m = out[tables.layout[0]["valve"] + k]
     return turbine_step(tables, out, k, tables.settings[0]["rho"], g, m, drop)[1] if g > 0.0 else 0.0
 
 
 @njit
 def turbine_step(tables, out, k, rho, g, m, drop):
-    """`chart_step` of a turbine whose fluid has the density rho [kg/m3], at the speed that it has."""
+    """`chart_step` of a turbine at its present speed, for fluid of density rho [kg/m3]."""
     weight, omega = rho * tables.settings[0]["gravity"], out[tables.layout[0]["drive"] + k]
     opening, stiff = vanes(tables, k, g), stiffness(tables, k)
     return chart_step(tables.floats, tables.valves[k]["data"], opening, omega, rho, weight, stiff, g, m, drop, m / rho)

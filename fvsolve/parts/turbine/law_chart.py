@@ -1,4 +1,4 @@
-"""Hill charts of turbines at any speed, flow and opening. Knows one chart and its numbers; knows no network.
+"""Hill charts of turbines at any speed, flow and opening.
 
 With n = omega / speed, u = flow / capacity: root = S(n, u), H = S |S| [m], straight lines of n and u between rays, so
 that at 1 m a curve is straight lines between its points; torque = H T, T straight along these lines at 1 m. Between
@@ -51,14 +51,14 @@ def mixed(floats, first, stride, k, share):
 
 @njit
 def capacity(floats, at, opening):
-    """Flow at 1 m of u = 1, over `flow`."""
+    """Flow of u = 1 at a head of 1 m, over `flow`."""
     k, share, least = between(floats, at, opening)
     return least * mixed(floats, at + OWN + int(floats[at + CURVES]), 1, k, share)
 
 
 @njit
 def ray_below(floats, first, many, angle):
-    """The last of rising angles that lies at or below one."""
+    """Index of the last of ascending angles at or below `angle`."""
     low, high = 0, many - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -71,7 +71,7 @@ def ray_below(floats, first, many, angle):
 
 @njit
 def turned(n, u):
-    """Angle from -pi / 2 on."""
+    """Angle of (n, u), from -pi / 2 to 3 pi / 2."""
     angle = atan2(u, n)
     return angle + 2.0 * pi if angle < -0.5 * pi else angle
 
@@ -109,7 +109,7 @@ def chart_at(floats, at, opening, omega, flow):
 
 @njit
 def chart_torque(floats, at, opening, omega, flow):
-    """Torque on the shaft, forward [N m]; behind shut vanes that of their water."""
+    """Torque on the shaft, positive forward [N m]; with shut vanes, the drag of the water."""
     if opening <= 0.0:
         return floats[at + STILL] * abs(omega) * omega
     return chart_at(floats, at, opening, omega, flow)[3]
@@ -124,7 +124,7 @@ def chart_head(floats, at, opening, omega, flow):
 
 @njit
 def is_outside(floats, at, opening, omega, flow):
-    """Whether it works at an angle that the chart does not give."""
+    """True if it works at an angle outside the chart."""
     curves = int(floats[at + CURVES])
     if opening <= 0.0:
         return False

@@ -80,7 +80,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
         return Edge(i, j, newton, float(first), drives=omega != 0.0)
 
     def follow(self, start, k) -> None:
-        """Nothing: `begin` sees to it."""
+        """Do nothing: `begin` sets the drop."""
 
     def begin(self, start, part, row) -> list[str]:
         draft, valve, moving = start.draft, start.valves[int(row["valve"])], []
@@ -107,7 +107,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
 
 
 def torn(start, name: str, part, valve) -> list[Notice]:
-    """A note on a turbine whose curves fold, with a pressure given on both sides."""
+    """Notice about a turbine with folded curves between two given pressures."""
     ends = (start.nodes["kind"][int(valve[key])] for key in ("from_node", "to_node"))
     if rec.JUNCTION in ends or not any(map(folds, part.hill_chart.curves)):
         return []
@@ -118,7 +118,7 @@ def torn(start, name: str, part, valve) -> list[Notice]:
 
 
 def heavy(start, name: str, part, valve) -> list[Notice]:
-    """A note on an inertia far from that of machines of the greatest power of its chart at the head of the start."""
+    """Notice about an inertia far from the usual value at the greatest power of the chart at the initial head."""
     speed, ends = float(np.max(np.abs(part.speed.value))), [int(valve["from_node"]), int(valve["to_node"])]
     if part.inertia is None or speed == 0.0 or start.weight == 0.0:
         return []
@@ -130,7 +130,7 @@ def heavy(start, name: str, part, valve) -> list[Notice]:
 
 
 def folds(one) -> bool:
-    """Whether n11 of a forward runner rises with the angle of a curve somewhere."""
+    """True if n11 of a forward runner rises with the angle somewhere on a curve."""
     points = list(zip(one.speed, one.flow, strict=True))
     rising = points[0][0] * points[1][1] > points[0][1] * points[1][0]
     ahead = points if rising else points[::-1]

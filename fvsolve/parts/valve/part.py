@@ -1,4 +1,4 @@
-"""A constriction with a stem. Knows its size, opening and characteristic; evaluates no flow."""
+"""Valves, and the size keys of all restrictions."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ WATER_15, WATER_60F = 1000.0, 999.016  # densities for which Kv and Cv are defin
 class Characteristic:
     """Relative flow area over stem opening, linear between entries.
 
-    opening, flow_area : float64[n]  opening rising from 0 to 1, flow area from 0 [-]
+    opening, flow_area : float64[n]  opening ascending from 0 to 1, flow area from 0 [-]
     """
 
     opening: np.ndarray
@@ -50,12 +50,12 @@ class Characteristic:
         return hash((self.opening.tobytes(), self.flow_area.tobytes()))
 
     def table(self) -> dict[str, list[float]]:
-        """What the file would say."""
+        """The table as in a case file."""
         return {"opening": self.opening.tolist(), "flow_area": self.flow_area.tolist()}
 
 
 class Trim(Value):
-    """A characteristic: one of two names, or a table."""
+    """Characteristic of a valve: a name or a table."""
 
     about = "relative flow area over opening"
     takes = '`"linear"`, `"equal-percentage"`, `{ opening = [0, ..., 1], flow_area = [0, ...] }`'
@@ -70,13 +70,15 @@ class Trim(Value):
             return given
         if not isinstance(given, dict):
             return self.names.read(given, setting)
-        found = read_keys(given, self.keys, setting)
-        opening, flow_area = found["opening"], found["flow_area"]
+        values = read_keys(given, self.keys, setting)
+        opening, flow_area = values["opening"], values["flow_area"]
         faults = []
         if len(opening) != len(flow_area):
-            faults.append((("flow_area",), f"{len(flow_area)} values for {len(opening)} openings"))
+            faults.append(
+                (("flow_area",), f"{len(flow_area)} values for {len(opening)} openings; expected equal numbers")
+            )
         if opening[0] != 0 or opening[-1] != 1:
-            faults.append((("opening",), "openings must lead from 0 to 1"))
+            faults.append((("opening",), "openings must begin at 0 and end at 1"))
         if flow_area[0] != 0:
             faults.append((("flow_area",), "opening 0 is shut: the first flow area must be 0"))
         try:
@@ -92,7 +94,7 @@ class Trim(Value):
 
 
 class Sized(Table):
-    """The size of a restriction, by one of four coefficients."""
+    """Size of a restriction, by Cd, loss coefficient, Kv or Cv."""
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
         ("discharge_coefficient", "loss_coefficient", "Kv", "Cv"),
@@ -103,24 +105,31 @@ class Sized(Table):
         float | None,
         Number(between(0, 1, open=True), f"Cd, with area or diameter; {DISCHARGE_COEFFICIENT} if left out"),
     ] = None
-    loss_coefficient: Annotated[float | None, Number(positive, "K on the velocity in area or diameter")] = None
-    Kv: Annotated[float | None, Number(positive, "m3/h at 1 bar, of water of 1000 kg/m3", COEFFICIENTS)] = None
+    loss_coefficient: Annotated[
+        float | None, Number(positive, "loss coefficient K, on the velocity in area or diameter")
+    ] = None
+    Kv: Annotated[
+        float | None, Number(positive, "flow coefficient Kv, m3/h of water of 1000 kg/m3 at 1 bar", COEFFICIENTS)
+    ] = None
     Cv: Annotated[
-        float | None, Number(positive, "US gpm at 1 psi, of water of 999.016 kg/m3 (60 degF)", COEFFICIENTS)
+        float | None,
+        Number(positive, "flow coefficient Cv, US gpm of water of 999.016 kg/m3 (60 degF) at 1 psi", COEFFICIENTS),
     ] = None
     area: Annotated[
         float | None,
         Quantity(
             "area",
             positive,
-            "of the opening [m2]; it or diameter is needed, but for Kv and Cv",
+            "area of the opening [m2]; needed unless diameter, Kv or Cv is given",
             Usual(1e-12, 200.0, "leaks to sluices"),
         ),
     ] = None
     diameter: Annotated[
-        float | None, Quantity("length", positive, "of the opening [m]", Usual(1e-6, 14.0, "leaks to sluices"))
+        float | None, Quantity("length", positive, "diameter of the opening [m]", Usual(1e-6, 14.0, "leaks to sluices"))
     ] = None
-    laminar_reynolds: Annotated[float | None, Number(positive, "Reynolds number below which it is laminar")] = None
+    laminar_reynolds: Annotated[float | None, Number(positive, "Reynolds number below which the flow is laminar")] = (
+        None
+    )
 
     def model_post_init(self, _: Any) -> None:
         if self.Kv is self.Cv is self.loss_coefficient is self.discharge_coefficient is None:
@@ -132,12 +141,12 @@ class Sized(Table):
         bare = next((key for key in ("Kv", "Cv") if key in given), None)
         if bare:
             stray = [key for key in ("area", "diameter") if key in given]
-            return faults + [((key,), f"{bare} says it all; leave {key} out") for key in stray]
+            return faults + [((key,), f"{bare} already gives the size; leave {key} out") for key in stray]
         if "area" in given or "diameter" in given:
             return faults
         alone = next((key for key in ("discharge_coefficient", "loss_coefficient") if key in given), None)
-        wanted = f"{alone} wants area or diameter" if alone else "no size; wanted area, diameter, Kv or Cv"
-        return faults + [((), wanted)]
+        text = f"{alone} needs area or diameter" if alone else "size is missing; expected area, diameter, Kv or Cv"
+        return faults + [((), text)]
 
     def flow_area(self) -> float:
         """Cd A at full opening, such that q = Cd A sqrt(2 dp / rho) [m2].
@@ -160,7 +169,7 @@ CLOSURE = 'opening = { start = "1 s", duration = "2 s", value = [1, 0] }'
 class Valve(Sized, TwoPort, kind="valve"):
     """Turbulent restriction, q = f(opening) Cd A sqrt(2 |dp| / rho) sign(dp) (79).
 
-    Ports: from, to; both directions alike; opening 0 is exactly no flow. Stored energy: none. Dissipated
+    Ports: from, to; equal in both directions; no flow at opening 0. Stored energy: none. Dissipated
     power: dp q [W].
     """
 

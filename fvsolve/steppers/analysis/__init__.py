@@ -1,1 +1,1 @@
-"""What a Butcher array says of its method: order, stability, Pade. Knows exact numbers; knows no time loop."""
+"""Properties of a Butcher array: order, stability, Pade approximation."""

@@ -1,4 +1,4 @@
-"""All that a tableau says of its method, in one place. Knows methods; knows no time loop."""
+"""Properties of a Runge-Kutta method, all computed from its tableau."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ from fvsolve.steppers.tableau import Method, method_named
 
 @dataclass(frozen=True)
 class Facts:
-    """A method known: order, cost, stability.
+    """Properties of a method: order, cost, stability.
 
-    error_order : of the embedded solution, 0 where there is none; digits : of its source, None where exact;
-    kind : explicit, diagonal, full or linear (Rosenbrock); angle : alpha of A(alpha) [degrees], None where no ray
-    is stable; real_interval, imaginary_interval, ssp_radius : inf where there is no end; pade : degrees (k, m) of
-    the entry of e^s that R is, else None; error_constant : of the least power of s in R(s) - e^s.
+    error_order : order of the embedded solution, 0 without one
+    digits : significant digits of the source, None where its numbers are exact
+    kind : explicit, diagonal, full or linear (Rosenbrock)
+    angle : alpha of A(alpha) stability [degrees], None where no ray is stable
+    real_interval, imaginary_interval, ssp_radius : inf where they are unbounded
+    pade : degrees (k, m) where R is that entry of the Pade table of e^s, else None
+    error_constant : coefficient of the lowest power of s in R(s) - e^s
     """
 
     name: str
@@ -47,19 +50,19 @@ class Facts:
     stability_function: StabilityFunction
 
     def plain(self) -> dict:
-        """As JSON says it: None for infinity, numerator and denominator of R lowest power first."""
-        found = {one.name: getattr(self, one.name) for one in fields(self)[:-1]}
+        """Return the properties for JSON: None for infinity, numerator and denominator of R lowest power first."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)[:-1]}
         r = self.stability_function
-        found["numerator"], found["denominator"] = (
+        values["numerator"], values["denominator"] = (
             [float(x) for x in p.coefficients] for p in (r.numerator, r.denominator)
         )
-        return {name: None if value == math.inf else value for name, value in found.items()}
+        return {name: None if value == math.inf else value for name, value in values.items()}
 
 
 def analyse(method: str | Method) -> Facts:
-    """What follows from the tableau alone: decided in exact numbers, with the numbers as published where rounded.
+    """Compute the properties of a method in exact arithmetic from its tableau, from the numbers as published.
 
-    Raises FvsolveError for a name that no method has.
+    Raises FvsolveError for an unknown method name.
     """
     return _facts(method_named(method))
 
@@ -67,9 +70,9 @@ def analyse(method: str | Method) -> Facts:
 @functools.cache
 def _facts(m: Method) -> Facts:
     r = stability_function(m)
-    taken = {one.name: getattr(m, one.name) for one in fields(Facts) if hasattr(m, one.name)}
+    given = {field.name: getattr(m, field.name) for field in fields(Facts) if hasattr(m, field.name)}
     return Facts(
-        **taken,
+        **given,
         a_stable=stability.a_stable(r),
         l_stable=stability.l_stable(r),
         i_stable=stability.i_stable(r),

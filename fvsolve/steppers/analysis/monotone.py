@@ -1,4 +1,4 @@
-"""How long a step keeps what Euler steps keep: the SSP radius (Kraaijevanger 1991). Knows exact numbers of tableaux."""
+"""Radius of absolute monotonicity of a method, which is its SSP radius (Kraaijevanger 1991)."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from fractions import Fraction
 
 from fvsolve.steppers.tableau import Method
 
-BITS = 52  # of the radius
-LONGEST = Fraction(1 << 64)  # a radius beyond is infinite
+BITS = 52  # precision of the radius
+LONGEST = Fraction(1 << 64)  # a larger radius counts as infinite
 
 
 def ssp_radius(method: Method) -> float:
-    """The greatest r with (I + r K)^-1 1 >= 0 and r K (I + r K)^-1 >= 0, K = [[A, 0], [b^T, 0]]; 0 where none.
+    """Greatest r with (I + r K)^-1 1 >= 0 and r K (I + r K)^-1 >= 0, K = [[A, 0], [b^T, 0]]; 0 if none exists.
 
-    Steps up to r times the greatest Euler step that keeps a norm from growing keep it too; inf where all do.
+    A norm that Euler steps up to h do not increase is not increased by steps of the method up to r h.
+    Returns inf where this holds for every step.
     """
     k = _used(method)
     if any(x < 0 for row in k for x in row) or not _fills_in(k):
@@ -37,14 +38,14 @@ def ssp_radius(method: Method) -> float:
 
 @functools.cache
 def in_euler_steps(method: Method) -> bool:
-    """Whether every stage is a mean of Euler steps of the whole length, the second at the end of the step."""
+    """True if every stage is a convex combination of Euler steps of length h, the second stage at the step's end."""
     if not method.explicit or method.adaptive or method.kind == "linear":
         return False
     return (method.stages == 1 or method.c[1] == 1.0) and ssp_radius(method) == 1.0
 
 
 def _used(method: Method) -> list[list]:
-    """K of the stages that the new state depends on."""
+    """K restricted to the stages that the new state depends on."""
     a, b = method.exact.a, method.exact.b
     used, new = set(), {j for j, x in enumerate(b) if x != 0}
     while new - used:
@@ -55,7 +56,7 @@ def _used(method: Method) -> list[list]:
 
 
 def _fills_in(k: list[list]) -> bool:
-    """Whether K^2 has entries only where K has: else the radius is 0."""
+    """True if K^2 is zero wherever K is zero; otherwise the radius is 0."""
     n = len(k)
     return all(
         k[i][j] != 0 or not any(k[i][m] != 0 and k[m][j] != 0 for m in range(n)) for i in range(n) for j in range(n)
@@ -63,7 +64,7 @@ def _fills_in(k: list[list]) -> bool:
 
 
 def _monotone(k: list[list], r: Fraction) -> bool:
-    """Whether the two conditions hold at r, decided: X = (I + r K)^-1 [1, r K] has no negative entry."""
+    """True if both conditions hold at r: X = (I + r K)^-1 [1, r K] has no negative entry, in exact arithmetic."""
     n = len(k)
     rows = [[(i == j) + r * k[i][j] for j in range(n)] + [Fraction(1)] + [r * x for x in k[i]] for i in range(n)]
     for i in range(n):

@@ -1,4 +1,4 @@
-"""The Pade table of e^s in exact rationals (course summary 5.9). Knows no method."""
+"""Pade table of e^s in exact rationals (course summary 5.9)."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from fvsolve.steppers.numbers.polynomial import Polynomial
 
 @door(k=AMOUNT, m=AMOUNT)
 def pade(k: int, m: int) -> tuple[Polynomial, Polynomial]:
-    """P^k_m: the quotient of degrees k over m that agrees with e^s in the most powers, k + m + 1 of them.
+    """Return numerator and denominator of P^k_m, the Pade approximation of e^s with degrees k over m.
 
-    N(s) = sum_j (k+m-j)! k! / ((k+m)! j! (k-j)!) s^j, D likewise in m and -s (Hairer and Wanner 1996, IV.3).
+    It agrees with e^s in k + m + 1 powers.
+    N(s) = sum_j (k+m-j)! k! / ((k+m)! j! (k-j)!) s^j; D likewise with m and -s (Hairer and Wanner 1996, IV.3).
     """
 
-    def half(one: int, sign: int) -> Polynomial:
-        weight = Fraction(factorial(one), factorial(k + m))
+    def part(degree: int, sign: int) -> Polynomial:
+        weight = Fraction(factorial(degree), factorial(k + m))
         return Polynomial(
-            weight * sign**j * Fraction(factorial(k + m - j), factorial(j) * factorial(one - j)) for j in range(one + 1)
+            weight * sign**j * Fraction(factorial(k + m - j), factorial(j) * factorial(degree - j))
+            for j in range(degree + 1)
         )
 
-    return half(k, 1), half(m, -1)
+    return part(k, 1), part(m, -1)

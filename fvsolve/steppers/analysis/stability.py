@@ -1,4 +1,4 @@
-"""Where |R(s)| <= 1, decided in exact numbers (13). Knows stability functions; knows no time loop."""
+"""Stability region |R(s)| <= 1 of a method, decided in exact arithmetic (13)."""
 
 from __future__ import annotations
 
@@ -11,32 +11,32 @@ from fvsolve.steppers.analysis.stability_function import StabilityFunction, chop
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 from fvsolve.steppers.numbers.sturm import first_sign_change, nowhere_negative, roots_right
 
-ANGLE_BITS = 36  # of the cosine of the angle of A(alpha)
+ANGLE_BITS = 36  # precision of the cosine of alpha in A(alpha)
 
 
 def e_polynomial(r: StabilityFunction) -> Polynomial:
     """E(x) = |D(iy)|^2 - |N(iy)|^2 with x = y^2 (Norsett 1975): |R(iy)| <= 1 where E >= 0."""
-    doubt = Polynomial(_square_doubt(r).coefficients[0::2])
-    return chopped(_modulus(r.denominator) - _modulus(r.numerator), doubt)
+    uncertainty = Polynomial(_square_doubt(r).coefficients[0::2])
+    return chopped(_modulus(r.denominator) - _modulus(r.numerator), uncertainty)
 
 
 def i_stable(r: StabilityFunction) -> bool:
-    """|R(iy)| <= 1 for all y."""
+    """True if |R(iy)| <= 1 for all y."""
     return nowhere_negative(e_polynomial(r))
 
 
 def a_stable(r: StabilityFunction) -> bool:
-    """|R(s)| <= 1 for all Re s <= 0: I-stable and all poles in the right half plane (5.8)."""
+    """True if |R(s)| <= 1 for all Re s <= 0: I-stable, and all poles in the right half plane (5.8)."""
     return i_stable(r) and roots_right(r.denominator)
 
 
 def l_stable(r: StabilityFunction) -> bool:
-    """A-stable, and R(s) -> 0 as s -> infinity."""
+    """True if the method is A-stable and R(s) -> 0 as s -> infinity."""
     return r.numerator.degree < r.denominator.degree and a_stable(r)
 
 
 def real_interval(r: StabilityFunction) -> float:
-    """The greatest x with |R| <= 1 on [-x, 0]; inf where there is no end, 0 where not even a short one is."""
+    """Greatest x with |R| <= 1 on [-x, 0]; inf if unbounded, 0 if no interval is stable."""
     down, up = (
         Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)
     )
@@ -47,18 +47,18 @@ def real_interval(r: StabilityFunction) -> float:
 
 
 def imaginary_interval(r: StabilityFunction) -> float:
-    """The greatest y with |R| <= 1 on [-iy, iy]; inf where there is no end, 0 where |R(iy)| > 1 at once."""
+    """Greatest y with |R| <= 1 on [-iy, iy]; inf if unbounded, 0 if |R(iy)| > 1 for all small y > 0."""
     e = e_polynomial(r)
     if _starts_negative(e):
         return 0.0
-    found = first_sign_change(e)
-    return math.inf if found is None else math.sqrt(found)
+    end = first_sign_change(e)
+    return math.inf if end is None else math.sqrt(end)
 
 
 def angle(r: StabilityFunction) -> float | None:
-    """The greatest alpha [degrees] with |R(s)| <= 1 for all |arg(-s)| <= alpha; None where no ray is stable.
+    """Greatest alpha [degrees] with |R(s)| <= 1 for all |arg(-s)| <= alpha; None if no ray is stable.
 
-    Decided on rays of rational cosine, and halved; within the sector there must be no pole.
+    Found by bisection over rays of rational cosine; the sector must contain no pole.
     """
     if a_stable(r):
         return 90.0
@@ -75,7 +75,7 @@ def angle(r: StabilityFunction) -> float | None:
 
 
 def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
-    """|R| <= 1 along s = -x exp(i phi), x >= 0, and no pole between this ray and the negative axis."""
+    """True if |R| <= 1 along s = -x exp(i phi), x >= 0, with no pole between this ray and the negative axis."""
     if nowhere_negative(chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), _square_doubt(r))):
         poles = np.roots([float(x) for x in r.denominator.coefficients][::-1])
         return not np.any(-poles.real > float(cosine) * np.abs(poles) * (1 + 1e-9))
@@ -87,17 +87,17 @@ def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
     cosines = [Fraction(1), cosine]
     while len(cosines) <= p.degree:
         cosines.append(2 * cosine * cosines[-1] - cosines[-2])
-    found = [Fraction(0)] * (2 * p.degree + 1)
+    coefficients = [Fraction(0)] * (2 * p.degree + 1)
     for j, x in enumerate(p.coefficients):
         for k, y in enumerate(p.coefficients):
-            found[j + k] = found[j + k] + (-1) ** (j + k) * cosines[abs(j - k)] * x * y
-    return Polynomial(found)
+            coefficients[j + k] = coefficients[j + k] + (-1) ** (j + k) * cosines[abs(j - k)] * x * y
+    return Polynomial(coefficients)
 
 
 def _square_doubt(r: StabilityFunction) -> Polynomial:
-    """What the sums over j + k = n of N_j N_k and D_j D_k may be off by."""
+    """Uncertainty of the sums over j + k = n of N_j N_k and D_j D_k."""
     pairs = zip((r.numerator, r.denominator), r.doubts, strict=True)
-    return sum((2 * Polynomial(map(abs, p.coefficients)) * doubt for p, doubt in pairs), Polynomial([]))
+    return sum((2 * Polynomial(map(abs, p.coefficients)) * uncertainty for p, uncertainty in pairs), Polynomial([]))
 
 
 def _modulus(p: Polynomial) -> Polynomial:
@@ -107,5 +107,5 @@ def _modulus(p: Polynomial) -> Polynomial:
 
 
 def _starts_negative(p: Polynomial) -> bool:
-    """Whether p(x) < 0 for small x > 0."""
+    """True if p(x) < 0 for small x > 0."""
     return next((sign(x) < 0 for x in p.coefficients if x != 0), False)

@@ -1,4 +1,4 @@
-"""Order conditions by rooted trees (Butcher 1963). Knows exact numbers and arrays of them; knows no method by name."""
+"""Order conditions of Runge-Kutta and Rosenbrock methods by rooted trees (Butcher 1963)."""
 
 from __future__ import annotations
 
@@ -7,45 +7,45 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 
-Tree = tuple  # (nodes, which of them): a name that says the size first, so that trees are in order
+Tree = tuple  # (number of nodes, index in trees(nodes)); the size comes first, so that trees sort by size
 
-ORDER_MOST = 12  # that is looked for: there are 4766 trees of 12 nodes, 12486 of 13
-BITS = 256  # kept of rounded coefficients on the way
+ORDER_MOST = 12  # greatest order that is tested: there are 4766 trees of 12 nodes, 12486 of 13
+BITS = 256  # precision of rounded coefficients in intermediate results
 
 
 @functools.cache
 def trees(nodes: int) -> tuple[tuple[Tree, ...], ...]:
-    """Rooted trees with so many nodes, each the names of its branches; tree (n, i) is trees(n)[i].
+    """Rooted trees with `nodes` nodes, each as the tuple of its branches; tree (n, i) is trees(n)[i].
 
-    There are 1, 1, 2, 4, 9, 20, 48, 115, 286, 719 of 1 to 10 nodes.
+    There are 1, 1, 2, 4, 9, 20, 48, 115, 286, 719 trees of 1 to 10 nodes.
     """
     smaller = [(n, i) for n in range(1, nodes) for i in range(len(trees(n)))]
-    found = []
+    partitions = []
 
-    def split(rest: int, most: int, branches: tuple) -> None:
+    def split(rest: int, count: int, branches: tuple) -> None:
         if rest == 0:
-            found.append(branches)
-        for k in reversed(range(most)):
+            partitions.append(branches)
+        for k in reversed(range(count)):
             if smaller[k][0] <= rest:
                 split(rest - smaller[k][0], k + 1, (*branches, smaller[k]))
 
     split(nodes - 1, len(smaller), ())
-    return tuple(found)
+    return tuple(partitions)
 
 
 @functools.cache
 def density(tree: Tree) -> int:
-    """gamma of a tree: its nodes times the densities of its branches."""
-    nodes, which = tree
-    return nodes * math.prod(map(density, trees(nodes)[which]))
+    """gamma of a tree: its number of nodes times the densities of its branches."""
+    nodes, index = tree
+    return nodes * math.prod(map(density, trees(nodes)[index]))
 
 
 class Conditions:
-    """sum_i b_i phi_i(tree) = 1 / gamma(tree) for one array A, and any weights b.
+    """Order conditions sum_i b_i phi_i(tree) = 1 / gamma(tree) of an array A, for any weights b.
 
-    rounding : relative error of each coefficient, 0 where they are exact.
-    single : the array that a lone branch takes in place of A, for Rosenbrock methods alpha + Gamma in place of alpha
-    (Hairer and Wanner 1996, theorem IV.7.3).
+    rounding : relative error of each coefficient, 0 where they are exact
+    single : array in place of A at a node with a single branch; for Rosenbrock methods alpha + Gamma in place of alpha
+    (Hairer and Wanner 1996, theorem IV.7.3)
     """
 
     def __init__(self, a: Sequence[Sequence], rounding: Fraction = Fraction(0), single: Sequence[Sequence] = ()):
@@ -55,27 +55,27 @@ class Conditions:
         self.known: dict[tuple[Tree, bool], list] = {}
 
     def residual(self, tree: Tree, b: Sequence):
-        """What a condition lacks: an exact number, 0 where it holds to the precision of the coefficients.
+        """Residual of a condition as an exact number; 0 where it holds to the precision of the coefficients.
 
-        Where that precision cannot tell 1 / gamma from 0, nothing holds.
+        Where that precision cannot separate 1 / gamma from 0, the condition counts as not satisfied.
         """
         left = sum((x * y for x, y in zip(b, self._phi(tree, False), strict=True) if x != 0), Fraction(0))
-        found = left - Fraction(1, density(tree))
-        if self.rounding and found != 0:
+        residual = left - Fraction(1, density(tree))
+        if self.rounding and residual != 0:
             size = sum(short(abs(x)) * y for x, y in zip(b, self._phi(tree, True), strict=True))
-            doubt = 2 * tree[0] * self.rounding * size
-            if abs(found) <= doubt < Fraction(1, density(tree)):
+            uncertainty = 2 * tree[0] * self.rounding * size
+            if abs(residual) <= uncertainty < Fraction(1, density(tree)):
                 return Fraction(0)
-        return found
+        return residual
 
     def holds(self, nodes: int, b: Sequence) -> bool:
-        """Whether all conditions of so many nodes hold."""
+        """True if all conditions for trees of `nodes` nodes hold."""
         return all(self.residual((nodes, i), b) == 0 for i in range(len(trees(nodes))))
 
     def order(self, b: Sequence) -> int:
-        """The greatest p such that all conditions up to p nodes hold; at most twice the stages (Butcher 1964)."""
-        p, most = 0, min(2 * len(self.a), ORDER_MOST)
-        while p < most and self.holds(p + 1, b):
+        """Greatest p such that all conditions up to p nodes hold; at most twice the number of stages (Butcher 1964)."""
+        p, limit = 0, min(2 * len(self.a), ORDER_MOST)
+        while p < limit and self.holds(p + 1, b):
             p += 1
         return p
 
@@ -83,39 +83,39 @@ class Conditions:
         return [[(j, short(x) if self.rounding else x) for j, x in enumerate(row) if x != 0] for row in a]
 
     def _phi(self, tree: Tree, absolute: bool) -> list:
-        """Products over the branches of A phi(branch); of absolute values where their size is wanted."""
+        """Elementary weights: products over the branches of A phi(branch); with absolute values to bound their size."""
         if (tree, absolute) not in self.known:
-            found = [Fraction(1)] * len(self.a)
+            product = [Fraction(1)] * len(self.a)
             branches = trees(tree[0])[tree[1]]
             rows = self.single if len(branches) == 1 else self.a
             if absolute:
                 rows = [[(j, abs(x)) for j, x in row] for row in rows]
             for branch in branches:
                 inner = self._phi(branch, absolute)
-                found = [
+                product = [
                     f * sum((x * inner[j] for j, x in row), Fraction(0)) if f != 0 else f
-                    for f, row in zip(found, rows, strict=True)
+                    for f, row in zip(product, rows, strict=True)
                 ]
-            self.known[tree, absolute] = [short(x) for x in found] if self.rounding else found
+            self.known[tree, absolute] = [short(x) for x in product] if self.rounding else product
         return self.known[tree, absolute]
 
 
 def short(x) -> Fraction:
-    """A fraction of few digits next to x, far closer than any published one."""
+    """Fraction within 2^-257 of x, far closer than any published coefficient."""
     if not isinstance(x, Fraction):
         x = sum(x.bracket()) / 2
     return Fraction(round(x * (1 << BITS)), 1 << BITS)
 
 
 def stage_order(a: Sequence[Sequence], b: Sequence, c: Sequence, rounding: Fraction = Fraction(0)) -> int:
-    """The greatest q with sum_j a_ij c_j^(k-1) = c_i^k / k and sum_j b_j c_j^(k-1) = 1 / k for all k <= q."""
+    """Greatest q with sum_j a_ij c_j^(k-1) = c_i^k / k and sum_j b_j c_j^(k-1) = 1 / k for all k <= q."""
 
-    def equal(row, k: int, wanted) -> bool:
+    def equal(row, k: int, expected) -> bool:
         terms = [x * y ** (k - 1) for x, y in zip(row, c, strict=True)]
         if not rounding:
-            return sum(terms, Fraction(0)) == wanted
-        size = sum(abs(float(x)) for x in terms) + abs(float(wanted))
-        return abs(sum(terms, Fraction(0)) - wanted) <= 2 * (k + 1) * rounding * Fraction(size)
+            return sum(terms, Fraction(0)) == expected
+        size = sum(abs(float(x)) for x in terms) + abs(float(expected))
+        return abs(sum(terms, Fraction(0)) - expected) <= 2 * (k + 1) * rounding * Fraction(size)
 
     q = 0
     while q < 2 * len(b):

@@ -1,1 +1,1 @@
-"""Exact numbers: fractions, algebraic numbers, polynomials of them, and how they are written. Knows no method."""
+"""Exact numbers: fractions, algebraic numbers, polynomials with such coefficients, and their parser."""

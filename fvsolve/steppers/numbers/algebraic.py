@@ -1,4 +1,4 @@
-"""Exact numbers a + b theta + c theta^2 + ..., theta a real algebraic number. Knows no method."""
+"""Exact numbers a + b theta + c theta^2 + ..., theta a real algebraic number."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from math import isqrt
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 from fvsolve.steppers.numbers.sturm import count_roots
 
-MIXED = "{} in one tableau; wanted one root alone, or decimals of 20 digits and more in place of all"
-BITS = 160  # of the first bracket of a root: enough for most signs and every float
+MIXED = "{} are used in one tableau. Expected a single root, or decimals of 20 digits or more in place of all roots"
+BITS = 160  # precision of the first bracket of a root: enough for most signs and every float
 
 
 class Field:
-    """The rational numbers with one root theta of a polynomial that has no double root."""
+    """Rational numbers extended by one root theta of a polynomial; double roots of the polynomial are divided out."""
 
     def __init__(self, name: str, polynomial: Polynomial, near: float):
         self.name = name
         self.polynomial = (polynomial // polynomial.gcd(polynomial.derivative())).monic()
         self.low, self.high = _isolated(self.polynomial, Fraction(near), name)
-        self.tail = tuple(-x for x in self.polynomial.coefficients[:-1])  # theta^n in lower powers
+        self.tail = tuple(-x for x in self.polynomial.coefficients[:-1])  # theta^n in terms of lower powers
 
     @property
     def theta(self) -> Algebraic:
         return Algebraic(self, [Fraction(0), Fraction(1)])
 
     def refine(self, bits: int) -> None:
-        """Halve the bracket of theta until it is shorter than 2^-bits."""
+        """Bisect the bracket of theta until it is no longer than 2^-bits."""
         low, high, p = self.low, self.high, self.polynomial
         rising = p(low) < 0
         while high - low > Fraction(1, 1 << bits):
@@ -40,7 +40,7 @@ class Field:
 
 
 class SquareRoot(Field):
-    """The rational numbers with sqrt(d)."""
+    """Rational numbers extended by sqrt(d)."""
 
     def __init__(self, d: int):
         self.name = f"sqrt({d})"
@@ -55,7 +55,7 @@ class SquareRoot(Field):
 
 
 class Algebraic:
-    """An element of a field that is not rational; operations return fractions where they can."""
+    """Irrational element of a field; operations return a fraction where the result is rational."""
 
     __slots__ = ("field", "parts")
 
@@ -93,18 +93,18 @@ class Algebraic:
             return NotImplemented
         if len(parts) == 1:
             return number(self.field, [x * parts[0] for x in self.parts])
-        found = [Fraction(0)] * (len(self.parts) + len(parts) - 1)
+        product = [Fraction(0)] * (len(self.parts) + len(parts) - 1)
         for i, x in enumerate(self.parts):
             for j, y in enumerate(parts):
                 if x and y:
-                    found[i + j] += x * y
+                    product[i + j] += x * y
         tail = self.field.tail
-        while len(found) > len(tail):
-            top = found.pop()
+        while len(product) > len(tail):
+            top = product.pop()
             if top:
-                for j, y in enumerate(tail, start=len(found) - len(tail)):
-                    found[j] += top * y
-        return number(self.field, found)
+                for j, y in enumerate(tail, start=len(product) - len(tail)):
+                    product[j] += top * y
+        return number(self.field, product)
 
     __rmul__ = __mul__
 
@@ -117,25 +117,25 @@ class Algebraic:
         return self.inverse() * other
 
     def __pow__(self, power: int):
-        found = Fraction(1)
+        result = Fraction(1)
         for _ in range(power):
-            found = found * self
-        return found
+            result = result * self
+        return result
 
     def inverse(self):
         """1 / self by the extended Euclidean algorithm."""
         if self.sign() == 0:
             raise ZeroDivisionError("division by zero")
-        modulus, one = self.field.polynomial, Polynomial(self.parts)
-        modulus = modulus // modulus.gcd(one)  # a factor that is not the one of theta
-        r0, r1, s0, s1 = modulus, one % modulus, Polynomial([]), Polynomial([1])
+        modulus, polynomial = self.field.polynomial, Polynomial(self.parts)
+        modulus = modulus // modulus.gcd(polynomial)  # drop the factors that do not vanish at theta
+        r0, r1, s0, s1 = modulus, polynomial % modulus, Polynomial([]), Polynomial([1])
         while r1.degree > 0:
-            whole, rest = divmod(r0, r1)
-            r0, r1, s0, s1 = r1, rest, s1, s0 - whole * s1
+            quotient, rest = divmod(r0, r1)
+            r0, r1, s0, s1 = r1, rest, s1, s0 - quotient * s1
         return number(self.field, (s1 / r1.coefficients[0]).coefficients)
 
     def bracket(self) -> tuple[Fraction, Fraction]:
-        """Bounds, by interval arithmetic on the bracket of theta."""
+        """Lower and upper bound, by interval arithmetic on the bracket of theta."""
         low = high = Fraction(0)
         for value in reversed(self.parts):
             ends = [low * self.field.low, low * self.field.high, high * self.field.low, high * self.field.high]
@@ -143,7 +143,7 @@ class Algebraic:
         return low, high
 
     def sign(self) -> int:
-        """-1, 0 or 1, decided."""
+        """Sign: -1, 0 or 1, exact."""
         low, high = self.bracket()
         if low <= 0 <= high and self._vanishes():
             return 0
@@ -202,7 +202,7 @@ class Algebraic:
 
 
 def number(field: Field, parts):
-    """The number with these parts: a fraction where it is one."""
+    """Number with these coefficients of powers of theta; a fraction where it is rational."""
     parts = list(parts)
     while len(parts) > 1 and not parts[-1]:
         parts.pop()
@@ -211,7 +211,7 @@ def number(field: Field, parts):
 
 @functools.cache
 def square_root(n: int):
-    """sqrt(n), n a whole number >= 0, as a whole multiple of a root without square factor."""
+    """sqrt(n) of an integer n >= 0, as an integer times the root of a square-free integer."""
     outside, inside, k = 1, n, 2
     while k * k <= inside:
         while inside % (k * k) == 0:
@@ -236,7 +236,7 @@ def _term(value: Fraction, symbol: str, sign: str) -> str:
 
 
 def _isolated(p: Polynomial, near: Fraction, name: str) -> tuple[Fraction, Fraction]:
-    """A bracket of the root nearest to `near`: it holds no other, and p changes its sign there."""
+    """Bracket of the root nearest to `near`; the polynomial has no other root there and changes sign."""
     width = Fraction(1, 1 << 40)
     while width <= 1 << 20:
         low, high = near - width, near + width

@@ -1,4 +1,4 @@
-"""Polynomials with exact coefficients, lowest power first. Knows fractions and algebraic numbers; knows no method."""
+"""Polynomials with exact coefficients (fractions or algebraic numbers), lowest power first."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from fractions import Fraction
 
 
 class Polynomial:
-    """sum_k coefficients[k] x^k; no highest coefficient is zero, so that the zero polynomial has none."""
+    """sum_k coefficients[k] x^k; the highest coefficient is not zero, so the zero polynomial has no coefficients."""
 
     __slots__ = ("coefficients",)
 
     def __init__(self, coefficients: Iterable):
-        found = [Fraction(x) if isinstance(x, int) else x for x in coefficients]
-        while found and found[-1] == 0:
-            found.pop()
-        self.coefficients = tuple(found)
+        exact = [Fraction(x) if isinstance(x, int) else x for x in coefficients]
+        while exact and exact[-1] == 0:
+            exact.pop()
+        self.coefficients = tuple(exact)
 
     @property
     def degree(self) -> int:
-        """-1 of the zero polynomial."""
+        """Degree; -1 for the zero polynomial."""
         return len(self.coefficients) - 1
 
     def __call__(self, x):
@@ -49,11 +49,11 @@ class Polynomial:
 
     def __mul__(self, other) -> Polynomial:
         other = _as(other)
-        found = [Fraction(0)] * (self.degree + other.degree + 1) if self.coefficients and other.coefficients else []
+        product = [Fraction(0)] * (self.degree + other.degree + 1) if self.coefficients and other.coefficients else []
         for i, x in enumerate(self.coefficients):
             for j, y in enumerate(other.coefficients):
-                found[i + j] = found[i + j] + x * y
-        return Polynomial(found)
+                product[i + j] = product[i + j] + x * y
+        return Polynomial(product)
 
     def __radd__(self, other) -> Polynomial:
         return self + other
@@ -65,26 +65,26 @@ class Polynomial:
         return self * other
 
     def __truediv__(self, number) -> Polynomial:
-        """By a number alone."""
+        """Divide by a number."""
         number = _as(number)
         if number.degree != 0:
-            raise ZeroDivisionError("a polynomial can be divided by a number other than 0 alone")
+            raise ZeroDivisionError("a polynomial can only be divided by a number other than 0")
         return Polynomial(x / number.coefficients[0] for x in self.coefficients)
 
     def __pow__(self, power: int) -> Polynomial:
-        found = Polynomial([1])
+        result = Polynomial([1])
         for _ in range(power):
-            found = found * self
-        return found
+            result = result * self
+        return result
 
     def __divmod__(self, other: Polynomial) -> tuple[Polynomial, Polynomial]:
-        rest, below = list(self.coefficients), other.coefficients
-        whole = [Fraction(0)] * max(len(rest) - len(below) + 1, 0)
-        for k in reversed(range(len(whole))):
-            whole[k] = rest[k + len(below) - 1] / below[-1]
+        remainder, below = list(self.coefficients), other.coefficients
+        quotient = [Fraction(0)] * max(len(remainder) - len(below) + 1, 0)
+        for k in reversed(range(len(quotient))):
+            quotient[k] = remainder[k + len(below) - 1] / below[-1]
             for j, y in enumerate(below):
-                rest[k + j] = rest[k + j] - whole[k] * y
-        return Polynomial(whole), Polynomial(rest[: len(below) - 1])
+                remainder[k + j] = remainder[k + j] - quotient[k] * y
+        return Polynomial(quotient), Polynomial(remainder[: len(below) - 1])
 
     def __floordiv__(self, other: Polynomial) -> Polynomial:
         return divmod(self, other)[0]
@@ -93,23 +93,23 @@ class Polynomial:
         return divmod(self, other)[1]
 
     def monic(self) -> Polynomial:
-        """With highest coefficient 1."""
+        """Polynomial scaled so that its highest coefficient is 1."""
         return Polynomial(x / self.coefficients[-1] for x in self.coefficients)
 
     def derivative(self) -> Polynomial:
         return Polynomial(k * x for k, x in enumerate(self.coefficients[1:], start=1))
 
     def gcd(self, other: Polynomial) -> Polynomial:
-        """Greatest common divisor, monic."""
-        one, two = self, other
-        while two.coefficients:
-            one, two = two, one % two
-            two = two.monic() if two.coefficients else two
-        return one.monic() if one.coefficients else one
+        """Monic greatest common divisor."""
+        a, b = self, other
+        while b.coefficients:
+            a, b = b, a % b
+            b = b.monic() if b.coefficients else b
+        return a.monic() if a.coefficients else a
 
 
 def sign(value) -> int:
-    """-1, 0 or 1 of an exact number, decided."""
+    """Sign of an exact number: -1, 0 or 1."""
     return (value > 0) - (value < 0) if isinstance(value, (int, Fraction)) else value.sign()
 
 

@@ -1,4 +1,4 @@
-"""Real roots and signs of polynomials with exact coefficients, decided (Sturm 1829, Routh 1877). Knows no method."""
+"""Real roots and signs of polynomials in exact arithmetic (Sturm 1829, Routh 1877)."""
 
 from __future__ import annotations
 
@@ -6,60 +6,60 @@ from fractions import Fraction
 
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 
-DIGITS = Fraction(1, 1 << 64)  # a root is bracketed this closely, relative to itself
+DIGITS = Fraction(1, 1 << 64)  # relative width of the bracket of a root
 
 
 def chain(p: Polynomial) -> list[Polynomial]:
-    """Sturm's chain p, p', -rem, ...; each scaled by a positive number."""
-    found = [p, p.derivative()]
-    while found[-1].degree > 0:
-        rest = -(found[-2] % found[-1])
-        if rest.degree < 0:
+    """Sturm's chain p, p', -rem, ...; each polynomial scaled by a positive number."""
+    polynomials = [p, p.derivative()]
+    while polynomials[-1].degree > 0:
+        remainder = -(polynomials[-2] % polynomials[-1])
+        if remainder.degree < 0:
             break
-        top = rest.coefficients[-1]
-        found.append(rest / (top if sign(top) > 0 else -top))
-    return found
+        top = remainder.coefficients[-1]
+        polynomials.append(remainder / (top if sign(top) > 0 else -top))
+    return polynomials
 
 
 def count_roots(p: Polynomial, low=None, high=None) -> int:
-    """How many different real roots lie in (low, high]; None is infinity. `p` is not zero."""
+    """Number of distinct real roots in (low, high]; None is infinity. `p` must not be zero."""
     if p.degree < 1:
         return 0
-    found = chain(p)
-    return _changes(found, low, -1) - _changes(found, high, 1)
+    polynomials = chain(p)
+    return _changes(polynomials, low, -1) - _changes(polynomials, high, 1)
 
 
 def odd_part(p: Polynomial) -> Polynomial:
-    """The product of the factors of odd multiplicity: where p changes its sign, all roots single (Yun 1976)."""
-    found, k = Polynomial([1]), 1
+    """Product of the factors of odd multiplicity: it has single roots where p changes sign (Yun 1976)."""
+    product, k = Polynomial([1]), 1
     common = p.gcd(p.derivative())
     w, y = p // common, p.derivative() // common
     while w.degree > 0:
         z = y - w.derivative()
         factor = w.gcd(z) if z.degree >= 0 else w.monic()
         if k % 2:
-            found = found * factor
+            product = product * factor
         w, y = w // factor, z // factor
         k += 1
-    return found
+    return product
 
 
 def first_sign_change(p: Polynomial) -> float | None:
-    """The least x > 0 at which p changes its sign, to the last bit or nearly; None where it never does."""
+    """Least x > 0 at which p changes sign, accurate to about the last bit; None if p never changes sign."""
     p = odd_part(p) if p.degree > 0 else p
     while p.degree > 0 and p.coefficients[0] == 0:
         p = Polynomial(p.coefficients[1:])
     if p.degree < 1:
         return None
-    found, low, high = chain(p), Fraction(0), Fraction(1)
-    at_low, far = _changes(found, low, 1), _changes(found, None, 1)
+    polynomials, low, high = chain(p), Fraction(0), Fraction(1)
+    at_low, far = _changes(polynomials, low, 1), _changes(polynomials, None, 1)
     if at_low == far:
         return None
-    while _changes(found, high, 1) == at_low:
+    while _changes(polynomials, high, 1) == at_low:
         low, high = high, 2 * high
-    while at_low - _changes(found, high, 1) > 1:
+    while at_low - _changes(polynomials, high, 1) > 1:
         middle = (low + high) / 2
-        if _changes(found, middle, 1) == at_low:
+        if _changes(polynomials, middle, 1) == at_low:
             low = middle
         else:
             high = middle
@@ -79,29 +79,29 @@ def first_sign_change(p: Polynomial) -> float | None:
 
 
 def nowhere_negative(p: Polynomial) -> bool:
-    """Whether p(x) >= 0 for all x >= 0."""
+    """True if p(x) >= 0 for all x >= 0."""
     return p.degree < 0 or (sign(p.coefficients[-1]) > 0 and first_sign_change(p) is None)
 
 
 def roots_right(p: Polynomial) -> bool:
-    """Whether all roots lie in the open right half plane, by Routh's array of p(-x)."""
+    """True if all roots lie in the open right half plane, by Routh's array of p(-x)."""
     up = [x if k % 2 == 0 else -x for k, x in enumerate(p.coefficients)][::-1]
-    one, two = up[0::2], up[1::2]
-    first = sign(one[0])
-    while two:
-        if sign(two[0]) != first:
+    upper, lower = up[0::2], up[1::2]
+    first = sign(upper[0])
+    while lower:
+        if sign(lower[0]) != first:
             return False
-        ratio = one[0] / two[0]
-        rest = [x - ratio * y for x, y in zip(one[1:], [*two[1:], Fraction(0)], strict=False)]
-        one, two = two, rest
+        ratio = upper[0] / lower[0]
+        rest = [x - ratio * y for x, y in zip(upper[1:], [*lower[1:], Fraction(0)], strict=False)]
+        upper, lower = lower, rest
     return True
 
 
-def _changes(found: list[Polynomial], x, side: int) -> int:
-    """Changes of sign along the chain at x, or at side * infinity."""
-    signs = [sign(q(x)) if x is not None else _far(q, side) for q in found]
+def _changes(polynomials: list[Polynomial], x, side: int) -> int:
+    """Number of sign changes along the Sturm chain at x, or at side * infinity."""
+    signs = [sign(q(x)) if x is not None else _far(q, side) for q in polynomials]
     signs = [s for s in signs if s != 0]
-    return sum(one != two for one, two in zip(signs, signs[1:], strict=False))
+    return sum(a != b for a, b in zip(signs, signs[1:], strict=False))
 
 
 def _far(p: Polynomial, side: int) -> int:

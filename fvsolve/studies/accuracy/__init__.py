@@ -1,1 +1,1 @@
-"""How fast errors fall, and what accuracy costs. Knows runs and errors; knows no stability."""
+"""Studies of accuracy: orders of convergence, and error against computing cost."""

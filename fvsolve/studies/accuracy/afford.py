@@ -1,4 +1,4 @@
-"""How coarse a refinement begins, so that it ends within minutes. Knows the cost of the rates; runs nothing."""
+"""Number of cells on the first row of a refinement, so that the study ends within minutes."""
 
 from __future__ import annotations
 
@@ -13,51 +13,61 @@ from fvsolve.studies.accuracy.refine import Plan, plan
 from fvsolve.studies.outcome import prepared
 from fvsolve.studies.points import Points
 
-LONGEST = 40.0  # CPU time that all rows and their reference may take, about [s]
-LEAST = 8  # cells along the pipe or side with most to begin with
-REFERENCE = 21.0 * 7.0  # calls of a reference for each of the finest row's, a stage: 4, 2 and 1 times as fine, 7 stages
+LONGEST = 40.0  # approximate CPU time of all rows and their reference [s]
+LEAST = 8  # least number of cells of the first row, along the pipe or side with most cells
+# Calls of a reference per call and stage of the finest row: 4, 2 and 1 times as fine (16 + 4 + 1), 7 stages.
+REFERENCE = 21.0 * 7.0
 
 
 def affordable(
     case, refine: str | None, key: str | None, levels: int | None, cells: int | None, against: str,
     points: Points | None,
 ) -> Plan:  # fmt: skip
-    """The rows of a refinement; where nothing says on how many cells it begins, as many as a minute or two allow."""
-    made = plan(case, refine, key, levels, cells)
-    if cells is not None or key is not None or made.way == "time" or not counts(case):
-        return made
-    asked = {"study": "order", "what": "first cells", "way": made.way, "levels": len(made.levels), "against": against}
-    known = None if points is None else points.find(case, asked)
-    first = known["cells"] if known else first_cells(case, made, refine, levels, against)
+    """Rows of a refinement. If nothing sets the cells of the first row, they are chosen to end in a minute or two.
+
+    points : result cache, which also stores the chosen number of cells
+    """
+    plan_made = plan(case, refine, key, levels, cells)
+    if cells is not None or key is not None or plan_made.way == "time" or not counts(case):
+        return plan_made
+    settings = {
+        "study": "order",
+        "what": "first cells",
+        "way": plan_made.way,
+        "levels": len(plan_made.levels),
+        "against": against,
+    }
+    stored = None if points is None else points.find(case, settings)
+    first = stored["cells"] if stored else first_cells(case, plan_made, refine, levels, against)
     if first == most(counts(case)):
-        return made
-    if points is not None and known is None:
-        points.get(case, asked, lambda: {"cells": first})
-    said = f"begun on {first} of {most(counts(case))} cells, to end within minutes (--cells says otherwise)"
-    made = plan(case, refine, key, levels, first)
-    return replace(made, words=f"{made.words}; {said}")
+        return plan_made
+    if points is not None and stored is None:
+        points.get(case, settings, lambda: {"cells": first})
+    remark = f"starts with {first} of {most(counts(case))} cells, to end within minutes (change with --cells)"
+    plan_made = plan(case, refine, key, levels, first)
+    return replace(plan_made, words=f"{plan_made.words}; {remark}")
 
 
-def first_cells(case, made: Plan, refine: str | None, levels: int | None, against: str) -> int:
-    """Cells to begin with: those of the case, or halved as often as the time asks and patches and holes allow."""
-    own, exact = counts(case), case.exact is not None or against != "auto" or bool(basins(case))
-    cells, seconds = most(own), rhs_seconds(prepared(case)) / total(case, own)
-    while cells >= 2 * LEAST and time_of(case, made, seconds, exact) > LONGEST:
-        if not loads(case, scaled(own, (cells // 2) / most(own))):
+def first_cells(case, rows: Plan, refine: str | None, levels: int | None, against: str) -> int:
+    """Cells of the first row: the case's own, halved until the study fits the time, if patches and holes allow."""
+    own_counts, exact = counts(case), case.exact is not None or against != "auto" or bool(basins(case))
+    cells, seconds = most(own_counts), rhs_seconds(prepared(case)) / total(case, own_counts)
+    while cells >= 2 * LEAST and time_of(case, rows, seconds, exact) > LONGEST:
+        if not loads(case, scaled(own_counts, (cells // 2) / most(own_counts))):
             break
         cells //= 2
-        made = plan(case, refine, None, levels, cells)
+        rows = plan(case, refine, None, levels, cells)
     return cells
 
 
-def time_of(case, made: Plan, seconds: float, exact: bool) -> float:
-    """CPU time of all rows, and of a reference where there is no exact solution [s]; 0 where steps follow an error.
+def time_of(case, rows: Plan, seconds: float, exact: bool) -> float:
+    """CPU time of all rows, and of a reference unless there is an exact solution [s]; 0 if steps follow an error.
 
-    seconds : of one call of the rates, a cell
+    seconds : time of one call of the rates for one cell [s]
     """
     numerics = case.numerics
     stages = method_named(automatic.first_method(numerics.method)).stages
-    each = [level.cells * (numerics.end - numerics.start) / level.step * seconds for level in made.levels]
-    if any(math.isnan(one) for one in each):
+    row_times = [level.cells * (numerics.end - numerics.start) / level.step * seconds for level in rows.levels]
+    if any(math.isnan(seconds_of_row) for seconds_of_row in row_times):
         return 0.0
-    return stages * sum(each) + (0.0 if exact else REFERENCE * each[-1])
+    return stages * sum(row_times) + (0.0 if exact else REFERENCE * row_times[-1])

@@ -1,4 +1,4 @@
-"""What of a case has cells, pipes and basins: how many, how large, how quickly waves cross them. Runs nothing."""
+"""Pipes and basins of a case that have cells: numbers and sizes of cells, wave rates, order of the scheme."""
 
 from __future__ import annotations
 
@@ -17,138 +17,146 @@ from fvsolve.studies.lines import lines
 from fvsolve.studies.outcome import prepared
 
 Counts = dict[str, tuple[int, ...]]  # dotted key -> numbers of cells: one of a pipe, two of a basin
-PLANE_ORDER = 2  # of `muscl`, which stands for all schemes that a basin has not
-JUMP = 0.75  # share of the greatest step between neighbours at the start that is still there on half the cells
+PLANE_ORDER = 2  # order of `muscl`, which replaces all schemes that a basin does not have
+JUMP = 0.75  # a jump keeps at least this fraction of its greatest difference between neighbours on finer cells
 
 
 def pipes(case) -> dict[str, Pipe]:
-    """The pipes of a case, by name."""
+    """Pipes of a case, by name."""
     return {name: link for name, link in case.links.items() if isinstance(link, Pipe)}
 
 
 def in_cells(case) -> dict[str, Pipe]:
-    """Those of them that have cells, and so are no delay lines."""
+    """Pipes that have cells, and so are not delay lines."""
     delayed = lines(case)
     return {name: pipe for name, pipe in pipes(case).items() if name not in delayed}
 
 
 def basins(case) -> dict[str, Basin]:
-    """The basins of a case that have cells, by name."""
+    """Basins of a case that have cells, by name."""
     return {name: case.nodes[name] for name in case.meshes}
 
 
 def counts(case) -> Counts:
-    """Numbers of cells that refine a case: of pipes that are no delay lines, and of basins that are rectangles."""
-    found: Counts = {f"links.{name}.cells": (pipe.cells,) for name, pipe in in_cells(case).items()}
-    return found | {f"nodes.{name}.cells": basin.cells for name, basin in basins(case).items() if basin.cells}
+    """Numbers of cells that refine a case: of pipes that are not delay lines, and of rectangular basins."""
+    numbers: Counts = {f"links.{name}.cells": (pipe.cells,) for name, pipe in in_cells(case).items()}
+    return numbers | {f"nodes.{name}.cells": basin.cells for name, basin in basins(case).items() if basin.cells}
 
 
 def from_files(case) -> list[str]:
-    """Basins whose cells a file has, so that nothing refines them."""
+    """Basins whose mesh is read from a file, so that it cannot be refined."""
     return [name for name, basin in basins(case).items() if basin.cells is None]
 
 
-def keys(found: Counts) -> dict[str, Any]:
+def keys(cells_by_key: Counts) -> dict[str, Any]:
     """Numbers of cells as keys of a case."""
-    return {key: list(numbers) if len(numbers) > 1 else numbers[0] for key, numbers in found.items()}
+    return {key: list(numbers) if len(numbers) > 1 else numbers[0] for key, numbers in cells_by_key.items()}
 
 
-def scaled(found: Counts, factor: float) -> Counts:
-    """So many times the cells along every side, one at least."""
-    return {key: tuple(max(1, round(n * factor)) for n in numbers) for key, numbers in found.items()}
+def scaled(cells_by_key: Counts, factor: float) -> Counts:
+    """Numbers of cells multiplied by a factor along every side; at least 1."""
+    return {key: tuple(max(1, round(n * factor)) for n in numbers) for key, numbers in cells_by_key.items()}
 
 
-def total(case, found: Counts) -> int:
-    """Cells of all pipes and basins."""
+def total(case, cells_by_key: Counts) -> int:
+    """Number of cells of all pipes and basins."""
     fixed = sum(case.meshes[name].area.size for name in from_files(case))
-    return fixed + sum(held(case, key, numbers) for key, numbers in found.items())
+    return fixed + sum(held(case, key, numbers) for key, numbers in cells_by_key.items())
 
 
 def held(case, key: str, numbers: tuple[int, ...]) -> int:
-    """Cells of one part; holes of a rectangle hold none."""
-    room = key.split(".")[0]
-    if room == "links":
+    """Number of cells of one part; holes of a rectangle have no cells."""
+    table = key.split(".")[0]
+    if table == "links":
         return numbers[0]
     name = key.split(".")[1]
     own = case.nodes[name].cells
     return round(case.meshes[name].area.size * math.prod(numbers) / math.prod(own))
 
 
-def most(found: Counts) -> int:
-    """Cells along the side that has most."""
-    return max(max(numbers) for numbers in found.values())
+def most(cells_by_key: Counts) -> int:
+    """Greatest number of cells along one side."""
+    return max(max(numbers) for numbers in cells_by_key.values())
 
 
 def size(case, key: str, numbers: tuple[int, ...]) -> float:
-    """Size of the cells of a part [m], of rectangles their longer side on average."""
-    room, name, _ = key.split(".")
-    lengths = (case.links[name].length,) if room == "links" else case.nodes[name].size
+    """Cell size of a part [m]; for a rectangle the greater of the mean cell sizes along its sides."""
+    table, name, _ = key.split(".")
+    lengths = (case.links[name].length,) if table == "links" else case.nodes[name].size
     return max(length / n for length, n in zip(lengths, numbers, strict=True))
 
 
-def loads(case, found: Counts) -> bool:
-    """Whether a case can be said with so many cells: patches and holes begin and end between cells."""
+def loads(case, cells_by_key: Counts) -> bool:
+    """True if a case can have these numbers of cells: edges of patches and holes must lie between cells."""
     from fvsolve.case import load
 
     try:
-        load(case, keys(found))
+        load(case, keys(cells_by_key))
     except CaseError:
         return False
     return True
 
 
-def greatest_rate(case, found: Mapping[str, tuple[int, ...]]) -> float:
-    """Cells that the quickest wave crosses in a second [1/s], in basins as they count them and at the start."""
-    rates = [case.wave_speed(name) * found[f"links.{name}.cells"][0] / pipe.length
+def greatest_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
+    """Number of cells that the fastest wave crosses per second [1/s].
+
+    Basins count with their own rate, at the start. Delay lines count with cells per travel time of the slowest line.
+    """
+    rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
              for name, pipe in in_cells(case).items()]  # fmt: skip
-    rates += [one.rate for one in followed(case).values() if one.line == "delay"]
+    rates += [method.rate for method in followed(case).values() if method.line == "delay"]
     if basins(case):
-        own = {key: numbers for key, numbers in counts(case).items() if key.startswith("nodes.")}
-        finer = max((max(found[key]) / max(numbers) for key, numbers in own.items()), default=1.0)
-        rates.append(finer * prepared(case).wave_rate)
+        own_cells = {key: numbers for key, numbers in counts(case).items() if key.startswith("nodes.")}
+        factor = max((max(cells_by_key[key]) / max(numbers) for key, numbers in own_cells.items()), default=1.0)
+        rates.append(factor * prepared(case).wave_rate)
     return max(rates)
 
 
 def space_order(case) -> int:
-    """Order of the scheme in all that has cells, where all is smooth."""
-    one = SCHEMES[case.numerics.scheme]
-    return min([one.order, *(one.on(bool(basin.cells) and not basin.holes).order for basin in basins(case).values())])
+    """Order of the scheme in smooth flow, the least over all parts with cells."""
+    scheme = SCHEMES[case.numerics.scheme]
+    return min(
+        [scheme.order, *(scheme.on(bool(basin.cells) and not basin.holes).order for basin in basins(case).values())]
+    )
 
 
 def order_varies(case) -> bool:
-    """Whether that is an upper bound: water in the plane comes down to second order, along one axis it does not."""
+    """True if `scheme_order` is an upper bound only.
+
+    Free surfaces in the plane fall to second order, along one axis they do not.
+    """
     fifth = space_order(case) > PLANE_ORDER
     return fifth and any(basin.own.steep for basin in basins(case).values())
 
 
 def starts_with_jump(case, coarse: Mapping, fine: Mapping) -> bool:
-    """Whether a basin starts from a jump: neighbours lie as far apart on finer cells."""
+    """True if a basin starts with a jump: neighbours differ by as much on finer cells."""
     if not any(basin.start or getattr(basin, "scalars", {}) for basin in basins(case).values()):
         return False
-    steps = [step_at_start(prepared(case, one)) for one in (coarse, fine)]
+    steps = [step_at_start(prepared(case, cells)) for cells in (coarse, fine)]
     return any(b > JUMP * a > 0.0 for a, b in zip(*steps, strict=True))
 
 
 def step_at_start(model) -> list[float]:
-    """Greatest step between neighbours at the start, of every quantity of every basin."""
-    found = []
+    """Greatest difference between neighbours at the start, for every quantity of every basin."""
+    greatest = []
     for basin in model.basins:
         inner = basin.mesh.inner
         left, right = basin.mesh.left[:inner], basin.mesh.right[:inner]
         values = contents(basin, model.start).values()
-        found += [float(np.max(np.abs(one[left] - one[right]), initial=0.0)) for one in values]
-    return found
+        greatest += [float(np.max(np.abs(field[left] - field[right]), initial=0.0)) for field in values]
+    return greatest
 
 
 def refinable(case) -> Counts:
-    """Numbers of cells that can be doubled; FvsolveError where there are none."""
-    found = counts(case)
-    if not found:
+    """Numbers of cells that can be doubled. Raises FvsolveError if there are none."""
+    cells_by_key = counts(case)
+    if not cells_by_key:
         files = from_files(case)
-        what = (
-            f"the mesh of {listing(files)} is a file, which nothing refines"
+        reason = (
+            f"the mesh of {listing(files)} is a file, which cannot be refined"
             if files
-            else "this case has no pipe or basin and so no cells"
+            else "this case has no pipe or basin, and so no cells"
         )
-        raise FvsolveError(f'{what}: refine "both" or "space" cannot be; wanted "time"')
-    return found
+        raise FvsolveError(f'{reason}: refine = "both" or "space" is impossible. Expected "time"')
+    return cells_by_key

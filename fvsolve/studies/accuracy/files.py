@@ -1,4 +1,4 @@
-"""A chart as files: chart.csv, chart.png and chart.svg. Knows charts and files; runs nothing."""
+"""Output files of a chart: chart.csv, chart.png and chart.svg."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ FILE = columns(
 ERRORS = ("mean error over the run [range]", "error at the end [range]")
 
 
-def write(found: Chart, folder: Path, title: str = "", dpi: float | None = None) -> list[Path]:
+def write(chart: Chart, folder: Path, title: str = "", dpi: float | None = None) -> list[Path]:
     """Write the table and both pictures of a chart; returns their paths."""
     from fvsolve.draw.chart import save
 
     paths = [folder / f"chart.{ending}" for ending in ("csv", "png", "svg")]
     for path in paths:
-        path.unlink(missing_ok=True)  # no old picture stands beside a new table
-    write_csv(found, paths[0])
-    made = figure(found, title)
-    save(made, paths[1], dpi)
-    save(made, paths[2])
+        path.unlink(missing_ok=True)  # avoids an old picture next to a new table
+    write_csv(chart, paths[0])
+    picture = figure(chart, title)
+    save(picture, paths[1], dpi)
+    save(picture, paths[2])
     return paths
 
 
-def write_csv(found: Chart, path: Path) -> None:
-    """One line per setting, failed ones included."""
-    rows, floor = found.rows, found.floor["trajectory"]
+def write_csv(chart: Chart, path: Path) -> None:
+    """Write one line per setting, failed settings included."""
+    rows, floor = chart.rows, chart.floor["trajectory"]
     good = [row for row in rows if row["ok"]]
     errors = [max(row["trajectory"], floor) for row in good]
     for cost in ("seconds", "updates"):
@@ -47,23 +47,23 @@ def write_csv(found: Chart, path: Path) -> None:
     Sheet(FILE, rows).write(path)
 
 
-def figure(found: Chart, title: str = ""):
-    """The picture of a chart, a matplotlib Figure: errors over the trajectory and at the end, by time and by work."""
+def figure(chart: Chart, title: str = ""):
+    """matplotlib Figure of a chart: errors over the trajectory and at the end, by CPU time and by work."""
     from fvsolve.draw.chart import Curve, chart_figure
 
     curves = []
-    for name, points in found.curves().items():
-        one = points[0].setting
+    for name, points in chart.curves().items():
+        setting = points[0].setting
         curves.append(
             Curve(
-                one.scheme or one.method,
-                one.method,
+                setting.scheme or setting.method,
+                setting.method,
                 [np.array([getattr(point, key) for point in points]) for key in ("trajectory", "end")],
                 [np.array([getattr(point, key) for point in points], float) for key in ("seconds", "updates")],
                 np.array([not point.ok for point in points]),
-                name == found.default,
+                name == chart.default,
             )
         )
-    work = "cell updates" if any(point.setting.cells for point in found.points) else "rates evaluated x states"
-    floors = [found.floor[key] or 0.0 for key in ("trajectory", "end")]
-    return chart_figure(curves, ERRORS, ("CPU time [s]", work), floors, title or f"{found.case}: what accuracy costs")
+    work = "cell updates" if any(point.setting.cells for point in chart.points) else "rates evaluated x states"
+    floors = [chart.floor[key] or 0.0 for key in ("trajectory", "end")]
+    return chart_figure(curves, ERRORS, ("CPU time [s]", work), floors, title or f"{chart.case}: error against cost")

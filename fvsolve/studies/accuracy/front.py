@@ -1,4 +1,4 @@
-"""The front of a chart: what is cheapest for each error, and the default beside it. Knows points; runs none."""
+"""Work-precision front of a chart: the cheapest setting for each error, and the default next to it."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from fvsolve.case.case import Case
 from fvsolve.studies.accuracy.pareto import Crossing, between, crossing
 from fvsolve.studies.accuracy.setting import MethodSetting, with_cells, without_cells
 
-COARSEST_RTOL = 0.1  # a tolerance beyond says nothing
+COARSEST_RTOL = 0.1  # results of greater tolerances are meaningless
 
 
 @dataclass(frozen=True)
 class Point:
-    """One setting and what came of it.
+    """One setting and the results of its run.
 
-    trajectory, greatest, end, overshoot : errors over the range of the worst component (studies/distance.py)
-    seconds : CPU time of the steps, the best of several [s]; updates : calls of the rates times cells (states)
+    trajectory, greatest, end, overshoot : errors over the range of the worst component (`studies/distance.py`)
+    seconds : CPU time of the steps, the best of several runs [s]; updates : calls of the rates times cells (states)
     """
 
     setting: MethodSetting
@@ -37,9 +37,9 @@ class Point:
 
 @dataclass(frozen=True)
 class FrontRow:
-    """One line of the front: the cheapest curve for a target and the program's default beside it.
+    """One row of the front: the cheapest curve for a target error, and the program's default next to it.
 
-    name, by_updates : the cheapest by CPU time and by cell updates; what is None is not reached
+    name, by_updates : cheapest curve by CPU time and by cell updates; None if no curve reaches the target
     """
 
     target: float
@@ -55,20 +55,23 @@ class FrontRow:
 
 def curves(points: Sequence[Point]) -> dict[str, list[Point]]:
     """Points by name of scheme and method, in their order."""
-    found: dict[str, list[Point]] = {}
+    points_by_name: dict[str, list[Point]] = {}
     for point in points:
-        found.setdefault(point.setting.name, []).append(point)
-    return found
+        points_by_name.setdefault(point.setting.name, []).append(point)
+    return points_by_name
 
 
 def row(points: Sequence[Point], target: float, floor: float, default: str) -> FrontRow:
-    """The line of a target; default : name of the default's curve."""
+    """Front row of a target error; default : name of the default's curve."""
     by_time, by_work = (cheapest(points, target, floor, cost) for cost in ("seconds", "updates"))
-    name, where = by_time or (None, None)
-    own, work = (crossings(points, target, floor, cost).get(default) for cost in ("seconds", "updates"))
+    name, best = by_time or (None, None)
+    default_time, default_work = (
+        crossings(points, target, floor, cost).get(default) for cost in ("seconds", "updates")
+    )
     return FrontRow(
-        target, name, fineness(points, name, where), where and where.cost, by_work and by_work[0],
-        by_work and by_work[1].cost, fineness(points, default, own), own and own.cost, work and work.cost,
+        target, name, fineness(points, name, best), best and best.cost, by_work and by_work[0],
+        by_work and by_work[1].cost, fineness(points, default, default_time), default_time and default_time.cost,
+        default_work and default_work.cost,
     )  # fmt: skip
 
 
@@ -78,30 +81,33 @@ def errors_of(points: Sequence[Point]) -> list[float]:
 
 
 def crossings(points: Sequence[Point], target: float, floor: float, cost: str) -> dict[str, Crossing]:
-    """Where each curve meets a target, by name; cost : "seconds" or "updates". Errors count as the floor at least."""
-    found = {}
+    """Crossing of each curve with a target error, by name of the curve.
+
+    cost : "seconds" or "updates"; errors below the floor count as the floor
+    """
+    by_name = {}
     for name, curve in curves(points).items():
-        errors = [max(one.trajectory, floor) if one.ok else math.inf for one in curve]
-        where = crossing(errors, [max(getattr(one, cost), 1e-12) for one in curve], target)
-        if where is not None:
-            found[name] = where
-    return found
+        errors = [max(point.trajectory, floor) if point.ok else math.inf for point in curve]
+        place = crossing(errors, [max(getattr(point, cost), 1e-12) for point in curve], target)
+        if place is not None:
+            by_name[name] = place
+    return by_name
 
 
 def cheapest(points: Sequence[Point], target: float, floor: float, cost: str) -> tuple[str, Crossing] | None:
-    """Name and crossing of the curve that costs least at a target, None where none meets it."""
-    return min(crossings(points, target, floor, cost).items(), key=lambda one: one[1].cost, default=None)
+    """Name and crossing of the curve with the least cost at a target; None if no curve reaches the target."""
+    return min(crossings(points, target, floor, cost).items(), key=lambda item: item[1].cost, default=None)
 
 
 def setting_between(case: Case, coarse: MethodSetting, fine: MethodSetting, share: float) -> MethodSetting:
-    """The setting at a share of the way between two of a curve."""
+    """Setting at the fraction `share` of the way between two settings of a curve."""
     if coarse.cells is not None:
         return with_cells(case, coarse.scheme, coarse.method, math.ceil(between(coarse.cells, fine.cells, share)))
     return without_cells(coarse.method, float(f"{between(coarse.size, fine.size, share):.2g}"), coarse.control)
 
 
 def coarser(case: Case, setting: MethodSetting) -> MethodSetting | None:
-    """The next coarser setting of a curve: half the cells, ten times the tolerance, twice the step; None at its end."""
+    """Next coarser setting of a curve: half the cells, ten times the tolerance, or twice the step; None at the end."""
     if setting.cells is not None:
         return with_cells(case, setting.scheme, setting.method, setting.cells // 2) if setting.cells > 1 else None
     size = float(f"{setting.size * (10.0 if setting.control == 'rtol' else 2.0):.6g}")
@@ -110,7 +116,7 @@ def coarser(case: Case, setting: MethodSetting) -> MethodSetting | None:
 
 
 def fineness(points, name: str | None, where: Crossing | None) -> str:
-    """What the crossing of a curve stands for: about so many cells, such a tolerance."""
+    """Approximate number of cells, tolerance or step at the crossing of a curve."""
     if name is None or where is None:
         return ""
     coarse, fine = (curves(points)[name][k].setting for k in (where.coarser, where.finer))

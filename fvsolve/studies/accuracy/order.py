@@ -1,4 +1,4 @@
-"""How fast the error of a case falls with refinement, row by row. Knows rows and errors; draws and prints nothing."""
+"""Study of the order of convergence of a case."""
 
 from __future__ import annotations
 
@@ -41,54 +41,58 @@ def order(
     exact: Callable | None = None, out: str | Path | Points | None = None, progress: Progress | None = None,
     jobs: int = 1, dask: str | None = None,
 ) -> Order | list[Order]:  # fmt: skip
-    """Errors of a case over a refinement and the order at which they fall; a list where several are asked for.
+    """Errors of a case over a refinement, and the order at which they fall; a list for several schemes or methods.
 
-    case, set : as `run` takes them; refine, key, levels, cells : as `studies.refine.plan` takes them
-    schemes, methods : in place of the case's, names or lists of them
-    against : "auto" (exact if the case names one, else finer, with basins richardson), "exact", "finer" (two levels
-    finer by another scheme and method) or "richardson" (each row against the next)
+    case, set : as in `run`; refine, key, levels, cells : as in `studies.accuracy.refine.refinement_plan`
+    schemes, methods : name or list of names that replace those of the case
+    against : "auto" (exact if the case names an exact solution, else finer; richardson with basins), "exact", "finer"
+    (two levels finer, by another scheme and method) or "richardson" (each row against the next)
     initial : initial(pipe, x) -> pressure [Pa], flow [m3/s] at the start, x float64[k] [m]
     source : source(pipe, x, t) -> mass [kg/s/m] and momentum [kg/s2] fed per length; both are averaged over cells
-    exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start where `initial` is left out
-    out : folder where finished rows are kept and found again; progress(done, total, next)
-    jobs, dask : who makes the runs, as in `sweep`; with functions of x and t this process alone
+    exact : exact(pipe, x, t) -> pressure [Pa], flow [m3/s]; the reference, and the start if `initial` is left out
+    out : folder in which finished rows are stored and found again; progress : progress(done, total, next)
+    jobs, dask : processes that make the runs, as in `sweep`; functions of x and t need this process alone
     Raises CaseError, FvsolveError.
     """
     if against not in REFERENCES:
         raise FvsolveError(
-            f'against = "{against}" is unknown{did_you_mean(against, REFERENCES)}; wanted {", ".join(REFERENCES)}'
+            f'against = "{against}" is unknown{did_you_mean(against, REFERENCES)}. Expected {", ".join(REFERENCES)}'
         )
     given = initial, source, exact
     if any(given) and (jobs != 1 or dask is not None):
-        raise FvsolveError("initial, source and exact are functions of this process; wanted jobs = 1 and no dask")
-    tell, found = progress or (lambda *_: None), []
+        raise FvsolveError("initial, source and exact are functions of this process. Expected jobs = 1 and no dask")
+    report, studies = progress or (lambda *_: None), []
     pairs = [(scheme, method) for scheme in names(schemes) or [None] for method in names(methods) or [None]]
     with kept_in(out) as points, Errands(case, jobs, dask) as errands:
         for scheme, method in pairs:
-            own = {"numerics.scheme": scheme, "numerics.method": method}
-            settings = {**(set or {}), **{name: value for name, value in own.items() if value is not None}}
-            found.append(_order(case, settings, (refine, key, levels, cells), against, given, points, tell, errands))
-    return found[0] if len(found) == 1 else found
+            pair_settings = {"numerics.scheme": scheme, "numerics.method": method}
+            settings = {**(set or {}), **{name: value for name, value in pair_settings.items() if value is not None}}
+            studies.append(
+                _order(case, settings, (refine, key, levels, cells), against, given, points, report, errands)
+            )
+    return studies[0] if len(studies) == 1 else studies
 
 
 def _order(case, settings: Mapping, rows: tuple, against, given, points, progress, errands: Errands) -> Order:
-    """The study of one scheme and method; rows : refine, key, levels and cells; given : initial, source and exact
-    solution, or None for each."""
+    """Order study of one scheme and method.
+
+    rows : refine, key, levels and cells; given : initial, source and exact solution, None if absent
+    """
     from fvsolve.case import load
 
     case = load(case, settings)
-    if kept := settled(case):
-        settings = settings | kept
-        case = load(case, kept)
-    made = affordable(case, *rows, against, points)
+    if fixed := settled(case):
+        settings = settings | fixed
+        case = load(case, fixed)
+    refinement = affordable(case, *rows, against, points)
     if given == (None, None, None):
         from fvsolve.studies.accuracy.judge import Judge
 
-        return Judge(case, made, against, errands, settings).study(points, progress)
+        return Judge(case, refinement, against, errands, settings).study(points, progress)
     from fvsolve.studies.accuracy.manufactured import Manufactured
 
     without_basins(case, "order by functions of pipes")
     if delayed := lines(case):
-        raise FvsolveError(f"functions along pipes want cells, and {listing(delayed)} would be delay lines: say "
-                           'numerics.line = "cells", and line of no pipe')  # fmt: skip
-    return Manufactured(case, made, against, *given).study(points, progress)
+        raise FvsolveError(f"functions along pipes need cells, but {listing(delayed)} would be delay lines. Set "
+                           'numerics.line = "cells", and no `line` of a pipe')  # fmt: skip
+    return Manufactured(case, refinement, against, *given).study(points, progress)

@@ -1,6 +1,6 @@
-"""Which of many settings is cheapest for an error. Knows numbers; knows no case and no method.
+"""Cheapest settings for an error: crossings with a target, and the Pareto front of error and cost.
 
-A curve is a row of points of one method from coarse to fine; errors of points that failed are infinite.
+A curve is a sequence of points of one method, from coarse to fine; failed points have infinite errors.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Crossing:
-    """Where a curve meets a target: its cost there, and between which points it lies.
+    """Crossing of a curve with a target error: its cost, and the two points around it.
 
-    cost : at the target, log-log between the two points; at the coarsest point where that is good enough already
-    coarser, finer : indices of the points; equal where nothing lies between; share : of the way in logarithms
+    cost : at the target, log-log between the two points; at the coarsest point if that is accurate enough
+    coarser, finer : indices of the points, equal if the crossing is a point; share : fraction of the way, in logarithms
     """
 
     cost: float
@@ -25,12 +25,12 @@ class Crossing:
 
     @property
     def within(self) -> bool:
-        """Whether the target lies between two points; else the coarsest one is better than asked."""
+        """True if the target lies between two points; False at a point, where the error may be less than the target."""
         return self.coarser != self.finer
 
 
 def crossing(errors: Sequence[float], costs: Sequence[float], target: float) -> Crossing | None:
-    """The coarsest place of a curve from which on all errors are at most `target`; None where its end misses it."""
+    """Coarsest place of a curve from which on all errors are at most `target`; None if its finest point exceeds it."""
     good = len(errors)
     while good > 0 and errors[good - 1] <= target:
         good -= 1
@@ -46,25 +46,25 @@ def crossing(errors: Sequence[float], costs: Sequence[float], target: float) -> 
 
 
 def between(low: float, high: float, share: float) -> float:
-    """The number at `share` of the way from low to high, in logarithms."""
+    """Number at the fraction `share` of the way from low to high, in logarithms."""
     return math.exp((1.0 - share) * math.log(low) + share * math.log(high))
 
 
 def front(errors: Sequence[float], costs: Sequence[float]) -> list[int]:
-    """Indices of the points that none beats in error and cost at once, from cheap to accurate."""
-    found, least = [], math.inf
+    """Indices of the Pareto-optimal points (error, cost), from cheap to accurate."""
+    indices, least = [], math.inf
     for k in sorted(range(len(errors)), key=lambda k: (costs[k], errors[k])):
         if errors[k] < least:
             least = errors[k]
-            found.append(k)
-    return found
+            indices.append(k)
+    return indices
 
 
 def targets(errors: Sequence[float], floor: float) -> list[float]:
-    """1e-1, 1e-2, ... down to the last power of ten that some error reaches and that is not below the floor."""
+    """Powers of ten 1e-1, 1e-2, ... down to the last that some error reaches and that is not below the floor."""
     least = max(min((e for e in errors if math.isfinite(e)), default=math.inf), floor)
-    found, power = [], -1
-    while 10.0**power >= least and power > -16:
-        found.append(10.0**power)
-        power -= 1
-    return found
+    powers, exponent = [], -1
+    while 10.0**exponent >= least and exponent > -16:
+        powers.append(10.0**exponent)
+        exponent -= 1
+    return powers

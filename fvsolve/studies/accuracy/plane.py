@@ -1,30 +1,30 @@
-"""What the cells of basins hold at the end, on other cells too, and how far apart that is. Knows fields; runs nothing.
+"""Fields of basins at the end of a run, averaged over the cells of coarser meshes.
 
-A variable is called "BASIN at the end: QUANTITY", its values are the deviations that states are.
+A variable has the name "BASIN at the end: QUANTITY". Its values are deviations, as states are.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-NEAR = 1e-9  # of its length: how near an edge of coarser cells must be to one of finer ones to be the same
-DEGREE = 5  # of the spline through contents, where it is not
+NEAR = 1e-9  # fraction of the length: edges of coarse and fine cells that lie nearer are equal
+DEGREE = 5  # degree of the spline through cumulative contents, for edges that are not equal
 
 
 def contents(basin, y: np.ndarray) -> dict[str, np.ndarray]:
-    """What states of a model say of a basin's cells, by quantity, what they carry included."""
-    found = dict(zip(basin.quantities, basin.of(y), strict=True))
-    carried = getattr(basin, "scalars", ())
-    return found | (dict(zip(carried, basin.amounts(y), strict=True)) if carried else {})
+    """Fields of a basin by quantity, from the states `y` of a model; scalars as amounts in each cell."""
+    fields = dict(zip(basin.quantities, basin.of(y), strict=True))
+    scalars = getattr(basin, "scalars", ())
+    return fields | (dict(zip(scalars, basin.amounts(y), strict=True)) if scalars else {})
 
 
 def variable_of(basin, quantity: str) -> str:
-    """Name of a variable."""
+    """Name of the variable of a basin's quantity."""
     return f"{basin.name} at the end: {quantity}"
 
 
 def unit_of(case, variable: str) -> str | None:
-    """Unit of a variable, None where it is none of a basin."""
+    """Unit of a variable; None if it does not belong to a basin."""
     name, _, quantity = variable.partition(" at the end: ")
     node = case.nodes.get(name)
     if not quantity or node is None or node.kind != "basin":
@@ -33,26 +33,30 @@ def unit_of(case, variable: str) -> str | None:
 
 
 def lowered(fine, values, coarse) -> np.ndarray:
-    """Averages float64[quantities, n] of a basin over the cells of another one of the same outline."""
+    """Cell averages float64[quantities, n] of a fine basin over the cells of a coarse basin with the same outline."""
     if fine.n == coarse.n and np.array_equal(fine.mesh.centre, coarse.mesh.centre):
         return np.asarray(values)
-    one, other = fine.mesh.grid, coarse.mesh.grid
-    degree = DEGREE if fine.is_grid else 1  # splines do not see holes
-    found = []
+    fine_grid, coarse_grid = fine.mesh.grid, coarse.mesh.grid
+    degree = DEGREE if fine.is_grid else 1  # higher splines would smooth across holes
+    averages = []
     for value in values:
-        held = np.where(one.index >= 0, value[one.index], 0.0) * np.outer(np.diff(one.y), np.diff(one.x))
-        held = gathered(gathered(held, one.x, other.x, degree, 1), one.y, other.y, degree, 0)
-        found.append((held / np.outer(np.diff(other.y), np.diff(other.x)))[other.index >= 0])
-    return np.array(found)
+        contents = np.where(fine_grid.index >= 0, value[fine_grid.index], 0.0) * np.outer(
+            np.diff(fine_grid.y), np.diff(fine_grid.x)
+        )
+        contents = gathered(
+            gathered(contents, fine_grid.x, coarse_grid.x, degree, 1), fine_grid.y, coarse_grid.y, degree, 0
+        )
+        averages.append((contents / np.outer(np.diff(coarse_grid.y), np.diff(coarse_grid.x)))[coarse_grid.index >= 0])
+    return np.array(averages)
 
 
-def gathered(held: np.ndarray, fine: np.ndarray, coarse: np.ndarray, degree: int, axis: int) -> np.ndarray:
-    """Contents of the cells between coarser edges, from those of finer cells, along an axis."""
-    first = np.zeros_like(np.take(held, [0], axis=axis))
-    contents = np.concatenate([first, np.cumsum(held, axis=axis)], axis=axis)
-    at = np.clip(np.searchsorted(fine, coarse - NEAR * (fine[-1] - fine[0])), 0, fine.size - 1)
-    if np.all(np.abs(fine[at] - coarse) <= NEAR * (fine[-1] - fine[0])):
-        return np.diff(np.take(contents, at, axis=axis), axis=axis)
+def gathered(fine_contents: np.ndarray, fine: np.ndarray, coarse: np.ndarray, degree: int, axis: int) -> np.ndarray:
+    """Contents of cells between the edges `coarse`, from cells between the edges `fine`, along an axis."""
+    first = np.zeros_like(np.take(fine_contents, [0], axis=axis))
+    cumulative = np.concatenate([first, np.cumsum(fine_contents, axis=axis)], axis=axis)
+    edges = np.clip(np.searchsorted(fine, coarse - NEAR * (fine[-1] - fine[0])), 0, fine.size - 1)
+    if np.all(np.abs(fine[edges] - coarse) <= NEAR * (fine[-1] - fine[0])):
+        return np.diff(np.take(cumulative, edges, axis=axis), axis=axis)
     from scipy.interpolate import make_interp_spline
 
-    return np.diff(make_interp_spline(fine, contents, k=min(degree, fine.size - 1), axis=axis)(coarse), axis=axis)
+    return np.diff(make_interp_spline(fine, cumulative, k=min(degree, fine.size - 1), axis=axis)(coarse), axis=axis)

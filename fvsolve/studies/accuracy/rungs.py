@@ -1,5 +1,7 @@
-"""A scene said with less: rigid columns, lumped volumes, few cells, water in tanks as ice or as modes, as keys of a
-case. Knows parts; runs nothing.
+"""Levels of the model hierarchy as keys of a case.
+
+Levels are rigid columns, lumped volumes, delay lines and few or many cells; for water in tanks on bodies frozen water,
+modes and cells.
 """
 
 from __future__ import annotations
@@ -16,94 +18,97 @@ from fvsolve.model.delay import what_needs_cells
 from fvsolve.studies.outcome import prepared
 
 SLOSHING = ("frozen", "modes", "cells")
-THIN = 4  # cells across a tank up to which nothing is followed there
+THIN = 4  # sides of a tank with at most so many cells are not refined
 WITH_CELLS = {"numerics.method": "ssp-rk3", "numerics.courant": 0.7}
 WITHOUT_CELLS = {"numerics.method": "auto", "numerics.rtol": 1e-7}
 
 
 class Unsayable(Exception):
-    """Why a case cannot be said by a rung."""
+    """Raised with the reason if a case has no model of a level."""
 
 
 def structures(case) -> list[str]:
-    """Names of the rungs of a case, poorest first."""
+    """Names of the levels of a case, simplest first."""
     pipes = [link for link in case.links.values() if link.kind == "pipe"]
     if tanks(case):
         return list(SLOSHING)
     if not pipes:
         return ["as it is"]
-    most = max(pipe.cells for pipe in pipes)
-    counts = [2**k for k in range(20) if 2 ** (k + 1) <= most]
+    greatest = max(pipe.cells for pipe in pipes)
+    counts = [2**k for k in range(20) if 2 ** (k + 1) <= greatest]
     cells = [f"{count} cell{'s' * (count > 1)}" for count in counts]
     return ["rigid column", "lumped volume", "column and volume", "delay lines", *cells, "full line"]
 
 
 def tanks(case) -> dict[str, Any]:
-    """Basins with a free surface that ride on bodies."""
-    return {name: one for name, one in case.nodes.items() if one.kind == "basin" and one.on and one.own.sloshes}
+    """Basins with a free surface that are mounted on bodies."""
+    return {name: node for name, node in case.nodes.items() if node.kind == "basin" and node.on and node.own.sloshes}
 
 
 def finer(case, doublings: int) -> list[str]:
-    """Names of rungs above the case's own, each with twice the cells of the one before; none without any to say so."""
-    able = any(link.kind == "pipe" for link in case.links.values())
-    if riding := tanks(case):
-        able = all(basin.cells for basin in riding.values())
-    return [f"{2**k} times the cells" for k in range(1, doublings + 1)] if able else []
+    """Names of levels finer than the case itself, each with twice the cells of the level before.
+
+    The list is empty if the case has no pipes, or if a tank on a body does not state its cells.
+    """
+    refinable = any(link.kind == "pipe" for link in case.links.values())
+    if basins := tanks(case):
+        refinable = all(basin.cells for basin in basins.values())
+    return [f"{2**k} times the cells" for k in range(1, doublings + 1)] if refinable else []
 
 
-def restated(case, rung: str) -> dict[str, Any]:
-    """The keys that say a case by a rung; raises Unsayable where it cannot be."""
-    if rung in ("full line", "as it is"):
+def restated(case, level: str) -> dict[str, Any]:
+    """Keys that turn a case into a level. Raises NotApplicable if that is impossible."""
+    if level in ("full line", "as it is"):
         return {}
     if tanks(case):
-        return sloshing(case, rung)
+        return sloshing(case, level)
     pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
-    if rung.endswith("times the cells"):
-        times, step = int(rung.split()[0]), case.numerics.step
-        found = {f"links.{name}.cells": times * pipe.cells for name, pipe in pipes.items()}
-        return found if step is None else found | {"numerics.step": step / times}
-    if rung == "delay lines":
+    if level.endswith("times the cells"):
+        factor, step = int(level.split()[0]), case.numerics.step
+        keys = {f"links.{name}.cells": factor * pipe.cells for name, pipe in pipes.items()}
+        return keys if step is None else keys | {"numerics.step": step / factor}
+    if level == "delay lines":
         return delayed(case, pipes)
-    if rung.endswith(("cell", "cells")):
-        count, most = int(rung.split()[0]), max(pipe.cells for pipe in pipes.values())
-        return {f"links.{name}.cells": max(1, round(pipe.cells * count / most)) for name, pipe in pipes.items()}
-    found = {"expect": {}, "compare": {}, "routes": {}, "limits": {}, **WITHOUT_CELLS}
-    found["output.probes"] = [probe.text for probe in case.output.probes if _survives(probe, pipes)]
-    if rung != "lumped volume":
-        found |= {f"links.{name}": column(case, name) for name in pipes}
+    if level.endswith(("cell", "cells")):
+        count, greatest = int(level.split()[0]), max(pipe.cells for pipe in pipes.values())
+        return {f"links.{name}.cells": max(1, round(pipe.cells * count / greatest)) for name, pipe in pipes.items()}
+    keys = {"expect": {}, "compare": {}, "routes": {}, "limits": {}, **WITHOUT_CELLS}
+    keys["output.probes"] = [probe.text for probe in case.output.probes if _survives(probe, pipes)]
+    if level != "lumped volume":
+        keys |= {f"links.{name}": column(case, name) for name in pipes}
     else:
         model = prepared(case)
-        found |= {f"links.{name}": resistance(case, model, name) for name in pipes}
-    if rung != "rigid column":
-        found |= volumes(case, pipes)
-    return found
+        keys |= {f"links.{name}": resistance(case, model, name) for name in pipes}
+    if level != "rigid column":
+        keys |= volumes(case, pipes)
+    return keys
 
 
-def sloshing(case, rung: str) -> dict[str, Any]:
-    """Water of all tanks that ride as ice, by its modes, or by cells, those of the case or so many times as many."""
-    riding, found = tanks(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
-    if rung in ("frozen", "modes"):
-        left = {"frozen": (), "modes": ("depth",)}[rung]
-        found["output.probes"] = [
-            one.text for one in case.output.probes if one.name not in riding or one.quantity in left
+def sloshing(case, level: str) -> dict[str, Any]:
+    """Keys of a level for all tanks on bodies: frozen water, modes, or cells (the case's own, or a multiple)."""
+    basins, keys = tanks(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
+    if level in ("frozen", "modes"):
+        kept_quantities = {"frozen": (), "modes": ("depth",)}[level]
+        keys["output.probes"] = [
+            entry.text for entry in case.output.probes if entry.name not in basins or entry.quantity in kept_quantities
         ]
-        return found | {f"nodes.{name}.sloshing": rung for name in riding} | WITHOUT_CELLS
-    found |= {f"nodes.{name}.sloshing": "cells" for name in riding}
-    if any(basin.lumped for basin in riding.values()):
-        found |= WITH_CELLS
-    if rung == "cells":
-        return found
-    times, step = int(rung.split()[0]), case.numerics.step
-    found |= {f"nodes.{name}.cells": [times * one if one > THIN else one for one in basin.cells]
-              for name, basin in riding.items()}  # fmt: skip
-    return found if step is None else found | {"numerics.step": step / times}
+        return keys | {f"nodes.{name}.sloshing": level for name in basins} | WITHOUT_CELLS
+    keys |= {f"nodes.{name}.sloshing": "cells" for name in basins}
+    if any(basin.lumped for basin in basins.values()):
+        keys |= WITH_CELLS
+    if level == "cells":
+        return keys
+    factor, step = int(level.split()[0]), case.numerics.step
+    keys |= {f"nodes.{name}.cells": [factor * entry if entry > THIN else entry for entry in basin.cells]
+              for name, basin in basins.items()}  # fmt: skip
+    return keys if step is None else keys | {"numerics.step": step / factor}
 
 
 def delayed(case, pipes: dict[str, Any]) -> dict[str, Any]:
-    """All pipes as delay lines."""
+    """Keys that make all pipes delay lines."""
     for name, pipe in pipes.items():
-        if lacks := what_needs_cells(case, name, pipe):
-            raise Unsayable(f"{name} is no delay line: {lacks}")
+        if reason := what_needs_cells(case, name, pipe):
+            raise Unsayable(f"{name} cannot be a delay line: {reason}")
     return {f"links.{name}.line": "delay" for name in pipes}
 
 
@@ -112,55 +117,58 @@ def _survives(probe, pipes: dict) -> bool:
 
 
 def column(case, name: str) -> dict[str, Any]:
-    """A pipe as a rigid column."""
-    keys = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
-    said = {"diameter": case.links[name].diameter, **link_said(case.raw, name)}
-    found = {"type": "rigid-column", **{key: said[key] for key in keys if key in said}}
-    if found.get("friction", {}).get("model") == "unsteady":  # a column has no memory
-        kept = {key: value for key, value in found["friction"].items() if key in ("roughness", "factor")}
-        found["friction"] = {"model": "quasi-steady", **kept}
-    return found
+    """Table of a pipe as a rigid column."""
+    names = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
+    raw = {"diameter": case.links[name].diameter, **link_said(case.raw, name)}
+    table = {"type": "rigid-column", **{key: raw[key] for key in names if key in raw}}
+    if table.get("friction", {}).get("model") == "unsteady":  # a rigid column has no unsteady friction
+        friction = {key: value for key, value in table["friction"].items() if key in ("roughness", "factor")}
+        table["friction"] = {"model": "quasi-steady", **friction}
+    return table
 
 
 def resistance(case, model, name: str) -> dict[str, Any]:
-    """A pipe as the drop that its friction takes from the flow of the start, dp = zeta rho v^2 / 2."""
+    """Table of a pipe as an orifice with the pipe's friction loss at the initial flow, dp = zeta rho v^2 / 2."""
     row = model.tables.pipes[[pipe.name for pipe in model.pipes].index(name)]
     law = [row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds")]
-    flow, per = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * case.links[name].length
+    flow, scale = float(row["flow"]), 2.0 * model.case.properties.density * row["area"] * case.links[name].length
     if law[0] not in (rec.FRICTION_NONE, rec.FRICTION_FACTOR) and flow == 0.0:
-        raise Unsayable(f"{name} is at rest at the start, so what its friction takes is not known")
-    zeta = float(per * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
+        raise Unsayable(f"{name} is at rest at the start, so its friction loss is not known")
+    zeta = float(scale * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
     if not zeta > 0.0:
-        raise Unsayable(f"{name} has no friction, so nothing is left of it between two volumes")
-    said = {"diameter": case.links[name].diameter, **link_said(case.raw, name)}
-    return {"type": "orifice", "from": said["from"], "to": said["to"], "diameter": said["diameter"],
+        raise Unsayable(f"{name} has no friction, so there is no resistance between two volumes")
+    raw = {"diameter": case.links[name].diameter, **link_said(case.raw, name)}
+    return {"type": "orifice", "from": raw["from"], "to": raw["to"], "diameter": raw["diameter"],
             "loss_coefficient": zeta}  # fmt: skip
 
 
 def volumes(case, pipes: dict) -> dict[str, Any]:
-    """The junctions that pipes touch as chambers that hold half of each, wall and all: V beta / K."""
-    held: dict[str, float] = {}
+    """Junctions at the ends of pipes as chambers that hold half of each pipe.
+
+    The volume contains the stiffness of fluid and wall: V beta / K, K = rho a^2.
+    """
+    volume_of: dict[str, float] = {}
     fluid = case.properties
     for name, pipe in pipes.items():
-        stiff = fluid.density * case.wave_speed(name) ** 2
-        half = 0.125 * math.pi * pipe.diameter**2 * pipe.length * fluid.bulk_modulus / stiff
+        stiffness = fluid.density * case.wave_speed(name) ** 2
+        half_volume = 0.125 * math.pi * pipe.diameter**2 * pipe.length * fluid.bulk_modulus / stiffness
         for end in pipe.ports.values():
-            held[end] = held.get(end, 0.0) + half
-    found = {}
-    for name, volume in held.items():
+            volume_of[end] = volume_of.get(end, 0.0) + half_volume
+    chambers = {}
+    for name, volume in volume_of.items():
         node = case.nodes.get(name, case.places[name])
         if node.kind in ("reservoir", "tank", "accumulator"):
             continue
         if node.kind not in ("junction", "inflow", "chamber"):
-            raise Unsayable(f"a volume at {name} would take the place of the {node.kind}")
+            raise Unsayable(f"a volume at {name} would replace the {node.kind}")
         if name not in case.nodes:
-            raise Unsayable(f"{name} belongs to a cylinder and holds no more than its own volume")
-        said = case.raw["nodes"][name]
+            raise Unsayable(f"{name} belongs to a cylinder, whose volume is its own only")
+        raw = case.raw["nodes"][name]
         if node.kind == "inflow" or (node.kind == "junction" and np.any(node.demand.value != 0.0)):
-            raise Unsayable(f"flow enters or leaves at {name}, which a volume does not do by itself")
-        keys = {key: said[key] for key in ("elevation", "position", "initial_pressure") if key in said}
-        own = node.volume if node.kind == "chamber" else 0.0
-        found[f"nodes.{name}"] = {"type": "chamber", "volume": own + volume, **keys}
-    if not found:
-        raise Unsayable("all ends hold their pressure, so there is no volume between them")
-    return found
+            raise Unsayable(f"flow enters or leaves at {name}, which a volume cannot represent")
+        start_keys = {key: raw[key] for key in ("elevation", "position", "initial_pressure") if key in raw}
+        own_volume = node.volume if node.kind == "chamber" else 0.0
+        chambers[f"nodes.{name}"] = {"type": "chamber", "volume": own_volume + volume, **start_keys}
+    if not chambers:
+        raise Unsayable("all ends have a given pressure, so there is no volume between them")
+    return chambers

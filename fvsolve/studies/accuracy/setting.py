@@ -1,4 +1,4 @@
-"""A setting of a chart: scheme, method and how fine, as keys of a case. Knows cases; runs nothing."""
+"""One setting of a chart: scheme, method and resolution, as keys of a case."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fvsolve.case.sections import DEFAULT_COURANT, steps_by_error
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import basins, counts, in_cells, keys, scaled
 
-TOLERANCE = 1e-4  # of implicit methods where there are cells: their steps follow what moves, not the cells
+TOLERANCE = 1e-4  # rtol of implicit methods with cells: their steps follow the solution, not the cell size
 
 
 @dataclass(frozen=True)
 class MethodSetting:
-    """Scheme (None without cells), method, step control and its size; cells of the part that counts.
+    """Scheme (None without cells), method, kind and size of step control, and cells of the main part.
 
     keys : dotted keys of the case -> values
     """
@@ -29,75 +29,80 @@ class MethodSetting:
 
     @property
     def curve(self) -> tuple:
-        """What the points of one curve share."""
+        """Identity of the curve that this setting belongs to."""
         return self.scheme, self.method, "courant" if self.control == "courant" else self.control
 
     @property
     def name(self) -> str:
-        """`upwind5 rk4`."""
+        """Name of scheme and method, such as `upwind5 rk4`."""
         return f"{self.scheme} {self.method}" if self.scheme else self.method
 
     @property
     def fineness(self) -> str:
-        """What makes it finer than its neighbours, in words."""
+        """Resolution in words, such as `200 cells` or `rtol 1e-06`."""
         return f"{self.cells} cells" if self.cells is not None else f"{self.control} {self.size:.3g}"
 
 
 def longest(case: Case) -> str | None:
-    """Name of the part whose cells count: the basin with most along a side, else the pipe that a wave crosses last.
+    """Name of the part whose number of cells is the resolution; None without cells, since delay lines have none.
 
-    None where there is none: delay lines have no cells.
+    It is the basin with most cells along a side, else the pipe with the longest travel time of a wave.
     """
-    found = {name: max(basin.cells) for name, basin in basins(case).items() if basin.cells}
-    if found:
-        return max(found, key=found.get)
-    found = {name: pipe.length / case.wave_speed(name) for name, pipe in in_cells(case).items()}
-    return max(found, key=found.get, default=None)
+    sizes = {name: max(basin.cells) for name, basin in basins(case).items() if basin.cells}
+    if sizes:
+        return max(sizes, key=sizes.get)
+    sizes = {name: pipe.length / case.wave_speed(name) for name, pipe in in_cells(case).items()}
+    return max(sizes, key=sizes.get, default=None)
 
 
 def own_cells(case: Case) -> int | None:
-    """Cells along the longer side of the basin that counts, None where a pipe does."""
+    """Cells along the longer side of the main basin; None if the main part is a pipe."""
     basin = basins(case).get(longest(case) or "")
     return None if basin is None else max(basin.cells)
 
 
 def cell_keys(case: Case, cells: int) -> dict:
-    """Keys that give the part that counts so many cells, and the others as many more or fewer as they had beside it.
+    """Keys that give the main part this number of cells, and scale all other parts in proportion.
 
-    Pipes that state `cells` keep stating them; those that do not share one `cell_time`. Beside basins all state them.
+    Pipes that state `cells` keep that key; the others share one `cell_time`. With basins all parts state `cells`.
     """
-    main, own = longest(case), own_cells(case)
-    if own is not None:
-        return keys(scaled(counts(case), cells / own))
+    main_part, main_cells = longest(case), own_cells(case)
+    if main_cells is not None:
+        return keys(scaled(counts(case), cells / main_cells))
     pipes = in_cells(case)
     stated = {name for name in pipes if link_said(case.raw, name).get("cells") is not None}
-    factor = cells / pipes[main].cells
-    found = {f"links.{name}.cells": max(1, round(pipes[name].cells * factor)) for name in stated}
-    if main not in stated:
-        found["numerics.cell_time"] = pipes[main].length / case.wave_speed(main) / cells
+    factor = cells / pipes[main_part].cells
+    changed = {f"links.{name}.cells": max(1, round(pipes[name].cells * factor)) for name in stated}
+    if main_part not in stated:
+        changed["numerics.cell_time"] = pipes[main_part].length / case.wave_speed(main_part) / cells
     elif len(stated) < len(pipes):
-        free = [pipe for name, pipe in pipes.items() if name not in stated]
+        unstated = [pipe for name, pipe in pipes.items() if name not in stated]
         travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes.items() if name not in stated)
-        found["numerics.cell_time"] = travel / (max(pipe.cells for pipe in free) * factor)
-    return found
+        changed["numerics.cell_time"] = travel / (max(pipe.cells for pipe in unstated) * factor)
+    return changed
 
 
 def with_cells(case: Case, scheme: str, method: str, cells: int) -> MethodSetting:
-    """A setting on pipes: Courant 0.9, 1 for upwind with Euler; a tolerance for adaptive implicit methods."""
+    """Setting of a case with cells: Courant number 0.9, or 1 for upwind with Euler.
+
+    Adaptive implicit methods use a tolerance instead.
+    """
     by_error = steps_by_error(method)
     control = "rtol" if by_error else "courant"
     size = TOLERANCE if by_error else 1.0 if (scheme, method) == ("upwind", "euler") else DEFAULT_COURANT
-    keys = {"numerics.scheme": scheme, "numerics.method": method, f"numerics.{control}": size}
-    return MethodSetting(scheme, method, control, size, cells, keys | cell_keys(case, cells))
+    settings = {"numerics.scheme": scheme, "numerics.method": method, f"numerics.{control}": size}
+    return MethodSetting(scheme, method, control, size, cells, settings | cell_keys(case, cells))
 
 
 def without_cells(method: str, size: float, control: str | None = None) -> MethodSetting:
-    """A setting of ordinary differential equations or delay lines: by tolerance, or by step where there is no error
-    estimate, if `control` does not say."""
+    """Setting of a case of ordinary differential equations or delay lines.
+
+    control : "rtol" or "step"; if None a tolerance, or a step for methods without an error estimate
+    """
     control = control or ("rtol" if adaptive(method) else "step")
     return MethodSetting(None, method, control, size, None, {"numerics.method": method, f"numerics.{control}": size})
 
 
 def adaptive(method: str) -> bool:
-    """Whether a method can hold its steps to a tolerance."""
+    """True if a method can keep the error of its steps within a tolerance."""
     return method == AUTO or METHODS[method].adaptive

@@ -1,4 +1,4 @@
-"""What a run costs: CPU time of its steps, best of several, compiled before. Knows runs; knows no question."""
+"""CPU time of runs: the best of several, with code that is already compiled."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from fvsolve.solve.solve import Run
 from fvsolve.steppers import slots
 from fvsolve.studies.outcome import Outcome, outcome, prepared, refusal
 
-MOST = 5  # runs of which the quickest counts
-BUDGET = 0.4  # [s] that they may take together, the first excepted
-LIMIT = 30.0  # [s] of CPU time after which a run is given up
-LASTING = 120.0  # the same of one that others are measured against
-TASTE = 20_000  # steps after which a run that only compiles is
+MOST = 5  # greatest number of runs, of which the fastest counts
+BUDGET = 0.4  # time of all repeated runs together, without the first [s]
+LIMIT = 30.0  # CPU time after which a run is stopped [s]
+LASTING = 120.0  # CPU time after which a reference run, or a row of an order study, is stopped [s]
+TASTE = 20_000  # steps after which a run that only compiles is stopped
 GIVEN_UP = "given up after"
 
 
 class Capped(Run):
-    """A run that is given up, between two chunks of steps, when it has cost too much."""
+    """Run that stops between two chunks of steps as soon as its cost exceeds a limit."""
 
     most_seconds, most_steps = np.inf, np.inf
 
     def pause(self) -> None:
-        """As of every run, until it is given up."""
+        """Pause as any run does, then check the cost."""
         super().pause()
         self.check()
 
     def check(self) -> None:
-        """Give up where it has cost too much."""
+        """Raise GivenUp if the cost exceeds its limits."""
         if self.processor > self.most_seconds or self.loop.memory[slots.STEPS] > self.most_steps:
             raise GivenUp
 
     def segments(self) -> str:
-        """Why the run ended."""
+        """Run all segments and return the reason for the end."""
         try:
             return super().segments()
         except GivenUp:
@@ -43,50 +43,53 @@ class Capped(Run):
 
 
 class GivenUp(Exception):
-    """Ends a run that costs too much."""
+    """Raised to end a run that costs too much."""
 
 
 def capped(model, state, sink, progress) -> Run:
-    """A run of LIMIT seconds at most."""
-    made = Capped(model, state, sink, progress)
-    made.most_seconds = LIMIT
-    return made
+    """Run with at most LIMIT seconds of CPU time."""
+    run = Capped(model, state, sink, progress)
+    run.most_seconds = LIMIT
+    return run
 
 
 def lasting(model, state, sink, progress) -> Run:
-    """A run of LASTING seconds at most."""
-    made = Capped(model, state, sink, progress)
-    made.most_seconds = LASTING
-    return made
+    """Run with at most LASTING seconds of CPU time."""
+    run = Capped(model, state, sink, progress)
+    run.most_seconds = LASTING
+    return run
 
 
 def tasted(model, state, sink, progress) -> Run:
-    """A run of TASTE steps or so."""
-    made = Capped(model, state, sink, progress)
-    made.most_steps = TASTE
-    return made
+    """Run with about TASTE steps at most."""
+    run = Capped(model, state, sink, progress)
+    run.most_steps = TASTE
+    return run
 
 
 def finished(model, run=None) -> Outcome:
-    """One run of a model, made by `run`; KeyboardInterrupt where the user broke it off."""
-    found = outcome(model, run=run)
-    if found.reason.startswith("interrupted"):
+    """Outcome of one run of a model, made by `run`. Raises KeyboardInterrupt if the user interrupted the run."""
+    result = outcome(model, run=run)
+    if result.reason.startswith("interrupted"):
         raise KeyboardInterrupt
-    return found
+    return result
 
 
 def best(model, most: int = MOST, budget: float = BUDGET) -> Outcome:
-    """The run with the least CPU time of up to `most`; a run that stops early, or is given up, is not repeated."""
-    began, found = perf_counter(), finished(model, capped)
-    for _ in range(most - 1 if found.ok else 0):
-        if perf_counter() - began + found.seconds > budget:
+    """Outcome with the least CPU time among up to `most` runs.
+
+    A run that stops early, or exceeds its limit, is not repeated.
+    """
+    began, fastest = perf_counter(), finished(model, capped)
+    for _ in range(most - 1 if fastest.ok else 0):
+        if perf_counter() - began + fastest.seconds > budget:
             break
-        found = min(found, finished(model, capped), key=lambda one: one.processor)
-    return found
+        fastest = min(fastest, finished(model, capped), key=lambda run: run.processor)
+    return fastest
 
 
 def quickest(case, keys) -> Outcome:
-    """The best run of a case with keys changed; one that is refused is an outcome too."""
+    """Best run of a case with changed keys; a refused case also gives an outcome."""
     try:
         return best(prepared(case, keys))
     except CaseError as error:
@@ -94,7 +97,10 @@ def quickest(case, keys) -> Outcome:
 
 
 def compile_seconds(model) -> float:
-    """Wall time that a first run takes beyond a second one [s]: compiling, or loading what was compiled before."""
+    """Wall time of a first run less that of a second run [s].
+
+    The difference is the time of compilation, or of loading compiled code.
+    """
     times = []
     for _ in range(2):
         began = perf_counter()

@@ -1,1 +1,1 @@
-"""Where energy comes from, stays and goes, and which methods make some. Knows the ledger; judges no accuracy."""
+"""Energy balance of runs, and passivity of schemes and methods."""

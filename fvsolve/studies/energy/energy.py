@@ -1,4 +1,4 @@
-"""Where the energy of a run comes from, where it stays and what the numbers take. Knows runs; prints nothing."""
+"""Energy balance of a run: supplied, stored and dissipated energy, and energy changed by the numerical method."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from fvsolve.solve import initial_state
 from fvsolve.studies.energy.booking import EnergyRun
 from fvsolve.studies.outcome import RowSink, prepared
 
-ROUNDING = 1e-12  # share of what passed below which a remainder is rounding
-SHORT = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds that a line need not name
+ROUNDING = 1e-12  # fraction of the energy throughput below which a remainder is rounding
+SHORT = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds omitted in names of ledger lines
 
 
 @dataclass(frozen=True)
 class Port:
-    """Condition (2) at one port: E0 + integral of p q >= 0, p from ambient, heights from the port's.
+    """Passivity at a port, condition (2): E0 + integral of p q dt >= 0, p gauge pressure, heights from the port.
 
-    work : the integral at its least [J], at `time` [s]; at_start : E0, what the network could give at the start;
-    others : what other ports had supplied at the least margin; margin : least of E0 + work + others. course, bound :
-    float64[k]  the integral and -(E0 + others) at the rows of the ledger [J]; text : the verdict as a sentence, in the
-    units of `[output]`.
+    work : least value of the integral [J], at `time` [s]; at_start : E0, available energy at the start [J]
+    others : energy supplied by other ports at the least margin [J]; margin : least value of E0 + work + others [J], at
+    `t_margin` [s]; course, bound : float64[k]  the integral and -(E0 + others) at the rows of the ledger [J]
+    text : verdict as a sentence, in the units of `[output]`
     """
 
     node: str
@@ -42,20 +42,21 @@ class Port:
     text: str = ""
 
     def plain(self) -> dict:
-        """For JSON, without its course."""
-        return {name: one for name, one in vars(self).items() if np.ndim(one) == 0}
+        """Plain values for JSON, without the arrays."""
+        return {name: value for name, value in vars(self).items() if np.ndim(value) == 0}
 
 
 @dataclass(frozen=True)
 class Energy:
-    """The ledger of a run, row by row at ends of steps; cumulative since the start [J].
+    """Energy ledger of a run at ends of steps, cumulative since the start [J].
 
-    t : float64[k] [s]; supplied, stored, dissipated : {"PART": float64[k]}, stored as change since the start;
-    scheme, law : {"PART": float64[k]}  what the cells of a pipe, or a law that is no exact one, take up; step :
-    float64[k]  what the steps take up; newton : float64[k]  what Newton leaves of its equations; remainder = supplied -
-    stored - dissipated, all four together: positive where the numbers dissipate, negative where they create.
-    at_start : {"PART": J} that was there to be had; datum : elevation from which heights count [m]; marks : what the
-    model carried on through, from when on.
+    t : float64[k] [s]; supplied, stored, dissipated : {"PART": float64[k]}, stored as change since the start
+    scheme, law : {"PART": float64[k]}  energy removed by the discretisation of a pipe, or by an inexact law
+    step : float64[k]  energy removed by the time steps; newton : float64[k]  energy of Newton residuals
+    remainder : supplied - stored - dissipated, the sum of these four; positive if the numerical method dissipates
+    energy, negative if it creates energy
+    at_start : {"PART": J}  available energy at the start; datum : elevation of zero height [m]
+    marks : texts on events outside the validity of the model, with their times
     """
 
     reason: str
@@ -78,47 +79,47 @@ class Energy:
 
     @property
     def through(self) -> float:
-        """Greatest energy that ports had supplied and parts had given away together [J]."""
+        """Energy throughput: greatest sum of energy supplied by ports and released by parts [J]."""
         total = np.zeros(len(self.t))
-        for one in self.supplied.values():
-            total += np.maximum(one, 0.0)
-        for one in self.stored.values():
-            total += np.maximum(-one, 0.0)
+        for values in self.supplied.values():
+            total += np.maximum(values, 0.0)
+        for values in self.stored.values():
+            total += np.maximum(-values, 0.0)
         return float(total.max(initial=0.0))
 
     @property
     def made(self) -> np.ndarray:
-        """The remainder without what Newton leaves: what scheme, law and step take up : float64[k] [J]."""
+        """Remainder without Newton residuals: energy removed by scheme, law and step : float64[k] [J]."""
         return self.remainder - self.newton
 
     @property
     def relative(self) -> float:
-        """|made| at the end over `through`; 0 where nothing passed."""
+        """|`numerical_remainder`| at the end over `throughput`; 0 without throughput."""
         return 0.0 if self.through == 0.0 else float(abs(self.made[-1]) / self.through)
 
     @property
     def newton_counts(self) -> bool:
-        """Whether what Newton leaves is ever more than rounding."""
+        """True if the energy of Newton residuals exceeds rounding at any row."""
         return bool(np.max(np.abs(self.newton)) > ROUNDING * self.through)
 
     @property
     def verdict(self) -> str:
-        """What the remainder means; what Newton leaves is no property of scheme and method and is not counted."""
+        """Meaning of the remainder, without Newton residuals, which are not a property of scheme and method."""
         if self.relative <= ROUNDING:
             return "rounding"
         return "the numbers dissipate" if self.made[-1] > 0.0 else "the numbers create energy"
 
     def numerical(self) -> dict[str, np.ndarray]:
-        """The remainder by cause: scheme, law, step and Newton; what is zero throughout is left out."""
-        none = np.zeros(len(self.t))
-        causes = {"scheme": sum(self.scheme.values(), none), "law": sum(self.law.values(), none), "step": self.step,
-                  "newton": self.newton if self.newton_counts else none}  # fmt: skip
-        return {name: one for name, one in causes.items() if one.any()} | {"remainder": self.remainder}
+        """Remainder by cause: scheme, law, step and Newton, without causes that are always zero, and their sum."""
+        zeros = np.zeros(len(self.t))
+        causes = {"scheme": sum(self.scheme.values(), zeros), "law": sum(self.law.values(), zeros), "step": self.step,
+                  "newton": self.newton if self.newton_counts else zeros}  # fmt: skip
+        return {name: values for name, values in causes.items() if values.any()} | {"remainder": self.remainder}
 
     def plain(self) -> dict:
-        """For JSON; the ledger at the end, its course is in the table."""
-        lines = {said: {name: float(one[-1]) for name, one in getattr(self, what).items()}
-                 for what, said in PLAIN.items()}  # fmt: skip
+        """Plain values for JSON: the ledger at the end; the table has all rows."""
+        lines = {json_name: {name: float(values[-1]) for name, values in getattr(self, kind).items()}
+                 for kind, json_name in PLAIN.items()}  # fmt: skip
         port = None if self.port is None else self.port.plain()
         return {
             "reason": self.reason, "ok": self.ok, "t": float(self.t[-1]), "steps": self.steps, **self.settings, **lines,
@@ -134,10 +135,11 @@ PLAIN = {"supplied": "supplied", "stored": "stored", "dissipated": "dissipated",
 
 @door(set=TABLE, port=TEXT, progress=CALL)
 def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
-    """The ledger of energy of a run of a case with keys changed; `case` as `run` takes it, or a Model.
+    """Run a case with changed keys and compute its energy ledger; `case` as for `run`, or a Model.
 
-    port : a reservoir, inflow or junction with a demand, at which (2) is judged. progress(t, seconds, steps).
-    Raises CaseError where the case cannot start, FvsolveError for an unknown port.
+    port : a reservoir, inflow or junction with a demand, at which condition (2) of passivity is checked
+    progress : called as progress(t, seconds, steps). Raises CaseError for an invalid case, FvsolveError for an unknown
+    port.
     """
     model = prepared(case, set) if not hasattr(case, "tables") else case
     check_port(model.case, port)
@@ -152,23 +154,24 @@ def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
 
 
 def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
-    """What a run has kept, line by line."""
+    """Energy ledger from the recorded totals of a run."""
     accounts, totals, holdings = run.accounts, np.array(run.totals), np.array(run.holdings)
-    lines = {what: by_name(accounts.accounts, what, totals) for what in ("supplied", "dissipated", "scheme", "law")}
+    lines = {kind: by_name(accounts.accounts, kind, totals) for kind in ("supplied", "dissipated", "scheme", "law")}
     stored = by_name(accounts.held, "stored", holdings)
-    dead = np.array(run.losses)
-    for name, column in zip(run.model.column_names, dead.T, strict=True):
+    impact_losses = np.array(run.losses)
+    for name, column in zip(run.model.column_names, impact_losses.T, strict=True):
         if column.any():
             lines["dissipated"][f"{name} stopped dead"] = column
-    none, kept = np.zeros(len(run.times)), holdings.sum(axis=1)
-    supplied, dissipated = (sum(lines[what].values(), none) for what in ("supplied", "dissipated"))
+    zeros, stored_sum = np.zeros(len(run.times)), holdings.sum(axis=1)
+    supplied, dissipated = (sum(lines[kind].values(), zeros) for kind in ("supplied", "dissipated"))
     numerics = run.model.case.numerics
     settings = {key: getattr(numerics, key) for key in ("scheme", "method", "courant", "step", "rtol")}
     reason = "interrupted" if summary.reason.startswith("interrupted") else summary.reason
     return Energy(
         reason, summary.finished, np.array(run.times), lines["supplied"], stored, lines["dissipated"],
-        lines["scheme"], lines["law"], totals[:, accounts.of("rate")].sum(axis=1) - dead.sum(axis=1) - kept,
-        totals[:, -1], supplied - kept - dissipated, available(run.model),
+        lines["scheme"], lines["law"], totals[:, accounts.of("rate")].sum(axis=1)
+        - impact_losses.sum(axis=1) - stored_sum,
+        totals[:, -1], supplied - stored_sum - dissipated, available(run.model),
         float(run.model.tables.settings[0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
         [f"{mark.text}: the ledger from {run.model.case.amount(mark.time, 'time', 6)} on is not to be trusted"
          for mark in summary.marks],
@@ -176,67 +179,67 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
     )  # fmt: skip
 
 
-def by_name(accounts: list[Account], what: str, columns: np.ndarray) -> dict[str, np.ndarray]:
-    """The lines of one kind that ever differ from zero, "PART" or "PART KIND" where a part has several."""
-    found = {}
-    for k, one in enumerate(accounts):
-        if one.what == what and columns[:, k].any():
-            several = what == "dissipated" and one.kind not in SHORT or one.kind == "over the rim"
-            name = f"{one.place} {one.kind}" if several else one.place
-            found[name] = found.get(name, 0.0) + columns[:, k]
-    return found
+def by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> dict[str, np.ndarray]:
+    """Ledger lines of a kind that are not always zero, named "PART", or "PART KIND" if a part has several kinds."""
+    lines = {}
+    for k, account in enumerate(accounts):
+        if account.what == kind and columns[:, k].any():
+            several = kind == "dissipated" and account.kind not in SHORT or account.kind == "over the rim"
+            name = f"{account.place} {account.kind}" if several else account.place
+            lines[name] = lines.get(name, 0.0) + columns[:, k]
+    return lines
 
 
 def check_port(case, port: str | None) -> None:
-    """FvsolveError where a node of a case is no port."""
-    known = [name for name, node in case.places.items() if node.driven is not None]
-    if port is not None and port not in known:
-        hint = did_you_mean(port, known) or f"; these are {', '.join(known)}"
-        hint = hint if known else ", and this case has none"
-        raise FvsolveError(f'no port named "{port}": wanted a reservoir, an inflow or a junction{hint}')
+    """Raise FvsolveError if a node of a case is not a port."""
+    ports = [name for name, node in case.places.items() if node.driven is not None]
+    if port is not None and port not in ports:
+        hint = did_you_mean(port, ports) or f". Ports are {', '.join(ports)}"
+        hint = hint if ports else "; the case has no such node"
+        raise FvsolveError(f'no port named "{port}". Expected a reservoir, an inflow or a junction{hint}')
 
 
 def judged(run: EnergyRun, port: str) -> Port:
-    """Condition (2) over a run, at every step; heights count from the port."""
+    """Check condition (2) of passivity at every step of a run; heights are measured from the port."""
     lines, totals = run.accounts.accounts, np.array(run.step_totals)
-    own = [k for k, one in enumerate(lines) if one.what == "supplied" and one.place == port]
-    every = run.accounts.of("supplied")
-    work = totals[:, own].sum(axis=1)
-    others = totals[:, every].sum(axis=1) - work
+    own_lines = [k for k, account in enumerate(lines) if account.what == "supplied" and account.place == port]
+    supplied_lines = run.accounts.of("supplied")
+    work = totals[:, own_lines].sum(axis=1)
+    others = totals[:, supplied_lines].sum(axis=1) - work
     at_rows = np.searchsorted(run.step_times, run.times, side="right") - 1
     start = sum(available(run.model).values())
     margin = start + work + others
     least, worst = int(np.argmin(work)), int(np.argmin(margin))
     size = start + np.max(np.abs(work)) + np.max(np.abs(others))
     t = run.step_times
-    found = Port(
+    verdict = Port(
         port, float(work[least]), float(t[least]), start, float(others[worst]), float(margin[worst]), float(t[worst]),
         bool(margin[worst] >= -ROUNDING * size), work[at_rows], -(start + others)[at_rows],
     )  # fmt: skip
-    return replace(found, text=said(found, run.model.case))
+    return replace(verdict, text=said(verdict, run.model.case))
 
 
 def said(port: Port, case) -> str:
-    """The verdict at a port as a sentence."""
-    work, least, own, others, margin = (
-        case.amount(one, "energy", 6)
-        for one in (port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin)
+    """Verdict at a port as a sentence, in the units of `[output]`."""
+    work, least, own_bound, others, margin = (
+        case.amount(energy_value, "energy", 6)
+        for energy_value in (port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin)
     )
-    bound = f"-(E0 + others) = {own}, {others} of it from other ports" if port.others else f"-E0 = {least}"
-    verdict = "passive over this run" if port.passive else "NOT passive: it gave more than it had"
-    when, then = (case.amount(one, "time", 6) for one in (port.time, port.t_margin))
-    return (f"port {port.node}: integral of p q falls to {work} at {when}, its bound is {bound}; "
-            f"least margin {margin} at {then}: {verdict}")  # fmt: skip
+    bound = f"-(E0 + others) = {own_bound}, of which {others} from other ports" if port.others else f"-E0 = {least}"
+    verdict = "passive over this run" if port.passive else "NOT passive: the network supplied more energy than it had"
+    time, margin_time = (case.amount(energy_value, "time", 6) for energy_value in (port.time, port.t_margin))
+    return (f"port {port.node}: integral of p q falls to {work} at {time}, its bound is {bound}; "
+            f"least margin {margin} at {margin_time}: {verdict}")  # fmt: skip
 
 
-def write_table(one: Energy, path: Path) -> None:
-    """energy.csv: time, then every line of the ledger [J], at ends of steps."""
-    columns = {"t [s]": one.t}
-    for what in ("supplied", "stored", "dissipated", "scheme", "law"):
-        columns |= {f"{what} {name} [J]": values for name, values in getattr(one, what).items()}
-    if one.port is not None:
-        columns |= {"integral of p q [J]": one.port.course, "bound [J]": one.port.bound}
-    columns |= {"step [J]": one.step, "newton [J]": one.newton, "remainder [J]": one.remainder}
+def write_table(result: Energy, path: Path) -> None:
+    """Write energy.csv: time, then every ledger line [J], at ends of steps."""
+    columns = {"t [s]": result.t}
+    for kind in ("supplied", "stored", "dissipated", "scheme", "law"):
+        columns |= {f"{kind} {name} [J]": values for name, values in getattr(result, kind).items()}
+    if result.port is not None:
+        columns |= {"integral of p q [J]": result.port.course, "bound [J]": result.port.bound}
+    columns |= {"step [J]": result.step, "newton [J]": result.newton, "remainder [J]": result.remainder}
     text = [",".join(columns)]
     text += [",".join(repr(float(x)) for x in row) for row in np.column_stack(list(columns.values()))]
     path.write_text("\n".join(text) + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""A case run by several schemes and methods: what each makes of its energy. Knows runs; prints nothing."""
+"""Energy remainders of a case for several schemes and methods."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.studies.outcome import refusal
 from fvsolve.studies.points import Points
 from fvsolve.studies.sheet import Column
 
-PAIR = (  # of a row that was measured
+PAIR = (  # columns of a row
     Column("scheme"),
     Column("method"),
     Column("remainder", words=".4g", head="remainder [J]"),
@@ -32,13 +32,14 @@ PAIR = (  # of a row that was measured
 def measured(
     case, schemes=None, methods=None, port: str | None = None, progress=None, points=None, watch=None
 ) -> list[dict]:
-    """One row per scheme and method of a case that is run with them: what they make of its energy.
+    """Run a case with every pair of scheme and method; returns a row for each pair with the energy remainders.
 
-    creates : whether the remainder, less what Newton leaves, is below zero by more than rounding at any row, None where
-    it did not run; least : the least of that [J]; margin : least of E0 + what came in at the port and elsewhere [J],
-    None without a port. progress(done, total, next); points : rows found before (`Points`); watch(t, seconds, steps) is
-    called during every run. Raises FvsolveError for unknown names; a pair that is refused or blows up is a row with its
-    reason.
+    creates : True if the remainder without Newton residuals is below zero by more than rounding at any row, None if the
+    case did not run; least : least value of that remainder [J]; margin : least value of E0 + energy supplied at the
+    port and at others [J], None without a port
+    progress : called as progress(done, total, next); points : `ResultCache` of earlier rows; watch : called as
+    watch(t, seconds, steps) during every run. A pair that is refused or diverges gives a row with its reason. Raises
+    FvsolveError for unknown names.
     """
     check_port(case, port)
     points = points or Points()
@@ -56,22 +57,22 @@ def measured(
 
 
 def one_run(case, scheme: str, method: str, port: str | None, watch=None) -> dict:
-    """The ledger of a case run by a scheme and a method, in short."""
-    none = dict.fromkeys(
+    """Row of a pair: energy remainders of a case run with a scheme and a method."""
+    missing = dict.fromkeys(
         ("remainder", "scheme_loss", "step_loss", "newton_loss", "least", "relative", "creates", "margin")
     )
     try:
-        one = energy(case, {"numerics.scheme": scheme, "numerics.method": method}, port, watch)
+        result = energy(case, {"numerics.scheme": scheme, "numerics.method": method}, port, watch)
     except CaseError as error:
-        return none | {"reason": refusal(error)}
-    if one.reason == "interrupted":  # a run ends cleanly at Ctrl-C; a study ends with it
+        return missing | {"reason": refusal(error)}
+    if result.reason == "interrupted":  # a run ends cleanly at Ctrl-C; the study must end too
         raise KeyboardInterrupt
-    losses = [float(values[-1]) for values in one.scheme.values()]
-    sound = one.ok and bool(np.all(np.isfinite(one.remainder)))
-    least = float(np.min(one.made))
-    return none | {
-        "remainder": float(one.remainder[-1]), "scheme_loss": sum(losses), "step_loss": float(one.step[-1]),
-        "newton_loss": float(one.newton[-1]),
-        "least": least, "relative": one.relative, "creates": not sound or least < -ROUNDING * one.through,
-        "margin": None if one.port is None else one.port.margin, "reason": one.reason,
+    losses = [float(values[-1]) for values in result.scheme.values()]
+    sound = result.ok and bool(np.all(np.isfinite(result.remainder)))
+    least = float(np.min(result.made))
+    return missing | {
+        "remainder": float(result.remainder[-1]), "scheme_loss": sum(losses), "step_loss": float(result.step[-1]),
+        "newton_loss": float(result.newton[-1]),
+        "least": least, "relative": result.relative, "creates": not sound or least < -ROUNDING * result.through,
+        "margin": None if result.port is None else result.port.margin, "reason": result.reason,
     }  # fmt: skip

@@ -1,1 +1,1 @@
-"""Whether ports are passive: positive real functions, exactly or by a sweep. Knows transfer functions."""
+"""Passivity of ports: tests for positive real transfer functions."""

@@ -1,4 +1,4 @@
-"""Is a rational transfer function positive real? Decided from its coefficients; knows no grid of frequencies."""
+"""Exact test of a rational transfer function for positive realness, from its coefficients."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from fvsolve.studies.ports.rational import (
 )
 from fvsolve.studies.sheet import Plain
 
-FATES = {  # of a pole that the numerator cancels
-    "right": "in the right half plane: a system that holds it is unstable, which H does not show",
-    "axis": "on the imaginary axis: a system that holds it is not asymptotically stable, which H does not show",
+FATES = {  # location of a cancelled pole -> text
+    "right": "in the right half plane: a system with this pole is unstable, which H does not show",
+    "axis": "on the imaginary axis: a system with this pole is not asymptotically stable, which H does not show",
     "left": "in the left half plane",
 }
 
 
 @dataclass(frozen=True)
 class RootSaid:
-    """A root in words: near : an estimate in floats [1/s]; side : right, axis or left, decided."""
+    """Root for a text; near : estimate in floats [1/s]; side : right, axis or left, exact."""
 
     near: complex
     side: str
@@ -39,7 +39,7 @@ class RootSaid:
 
 @dataclass(frozen=True)
 class AxisPole:
-    """A pole at s = j frequency [rad/s] (inf: at infinity); `residue` of a simple one, `fault` where it has one."""
+    """Pole at s = j frequency [rad/s] (inf: at infinity); residue : of a simple pole; fault : text, None if allowed."""
 
     frequency: float
     order: int
@@ -49,7 +49,7 @@ class AxisPole:
 
 @dataclass(frozen=True)
 class Band:
-    """low < w < high [rad/s] in which Re H(jw) < 0; `least` is its infimum and `worst` where that is [rad/s]."""
+    """Interval low < w < high [rad/s] with Re H(jw) < 0; least : its infimum; worst : frequency of it [rad/s]."""
 
     low: float
     high: float
@@ -60,15 +60,16 @@ class Band:
 
 @dataclass(frozen=True)
 class Verdict(Plain):
-    """What `positive_real` decided, and why.
+    """Result of `positive_real` with reasons.
 
-    positive_real : the course's definition (4.1), pole at infinity included
+    positive_real : definition (4.1) of the course, with the pole at infinity
     strictly : H(s - e) is positive real for some e > 0 (Khalil, Nonlinear Systems, definition 6.4)
     lossless : positive real with Re H(jw) = 0 at every w
-    reason, reasons : in words; every fault that was found, or what makes it hold
-    poles : of the reduced function; axis_poles : those on the axis and at infinity, w >= 0
-    bands : where Re H(jw) < 0, w >= 0; zeros : where Re H(jw) = 0 [rad/s], none listed where it is zero everywhere
-    hidden : poles that the numerator cancels: H does not show them, a system may still have them
+    reason, reasons : texts, all faults or the proof
+    poles : poles of the reduced function; axis_poles : poles on the imaginary axis and at infinity, w >= 0
+    bands : intervals with Re H(jw) < 0, w >= 0; zeros : frequencies with Re H(jw) = 0 [rad/s], empty if it is zero
+    everywhere
+    hidden : poles cancelled by the numerator; H does not show them, but a system may have them
     numerator, denominator : reduced, highest power first
     """
 
@@ -88,12 +89,12 @@ class Verdict(Plain):
 
     @property
     def reason(self) -> str:
-        """All reasons in one line."""
+        """All reasons in a single text."""
         return "; ".join(self.reasons)
 
     @property
     def hidden_unstable(self) -> bool:
-        """Whether a cancelled pole lies in the right half plane or on the axis."""
+        """True if a cancelled pole is in the right half plane or on the imaginary axis."""
         return any(mode.side != "left" for mode in self.hidden)
 
     def __bool__(self) -> bool:
@@ -101,16 +102,16 @@ class Verdict(Plain):
 
 
 def positive_real(numerator, denominator) -> Verdict:
-    """Whether H(s) = numerator / denominator is positive real; coefficients HIGHEST power FIRST, as in numpy and SciPy.
+    """Test if H(s) = numerator / denominator is positive real; coefficients HIGHEST power FIRST, as in numpy and SciPy.
 
-    Exact: no pole with Re s > 0 (Cauchy index), poles on the axis and at infinity simple with a positive real
-    residue, and E(w^2) = Re N(jw) D(-jw) >= 0 for all w (Sturm), after common factors are taken out. Coefficients are
-    whole numbers, fractions, text such as "0.1" or floats; a float is the binary fraction that it is, so that 0.1 is
-    not 1/10. Raises FvsolveError for what is no real coefficient and for a denominator of zeros.
+    Exact conditions, after common factors are removed: no pole with Re s > 0 (Cauchy index), simple poles with positive
+    real residue on the axis and at infinity, and E(w^2) = Re N(jw) D(-jw) >= 0 for all w (Sturm). Coefficients are
+    whole numbers, fractions, text such as "0.1" or floats. A float is taken as its binary fraction, so that 0.1 is not
+    1/10. Raises FvsolveError for invalid coefficients and for a zero denominator.
     """
     n, d = coefficients(numerator, "numerator"), coefficients(denominator, "denominator")
     if d.degree < 0:
-        raise FvsolveError("the denominator is zero; wanted at least one coefficient other than 0")
+        raise FvsolveError("the denominator is zero. Expected at least one coefficient other than 0")
     common = n.gcd(d)
     n, d = n // common, d // common
     where = places(d)
@@ -132,10 +133,10 @@ def positive_real(numerator, denominator) -> Verdict:
 # poles ----------------------------------------------------------------------------------------------------------
 
 
-def _modes(p: Polynomial, where: Places) -> tuple[RootSaid, ...]:
-    names = ["right"] * where.right + ["axis"] * where.axis + ["left"] * where.left
-    found = zip(estimates(p), names, strict=True)
-    return tuple(RootSaid(complex(0.0, s.imag) if side == "axis" else s, side) for s, side in found)
+def _modes(p: Polynomial, locations: Places) -> tuple[RootSaid, ...]:
+    names = ["right"] * locations.right + ["axis"] * locations.axis + ["left"] * locations.left
+    pairs = zip(estimates(p), names, strict=True)
+    return tuple(RootSaid(complex(0.0, s.imag) if side == "axis" else s, side) for s, side in pairs)
 
 
 def _infinity(n: Polynomial, d: Polynomial) -> list[AxisPole]:
@@ -145,35 +146,39 @@ def _infinity(n: Polynomial, d: Polynomial) -> list[AxisPole]:
     residue = n.coefficients[-1] / d.coefficients[-1]
     fault = None
     if order > 1:
-        fault = f"the pole at infinity has order {order}; a positive real function has at most a simple one there"
+        fault = f"the pole at infinity has order {order}; a positive real function has at most a simple pole there"
     elif residue < 0:
         fault = f"the pole at infinity has the negative residue {_float(residue):.6g}"
     return [AxisPole(math.inf, order, complex(_float(residue)) if order == 1 else None, fault)]
 
 
-def _origin(n: Polynomial, d: Polynomial, where: Places) -> list[AxisPole]:
-    if not where.zero:
+def _origin(n: Polynomial, d: Polynomial, locations: Places) -> list[AxisPole]:
+    if not locations.zero:
         return []
-    if where.zero > 1:
-        return [AxisPole(0.0, where.zero, None, f"the pole at s = 0 has order {where.zero}; wanted a simple one")]
+    if locations.zero > 1:
+        return [
+            AxisPole(0.0, locations.zero, None, f"the pole at s = 0 has order {locations.zero}; expected a simple pole")
+        ]
     residue = n.coefficients[0] / d.coefficients[1]
     fault = f"the pole at s = 0 has the negative residue {_float(residue):.6g}" if residue < 0 else None
     return [AxisPole(0.0, 1, complex(_float(residue)), fault)]
 
 
 def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
-    """The pole at s = j sqrt(x): with D = C(s^2) R(s), its residue is N / (2 s C' R)."""
+    """Pole at s = j sqrt(x): with D = C(s^2) R(s), its residue is N / (2 s C' R)."""
     name = f"the pole at w = {x.frequency:.12g} rad/s"
     if order > 1:
-        return AxisPole(x.frequency, order, None, f"{name} has order {order}; wanted a simple one")
+        return AxisPole(x.frequency, order, None, f"{name} has order {order}; expected a simple pole")
     c = shared(d)
     (ne, no), (de, do) = sides(n), sides(d)
     re, ro = de // c, do // c
     turned, straight = ne * re + Polynomial([0, 1]) * no * ro, no * re - ne * ro
-    slope, at = c.derivative(), x.refine()
-    below = -2 * slope(at) * (re(at) ** 2 + at * ro(at) ** 2)
+    slope, x_value = c.derivative(), x.refine()
+    below = -2 * slope(x_value) * (re(x_value) ** 2 + x_value * ro(x_value) ** 2)
     real = x.sign_of(turned) == 0
-    residue = complex(_float(straight(at) / below), 0.0 if real else -_float(turned(at) / below) / float_root(at))
+    residue = complex(
+        _float(straight(x_value) / below), 0.0 if real else -_float(turned(x_value) / below) / float_root(x_value)
+    )
     if not real:
         return AxisPole(x.frequency, 1, residue, f"{name} has the residue {residue:.6g}, which is not real")
     negative = x.sign_of(straight) * x.sign_of(slope) > 0
@@ -192,17 +197,17 @@ def _real_part(n: Polynomial, d: Polynomial) -> tuple[Polynomial, Polynomial]:
 
 
 def _bands(even: Polynomial, below: Polynomial) -> list[Band]:
-    """The open intervals of x > 0 with E < 0, by the roots at which E changes its sign."""
+    """Open intervals of x > 0 with E < 0, between the roots at which E changes sign."""
     if even.degree < 0:
         return []
     edges = positive_roots(odd_part(even)) if even.degree > 0 else []
     negative = sign(next(c for c in even.coefficients if c != 0)) < 0
-    found = []
+    bands = []
     for low, high in zip([None, *edges], [*edges, None], strict=True):
         if negative:
-            found.append(_band(even, below, low, high))
+            bands.append(_band(even, below, low, high))
         negative = not negative
-    return found
+    return bands
 
 
 def _band(even: Polynomial, below: Polynomial, low: Root | None, high: Root | None) -> Band:
@@ -220,24 +225,24 @@ def _least(even: Polynomial, below: Polynomial, left: Fraction, right: Fraction 
     """(frequency, infimum) of E / P between left and right."""
     common = even.gcd(below)
     top, below = even // common, below // common
-    inside = [left, *(() if right is None else (right,))]
-    for at in _between(below, left, right) + [x for x in inside if below(x) == 0]:
-        return float_root(at), -math.inf  # a pole that bends Re H
+    candidates = [left, *(() if right is None else (right,))]
+    for x_value in _between(below, left, right) + [x for x in candidates if below(x) == 0]:
+        return float_root(x_value), -math.inf  # Re H is unbounded at a pole
     if right is None and top.degree > below.degree:
         return math.inf, -math.inf
     slope = top.derivative() * below - top * below.derivative()
-    inside += _between(slope, left, right) + ([(left + right) / 2] if right is not None else [])
-    found = [(_float(top(x) / below(x)), float_root(x)) for x in inside]
+    candidates += _between(slope, left, right) + ([(left + right) / 2] if right is not None else [])
+    values = [(_float(top(x) / below(x)), float_root(x)) for x in candidates]
     if right is None:
-        far = top.coefficients[-1] / below.coefficients[-1] if top.degree == below.degree else Fraction(0)
-        found.append((_float(far), math.inf))
-    least, worst = min(found)
+        limit = top.coefficients[-1] / below.coefficients[-1] if top.degree == below.degree else Fraction(0)
+        values.append((_float(limit), math.inf))
+    least, worst = min(values)
     return worst, least
 
 
 def _between(p: Polynomial, left: Fraction, right: Fraction | None) -> list[Fraction]:
-    found = [x.refine() for x in positive_roots(p)]
-    return [x for x in found if left <= x and (right is None or x <= right)]
+    roots = [x.refine() for x in positive_roots(p)]
+    return [x for x in roots if left <= x and (right is None or x <= right)]
 
 
 def _zeros(even: Polynomial, below: Polynomial) -> list[float]:
@@ -247,21 +252,21 @@ def _zeros(even: Polynomial, below: Polynomial) -> list[float]:
     return [*([0.0] if top.coefficients[0] == 0 else []), *(x.frequency for x in positive_roots(top))]
 
 
-def _strictly(n: Polynomial, d: Polynomial, where: Places, even: Polynomial, zeros: list[float]) -> bool:
-    """Poles left of the axis, Re H(jw) > 0 at every finite w, and w^2 Re H not to zero for w to infinity."""
-    far = even.degree == (d.degree - 1 if n.degree < d.degree else d.degree)
-    return where.axis == 0 and not zeros and even.degree >= 0 and far
+def _strictly(n: Polynomial, d: Polynomial, locations: Places, even: Polynomial, zeros: list[float]) -> bool:
+    """True if all poles are left of the axis, Re H(jw) > 0 at every finite w, and w^2 Re H does not tend to zero."""
+    bounded_decay = even.degree == (d.degree - 1 if n.degree < d.degree else d.degree)
+    return locations.axis == 0 and not zeros and even.degree >= 0 and bounded_decay
 
 
 # words ----------------------------------------------------------------------------------------------------------
 
 
 def _right(poles: tuple[RootSaid, ...]) -> list[str]:
-    found = [mode.near for mode in poles if mode.side == "right"]
-    if not found:
+    unstable = [mode.near for mode in poles if mode.side == "right"]
+    if not unstable:
         return []
-    many = "a pole" if len(found) == 1 else f"{len(found)} poles"
-    return [f"{many} in the right half plane, near s = {_listed(found)}"]
+    count_text = "a pole" if len(unstable) == 1 else f"{len(unstable)} poles"
+    return [f"{count_text} in the right half plane, near s = {_listed(unstable)}"]
 
 
 def _says(band: Band) -> str:
@@ -275,35 +280,35 @@ def _says(band: Band) -> str:
 
 def _praise(axis: list[AxisPole], zeros: list[float], lossless: bool, n: Polynomial) -> list[str]:
     if n.degree < 0:
-        return ["H = 0: positive real, and neither gives nor takes energy"]
-    found = ["no pole in the right half plane"]
+        return ["H = 0: positive real, neither supplies nor absorbs energy"]
+    texts = ["no pole in the right half plane"]
     if lossless:
-        found.append("Re H(jw) = 0 at every w: lossless, on the boundary")
+        texts.append("Re H(jw) = 0 at every w: lossless, on the boundary")
     else:
-        touch = f", zero at w = {', '.join(f'{w:.12g}' for w in zeros)} rad/s" if zeros else ""
-        found.append(f"Re H(jw) >= 0 at every w{touch}")
+        zeros_text = f", zero at w = {', '.join(f'{w:.12g}' for w in zeros)} rad/s" if zeros else ""
+        texts.append(f"Re H(jw) >= 0 at every w{zeros_text}")
     for pole in axis:
         place = "infinity" if math.isinf(pole.frequency) else f"w = {pole.frequency:.12g} rad/s"
-        found.append(f"the pole at {place} is simple with the positive residue {pole.residue.real:.6g}")
-    return found
+        texts.append(f"the pole at {place} is simple with the positive residue {pole.residue.real:.6g}")
+    return texts
 
 
 def _cancelled(hidden: tuple[RootSaid, ...]) -> list[str]:
-    found = []
+    texts = []
     for side, where in FATES.items():
-        near = [mode.near for mode in hidden if mode.side == side]
-        if near:
-            poles = "pole" if len(near) == 1 else "poles"
-            found.append(f"hidden: {len(near)} cancelled {poles} near s = {_listed(near)}, {where}")
-    return found
+        roots = [mode.near for mode in hidden if mode.side == side]
+        if roots:
+            poles = "pole" if len(roots) == 1 else "poles"
+            texts.append(f"hidden: {len(roots)} cancelled {poles} near s = {_listed(roots)}, {where}")
+    return texts
 
 
-def _listed(found: list[complex]) -> str:
-    return ", ".join(f"{s.real:.6g}" if s.imag == 0 else f"{s:.6g}" for s in found)
+def _listed(roots: list[complex]) -> str:
+    return ", ".join(f"{s.real:.6g}" if s.imag == 0 else f"{s:.6g}" for s in roots)
 
 
 def _float(x: Fraction) -> float:
-    """The nearest float; infinite beyond them."""
+    """Nearest float; infinite outside of their range."""
     try:
         return float(x)
     except OverflowError:

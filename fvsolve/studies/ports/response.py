@@ -1,4 +1,4 @@
-"""Transfer function at a port of a linearised case: pressure against flow, and whether it is positive real."""
+"""Transfer function between pressure and flow at a port of a linearised case, and its positive realness."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from fvsolve.doors import FLAG, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.ports.state_space import TOLERANCE, StateVerdict, Transfer, state_positive_real
 
-LARGEST = 800  # states whose Hamiltonian matrix, twice as large, is still taken
-DECADE = 200  # frequencies a decade in the table
+LARGEST = 800  # greatest number of states; the Hamiltonian matrix is twice as large
+DECADE = 200  # frequencies per decade in the table
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """dx/dt = A x + B u, y = C x + D u at one port, its frequency response and verdict; SI, deviations.
+    """State space dx/dt = A x + B u, y = C x + D u at a port, its frequency response and verdict; deviations in SI.
 
-    kind : "admittance" of a reservoir (u pressure [Pa], y flow into the network [m3/s]) or "impedance" (u flow fed in
-    [m3/s], y pressure [Pa]); a : float64[n, n]; b, c : float64[n]; d : float; w : float64[k] [rad/s];
-    h : complex128[k]; moving : greatest rate of the state there, by its scale [1/s];
-    error : relative one of A, B, C, D, by two steps of the differences
+    kind : "admittance" of a reservoir (u pressure [Pa], y flow into the network [m3/s]) or "impedance" (u inflow
+    [m3/s], y pressure [Pa]); a : float64[n, n]; b, c : float64[n]; d : float; w : float64[k] [rad/s]; h : complex128[k]
+    moving : greatest rate of change of the state, over its scale [1/s]; 0 for a steady state
+    error : relative error of A, B, C, D, from two difference steps
     """
 
     case: str
@@ -46,16 +46,16 @@ class Response:
 
     @property
     def units(self) -> tuple[str, str]:
-        """Of u and y."""
+        """Units of u and y."""
         return ("Pa", "m3/s") if self.kind == "admittance" else ("m3/s", "Pa")
 
     def __call__(self, s):
-        """H at complex numbers s [1/s]; a number of a number, an array of an array."""
-        found = self.transfer(s)
-        return complex(found[0]) if np.ndim(s) == 0 else found
+        """H at complex numbers s [1/s]; returns a number for a number, an array for an array."""
+        values = self.transfer(s)
+        return complex(values[0]) if np.ndim(s) == 0 else values
 
     def plain(self) -> dict:
-        """As JSON says it: complex numbers as [re, im]."""
+        """Plain values for JSON: complex numbers as [re, im]."""
         poles = sorted(
             zip(self.transfer.poles, self.transfer.residues, strict=True), key=lambda p: (abs(p[0]), p[0].imag)
         )
@@ -74,23 +74,23 @@ def response(
     case, port: str, at: float | None = None, before: bool = False, scheme: str | None = None,
     set: Mapping | None = None, frequencies: np.ndarray | None = None,
 ) -> Response:  # fmt: skip
-    """The transfer function between pressure and flow at a node of a case, linearised as `linearise` does.
+    """Compute the transfer function between pressure and flow at a node of a case, linearised by `linearise`.
 
-    port : a reservoir (admittance), or a junction, inflow, chamber or tank (impedance, flow fed in there);
-    at, before, scheme : see `linearise`; frequencies : float64[k] [rad/s] of the table. Raises FvsolveError for a port
-    that is none, a case that cannot be linearised and one with more than 800 states.
+    port : a reservoir (admittance), or a junction, inflow, chamber or tank (impedance); at, before, scheme : see
+    `linearise`; frequencies : float64[k]  frequencies of the table [rad/s]. Raises FvsolveError for an invalid port, a
+    case that cannot be linearised, and more than 800 states.
     """
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
     if not any(node.domain == "hydraulic" for node in case.places.values()):
-        raise FvsolveError(f"{case.name} has no port: nothing in it has a pressure; a reservoir, junction, inflow, "
-                           "chamber or tank is one")  # fmt: skip
+        raise FvsolveError(f"{case.name} has no port, because no node has a pressure. Expected a reservoir, junction, "
+                           "inflow, chamber or tank")  # fmt: skip
     if port not in case.places:
-        raise FvsolveError(f'no port named "{port}"{did_you_mean(port, case.places)}; ports are {listing(case.places)}')
+        raise FvsolveError(f'no port named "{port}"{did_you_mean(port, case.places)}. Ports are {listing(case.places)}')
     system, flows = _linear(case, port, at, before, scheme)
     a, b, c, d = system
-    found = flows.at.model
+    model = flows.at.model
     error = max(flows.error.values())
     transfer = _transfer(flows.at, a, b, c, d, error)
     verdict = state_positive_real(transfer, max(TOLERANCE, 10.0 * error))
@@ -98,67 +98,67 @@ def response(
     driven = case.places[port].driven
     kind = "admittance" if driven is not None and driven[1] == 0.0 else "impedance"
     return Response(
-        case.name, flows.at.when, port, kind, found.case.numerics.scheme if found.cells else None,
+        case.name, flows.at.when, port, kind, model.case.numerics.scheme if model.cells else None,
         tuple(flows.states), tuple(flows.state_units), a, b, c, d, error, transfer, w, transfer(1j * w), verdict,
-        float(np.max(np.abs(flows.at.rate) / found.scale)),
+        float(np.max(np.abs(flows.at.rate) / model.scale)),
     )  # fmt: skip
 
 
 def _linear(case, port: str, at, before, scheme):
-    """((A, b, c, d), the Linear they are from)."""
+    """((A, b, c, d), `Linear` system with the inputs and outputs of the port)."""
     from fvsolve.studies.linear.linearise import linearise
 
     driven = case.places[port].driven
-    asked: Callable = lambda inputs, outputs: linearise(case, inputs, outputs, at, before, scheme)  # noqa: E731
+    linear: Callable = lambda inputs, outputs: linearise(case, inputs, outputs, at, before, scheme)  # noqa: E731
     if driven is not None and driven[1] == 0.0:
         signs = port_flows(case, port)
-        found = asked([f"{port}.{driven[0]}"], list(signs))
+        system = linear([f"{port}.{driven[0]}"], list(signs))
         weights = np.array(list(signs.values()))
-        return (_dense(found.a), found.b[:, 0], weights @ found.c, float(weights @ found.d[:, 0])), found
+        return (_dense(system.a), system.b[:, 0], weights @ system.c, float(weights @ system.d[:, 0])), system
     pressure = f"nodes.{port}.pressure" if port in case.nodes else f"{port}.pressure"
     if driven is not None:
         key, sign = driven
-        found = asked([f"{port}.{key}"], [pressure])
-        return (_dense(found.a), sign * found.b[:, 0], found.c[0], sign * float(found.d[0, 0])), found
-    found = asked([], [pressure])
-    row = found.at.model.tables.nodes[found.at.model.node_names.index(port)]
-    b = np.zeros(len(found.states))
-    b[row["y"]] = _density(found, row)
-    return (_dense(found.a), b, found.c[0], 0.0), found
+        system = linear([f"{port}.{key}"], [pressure])
+        return (_dense(system.a), sign * system.b[:, 0], system.c[0], sign * float(system.d[0, 0])), system
+    system = linear([], [pressure])
+    row = system.at.model.tables.nodes[system.at.model.node_names.index(port)]
+    b = np.zeros(len(system.states))
+    b[row["y"]] = _density(system, row)
+    return (_dense(system.a), b, system.c[0], 0.0), system
 
 
 def port_flows(case, port: str) -> dict[str, float]:
-    """Probes whose sum, each with its sign, is the flow from a node into its links [m3/s]."""
-    found: dict[str, float] = {}
+    """Probe -> sign; the signed sum of these probes is the flow from a node into its links [m3/s]."""
+    signs: dict[str, float] = {}
     for name, link in case.links.items():
-        for end, place in link.ports.items():
-            if place != port:
+        for end, node in link.ports.items():
+            if node != port:
                 continue
             if link.kind == "pipe":
-                found[f"links.{name}.flow@{0 if end == 'from' else 1}"] = 1.0 if end == "from" else -1.0
+                signs[f"links.{name}.flow@{0 if end == 'from' else 1}"] = 1.0 if end == "from" else -1.0
             elif link.kind == "spool-valve":
-                found[f"links.{name}.flow_{end}"] = 1.0
+                signs[f"links.{name}.flow_{end}"] = 1.0
             else:
-                found[f"links.{name}.flow"] = 1.0 if end == "from" else -1.0
-    return found
+                signs[f"links.{name}.flow"] = 1.0 if end == "from" else -1.0
+    return signs
 
 
-def _density(found, row) -> float:
-    """Mass per volume fed in at a storing node [kg/m3]."""
-    return float(found.at.model.case.law.density(found.output_values[0]))
+def _density(system, row) -> float:
+    """Density of the inflow at a storing node [kg/m3]."""
+    return float(system.at.model.case.law.density(system.output_values[0]))
 
 
 def _dense(a) -> np.ndarray:
-    """A as a full array, before which its size is looked at."""
+    """Convert A to a full array. Raises FvsolveError if it has too many states."""
     if a.shape[0] > LARGEST:
-        share = math.floor(100 * LARGEST / a.shape[0])
-        raise FvsolveError(f"the case has {a.shape[0]} states, a verdict is found up to {LARGEST}: give its pipes "
-                           f"fewer cells, {share} % of what they have, --set links.NAME.cells=...")  # fmt: skip
+        percent = math.floor(100 * LARGEST / a.shape[0])
+        raise FvsolveError(f"the case has {a.shape[0]} states. Expected {LARGEST} or fewer. Reduce the cells of its "
+                           f"pipes to {percent} %: --set links.NAME.cells=...")  # fmt: skip
     return a if isinstance(a, np.ndarray) else a.toarray()
 
 
 def _transfer(at, a, b, c, d, error: float) -> Transfer:
-    """H in coordinates whose square is energy."""
+    """Transfer function from a state space in coordinates whose squared norm is the energy."""
     from fvsolve.model.energy import energy_form
 
     form = energy_form(at.model, at.y).completed()
@@ -166,7 +166,7 @@ def _transfer(at, a, b, c, d, error: float) -> Transfer:
 
 
 def _table(verdict: StateVerdict, h: Transfer) -> np.ndarray:
-    """Frequencies of the table: even in their logarithm, those of poles left of the axis, and the worst of bands."""
+    """Frequencies of the table: logarithmic grid, poles that are not on the axis, and worst frequencies of dips."""
     low, high = verdict.low, verdict.high
     grid = np.geomspace(low, high, int(DECADE * np.log10(high / low)) + 1)
     poles = np.abs(h.poles.imag[~np.isin(h.poles, verdict.axis)])
