@@ -29,7 +29,8 @@ def test_a_run_counts_its_parts_scheme_method_and_law(request):
     tally = request.config.stash[TALLY]
     before, tally.names = tally.names, Tally().names
     try:
-        nodes, links = {"a": lake(30.0), "b": reservoir(2e5)}, {"p": pipe("a", "b", 100.0, 0.1, 1000.0, 4)}
+        nodes = {"a": lake(30.0), "b": reservoir(2e5)}
+        links = {"p": pipe("a", "b", 100.0, 0.1, 1000.0, 4, initial_flow=0.0)}
         fvsolve.run(scene(nodes, links, 0.1, {"scheme": "fromm", "method": "heun", "courant": 0.4}))
         assert tally.plain() == {
             "law": ["linear"], "method": ["heun"], "part": ["pipe", "reservoir"], "scheme": ["fromm"]

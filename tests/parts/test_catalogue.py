@@ -133,7 +133,7 @@ def test_what_was_not_read_is_refused_and_asked_for():
         ({"material": "PE100", "nominal": "DN110"}, "expected a class for PE100"),
         ({"class": "K9", "nominal": "DN300"}, 'expected material = "ductile-iron"'),
         ({"class": "K9", "diameter": 0.3}, "diameter and class are given; keep one"),
-        ({"class": "K9", "nominal": "DN310", "material": "ductile-iron"}, "the nearest are DN250, DN300, DN350"),
+        ({"class": "K9", "nominal": "DN310", "material": "ductile-iron"}, "the nearest sizes are DN250, DN300, DN350"),
         ({"class": "C20", "nominal": "DN300", "material": "ductile-iron"}, "available are C100, C40, C50, C64"),
         ({"class": "X9", "nominal": "DN300"}, 'unknown class "X9"'),
         ({"class": "PN16", "nominal": "DN110", "material": "PVC-U"}, "Expected such a material, or the SDR"),

@@ -211,11 +211,11 @@ def test_a_wall_of_no_elements_has_no_state_and_elements_that_give_nothing_chang
     (lambda case: case.update(scalars={"salt": {}}), "takes up liquid, into which scalars are not followed"),
     (lambda case: case["links"]["main"].update(line="delay"),
      '"delay" is not possible .* its wall creeps in every cell'),
-    (lambda case: case["links"]["main"].update(lining={"youngs_modulus": 2e10, "thickness": 0.004}), "of a lined wall"),
-    (lambda case: case["links"]["main"]["wall"].update(creep={"compliance": [1e-10], "time": [1, 2]}), "one of each"),
+    (lambda case: case["links"]["main"].update(lining={"youngs_modulus": 2e10, "thickness": 0.004}), "for a lined wall"),
+    (lambda case: case["links"]["main"]["wall"].update(creep={"compliance": [1e-10], "time": [1, 2]}), "one compliance and one time for each element"),
     (lambda case: case["links"]["main"]["wall"].update(creep={"compliance": [0], "time": [1]}), "a value above 0"),
     (lambda case: case["links"]["main"]["wall"].update(creep={"complience": [1]}), "unknown key"),
-    (lambda case: case["links"]["main"]["wall"].update(creep=3), "is no table; wanted"),
+    (lambda case: case["links"]["main"]["wall"].update(creep=3), "3 is not a table; expected"),
 ])  # fmt: skip
 def test_faults(change, words):
     case = line(9)

@@ -432,7 +432,7 @@ def test_where_a_chamber_holds_explicit_steps_back_references_are_implicit():
     [
         (line, {"schemes": ["upwnd"]}, 'unknown scheme upwnd; did you mean "upwind"'),
         (line, {"methods": ["rk5"]}, "unknown method rk5"),
-        (line, {"rtol": [1e-3]}, "has pipes.*--cells"),
+        (line, {"rtol": [1e-3]}, "has cells.*--cells"),
         (pot, {"cells": [10]}, "no pipe.*rtol or step"),
         (pot, {"schemes": ["muscl"]}, "no pipe.*rtol or step"),
     ],
