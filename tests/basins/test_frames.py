@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from truth.scenes import GRAVITY, scene
 
 from fvsolve import advance, build, load, run
 from fvsolve.errors import CaseError
 from fvsolve.model.model import State
-from tests.truth.scenes import GRAVITY, scene
 
 HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}
 METHODS = ("ssp-rk3", "gauss-4", "rodas-4")

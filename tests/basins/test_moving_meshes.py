@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import trapezoid
 from scipy.optimize import brentq
 from truth.meshes import write
+from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, ramp, scene, smooth_ramp, smooth_step
 
 from fvsolve import advance, build, load, run
 from fvsolve.basins.lower_mesh import lower_mesh
@@ -18,7 +19,6 @@ from fvsolve.mesh.edges import edges_of
 from fvsolve.mesh.shapes import assemble
 from fvsolve.model.model import State
 from fvsolve.studies.energy.energy import energy
-from tests.truth.scenes import AMBIENT, GRAVITY, RHO, WATER, ramp, scene, smooth_ramp, smooth_step
 
 SIDES = {"west": (0, 0.0), "east": (0, 1.0), "south": (1, 0.0), "north": (1, 1.0)}
 STEPPED = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2"}

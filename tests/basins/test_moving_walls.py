@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from truth.scenes import GRAVITY, RHO, scene
 
 from fvsolve import advance, build, load, run
 from fvsolve.model.model import State
 from fvsolve.studies.energy.energy import energy
-from tests.truth.scenes import GRAVITY, RHO, scene
 
 SIDES = ("west", "east", "south", "north")
 STEPPED = {"scheme": "muscl", "limiter": "minmod", "method": "ssp-rk2"}

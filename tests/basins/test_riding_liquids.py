@@ -10,12 +10,12 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import j0
 from truth.meshes import shaken, write
+from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, scene
 
 from fvsolve import advance, build, load, run
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.model.model import State
 from fvsolve.studies.energy.energy import energy
-from tests.truth.scenes import AMBIENT, GRAVITY, RHO, WATER, scene
 
 HEAVY = {"type": "body", "mass": 10.0, "inertia": [1.0, 1.0, 1.0]}
 TILT = {"roll": "30 deg", "pitch": "-70 deg", "yaw": "25 deg"}

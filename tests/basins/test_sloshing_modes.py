@@ -8,6 +8,8 @@ import meshio
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from truth.potential import added
+from truth.scenes import GRAVITY, RHO, scene, smooth_ramp
 
 from fvsolve import advance, build, load, run
 from fvsolve.case import sloshing
@@ -15,8 +17,6 @@ from fvsolve.errors import CaseError
 from fvsolve.model.model import State
 from fvsolve.studies import linearise
 from fvsolve.studies.energy.energy import energy
-from tests.truth.potential import added
-from tests.truth.scenes import GRAVITY, RHO, scene, smooth_ramp
 
 SIDE, DEPTH = 2.0, 0.8
 BOX = sloshing.Outline((SIDE, 1.0), np.zeros(2), False)

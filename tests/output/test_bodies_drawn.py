@@ -7,11 +7,11 @@ import math
 import meshio
 import numpy as np
 import pytest
+from truth.scenes import scene
 
 from fvsolve import run
 from fvsolve.errors import RunError
 from fvsolve.output.fields import read_series
-from tests.truth.scenes import scene
 
 
 def test_a_turning_boom_and_its_tank_are_written_where_they_are(tmp_path):

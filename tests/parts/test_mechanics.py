@@ -363,7 +363,9 @@ def test_a_piston_beyond_its_stroke_is_marked_and_one_without_room_ends_the_run(
     light = {"links.cyl.dead_volume_B": 1e-6, "nodes.load.mass": 1e5, "numerics.method": "rk4", "numerics.step": 1e-5}
     stopped = fvsolve.run(case, set=light)
     assert (
-        not stopped.ok and "the chamber volume at cyl.B is zero" in stopped.reason and "give the piston an end-stop" in stopped.reason
+        not stopped.ok
+        and "the chamber volume at cyl.B is zero" in stopped.reason
+        and "give the piston an end-stop" in stopped.reason
     )
 
 

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from truth.scenes import AMBIENT, WATER, reservoir, scene
 
 from fvsolve import run
 from fvsolve.case.load import load
@@ -14,7 +15,6 @@ from fvsolve.exact.schedule import value
 from fvsolve.kernels.schedules import piece_slopes, piece_value
 from fvsolve.model.schedules import Schedules
 from fvsolve.parts.schedule import Schedule
-from tests.truth.scenes import AMBIENT, WATER, reservoir, scene
 
 WAVE = {"mean": 0.01, "amplitude": "5 l/s", "period": "0.4 s", "phase": "30 deg"}
 BULK = WATER["bulk_modulus"]
