@@ -650,7 +650,7 @@ BAD = {
     ),
     "some oil": (
         swap('name = "user"', 'name = "oil"'),
-        'fluid.name: "oil" is no CoolProp fluid; oils are ISO VG 32, ISO VG 46, ISO VG 68, or give a "user" fluid',
+        'fluid.name: "oil" is not a CoolProp fluid; oils are ISO VG 32, ISO VG 46, ISO VG 68, or give a "user" fluid',
     ),
     "a fluid that is a text": (
         re.sub(r"\[fluid\](\n.+)*\n", "", SCENE).replace("schema = 1", 'schema = 1\nfluid = "oil"'),
