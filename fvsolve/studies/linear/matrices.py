@@ -84,12 +84,8 @@ def entries(at: Frozen, width, rows, columns, steps) -> tuple[np.ndarray, np.nda
 
 def in_basins(model) -> np.ndarray:
     """True for states of basins : bool[n]; upwind fluxes of water at rest have kinks of some 1e-4 of their row."""
-    prefixes = tuple(f"{basin.name}." for basin in model.basins)
-    return (
-        np.array([name.startswith(prefixes) for name in model.state_names])
-        if prefixes
-        else np.zeros(model.y_size, bool)
-    )
+    names = tuple(f"{basin.name}." for basin in model.basins)
+    return np.array([name.startswith(names) for name in model.state_names]) if names else np.zeros(model.y_size, bool)
 
 
 def refuse(model, j: int, cause: str) -> None:
@@ -143,9 +139,8 @@ def output_matrix(at: Frozen, outputs: int, steps: np.ndarray) -> tuple[np.ndarr
     size = np.sum(np.abs(slopes[len(steps) // 2]), axis=0)
     size = np.maximum(size, NOISE / steps[0] * np.abs(base[n:]))
     row_size = np.tile(np.where(size > 0.0, size, 1.0), n)
-    starts = np.arange(
-        n * outputs
-    )  # each entry has its own step: for a valve, the step of a hose has too much round-off
+    # Each entry has its own step: for a valve, the step of a hose has too much round-off.
+    starts = np.arange(n * outputs)
     values, errors = settled(slopes.reshape(len(steps), -1), row_size, starts)
     kink = np.maximum(kinks(sides.reshape(len(steps), -1), row_size, starts), errors)
     if np.max(kink) > SMOOTH:

@@ -51,23 +51,23 @@ def longest(
     Error and kink are relative to the entry. A slope that falls with the step is zero. It is a kink if both sides are
     constant at different values over longer steps: the law smooths this kink over a range below those steps.
     """
-    slopes, size_of_slope = 0.5 * (forward + backward), np.maximum(np.abs(forward), np.abs(backward))
-    clear = size_of_slope[1:] > NOISE * size / steps[1:, None]
-    changes, sides, greatest = (
+    slopes, magnitude = 0.5 * (forward + backward), np.maximum(np.abs(forward), np.abs(backward))
+    clear = magnitude[1:] > NOISE * size / steps[1:, None]
+    change, sides, peak = (
         np.abs(np.diff(slopes, axis=0)),
         np.abs(forward - backward)[1:],
-        above_zero(size_of_slope.max(axis=0)),
+        above_zero(magnitude.max(axis=0)),
     )
-    good = clear & (np.maximum(changes, sides) <= SMOOTH * size_of_slope[1:])
+    good = clear & (np.maximum(change, sides) <= SMOOTH * magnitude[1:])
     started = np.maximum.accumulate(good, axis=0)
     stretch = good & ~np.maximum.accumulate(started & ~good, axis=0)
     none = ~started[-1]
-    errors = np.where(none, changes / greatest, np.where(stretch, changes / above_zero(size_of_slope[1:]), np.inf))
+    errors = np.where(none, change / peak, np.where(stretch, change / above_zero(magnitude[1:]), np.inf))
     errors = np.nan_to_num(errors, nan=np.inf)
     best, entries = np.argmin(errors, axis=0), np.arange(size.size)
     side_change = np.maximum(np.abs(np.diff(forward, axis=0)), np.abs(np.diff(backward, axis=0)))
     kink = np.where(clear & none, sides - BEND * side_change, 0.0)
-    return slopes[best + 1, entries], errors[best, entries], np.max(kink, axis=0) / greatest
+    return slopes[best + 1, entries], errors[best, entries], np.max(kink, axis=0) / peak
 
 
 def above_zero(x: np.ndarray) -> np.ndarray:

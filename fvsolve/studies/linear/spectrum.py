@@ -29,7 +29,7 @@ ZERO = 1e-10  # of the greatest modulus: smaller eigenvalues and real or imagina
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Eigenvalues [1/s], by rising modulus; complete : True if these are all; said : description of the selection."""
+    """Eigenvalues [1/s], by rising modulus; complete : True if these are all; description : of the selection."""
 
     values: np.ndarray
     complete: bool
@@ -51,17 +51,15 @@ class Spectrum:
 def poles_of(a: Any, form: EnergyForm) -> Spectrum:
     """Eigenvalues of A in the energy norm, with those of motions that store no energy."""
     form = form.fitting(a)
-    spectrum_ = spectrum(form.seen(a))
+    moving = spectrum(form.seen(a))
     if form.idle.shape[1] == 0:
-        return spectrum_
+        return moving
     idle = np.linalg.eigvals(form.idle_rows @ (a @ form.idle))
-    values = tidy(np.concatenate([spectrum_.values, idle]))
-    description = (
-        f"all {values.size}"
-        if spectrum_.complete
-        else f"{spectrum_.said}, and {idle.size} of motions that store no energy"
+    values = tidy(np.concatenate([moving.values, idle]))
+    text = (
+        f"all {values.size}" if moving.complete else f"{moving.said}, and {idle.size} of motions that store no energy"
     )
-    return Spectrum(values, spectrum_.complete, description)
+    return Spectrum(values, moving.complete, text)
 
 
 def spectrum(e: Any) -> Spectrum:
