@@ -22,9 +22,9 @@ DIRECTIONS = 3  # random directions along which A is checked
 def responses(at: Frozen, y: np.ndarray, outputs: int) -> np.ndarray:
     """dy/dt and the first probes at the state y : float64[n + outputs]."""
     model, t = at.model, float(at.t)
-    with model.slate(at.armed) as slate:
-        dydt, out = slate.evaluate(t, y, np.inf)
-        values = slate.observe(t, y, out)[:outputs] if outputs else np.zeros(0)
+    with model.slate(at.armed) as data:
+        dydt, out = data.evaluate(t, y, np.inf)
+        values = data.observe(t, y, out)[:outputs] if outputs else np.zeros(0)
     if out[rec.STATUS] != rec.OK or not np.all(np.isfinite(dydt)):
         place = f" at {model.node_names[int(out[rec.WHERE])]}" if out[rec.WHERE] >= 0 else ""
         raise FvsolveError(

@@ -170,11 +170,11 @@ class Delayed:
             start = end
         return growth
 
-    def place(self, found: Grown) -> tuple[str, float]:
+    def place(self, grown: Grown) -> tuple[str, float]:
         """(part with the most energy of the grown deviation, its share of the energy)."""
-        waves = np.sum((self.weight[:, None] * found.end_before) ** 2, axis=(0, 1))
+        waves = np.sum((self.weight[:, None] * grown.end_before) ** 2, axis=(0, 1))
         shares = dict.fromkeys(self.parts, 0.0)
-        for part, root in zip(self.parts, self.stored @ found.end, strict=True):
+        for part, root in zip(self.parts, self.stored @ grown.end, strict=True):
             shares[part] += float(root**2)
         for k, (first, last) in enumerate(zip(self.first, self.last, strict=True)):
             name = self.model.pipes[self.model.tables.delays[k]["pipe"]].name
@@ -191,26 +191,26 @@ def friction(pipe, tau: float) -> float:
     return k / (1.0 + k)
 
 
-def local(model, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """A, B, C, D at the start, by central differences; kept : indices of the states x."""
+def local(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A, B, C, D at the start, by central differences; states : indices of x."""
     t, y, rows = float(model.case.numerics.start), model.start, model.tables.delays
     ends = int(model.layout["ends"]) + 4 * rows["pipe"][:, None] + np.array([0, 3])
     first = np.cumsum(rows["stretches"]) - rows["stretches"]
     admittance = np.repeat(model.tables.pipes["admittance"][rows["pipe"]], 2)
 
-    with model.slate() as slate:
-        past, arrivals = slate.past, at.places_of(slate.past)[0]
+    with model.slate() as data:
+        past, arrivals = data.past, at.places_of(data.past)[0]
         inputs = arrivals + at.ARRIVALS * np.stack([first, first + rows["stretches"] - 1], axis=1) + np.array([0, 1])
 
         def evaluate(y: np.ndarray, w: np.ndarray) -> np.ndarray:
             past[inputs.ravel()] = w
             past[at.COUNT] = past[at.KNOWN_COUNT] = at.ZEROS + 1.0
             past[at.KNOWN_TIME] = t
-            dydt, out = slate.evaluate(t, y, np.inf)
-            return np.append(dydt[kept], out[ends.ravel()])
+            dydt, out = data.evaluate(t, y, np.inf)
+            return np.append(dydt[states], out[ends.ravel()])
 
         rest, slopes = np.zeros(inputs.size), []
-        for i in kept:
+        for i in states:
             width = np.zeros(y.size)
             width[i] = NEAR * (model.scale[i] + abs(y[i]))
             slopes.append((evaluate(y + width, rest) - evaluate(y - width, rest)) / (2.0 * width[i]))
@@ -218,5 +218,5 @@ def local(model, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
             width = np.zeros(rest.size)
             width[i] = NEAR * admittance[i] * BAR
             slopes.append((evaluate(y, width) - evaluate(y, -width)) / (2.0 * width[i]))
-    matrix, n = np.array(slopes).reshape(-1, kept.size + rest.size).T, kept.size
+    matrix, n = np.array(slopes).reshape(-1, states.size + rest.size).T, states.size
     return matrix[:n, :n], matrix[:n, n:], matrix[n:, :n], matrix[n:, n:]

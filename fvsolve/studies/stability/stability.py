@@ -133,13 +133,13 @@ def stability(
     texts = (AUTOMATIC,) if AUTO in requested else ()
     requested = {"at": at, "before": before, "steps": steps, "threshold": threshold}
     work, pairs = StabilityWork(case, **requested), [*itertools.product(schemes, methods)]
-    with Points(out) as points, Bench(work, jobs, dask) as bench:
-        rows = kept_rows(points, case, requested, pairs, bench, progress or (lambda *_: None))
+    with Points(out) as points, Bench(work, jobs, dask) as pool:
+        rows = kept_rows(points, case, requested, pairs, pool, progress or (lambda *_: None))
     return Stability(case.name, tuple(map(read, rows)), texts, {scheme: work.maker(scheme).side for scheme in schemes})
 
 
-def kept_rows(points: Points, case, options: dict, pairs: list, bench: Bench, report: Progress) -> list[dict]:
-    """Rows of pairs (scheme, method); missing rows are computed by `bench` and stored as they are finished."""
+def kept_rows(points: Points, case, options: dict, pairs: list, pool: Bench, report: Progress) -> list[dict]:
+    """Rows of pairs (scheme, method); missing rows are computed by `pool` and stored as they are finished."""
     keys = [{"study": "stability", "scheme": scheme, "method": method, **options} for scheme, method in pairs]
     rows = [points.find(case, extra) for extra in keys]
     new = [k for k, row in enumerate(rows) if row is None]
@@ -149,7 +149,7 @@ def kept_rows(points: Points, case, options: dict, pairs: list, bench: Bench, re
         report(known + count, len(pairs), "".join(" with ".join(pairs[k]) for k in new[count : count + 1]))
 
     progress(0)
-    for count, (number, row) in enumerate(bench.do([pairs[k] for k in new]), 1):
+    for count, (number, row) in enumerate(pool.do([pairs[k] for k in new]), 1):
         index = new[number]
         rows[index] = points.keep(key_of(case, keys[index]), keys[index], row)
         progress(count)
