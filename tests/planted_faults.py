@@ -87,8 +87,12 @@ FAULTS = [
         "np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])",
         "np.log(e[:-1] / e[1:]) / np.log(1.01 * h[:-1] / h[1:])",
     ),
-    Fault("studies/stability/carried.py", "scaled @ found + x * v", "scaled @ found - x * v"),
-    Fault("studies/linear/linearise.py", "(value - one.offset) / one.scale", "(value + one.offset) / one.scale"),
+    Fault("studies/stability/carried.py", "scaled @ result + x * v", "scaled @ result - x * v"),
+    Fault(
+        "studies/linear/linearise.py",
+        "(value - input_.offset) / input_.scale",
+        "(value + input_.offset) / input_.scale",
+    ),
     Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
     Fault(
         "output/lines.py",

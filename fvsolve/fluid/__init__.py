@@ -104,7 +104,7 @@ def _found(name: str, law: str, temperature: float, pressure: float) -> dict:
 def _check_numbers(numbers: dict[str, float], law: str) -> None:
     if law not in LAWS:
         laws = f"{did_you_mean(law, LAWS)}; laws are {', '.join(LAWS)}"
-        raise FluidError("law", f'"{law}" is no density law{laws}')
+        raise FluidError("law", f'"{law}" is an unknown density law{laws}')
     for key, value in numbers.items():
         if not math.isfinite(value) or value < 0.0 or (value == 0.0 and key != "vapor_pressure"):
             raise FluidError(key, f"{value:g} is not a positive, finite number")
@@ -119,5 +119,5 @@ def _missing(name: str, key: str) -> str:
 def _not_liquid(name: str, boiling: float, temperature: float, pressure: float) -> str:
     return (
         f"{pressure:.6g} Pa is not above the vapour pressure of {name} at {celsius(temperature)}, "
-        f"{boiling:.6g} Pa; wanted a liquid (pressures are absolute)"
+        f"{boiling:.6g} Pa; expected a liquid (pressures are absolute)"
     )

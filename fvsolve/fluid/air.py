@@ -37,16 +37,21 @@ def mixed(given: dict[str, float]) -> Air:
     """Free gas and cavitation by the given keys."""
     fraction, cavitation = given.get("air_fraction", 0.0), bool(given.get("cavitation"))
     if not 0.0 <= fraction < 1.0:
-        raise FluidError("air_fraction", f"{fraction:g} is no share of a volume; wanted at least 0 and below 1")
+        raise FluidError("air_fraction", f"{fraction:g} is not a volume fraction; expected at least 0 and below 1")
     if cavitation and fraction == 0.0:
-        raise FluidError("cavitation", "cavities grow from free gas; give air_fraction, 1e-7 for a degassed liquid")
+        raise FluidError(
+            "cavitation",
+            "needs free gas, from which cavities grow; give air_fraction, for example 1e-7 for a degassed liquid",
+        )
     exponent, saturation = given.get("gas_exponent", 1.0), given.get("saturation_pressure", math.inf)
     if not 1.0 <= exponent <= 2.0:
-        raise FluidError("gas_exponent", f"{exponent:g} is not between 1, isothermal, and 2")
+        raise FluidError("gas_exponent", f"{exponent:g} is out of range; expected a value between 1 (isothermal) and 2")
     if cavitation and exponent != 1.0:
-        raise FluidError("gas_exponent", f"{exponent:g} is not 1, and the gas in a cavity is isothermal")
+        raise FluidError("gas_exponent", f"{exponent:g} is not 1; with cavitation the gas is isothermal, expected 1")
     if saturation <= ATMOSPHERE:
-        raise FluidError("saturation_pressure", f"{saturation:g} Pa is not above 1 atm, where air_fraction counts")
+        raise FluidError(
+            "saturation_pressure", f"{saturation:g} Pa is not above 1 atm, the pressure to which air_fraction refers"
+        )
     return Air(fraction, exponent, saturation, cavitation)
 
 
@@ -57,4 +62,7 @@ def check_cavities(fluid) -> None:
     if fluid.vapor_pressure == 0.0:
         raise FluidError("cavitation", f'needs the vapour pressure of "{fluid.name}"; give vapor_pressure')
     if fluid.vapor_pressure >= ATMOSPHERE:
-        raise FluidError("cavitation", f"{fluid.name} boils at 1 atm, where air_fraction counts; leave cavitation out")
+        raise FluidError(
+            "cavitation",
+            f"{fluid.name} boils at 1 atm, the pressure to which air_fraction refers; leave cavitation out",
+        )

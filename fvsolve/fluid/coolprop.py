@@ -17,7 +17,9 @@ def ask(name: str, temperature: float, pressure: float, law: str) -> dict[str, A
     """Fields of Fluid from CoolProp; None: density of a boiling fluid, bulk_modulus of INCOMP."""
     backend, _, rest = name.rpartition("::")
     if backend not in ("", "HEOS", "INCOMP"):
-        raise FluidError("name", f'"{name}": wanted a CoolProp fluid without a prefix, or "INCOMP::..."')
+        raise FluidError(
+            "name", f'"{name}" has an unknown prefix; expected a CoolProp fluid without a prefix, or "INCOMP::..."'
+        )
     if backend == "INCOMP":
         return _ask_incompressible(name, temperature, pressure)
     return _ask_pure(rest, temperature, pressure, law)
@@ -35,7 +37,9 @@ def _ask_pure(name: str, temperature: float, pressure: float, law: str) -> dict[
     try:
         state.update(CoolProp.PT_INPUTS, pressure, temperature)
     except ValueError as error:
-        raise FluidError("pressure", f"{name} is two-phase there, or unknown (CoolProp: {error})") from None
+        raise FluidError(
+            "pressure", f"{name} is two-phase at that state, or has no data there (CoolProp: {error})"
+        ) from None
     values |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
     values["viscosity"] = known(state.viscosity)
     if LAWS[law].tabulated:
@@ -48,12 +52,12 @@ def _pure_state(name: str) -> Any:
     from CoolProp import AbstractState
 
     if "&" in name or "[" in name or name.endswith(".mix"):
-        text = f'"{name}" is a mixture; only pure fluids and "INCOMP::..." solutions are known'
+        text = f'"{name}" is a mixture; expected a pure fluid or an "INCOMP::..." solution'
         raise FluidError("name", text)
     try:
         return AbstractState("HEOS", name)
     except ValueError:
-        raise FluidError("name", f'"{name}" is no CoolProp fluid{_suggestion(name)}') from None
+        raise FluidError("name", f'"{name}" is not a CoolProp fluid{_suggestion(name)}') from None
 
 
 def _suggestion(name: str) -> str:
@@ -112,7 +116,7 @@ def _ask_incompressible(name: str, temperature: float, pressure: float) -> dict[
 
     bare = re.sub(r"(\[[^]]*\]|-[0-9.]+%)$", "", name.removeprefix("INCOMP::"))
     if bare not in _incompressible_names():
-        raise FluidError("name", f'"{name}" is no CoolProp fluid{_suggestion("INCOMP::" + bare)}')
+        raise FluidError("name", f'"{name}" is not a CoolProp fluid{_suggestion("INCOMP::" + bare)}')
     _check_temperature(name, temperature, *(PropsSI(key, f"INCOMP::{bare}") for key in ("TMIN", "TMAX")))
     try:
         density = PropsSI("D", "T", temperature, "P", pressure, name)

@@ -1,7 +1,7 @@
-"""Density laws: what each can carry, and how density, head and mass hang on pressure. Knows one fluid; knows no scene.
+"""Density laws: density, head and mass of a fluid as functions of pressure.
 
 A law is one class here and one file of compiled functions in `kernels.density`; basins of liquid have their own
-(`basins.liquid.lower`). What is asked of a law elsewhere is asked by these names, never by its own.
+(`basins.liquid.lower`). Other modules use the attributes and methods of `Law`, never the name of a law.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from fvsolve.fluid.air import AIR_KEYS, Air, mixed
 from fvsolve.fluid.oils import OILS
 from fvsolve.kernels import records as rec
 
-LAWS: dict[str, type[Law]] = {}  # name -> law, in the order of what they know
+LAWS: dict[str, type[Law]] = {}  # name -> law, from the simplest to the most general
 
 
 def named(fits: Callable[[type[Law]], bool]) -> str:
-    """Names of the laws that fit, as a message wants them."""
-    *some, last = (f'"{name}"' for name, law in LAWS.items() if fits(law))
-    return f"{', '.join(some)} or {last}" if some else last
+    """Names of the laws for which `fits` is true, as text for a message."""
+    *others, last = (f'"{name}"' for name, law in LAWS.items() if fits(law))
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def over_weight(rise, weight: float):
-    """rise / weight [m]; no number where nothing weighs."""
+    """rise / weight [m]; NaN for zero weight."""
     return rise / weight if weight > 0.0 else np.full(np.shape(rise), np.nan)[()]
 
 
 class Law:
-    """How one fluid's density hangs on pressure; heads count from ambient pressure, heights are z [m].
+    """Density of one fluid as a function of pressure; heads count from ambient pressure, heights are z [m].
 
-    name, code : as case files and as kernels say it
-    linear : waves add up: no state changes their speed or what they carry; pressure is linear in mass and in head
-    scalars : whether its flows carry any
-    tabulated : whether it reads CoolProp's own density; keys : of [fluid] that no other law knows
+    name, code : name in case files, code in kernels
+    linear : True if waves superpose: wave speed and impedance are constant, pressure is linear in mass and in head
+    scalars : True if flows transport scalars
+    tabulated : True if density is a table from CoolProp; keys : keys of [fluid] that only this law has
     """
 
     name: ClassVar[str]
@@ -60,33 +60,36 @@ class Law:
 
     @classmethod
     def lower(cls, fluid, s, floats: list[float]) -> None:
-        """Fill in what kernels read of a law: numbers of `settings`, and floats of its own."""
+        """Write the parameters of the law for kernels: record `s` of `settings`, and its own `floats`."""
         s["law"], s["rho"], s["beta"], s["reference"] = cls.code, fluid.density, fluid.bulk_modulus, fluid.pressure
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
-        """Raise FluidError where a fluid, or a number given for it, does not go with the law."""
+        """Raise FluidError for a fluid, or a property given for it, that the law does not allow."""
 
     @classmethod
     def air(cls, given: dict[str, float]) -> Air | None:
-        """What is mixed in, by the keys given."""
+        """Free gas from the given keys; raises FluidError for a law without gas."""
         for key in given:
-            raise FluidError(key, f'law = "{cls.name}" knows no gas; use law = "mixture"')
+            raise FluidError(key, f'law = "{cls.name}" has no free gas; use law = "mixture"')
         return None
 
     @property
     def cavitates(self) -> bool:
-        """Whether it knows cavities: no pressure is below its floor."""
+        """True if cavities form: the floor (vapour pressure) is the lower bound of pressure."""
         return bool(self.st["floor"] > 0.0)
 
     @property
     def family(self) -> str:
-        """Which kernels it runs on: "linear" hold pressures, "barotropic" masses, "cavitating" cavities too."""
+        """Family of kernels: states of "linear" are pressures, of "barotropic" masses; "cavitating" adds cavities."""
         return "linear" if self.linear else "cavitating" if self.cavitates else "barotropic"
 
     @property
     def cavity_pressure(self) -> float:
-        """Pressure [Pa] below which a place is a cavity: vapour pressure, or where more vapour than gas is in it."""
+        """Pressure [Pa] below which a place is a cavity.
+
+        Vapour pressure; with cavitation twice that: below it the vapour pressure exceeds the pressure of the gas.
+        """
         return self.fluid.vapor_pressure * (2.0 if self.cavitates else 1.0)
 
     @property
@@ -96,30 +99,30 @@ class Law:
 
     @property
     def to_cavitate(self) -> str:
-        """What must stand in [fluid] before `cavitation = true`."""
+        """Keys that [fluid] needs before `cavitation = true`, as text for a message."""
         return 'law = "mixture" and '
 
     @property
     def advice(self) -> str:
-        """What to try where a run cannot go on."""
+        """Advice for a run that failed, appended to its message."""
         return ""
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:
-        """Wave speed of a pipe [m/s] for those who see one number: that of liquid and wall."""
+        """Wave speed of a pipe [m/s] as one number: that of liquid and wall."""
         return float(row["speed"])
 
 
 class LinearLaw(Law, name="linear"):
-    """One density, but that mass and pressure of what is squeezed are linear in each other."""
+    """Constant density of flow; stored mass is linear in pressure."""
 
     code, linear, scalars = rec.LAW_LINEAR, True, True
 
     def density(self, pressure):
-        """Density [kg/m3] of what flows, at pressures."""
+        """Density [kg/m3] of the flow at pressures [Pa]: constant."""
         return np.full(np.shape(pressure), self.rho)[()]
 
     def potential_of(self, pressure: float, z: float) -> float:
-        """What is constant in a fluid at rest, as a pressure at z = 0 [Pa]."""
+        """Potential that is constant in a fluid at rest, as a pressure at z = 0 [Pa]."""
         return pressure + self.rho * self.gravity * z
 
     def pressure_of(self, potential: float, z: float) -> float:
@@ -139,7 +142,7 @@ class LinearLaw(Law, name="linear"):
         return self.rho * volume * (1.0 + (pressure - self.fluid.pressure) / self.fluid.bulk_modulus)
 
     def compliance(self, speed: float) -> float:
-        """Growth of a pipe's area with pressure that makes its wave speed [1/Pa]; here the speed alone says it."""
+        """Wall compliance (1/A) dA/dp [1/Pa] that gives a pipe a wave speed; 0 here: kernels use the speed alone."""
         return 0.0
 
     def area(self, row, pressure):
@@ -147,7 +150,7 @@ class LinearLaw(Law, name="linear"):
         return row["area"]
 
     def cell_pressure(self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
-        """Pressure [Pa] in the cells of a pipe from its start [Pa], the profile and the sum of both waves [kg/s]."""
+        """Pressure [Pa] in the cells of a pipe: start pressure [Pa], profile and sum of both waves [kg/s] are given."""
         return start + waves / row["admittance"]
 
     def held_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
@@ -157,19 +160,19 @@ class LinearLaw(Law, name="linear"):
 
 
 class DenseLaw(Law):
-    """Laws whose kernels hold masses: their questions are those of `kernels.density`."""
+    """Laws whose kernels have masses as states; the functions are those of `kernels.density`."""
 
     @cached_property
     def kernels(self):
-        from fvsolve.kernels import density  # which scenes under a linear law do without
+        from fvsolve.kernels import density  # not imported for scenes with the linear law
 
         return density
 
-    def each(self, question, *arguments):
-        """A compiled question for each pressure, or whatever comes last."""
+    def each(self, function, *arguments):
+        """Values of a compiled function at each element of its last argument."""
         *first, last = arguments
-        found = [question(self.st, self.floats, *first, float(x)) for x in np.ravel(last)]
-        return np.array(found).reshape(np.shape(last))[()]
+        values = [function(self.st, self.floats, *first, float(x)) for x in np.ravel(last)]
+        return np.array(values).reshape(np.shape(last))[()]
 
     def density(self, pressure):
         return self.each(self.kernels.density, pressure)
@@ -218,18 +221,18 @@ class LogLaw(DenseLaw, name="log"):
 
 
 class TableLaw(DenseLaw, name="table"):
-    """CoolProp's own density along the isentrope through the reference state."""
+    """Density of CoolProp along the isentrope through the reference state."""
 
     code, tabulated = rec.LAW_TABLE, True
 
     @classmethod
     def check(cls, name: str, given: dict[str, float]) -> None:
         if name == "user" or name in OILS or name.startswith("INCOMP::"):
-            text = f'"table" wants a compressible CoolProp fluid, "{name}" is none; use "linear" or "log"'
+            text = f'"table" needs a compressible fluid of CoolProp, not "{name}"; use "linear" or "log"'
             raise FluidError("law", text)
         for key in ("density", "bulk_modulus"):
             if key in given:
-                text = f'law = "table" takes it from CoolProp; leave {key} out, or use law = "log"'
+                text = f'law = "table" reads {key} from CoolProp; leave {key} out, or use law = "log"'
                 raise FluidError(key, text)
 
     @classmethod
@@ -242,7 +245,7 @@ class TableLaw(DenseLaw, name="table"):
 
 
 class MixtureLaw(DenseLaw, name="mixture"):
-    """Liquid with free gas, and vapour where cavities are asked for; with nothing mixed in it is `log`."""
+    """Liquid with free gas, and with vapour if `cavitation` is true; without free gas it is `log`."""
 
     code, keys = rec.LAW_MIXTURE, AIR_KEYS
 
@@ -271,11 +274,11 @@ class MixtureLaw(DenseLaw, name="mixture"):
 
     @property
     def advice(self) -> str:
-        """Gas that expands far is more than it can follow without a floor."""
+        """Advice on strong expansion of gas, which fails without a lower bound of pressure."""
         if self.cavitates:
             return ""
         return "; where much gas expands, give the fluid cavitation = true and a scheme for it (docs/cavitation)"
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:
-        """The mean along the pipe."""
+        """Harmonic mean of the local wave speeds along the pipe [m/s]."""
         return len(pressure) / sum(1.0 / self.each(self.kernels.local_speed, row, pressure))

@@ -1,7 +1,8 @@
-"""Mineral hydraulic oils by ISO viscosity grade, as printed; their sources are in docs/fluids.md. Knows no CoolProp.
+"""Mineral hydraulic oils by ISO viscosity grade, with the numbers of their sources (docs/fluids.md).
 
-Viscosity: Walther's line (ASTM D341) through 40 and 100 degC. Density: ASTM D1250 for lubricating oils from 15 degC.
-Compressibility: Tait's equation of an HLP 32 for all grades, made isentropic by 1/K_s = 1/K_T - T a^2 / (rho cp).
+Viscosity: Walther's equation (ASTM D341) through 40 and 100 degC. Density: ASTM D1250 for lubricating oils, from the
+value at 15 degC. Compressibility: Tait's equation of an HLP 32 for all grades, made isentropic by
+1/K_s = 1/K_T - T a^2 / (rho cp).
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from typing import Any
 from fvsolve.errors import FluidError
 
 ZERO, ATMOSPHERE = 273.15, 1.01325  # [K], [bar]
-COLDEST, HOTTEST, HIGHEST = 273.15, 373.15, 1e8  # what the sources span [K], [Pa]
+COLDEST, HOTTEST, HIGHEST = 273.15, 373.15, 1e8  # range of the sources [K], [Pa]
 
 
 @dataclass(frozen=True)
 class Oil:
-    """kinematic viscosity at 40 and 100 degC [mm2/s], density at 15 degC and 1 atm [kg/m3]."""
+    """Oil: kinematic viscosity at 40 and 100 degC [mm2/s], density at 15 degC and 1 atm [kg/m3]."""
 
     viscosity_40: float
     viscosity_100: float
@@ -41,23 +42,21 @@ HEAT = 1895.4, 2118.1  # cp at 25 and 80 degC [J/kg/K]
 
 
 def oil_name(name: str) -> str | None:
-    """The grade that a name means, `ISO VG 46` for "ISO-VG46", "VG 46", "HLP 46" or "HM 46"; None for no oil."""
-    found = re.fullmatch(r"(?:ISO[\s-]*VG|VG|HLP|HM)[\s-]*(\d+)", name.strip(), re.IGNORECASE)
-    if found is None:
+    """Grade for a name: `ISO VG 46` for "ISO-VG46", "VG 46", "HLP 46" or "HM 46"; None for other fluids."""
+    match = re.fullmatch(r"(?:ISO[\s-]*VG|VG|HLP|HM)[\s-]*(\d+)", name.strip(), re.IGNORECASE)
+    if match is None:
         return None
-    grade = f"ISO VG {found[1]}"
+    grade = f"ISO VG {match[1]}"
     if grade not in OILS:
-        raise FluidError(
-            "name", f'"{name}" is no oil that is known; oils are {", ".join(OILS)}, or give a "user" fluid'
-        )
+        raise FluidError("name", f'"{name}" is an unknown oil; expected one of {", ".join(OILS)}, or a "user" fluid')
     return grade
 
 
 def ask_oil(name: str, temperature: float, pressure: float) -> dict[str, Any]:
-    """The keys of Fluid for an oil at temperature [K] and pressure [Pa]; raises FluidError outside its range."""
+    """Fields of `Fluid` for an oil at temperature [K] and pressure [Pa]; raises FluidError outside its range."""
     if not COLDEST <= temperature <= HOTTEST:
-        given = f"{temperature - ZERO:.6g} degC"
-        raise FluidError("temperature", f"{given} is outside the range of {name}, 0 degC to 100 degC")
+        text = f"{temperature - ZERO:.6g} degC"
+        raise FluidError("temperature", f"{text} is outside the range of {name}, 0 degC to 100 degC")
     if pressure > HIGHEST:
         raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, {HIGHEST:g} Pa")
     oil, p = OILS[name], pressure / 1e5
@@ -67,8 +66,8 @@ def ask_oil(name: str, temperature: float, pressure: float) -> dict[str, Any]:
     isothermal = 1e5 * (b + p) / c * (1.0 - c * math.log((b + p) / b))
     cp = HEAT[0] + (HEAT[1] - HEAT[0]) * (temperature - ZERO - 25.0) / 55.0
     isentropic = 1.0 / (1.0 / isothermal - temperature * expansion**2 / (rho * cp))
-    found = dict(density=rho, bulk_modulus=isentropic, viscosity=rho * walther(oil, temperature))
-    return found | dict(vapor_pressure=0.0, table=None, source="docs/fluids.md, oils")
+    values = dict(density=rho, bulk_modulus=isentropic, viscosity=rho * walther(oil, temperature))
+    return values | dict(vapor_pressure=0.0, table=None, source="docs/fluids.md, oils")
 
 
 def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:
@@ -78,7 +77,7 @@ def density_1atm(oil: Oil, temperature: float) -> tuple[float, float]:
 
 
 def walther(oil: Oil, temperature: float) -> float:
-    """Kinematic viscosity [m2/s] at 1 atm: lg lg (nu + 0.7) is linear in lg T, nu in mm2/s, ASTM D341."""
+    """Kinematic viscosity [m2/s] at 1 atm; log10(log10(nu + 0.7)) is linear in log10(T), nu in mm2/s, ASTM D341."""
     cold, hot = (math.log10(math.log10(nu + 0.7)) for nu in (oil.viscosity_40, oil.viscosity_100))
     share = math.log(temperature / (ZERO + 40.0)) / math.log((ZERO + 100.0) / (ZERO + 40.0))
     return 1e-6 * (10.0**10.0 ** (cold + share * (hot - cold)) - 0.7)

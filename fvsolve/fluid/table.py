@@ -1,4 +1,4 @@
-"""Density along an isentrope, as a table. Knows CoolProp's state object; knows nothing of the cache."""
+"""Tables of density along an isentrope, computed with a state object of CoolProp."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import numpy as np
 
 from fvsolve.errors import FluidError
 
-REACH = 1e8  # a table goes up to this pressure [Pa], or to twice the reference pressure where that is more
-AIM = 1e-9  # relative density error at which a table is fine enough
-WORST = 1e-6  # ... and above which it is refused
-INTERVALS = (32, 2048)  # least and most
+REACH = 1e8  # upper end of a table [Pa], or twice the reference pressure if that is higher
+AIM = 1e-9  # relative density error at which refinement stops
+WORST = 1e-6  # relative density error above which a table is refused
+INTERVALS = (32, 2048)  # least and greatest number of intervals
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,10 +24,10 @@ class FluidTable:
     pressure        : float64[n]  uniform grid from the vapour pressure up, absolute  [Pa]
     log_density     : float64[n]  ln(rho / (1 kg/m3))  [-]
     compressibility : float64[n]  d ln rho / dp = 1 / (rho a^2) at constant entropy  [1/Pa]
-    error           : greatest relative density error, met at the midpoints against CoolProp  [-]
+    error           : greatest relative density error at the midpoints, against CoolProp  [-]
 
-    Outside the grid compressibility keeps its end value: ln rho goes on in a straight line. Below the vapour
-    pressure there is no stable liquid to ask CoolProp for.
+    Outside the grid compressibility keeps its end value: ln rho is extrapolated linearly. Below the vapour pressure
+    CoolProp has no stable liquid.
     """
 
     pressure: np.ndarray
@@ -50,7 +50,7 @@ class FluidTable:
         return hash((self.error, self.pressure.size))
 
     def numbers(self, density: float, pressure: float) -> list[float]:
-        """Four columns for kernels: ln(rho / density), its slope, enthalpy from `pressure` on [J/kg], its slope."""
+        """Four columns for kernels: ln(rho / density), its slope, enthalpy relative to `pressure` [J/kg], its slope."""
         p, k = self.pressure, self.compressibility
         step = (p[-1] - p[0]) / (len(p) - 1)
         log_density = self.log_density - hermite_at(p, self.log_density, k, pressure)
@@ -66,7 +66,7 @@ class FluidTable:
 
 
 def hermite_at(grid, values, slopes, at):
-    """Cubic Hermite interpolant of a uniform table at given places."""
+    """Cubic Hermite interpolant of a uniform table at the abscissas `at`."""
     step = grid[1] - grid[0]
     k = np.clip(((at - grid[0]) / step).astype(int) if hasattr(at, "astype") else int((at - grid[0]) / step), 0,
                 len(grid) - 2)  # fmt: skip
@@ -77,30 +77,32 @@ def hermite_at(grid, values, slopes, at):
 
 
 def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
-    """The table through the present state of CoolProp's `state`; raises FluidError where it has no liquid.
+    """Table of the isentrope through the current state of CoolProp's `state`; raises FluidError for no liquid.
 
-    Intervals are doubled until the error met between the nodes is below AIM, or there are INTERVALS[1].
+    The number of intervals is doubled until the error at midpoints is at most `TARGET_ERROR`, or to INTERVALS[1].
     """
     temperature, pressure, entropy = state.T(), state.p(), state.smass()
     if not 0.0 < vapor_pressure < pressure:
-        raise FluidError("law", f'"table" wants a liquid, and {name} is none there; use "linear" or "log"')
+        raise FluidError(
+            "law", f'"table" needs a liquid, and {name} is not liquid at that state; use "linear" or "log"'
+        )
     span = (vapor_pressure, _reach(state, temperature, pressure))
-    intervals, most = INTERVALS
+    intervals, max_intervals = INTERVALS
     try:
         table = _tabulate(state, span, intervals, temperature, entropy)
-        while table.error > AIM and intervals < most:
+        while table.error > AIM and intervals < max_intervals:
             intervals *= 2
             table = _tabulate(state, span, intervals, temperature, entropy)
     except ValueError as error:
-        raise FluidError("law", f'no "table" of {name} from there (CoolProp: {error}); use "log"') from None
+        raise FluidError("law", f'no "table" of {name} from that state (CoolProp: {error}); use "log"') from None
     if table.error > WORST or not _monotone(table):
-        text = f'"table" of {name} would err by {table.error:.1g}, too near its critical point; use "log"'
+        text = f'"table" of {name} has an error of {table.error:.1g}, too near its critical point; use "log"'
         raise FluidError("law", text)
     return table
 
 
 def _reach(state: Any, temperature: float, pressure: float) -> float:
-    """Where the table ends [Pa]: REACH, or twice the pressure, but no further than CoolProp allows."""
+    """Upper end of the table [Pa]: `TABLE_PRESSURE`, or twice the pressure, within the limits of CoolProp."""
     from CoolProp import CoolProp
 
     limits = [max(REACH, 2.0 * pressure), state.pmax()]
@@ -120,12 +122,12 @@ def _tabulate(state: Any, span: tuple[float, float], intervals: int, temperature
 
 
 def _march(state: Any, grid: np.ndarray, temperature: float, entropy: float) -> tuple[np.ndarray, np.ndarray]:
-    """ln rho and 1/(rho a^2) at the pressures of `grid`; Newton on T from the neighbour, ds/dT = cp/T."""
+    """ln rho and 1/(rho a^2) at the pressures of `grid`; Newton for T from the value before, ds/dT = cp/T."""
     from CoolProp import CoolProp
 
     log_density, compressibility = np.empty_like(grid), np.empty_like(grid)
     for i, pressure in enumerate(grid):
-        # Below the critical pressure the phase is named, or states next to boiling would be refused.
+        # Below the critical pressure the phase is imposed; CoolProp would refuse states next to boiling.
         subcritical = pressure < state.p_critical()
         state.specify_phase(CoolProp.iphase_liquid if subcritical else CoolProp.iphase_not_imposed)
         for _ in range(12):
@@ -140,16 +142,16 @@ def _march(state: Any, grid: np.ndarray, temperature: float, entropy: float) -> 
 
 
 def _monotone(table: FluidTable) -> bool:
-    """Whether slopes are within [0, 3] times the chord's, so that the cubics rise (Fritsch, Carlson 1980)."""
+    """True if slopes are within [0, 3] times those of chords, so that the cubics rise (Fritsch, Carlson 1980)."""
     chord = np.diff(table.log_density) / np.diff(table.pressure)
     slopes = np.concatenate([table.compressibility[:-1] / chord, table.compressibility[1:] / chord])
     return bool(np.all(chord > 0.0) and np.all(slopes >= 0.0) and np.all(slopes <= 3.0))
 
 
-def known(ask: Callable[[], float]) -> float | None:
-    """What CoolProp answers, or None where it has no model for it."""
+def known(read: Callable[[], float]) -> float | None:
+    """Value of a function of CoolProp; None if CoolProp has no model for it."""
     try:
-        value = ask()
+        value = read()
     except ValueError:
         return None
     return value if math.isfinite(value) else None

@@ -231,7 +231,7 @@ class Choice(Value):
 
 @dataclass(frozen=True)
 class Flag(Value):
-    """true or false."""
+    """Boolean, `true` or `false`."""
 
     about: str = ""
     changes: str = SHAPE

@@ -37,7 +37,7 @@ def parse(given: Any, dimension: str) -> Any:
     if not math.isfinite(value):
         raise ValueError(f"{show(given)} is not finite; {wanted(dimension)}")
     if abs(value) > MOST:
-        raise ValueError(f"{show(given)} is beyond {MOST:g} SI, where squares and products end; {wanted(dimension)}")
+        raise ValueError(f"{show(given)} is greater than {MOST:g} SI, where products overflow; {wanted(dimension)}")
     if (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge:
         return value, unit is not None and unit.gauge
     if unit is not None and unit.dimension == "kinematic viscosity" and dimension == "viscosity":
@@ -53,32 +53,32 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     """Unit of a spelling that measures `dimension`; ValueError with a suggestion otherwise."""
     if len(spelling) > LONGEST:  # pint would take minutes to read it
         raise ValueError(
-            f"{show(f'{number} {spelling}'.strip())}: no unit has {len(spelling)} letters; {wanted(dimension)}"
+            f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {wanted(dimension)}"
         )
     base = DIMENSIONS[dimension].base or dimension
     unit = UNITS.get(_plain(spelling))
     if unit is None:
         folded = _plain(spelling).casefold().replace(" ", "")
-        for other in _spellings(dimension):
-            if other.casefold().replace(" ", "") == folded:
-                raise ValueError(f"no unit {show(spelling)}; did you mean {show((number + ' ' + other).strip())}?")
+        for known in _spellings(dimension):
+            if known.casefold().replace(" ", "") == folded:
+                raise ValueError(f"unknown unit {show(spelling)}; did you mean {show((number + ' ' + known).strip())}?")
         unit = ask_pint(spelling) if _plain(spelling) not in MEANT else None
     text = show(f"{number} {spelling}".strip())
-    meant = MEANT.get(_plain(spelling), "")
+    suggested = MEANT.get(_plain(spelling), "")
     if unit is None:
-        if not meant or UNITS[meant].dimension != base:
+        if not suggested or UNITS[suggested].dimension != base:
             close = difflib.get_close_matches(_plain(spelling), _spellings(dimension), n=1)
-            meant = close[0] if close else ""
-        hint = f"did you mean {show((number + ' ' + meant).strip())}?" if meant else wanted(dimension)
-        raise ValueError(f"{text}: no unit {show(spelling)}; {hint}")
+            suggested = close[0] if close else ""
+        hint = f"did you mean {show((number + ' ' + suggested).strip())}?" if suggested else wanted(dimension)
+        raise ValueError(f"{text}: unknown unit {show(spelling)}; {hint}")
     if unit.dimension != base and not (dimension == "viscosity" and unit.dimension == "kinematic viscosity"):
         hint = wanted(dimension)
-        if meant and UNITS[meant].dimension == base:
-            hint = f"wanted {DIMENSIONS[dimension].words}; did you mean {show((number + ' ' + meant).strip())}?"
+        if suggested and UNITS[suggested].dimension == base:
+            hint = f"expected {DIMENSIONS[dimension].words}; did you mean {show((number + ' ' + suggested).strip())}?"
         words = DIMENSIONS[unit.dimension].words if unit.dimension in DIMENSIONS else f"a {unit.dimension}"
         raise ValueError(f"{text} is {words}; {hint}")
     if dimension == "gauge_pressure" and unit.absolute:
-        raise ValueError(f"{text} is an absolute pressure; wanted a gauge one, for example {show('5 barg')}")
+        raise ValueError(f"{text} is an absolute pressure; expected a gauge pressure, for example {show('5 barg')}")
     if unit.gauge and not DIMENSIONS[dimension].gauge:
         raise ValueError(f"{text} is a gauge pressure; {wanted(dimension)}")
     return unit
@@ -113,17 +113,17 @@ def span(unit: str) -> str:
 def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
     """'; did you mean "304.8 mm"?': `given` in a unit that puts it in the range `least` to `greatest` (SI)."""
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
-    number, said = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
+    number, spelling = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
     fit = [unit for unit, weight in LIKELY.get(DIMENSIONS[dimension].base or dimension, {}).items()
-           if unit != _plain(said) and least <= weight * UNITS[unit].si(float(number)) <= greatest]  # fmt: skip
+           if unit != _plain(spelling) and least <= weight * UNITS[unit].si(float(number)) <= greatest]  # fmt: skip
     fit = [show(f"{number} {unit}") for unit in fit[: 2 if dimension == "viscosity" else 1]]
     return f"; did you mean {' or '.join(fit)}?" if fit else ""
 
 
 def wanted(dimension: str) -> str:
-    """'wanted a length, for example "300 mm"'."""
+    """Text 'expected a length, for example "300 mm"'."""
     words, example = DIMENSIONS[dimension].words, DIMENSIONS[dimension].example
-    return f"wanted {words}, for example {example if dimension == 'number' else show(example)}"
+    return f"expected {words}, for example {example if dimension == 'number' else show(example)}"
 
 
 def show(given: Any) -> str:
@@ -147,7 +147,7 @@ def _parse_number(given: Any, dimension: str) -> float:
 def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
     match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-"))
     if match is None:
-        raise ValueError(f"{show(text)} is no number with a unit; {wanted(dimension)}")
+        raise ValueError(f"{show(text)} is not a number with a unit; {wanted(dimension)}")
     number, spelling = match.groups()
     if not spelling:
         if dimension != "number":

@@ -24,18 +24,18 @@ def ask_pint(spelling: str) -> Unit | None:
 
     registry = pint.get_application_registry()
     try:
-        one = registry.Quantity(1.0, registry.parse_units(spelling)).to_base_units()
-        zero = registry.Quantity(0.0, registry.parse_units(spelling)).to_base_units()
+        unit_value = registry.Quantity(1.0, registry.parse_units(spelling)).to_base_units()
+        zero_value = registry.Quantity(0.0, registry.parse_units(spelling)).to_base_units()
     except Exception:  # pint raises errors of many families; whichever, it does not know the spelling
         return None
-    factor = float(one.magnitude - zero.magnitude)
+    factor = float(unit_value.magnitude - zero_value.magnitude)
     if not (math.isfinite(factor) and factor > 0):
         return None
     for name, dimension in DIMENSIONS.items():
         si = dimension.si.replace("-", "").replace("m2", "m**2").replace("m3", "m**3").replace("s2", "s**2")
-        if not dimension.base and registry.Quantity(1.0, si.replace(" ", "*")).check(one.dimensionality):
-            return Unit(name, factor, offset=float(zero.magnitude) / factor)
-    return Unit(f"quantity of [{base_units(one.dimensionality)}]", factor)
+        if not dimension.base and registry.Quantity(1.0, si.replace(" ", "*")).check(unit_value.dimensionality):
+            return Unit(name, factor, offset=float(zero_value.magnitude) / factor)
+    return Unit(f"quantity of [{base_units(unit_value.dimensionality)}]", factor)
 
 
 def base_units(dimensionality: Mapping[str, float]) -> str:

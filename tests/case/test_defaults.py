@@ -106,7 +106,7 @@ def test_settings_and_sweeps_reach_them(file):
     (("cells = 30", "cells = -1"), "defaults.pipe.cells", "out of range"),
     (("cells = 30", "from = 'lake'"), "defaults.pipe.from", "each pipe states its own"),
     (("cells = 30", "type = 'pipe'"), "defaults.pipe.type", "each pipe states its own"),
-    (("7 mm", "7 kg"), "defaults.pipe.wall.thickness", "is a mass; wanted a length"),
+    (("7 mm", "7 kg"), "defaults.pipe.wall.thickness", "is a mass; expected a length"),
     (("factor = 0.02", "factr = 0.02"), "defaults.pipe.friction.factr", "unknown key"),
     (("wall = {", "wave_speed = 900\nwall = {"), "defaults.pipe.wall", "wave_speed and wall are given; keep one"),
     (("[defaults.pipe]", "[defaults.pip]"), "defaults.pip", 'defaults of "pip" are unknown; did you mean "pipe"?'),

@@ -74,7 +74,7 @@ def test_the_example_of_the_design(tmp_path):
     assert faults(text, tmp_path).splitlines() == [
         "scene.toml: 3 faults",
         '  line 25: links.main.to: no place named "gat"; places are gate, lake, outfall; did you mean "gate"?',
-        '  line 27: links.main.diameter: "304.8 kg" is a mass; wanted a length, for example "300 mm"',
+        '  line 27: links.main.diameter: "304.8 kg" is a mass; expected a length, for example "300 mm"',
         '  line 38: links.valve.openning: unknown key; did you mean "opening"?',
     ]
 
@@ -277,11 +277,11 @@ BAD = {
         swap('"304.8 mm"', "0"),
         "line 27: links.main.diameter: 0 is out of range; expected a value above 0",
     ),
-    "infinite size": (swap('"914.4 m"', "inf"), "links.main.length: inf is not finite; wanted a length"),
-    "size not a number": (swap('"914.4 m"', "nan"), "links.main.length: nan is not finite; wanted a length"),
+    "infinite size": (swap('"914.4 m"', "inf"), "links.main.length: inf is not finite; expected a length"),
+    "size not a number": (swap('"914.4 m"', "nan"), "links.main.length: nan is not finite; expected a length"),
     "size that is true": (
         swap('"914.4 m"', "true"),
-        "links.main.length: true is true or false; wanted a length",
+        "links.main.length: true is true or false; expected a length",
     ),
     "no unit": (
         swap('"914.4 m"', '"914.4"'),
@@ -289,7 +289,7 @@ BAD = {
     ),
     "wrong unit": (
         swap('"304.8 mm"', '"304.8 kg"'),
-        '"304.8 kg" is a mass; wanted a length, for example "300 mm"',
+        '"304.8 kg" is a mass; expected a length, for example "300 mm"',
     ),
     "zero cells": (
         swap("cells = 200", "cells = 0"),
@@ -476,7 +476,7 @@ BAD = {
     ),
     "schedule file, bad unit": (
         opening('{ file = "kilo.csv" }'),
-        'kilo.csv, column "stem [kg]": "kg" is a mass; wanted a number',
+        'kilo.csv, column "stem [kg]": "kg" is a mass; expected a number',
     ),
     "schedule file, no number": (
         opening('{ file = "text.csv" }'),
@@ -573,7 +573,7 @@ BAD = {
     ),
     "output unit": (
         add("output", 'units = { pressure = "l/s" }'),
-        'output.units.pressure: "l/s" is a flow; wanted a pressure',
+        'output.units.pressure: "l/s" is a flow; expected a pressure',
     ),
     "output quantity": (
         add("output", 'units = { presure = "bar" }'),
@@ -596,7 +596,7 @@ BAD = {
     ),
     "claim in a wrong unit": (
         SCENE + '[expect]\n"max(gate.head)" = { value = "1 bar", rtol = 1 }',
-        "is a pressure; wanted a head",
+        "is a pressure; expected a head",
     ),
     "claim without time": (
         SCENE + '[expect]\n"at(gate.head)" = { value = 1, rtol = 1 }',
@@ -608,7 +608,7 @@ BAD = {
     ),
     "claim at no time": (
         SCENE + '[expect]\n"at(gate.head, 3 m)" = { value = 1, rtol = 1 }',
-        '"3 m" is a length; wanted a time',
+        '"3 m" is a length; expected a time',
     ),
     "claim at a time outside": (
         SCENE + '[expect]\n"at(gate.head, 11 s)" = { value = 1, rtol = 1 }',
@@ -650,7 +650,7 @@ BAD = {
     ),
     "some oil": (
         swap('name = "user"', 'name = "oil"'),
-        'fluid.name: "oil" is no CoolProp fluid; oils are ISO VG 32, ISO VG 46, ISO VG 68, or give a "user" fluid',
+        'fluid.name: "oil" is not a CoolProp fluid; oils are ISO VG 32, ISO VG 46, ISO VG 68, or give a "user" fluid',
     ),
     "a fluid that is a text": (
         re.sub(r"\[fluid\](\n.+)*\n", "", SCENE).replace("schema = 1", 'schema = 1\nfluid = "oil"'),
@@ -848,7 +848,7 @@ def test_a_dict_has_faults_without_lines():
     with pytest.raises(CaseError) as caught:
         load(table)
     assert str(caught.value) == (
-        'case: 1 fault\n  links.main.length: None is a NoneType; wanted a length, for example "300 mm"'
+        'case: 1 fault\n  links.main.length: None is a NoneType; expected a length, for example "300 mm"'
     )
     assert isinstance(caught.value, FvsolveError) and caught.value.faults[0].place == "links.main.length"
 

@@ -253,7 +253,7 @@ def test_expect_reaches_whole_pipes_and_routes() -> None:
         ({"on": "hihg", "greatest": 1e6}, "on", 'did you mean "high"'),
         ({"on": "high"}, "", "bound is missing; expected one of least, greatest, share_of_class"),
         ({"greatest": 1e6}, "", "on is missing"),
-        ({"on": "high", "greatest": "3 m/s"}, "greatest", "is a velocity; wanted a pressure"),
+        ({"on": "high", "greatest": "3 m/s"}, "greatest", "is a velocity; expected a pressure"),
         ({"on": "high", "quantity": "gas_volume", "greatest": 1.0}, "quantity", "high has no"),
         ({"on": "high", "least": 2e6, "greatest": 1e6}, "least", "is not below greatest"),
         ({"on": "high", "quantity": "velocity", "least": "vacuum"}, "least", "is a pressure; expected a velocity"),
@@ -301,7 +301,7 @@ def test_where_nothing_weighs_there_is_no_head() -> None:
             {"pipes": ["low", "far"]},
             "far does not join the previous pipe: low joins lake and middle and far joins gate and end",
         ),
-        ({"pipes": ["low"], "start": "3 s"}, "is a time; wanted a length"),
+        ({"pipes": ["low"], "start": "3 s"}, "is a time; expected a length"),
         ({"pipes": ["tap"]}, '"tap" is a valve, not a pipe'),
     ],
 )

@@ -81,10 +81,10 @@ def test_an_oil_goes_by_the_spellings_of_the_field():
 @pytest.mark.parametrize(
     "name, temperature, pressure, law, key, text",
     [
-        ("ISO VG 22", 313.15, ATM, "log", "name", "oils are ISO VG 32, ISO VG 46, ISO VG 68"),
+        ("ISO VG 22", 313.15, ATM, "log", "name", "expected one of ISO VG 32, ISO VG 46, ISO VG 68"),
         ("ISO VG 46", 253.15, ATM, "log", "temperature", "-20 degC is outside the range of ISO VG 46"),
         ("ISO VG 46", 313.15, 2e8, "log", "pressure", "above the range"),
-        ("ISO VG 46", 313.15, ATM, "table", "law", "compressible CoolProp fluid"),
+        ("ISO VG 46", 313.15, ATM, "table", "law", "compressible fluid of CoolProp"),
         ("ISO VC 46", 313.15, ATM, "log", "name", 'did you mean "ISO VG 46"?'),
     ],
 )

@@ -296,9 +296,9 @@ def test_one_pair_is_explained(said):
         (("--scheme", "upwid"), 'did you mean "upwind"'),
         (("--method", "rk44"), 'did you mean "rk4"'),
         (("--scheme", "muscl", "--method", "gauss-4"), "gauss-4 is implicit"),
-        (("--cells", "2"), "wanted 6 or more"),
+        (("--cells", "2"), "expected 6 or more"),
         (("--courant", "-1"), "expected a positive number"),
-        (("--steps", "1"), "wanted 10 or more"),
+        (("--steps", "1"), "expected 10 or more"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(said, words, wanted):

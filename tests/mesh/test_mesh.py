@@ -182,7 +182,7 @@ def test_the_unit_of_a_file(tmp_path):
     path = write(tmp_path / "mm.msh", 1e3 * np.array(SQUARE), TWO)
     mesh = read(path, unit="mm")
     assert mesh.points.tolist() == [list(p) for p in SQUARE] and mesh.area.tolist() == [1.0, 1.0]
-    with pytest.raises(MeshError, match='mm.msh: 1 fault\n  unit: "bar" is a pressure; wanted a length'):
+    with pytest.raises(MeshError, match='mm.msh: 1 fault\n  unit: "bar" is a pressure; expected a length'):
         read(path, unit="bar")
     bad = write(tmp_path / "bad.msh", 1e3 * np.array(SQUARE), [TWO[0], [1, 2, 4, 5]])
     with pytest.raises(MeshError, match=r"cell 1 at \(1500, 500\) mm"):

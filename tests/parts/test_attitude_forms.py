@@ -118,19 +118,19 @@ BAD = {
         {"matrix": [[1, 0], [0, 1]], "euler_parameters": [1, 0, 0]},
         {"matrix": "expected three rows of three", "euler_parameters": "has 3 values; expected 4"},
     ),
-    "row": ({"matrix": [[1, 0, 0], [0, 1], [0, "x", 1]]}, {"matrix.1": "expected 3", "matrix.2.1": "no number"}),
+    "row": ({"matrix": [[1, 0, 0], [0, 1], [0, "x", 1]]}, {"matrix.1": "expected 3", "matrix.2.1": "not a number"}),
     "key": ({"rol": 1}, {"rol": 'did you mean "roll"?'}),
     "key of others": ({"quaternion": [1, 0, 0, 0]}, {"quaternion": "use euler_parameters = [eta, e1, e2, e3]"}),
     "not finite": ({"euler_parameters": [float("nan"), 0, 0, 0]}, {"euler_parameters.0": "not finite"}),
     "no form that can be read": (  # and what can be read is held against nothing
         {"pitch": "x", "yaw": "90 deg", "matrix": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]},
-        {"pitch": "no number"},
+        {"pitch": "not a number"},
     ),
     "all at once": (
         {"axis": [0, 0, 0], "angle": "m", "matrix": 2 * [[2, 0, 0]] + [[0, 0, 1]], "yaw": 0, "zyz": [0, 1, 0], "x": 1},
         {
             "axis": "has zero length",
-            "angle": "no number",
+            "angle": "not a number",
             "matrix": "from the identity by 7",
             "zyz": "57.3 deg away",
             "x": "unknown key",

@@ -39,11 +39,11 @@ BAD = {
     "a joint without axis": (arm(joint={"kind": "revolute"}), "nodes.arm.joint: axis is missing"),
     "an axis of zeros": (arm(joint=hinge(axis=[0, 0, 0])), "nodes.arm.joint.axis: is all zeros"),
     "an axis that is too short": (arm(joint=hinge(axis=[0, 1e-300, 0])), "nodes.arm.joint.axis: is all zeros"),
-    "a place beyond all": (arm(centre_of_mass=[0, 0, 1e300]), "centre_of_mass[2]: 1e+300 is beyond 1e+100 SI, where"),
+    "a place beyond all": (arm(centre_of_mass=[0, 0, 1e300]), "centre_of_mass[2]: 1e+300 is greater than 1e+100 SI"),
     "a place that is none": (arm(points={"bob": [0, 0, float("nan")]}), "nodes.arm.points.bob[2]: nan is not finite"),
     "a mass below zero": (arm(mass="-3 kg"), 'nodes.arm.mass: "-3 kg" is out of range; expected a value above 0'),
-    "a mass in words": (arm(mass="heavy"), 'nodes.arm.mass: "heavy" is no number with a unit; wanted a mass'),
-    "a length as a mass": (arm(mass="3 m"), 'nodes.arm.mass: "3 m" is a length; wanted a mass'),
+    "a mass in words": (arm(mass="heavy"), 'nodes.arm.mass: "heavy" is not a number with a unit; expected a mass'),
+    "a length as a mass": (arm(mass="3 m"), 'nodes.arm.mass: "3 m" is a length; expected a mass'),
     "two joints": (
         arm(joint=[hinge(), {"kind": "ball"}]),
         "nodes.arm.joint: is a list of 2 tables; expected a single table, joint to another body or the world",
@@ -244,7 +244,7 @@ step = 0.01
 """
 TOLD = """all.toml: 11 faults
   line 11: nodes.arm.mass: 0 is out of range; expected a value above 0
-  line 12: nodes.arm.inertia[0]: "1 kg m" is a quantity of [kg·m]; wanted a moment of inertia, for example "12 kg m2"
+  line 12: nodes.arm.inertia[0]: "1 kg m" is a quantity of [kg·m]; expected a moment of inertia, for example "12 kg m2"
   line 13: nodes.arm.joint: axis is missing: a revolute joint moves along or about one, for example [0, 1, 0]
   line 17: nodes.boom.inertia: moments of 1, 1, 9 kg m2 are not possible: the largest exceeds the sum of the other two
   line 23: nodes.a.joint.on: is carried by itself: a on b on a; leave one on out and close the loop by a pin

@@ -140,15 +140,15 @@ BAD = {
     "from and to": (swap(SPOOL, 'from = "pump"'), "links.spool.from: unknown key; keys are "),
     "a force for a stiffness": (
         swap('"20 N/mm"', '"20 N"'),
-        'links.spring.stiffness: "20 N" is a force; wanted a stiffness, for example "50 N/mm"',
+        'links.spring.stiffness: "20 N" is a force; expected a stiffness, for example "50 N/mm"',
     ),
-    "a pressure for a force": (swap('"-1.5 kN"', '"3 bar"'), '"3 bar" is a pressure; wanted a force'),
-    "a length for a damping": (swap('"0.1 N s/mm"', '"3 m"'), '"3 m" is a length; wanted a damping'),
+    "a pressure for a force": (swap('"-1.5 kN"', '"3 bar"'), '"3 bar" is a pressure; expected a force'),
+    "a length for a damping": (swap('"0.1 N s/mm"', '"3 m"'), '"3 m" is a length; expected a damping'),
     "a flow for a leakage": (
         swap('"0.01 l/min/bar"', '"1 l/min"'),
-        'links.cyl.leakage: "1 l/min" is a flow; wanted a leakage, for example "0.1 l/min/bar"',
+        'links.cyl.leakage: "1 l/min" is a flow; expected a leakage, for example "0.1 l/min/bar"',
     ),
-    "a volume for a mass": (swap('"50 kg"', '"50 l"'), 'nodes.load.mass: "50 l" is a volume; wanted a mass'),
+    "a volume for a mass": (swap('"50 kg"', '"50 l"'), 'nodes.load.mass: "50 l" is a volume; expected a mass'),
     "a piston outside": (
         swap('"100 mm"', '"300 mm"'),
         "links.cyl.stroke: the piston starts at 0.3 m (load minus ground); expected 0 to 0.2 m",

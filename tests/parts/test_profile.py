@@ -181,7 +181,7 @@ def test_x_y_and_z_give_the_way_and_files_read_as_lists(tmp_path) -> None:
         ({"chainage": [0, 10, 3000], "elevation": [30, 60, 20]}, "10 m from chainage 0 m is too short to rise"),
         ({"chainage": [0, 3000], "elevation": [30, 25, 20]}, "2 of chainage, 3 of elevation"),
         ({"chainage": [0], "elevation": [30]}, "has one point"),
-        ({"chainage": [0, "3 kg"], "elevation": [30, 20]}, "is a mass; wanted a length"),
+        ({"chainage": [0, "3 kg"], "elevation": [30, 20]}, "is a mass; expected a length"),
         ({"distance": [0, 3000], "elevation": [30, 20]}, "expected chainage and elevation, or x, y, z"),
         ({"x": [0, 0], "y": [0, 0], "z": [30, 30]}, "points 1 and 2 coincide"),
         ([0, 3000], "is not a table; expected for example"),

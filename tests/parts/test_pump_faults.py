@@ -34,7 +34,7 @@ FOUND = [
     ({"curve": ONE, "trip": 1.0}, "trip: needs rated_speed"),
     ({"curve": ONE, "inertia": 2.0}, 'inertia: needs rated_speed, for example "1480 rpm"'),
     ({"curve": ONE, "inertia": -2.0, "rated_speed": 150.0}, "inertia: -2.0 is out of range; expected a value above 0"),
-    ({"curve": ONE, "inertia": "2 kg", "rated_speed": 150.0}, "is a mass; wanted a moment of inertia"),
+    ({"curve": ONE, "inertia": "2 kg", "rated_speed": 150.0}, "is a mass; expected a moment of inertia"),
     ({"curve": ONE, "inertia": 2.0, "rated_speed": 150.0, "trip": -1.0}, "-1 s lies before the start at 0 s"),
     ({"curve": ONE, "speed": -1.0}, "speed: -1.0 is out of range"),
     ({"curve": ONE, "efficiency": 1.2}, "efficiency: 1.2 is out of range"),

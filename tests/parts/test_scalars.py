@@ -378,7 +378,7 @@ FAULTS = [
     (("nodes", "lake", "scalars"), {"dya": 1.0}, 'no scalar named "dya"; did you mean "dye"?'),
     (("nodes", "tap", "scalars"), {"dye": 1.0}, "a junction has no value of a scalar"),
     (("nodes", "pool", "scalars"), {"dye": {"time": [0, 1], "value": [0, 1]}}, "not a schedule"),
-    (("links", "a", "scalars"), {"dye": "much"}, '"much" is no number'),
+    (("links", "a", "scalars"), {"dye": "much"}, '"much" is not a number'),
     (
         ("links", "a"),
         {"type": "rigid-column", "from": "lake", "to": "tap", "length": 10.0, "diameter": BORE},

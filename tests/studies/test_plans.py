@@ -47,7 +47,7 @@ def test_all_that_is_wrong_of_ranges_is_said_at_once(case):
         ranges(case, wrong)
     said = str(raised.value)
     assert "8 faults" in said and "the range from 0.002 to 0.001 is reversed" in said
-    assert 'the range from "900 m" to 900 is empty' in said and '"1 kg" is a mass; wanted a length' in said
+    assert 'the range from "900 m" to 900 is empty' in said and '"1 kg" is a mass; expected a length' in said
     assert (
         "links.main.cells: is not a continuous quantity" in said
         and "numerics.scheme: is not a continuous quantity" in said
@@ -111,7 +111,7 @@ def test_all_that_is_wrong_of_a_file_is_said_at_once(case, tmp_path):
         'links.valve.aera: unknown key; did you mean "area"?' in said
         and "two columns have the key nodes.lake.head" in said
     )
-    assert '"kg" is a mass; wanted a head' in said and "values of numerics.scheme have no unit" in said
+    assert '"kg" is a mass; expected a head' in said and "values of numerics.scheme have no unit" in said
     assert "line 3, links.valve.aera: is empty. Expected a value in every row" in said and '"2 kg" is a mass' in said
 
 

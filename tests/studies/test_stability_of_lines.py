@@ -64,5 +64,5 @@ def test_what_check_tells_to_grow_has_a_limit_below_the_step():
 def test_where_no_store_is_no_step_fails():
     row = studies.stability(main(2.0), methods=["rk4"], steps=50).rows[0]
     assert np.isinf(row.predicted) and np.isinf(row.measured) and "slowest line" in row.notes[0]
-    with pytest.raises(FvsolveError, match="stability of delay lines is about the start"):
+    with pytest.raises(FvsolveError, match="stability of delay lines is computed about the start"):
         studies.stability(main(2.0), at=1.0)

@@ -45,7 +45,7 @@ def test_two_runs_of_a_scene_with_events_keep_apart_what_has_shut_in_each():
 
 def test_a_state_that_moves_is_named_where_prediction_and_measurement_differ_and_at_rest_they_do_not():
     (moves,) = stability(case("surge-tank")).rows
-    assert abs(moves.difference) > 0.1 and any("the state leaves the one" in note for note in moves.notes)
+    assert abs(moves.difference) > 0.1 and any("the state leaves the linearised state" in note for note in moves.notes)
     (rests,) = stability(case("surge-tank", links__tunnel__initial_flow=0.0, nodes__shaft__level=50.0)).rows
     assert abs(rests.difference) < 1e-3
 

@@ -1,1 +1,1 @@
-"""A case about a state: A, B, C, D and their spectrum. Knows derivatives; judges nothing."""
+"""Linearisation of a case about a state: matrices A, B, C, D and eigenvalues."""

@@ -1,4 +1,4 @@
-"""A state to be linearised: run there, schedules held as they are at that time. Knows runs; takes no derivative."""
+"""Operating points for linearisation: a state of a case with schedules held at their values."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from fvsolve.model.delay import followed
 from fvsolve.schemes import LIMITED, SCHEMES
 from fvsolve.studies.outcome import outcome, prepared
 
-NEAR = 0.01  # of a wave: by which cells that stand for a delay line are off
+NEAR = 0.01  # relative error of a wave in cells that replace a delay line, for the frequency in the note
 
 
 @dataclass(frozen=True, eq=False)
 class Frozen:
-    """A model whose schedules stand still, and a state of it.
+    """Model with held schedules, and a state of it.
 
-    t : time at which they were stopped [s]; y : float64[n]  deviations from the profile
-    when : the same in words, with the side of a kink or jump where there is one
-    armed : flags of devices there, see `model.Slate`; 0 at a start
+    t : time at which schedules are held [s]; y : float64[n]  state, deviations from the profile
+    when : description of that time, with the side of a kink or jump of a schedule
+    armed : flags of devices at that time, see `model.run_data.RunData`; 0 at the start
     """
 
     model: object
@@ -35,30 +35,31 @@ class Frozen:
 
     @property
     def rate(self) -> np.ndarray:
-        """dy/dt there : float64[n]; zero at a state that does not move."""
+        """dy/dt : float64[n]; zero at a steady state."""
         return self.model.rhs(self.t, self.y)
 
 
 def frozen(case, set=None, at: float | None = None, before: bool = False, probes=()) -> Frozen:
-    """The state of a case at its start, or at the time `at` [s], where it is run to first.
+    """Operating point of a case at its start, or at the time `at` [s], to which the case is run.
 
-    before : at a kink or jump of a schedule, hold the value just before it; else the one just after
-    probes : names to be observed beside those of the case, first in their order
-    A case that names no scheme gets the linear one that the default is where all is smooth, with basins upwind.
-    Raises CaseError for a case or probe that cannot be read, FvsolveError where there is no state, or no way there.
+    before : at a kink or jump of a schedule, hold its left limit; else its right limit
+    probes : names to be observed besides those of the case, first in the order
+    Delay lines are replaced by cells. In a case without a scheme the linear scheme that a limited default equals in
+    smooth solutions replaces it, with basins `upwind`. Raises CaseError for a case or probe that cannot be read,
+    FvsolveError for a case without states and for a run that does not reach `at`.
     """
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
-    lines = [name for name, one in followed(case).items() if one.line == "delay"]
-    if lines:
-        case = load(case, {"numerics.line": "cells"} | {f"links.{name}.line": "cells" for name in lines})
+    delay_lines = [name for name, choice in followed(case).items() if choice.line == "delay"]
+    if delay_lines:
+        case = load(case, {"numerics.line": "cells"} | {f"links.{name}.line": "cells" for name in delay_lines})
     if "scheme" not in case.raw["numerics"] and case.numerics.scheme in LIMITED:
         linear = "upwind" if case.meshes else SCHEMES[case.numerics.scheme].twin
         case = load(case, {"numerics.scheme": linear})
     names = list(dict.fromkeys([*probes, *(probe.text for probe in case.probes)]))
-    last = case.numerics.end if at is None else max(case.numerics.end, float(at))
-    model = prepared(case, {"output.probes": names, "numerics.end": last})
+    end = case.numerics.end if at is None else max(case.numerics.end, float(at))
+    model = prepared(case, {"output.probes": names, "numerics.end": end})
     if model.y_size == 0:
         raise FvsolveError(f"{case.name} has no state: every pressure in it is given; add a pipe, tank or chamber")
     t, y, armed = _arrive(model, at)
@@ -66,40 +67,40 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     side = "before" if before else "after"
     when = "the start" if at is None else f"t = {case.amount(t, 'time', 6)}"
     when += f", just {side} a {'jump' if sides[t] else 'kink'} of a schedule" if t in sides else ""
-    when += in_cells(model, lines) if lines else ""
+    when += in_cells(model, delay_lines) if delay_lines else ""
     return Frozen(stopped(model, t, before), t, y, when, armed)
 
 
 def in_cells(model, lines: list[str]) -> str:
-    """Up to which frequency cells stand for delay lines: exp(-s tau) of the slowest pipe to a hundredth."""
+    """Note with the frequency up to which cells replace delay lines: error of exp(-s tau) at most `DELAY_ERROR`."""
     theta = np.linspace(0.0, np.pi, 20001)[1:]
-    off = np.abs(symbol(SCHEMES[model.case.numerics.scheme].weights, theta) + 1j * theta)
+    error = np.abs(symbol(SCHEMES[model.case.numerics.scheme].weights, theta) + 1j * theta)
     rates = []
     for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
         if pipe.name in lines:
-            good = theta[pipe.cells * off <= NEAR]
-            rates.append((good.max() if good.size else 0.0) * row["speed"] / row["dx"] / (2.0 * np.pi))
-    return f", delay lines as cells (their delay to {NEAR:g} up to {min(rates):.3g} Hz)"
+            accurate = theta[pipe.cells * error <= NEAR]
+            rates.append((accurate.max() if accurate.size else 0.0) * row["speed"] / row["dx"] / (2.0 * np.pi))
+    return f", delay lines as cells (error of waves at most {NEAR:g} up to {min(rates):.3g} Hz)"
 
 
 def _arrive(model, at: float | None) -> tuple[float, np.ndarray, np.ndarray | float]:
-    """Time, state and flags at `at`, by a run; the start where it is None."""
+    """Time, state and flags of a run at `at`; those of the start if it is None."""
     start = model.case.numerics.start
     if at is None or at == start:
         return start, model.start.copy(), 0.0
     if not start < at < np.inf:
-        raise FvsolveError(f"at = {at:g} s is no time after the start of the case, {start:g} s")
+        raise FvsolveError(f"at = {at:g} s is not a finite time after the start of the case, {start:g} s")
     numerics = model.case.numerics.model_copy(update={"end": float(at)})
     run = outcome(replace(model, case=replace(model.case, numerics=numerics)))
     if not run.ok:
-        raise FvsolveError(f"the case cannot be run to t = {at:g} s, to be linearised there: {run.reason}")
+        raise FvsolveError(f"the run to t = {at:g} s, where the case is to be linearised, failed: {run.reason}")
     return float(at), run.y, run.slate.armed
 
 
 def stopped(model, t: float, before: bool = False):
-    """The same model with every schedule, and velocities that turn back, held as at t [s], left or right limit.
+    """Model with all schedules and all periodic velocities of basins held at t [s], left or right limit.
 
-    Schedules that drive joints and walls go on at the rate that they have there.
+    Schedules that drive joints and walls continue at their rate at that time.
     """
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
@@ -119,7 +120,10 @@ def stopped(model, t: float, before: bool = False):
 
 
 def without_limits(tables: rec.Tables) -> rec.Tables:
-    """Tables by which pipes carry scalars without slopes, and no bound cuts what leaves: kinks that no scene has."""
+    """Tables in which pipes transport scalars without slopes, and mixed values are not bounded.
+
+    Both would be kinks of the right-hand side.
+    """
     settings, scalars = tables.settings.copy(), tables.scalars.copy()
     settings["limiter"] = rec.FLAT
     scalars["least"], scalars["greatest"] = -np.inf, np.inf
@@ -127,7 +131,7 @@ def without_limits(tables: rec.Tables) -> rec.Tables:
 
 
 def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
-    """Tables by which velocities that are given to basins, and turn back in a period, stand still as they are at t."""
+    """Tables in which given velocities of basins that reverse with a period are held at their values at t."""
     if not any(row["period"] > 0.0 for row in tables.basins):
         return tables
     tables = tables._replace(basins=tables.basins.copy(), plane=tables.plane.copy())
@@ -142,9 +146,9 @@ def with_held_velocities(model, tables: rec.Tables, t: float) -> rec.Tables:
 
 
 def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
-    """The same state with a linear scheme of these weights of cells u-2 .. u+2, ends of polynomials of `degree`.
+    """Operating point with a linear scheme: weights of cells u-2 .. u+2, polynomials of `degree` at pipe ends.
 
-    No wider than the scheme of `at`, whose pattern of the Jacobian is kept.
+    Its stencil must not be wider than that of the scheme of `at`, whose Jacobian pattern is reused.
     """
     tables = at.model.tables._replace(settings=at.model.tables.settings.copy())
     settings = tables.settings[0]
@@ -158,7 +162,7 @@ def reweighted(at: Frozen, weights: tuple[float, ...], degree: int) -> Frozen:
 
 
 def has_limiter(model) -> bool:
-    """Whether a limited scheme is at work; in basins all that is not `upwind`, or `upwind5` on a grid."""
+    """True if a limited scheme is used: in basins all but `upwind`, and but `upwind5` on a grid."""
     scheme = model.case.numerics.scheme
     if any(limited(basin, scheme) for basin in model.basins):
         return True
@@ -166,5 +170,5 @@ def has_limiter(model) -> bool:
 
 
 def limited(basin, scheme: str) -> bool:
-    """Whether a basin limits its slopes under a scheme."""
+    """True if a basin limits its slopes under a scheme."""
     return scheme != "upwind" and not (scheme == "upwind5" and basin.is_grid)

@@ -1,4 +1,4 @@
-"""A case about a state as A, B, C, D (9), (10), named, in SI. Knows models and differences; steps nothing."""
+"""State-space form of a case about a state: A, B, C, D (9), (10) with names and SI units."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ STATE_UNITS = {
 class Linear:
     """dx/dt = A x + B u, y = C x + D u for deviations x, u, y from a state (9), (10); SI.
 
-    a : float64[n, n], or scipy csc where n > 1000; b : float64[n, inputs]; c : float64[outputs, n];
-    d : float64[outputs, inputs]; at : what was linearised; rate : float64[n]  dx/dt there, zero if it stands still
-    error : of each of A, B, C, D, by how much two steps of the differences disagree, relative to the sum of what all
-    columns (each by its small deviation) do to a row, the worst entry
+    a : float64[n, n], or scipy csc if n > 1000; b : float64[n, inputs]; c : float64[outputs, n];
+    d : float64[outputs, inputs]; at : operating point
+    error : for each of A, B, C, D the greatest difference of an entry between two steps of the differences, relative
+    to the sum of |entry| times small deviation of its column over the row
     """
 
     at: Frozen
@@ -68,11 +68,11 @@ class Linear:
 
     @property
     def sparse(self) -> bool:
-        """Whether A is a scipy sparse array."""
+        """True if A is a scipy sparse array."""
         return not isinstance(self.a, np.ndarray)
 
     def plain(self) -> dict:
-        """As JSON says it; a sparse A by rows, columns and values."""
+        """Data for JSON; a sparse A as rows, columns and values."""
         a = self.a
         if self.sparse:
             entries = a.tocoo()
@@ -89,7 +89,7 @@ class Linear:
 
 
 def state_unit(name: str, opens: bool) -> str:
-    """SI unit of a state; the speed of what opens and shuts is that of its opening."""
+    """SI unit of a state; for a part with an opening (`opens`), `speed` is the rate of its opening [1/s]."""
     quantity = name.rsplit(".", 1)[1].rstrip("0123456789[]")
     amount = "kg/m" if name.endswith("]") else "kg"  # of a scalar, times its own unit
     return "1/s" if quantity == "speed" and opens else STATE_UNITS.get(quantity, amount)
@@ -99,100 +99,100 @@ def state_unit(name: str, opens: bool) -> str:
 def linearise(
     case, inputs=(), outputs=None, at: float | None = None, before: bool = False, scheme: str | None = None, set=None,
 ) -> Linear:  # fmt: skip
-    """A case linearised by central differences at its start, or at the time `at` [s], schedules held.
+    """Linearise a case by central differences at its start, or at the time `at` [s], with held schedules.
 
     inputs : names such as "valve.opening", "lake.pressure"; outputs : probes, those of the case if None
-    before : at a kink or jump of a schedule hold its value before it; scheme : linear one in place of the case's
-    An input at the end of its range is moved to one side only. Raises CaseError, and FvsolveError for a name that is
-    none, a state without a derivative (a limited scheme, a valve at a drop of zero, a kink), a case without states.
+    before : at a kink or jump of a schedule hold its left limit; scheme : linear scheme in place of that of the case
+    For an input at the end of its range differences are one-sided. Raises CaseError, and FvsolveError for an unknown
+    name, a state without a derivative (a limited scheme, a valve at a drop of zero, a kink), a case without states.
     """
     set = dict(set or {}) | ({} if scheme is None else {"numerics.scheme": scheme})
-    found = frozen(case, set, at, before, outputs or ())
-    return linearised(found, inputs, len(outputs) if outputs is not None else len(found.model.probes))
+    point = frozen(case, set, at, before, outputs or ())
+    return linearised(point, inputs, len(outputs) if outputs is not None else len(point.model.probes))
 
 
 def linearised(at: Frozen, inputs=(), outputs: int = 0) -> Linear:
-    """The same about a frozen state, with the first of its probes as outputs."""
+    """Linearise about an operating point, with the first `outputs` of its probes as outputs."""
     model, inputs = at.model, tuple(dict.fromkeys(inputs))
-    known = inputs_of(model)
+    available = inputs_of(model)
     for name in inputs:
-        if name not in known:
-            near = did_you_mean(name, known) or f"; inputs are {listing(known)}"
-            raise FvsolveError(f'no input named "{name}"{near}')
+        if name not in available:
+            hint = did_you_mean(name, available) or f"; inputs are {listing(available)}"
+            raise FvsolveError(f'no input named "{name}"{hint}')
     refuse_limiter(model)
     a, size, error_a, steps = state_matrix(at)
     c, error_c = output_matrix(at, outputs, steps)
-    values = [input_value(at, name, known[name]) for name in inputs]
-    columns = [input_column(at, name, known[name], value, size, outputs, steps)
+    values = [input_value(at, name, available[name]) for name in inputs]
+    columns = [input_column(at, name, available[name], value, size, outputs, steps)
                for (name, value) in zip(inputs, values, strict=True)]  # fmt: skip
-    n, both = model.y_size, np.array([column for column, _ in columns]).reshape(len(inputs), model.y_size + outputs).T
+    n, bd = model.y_size, np.array([column for column, _ in columns]).reshape(len(inputs), model.y_size + outputs).T
     error = max((error for _, error in columns), default=0.0)
     probes = model.case.probes[:outputs]
     return Linear(
-        at, a, both[:n].copy(), c, both[n:].copy(), inputs, tuple(one.text for one in probes),
-        tuple(known[name].sort.unit for name in inputs),
-        tuple(one.unit or DIMENSIONS[one.dimension].si for one in probes),
+        at, a, bd[:n].copy(), c, bd[n:].copy(), inputs, tuple(probe.text for probe in probes),
+        tuple(available[name].sort.unit for name in inputs),
+        tuple(probe.unit or DIMENSIONS[probe.dimension].si for probe in probes),
         tuple(values), tuple(responses(at, at.y, outputs)[n:].tolist()), {"A": error_a, "C": error_c, "BD": error},
     )  # fmt: skip
 
 
 def refuse_limiter(model) -> None:
-    """Raise where a limited scheme is at work."""
-    scheme, able = model.case.numerics.scheme, model.case.schemes
+    """Raise FvsolveError if a limited scheme is used."""
+    scheme, schemes = model.case.numerics.scheme, model.case.schemes
     if has_limiter(model):
-        smooth = "upwind"
+        linear = "upwind"
         if model.basins and all(basin.is_grid for basin in model.basins):
-            smooth = "upwind or upwind5"
-        elif "upwind5" in able and not model.basins:
-            smooth = f"{SCHEMES[scheme].twin} (what {scheme} is where all is smooth), upwind or upwind5"
+            linear = "upwind or upwind5"
+        elif "upwind5" in schemes and not model.basins:
+            linear = f"{SCHEMES[scheme].twin} ({scheme} in smooth solutions), upwind or upwind5"
         raise FvsolveError(
             f"numerics.scheme = {scheme} is limited: it has no derivative where the state is constant, however small "
-            f"the deviation; linearise with a linear scheme, --scheme {smooth}"
+            f"the deviation; linearise with a linear scheme, --scheme {linear}"
         )
 
 
-def input_value(at: Frozen, name: str, one: Input) -> float:
+def input_value(at: Frozen, name: str, input_: Input) -> float:
     """Value of an input at the state [SI]."""
     model = at.model
-    if one.node >= 0:
-        pressure = float(model.tables.nodes[one.node]["pressure"]
-                         + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + one.node])  # fmt: skip
-        place = model.node_names[one.node]
-        return pressure if one.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
-    value = value_until(model.tables.schedules, model.tables.pieces, one.schedule, at.t, np.inf)
-    if one.other >= 0:
-        value -= value_until(model.tables.schedules, model.tables.pieces, one.other, at.t, np.inf)
-    return float((value - one.offset) / one.scale)
+    if input_.node >= 0:
+        pressure = float(model.tables.nodes[input_.node]["pressure"]
+                         + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + input_.node])  # fmt: skip
+        place = model.node_names[input_.node]
+        return pressure if input_.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
+    value = value_until(model.tables.schedules, model.tables.pieces, input_.schedule, at.t, np.inf)
+    if input_.other >= 0:
+        value -= value_until(model.tables.schedules, model.tables.pieces, input_.other, at.t, np.inf)
+    return float((value - input_.offset) / input_.scale)
 
 
-def input_width(at: Frozen, one: Input, value: float) -> float:
-    """What counts as a small change of an input [SI]."""
-    usual = one.sort.small / (one.scale or 1e4) if one.node >= 0 else one.sort.small
-    return usual if one.sort.bounded or one.sort is PRESSURE else max(usual, abs(value))
+def input_width(at: Frozen, input_: Input, value: float) -> float:
+    """Small change of an input for differences [SI]."""
+    usual = input_.sort.small / (input_.scale or 1e4) if input_.node >= 0 else input_.sort.small
+    return usual if input_.sort.bounded or input_.sort is PRESSURE else max(usual, abs(value))
 
 
-def input_column(at, name, one, value, size, outputs, steps) -> tuple[np.ndarray, float]:
-    """(column of B over that of D, error) of one input; one-sided where it is at the end of its range."""
+def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndarray, float]:
+    """(column of B over that of D, error) of an input; one-sided differences at the end of its range."""
     model = at.model
-    width = np.array([input_width(at, one, value)])
-    low, high = one.sort.least, one.sort.greatest
-    scheme = two_sided
-    if one.sort.bounded:
+    width = np.array([input_width(at, input_, value)])
+    low, high = input_.sort.least, input_.sort.greatest
+    differences = two_sided
+    if input_.sort.bounded:
         steps = np.concatenate([COARSE, steps])
     if value <= low or value >= high:
-        scheme, width = one_sided, width if value <= low else -width
-    elif one.sort.bounded:
+        differences, width = one_sided, width if value <= low else -width
+    elif input_.sort.bounded:
         width = np.minimum(width, min(value - low, high - value))
 
     def at_input(u: np.ndarray) -> np.ndarray:
-        held = replace(at, model=hold(model, {name: float(u[0])}))
-        return responses(held, at.y, outputs)
+        changed = replace(at, model=hold(model, {name: float(u[0])}))
+        return responses(changed, at.y, outputs)
 
     x = np.array([value])
-    sides = scheme(at_input, x, width, at_input(x), steps)
-    found, error, kink = longest(*sides, np.concatenate([size, np.zeros(outputs)]), steps)
+    sides = differences(at_input, x, width, at_input(x), steps)
+    slope, error, kink = longest(*sides, np.concatenate([size, np.zeros(outputs)]), steps)
     if max(np.max(error), np.max(kink)) > SMOOTH:
-        why = "from side to side" if np.max(kink) > SMOOTH else "with every step"
-        raise FvsolveError(f"{name} = {value:g} is no place to linearise: its effect differs {why} there; hold it "
-                           "elsewhere with --set, or choose another time with --at")  # fmt: skip
-    return found / width[0], float(np.max(error))
+        reason = "from side to side" if np.max(kink) > SMOOTH else "with the step of the differences"
+        raise FvsolveError(f"{name} = {value:g} cannot be linearised: its effect differs {reason} there; give it "
+                           "another value with --set, or choose another time with --at")  # fmt: skip
+    return slope / width[0], float(np.max(error))

@@ -1,4 +1,4 @@
-"""Eigenvalues of a linearised case: poles, in the energy norm. Knows matrices and norms; steps nothing."""
+"""Eigenvalues (poles) of a linearised case, computed in the energy norm."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from fvsolve.errors import FvsolveError
 from fvsolve.model.energy import EnergyForm
 from fvsolve.studies.sheet import Column
 
-MANY = 1500  # states up to which all eigenvalues are found; beyond, some by ARPACK
-SOME = 20  # eigenvalues that ARPACK is asked for at each place
-RIM = 5  # places, from straight up to straight left: the lower half mirrors the upper one
-RESTARTS, LONGEST = 12, 10.0  # of ARPACK at each place; at all of them together [s]
+MANY = 1500  # greatest number of states for which all eigenvalues are computed; above, some by ARPACK
+SOME = 20  # eigenvalues that ARPACK computes at each place
+RIM = 5  # places on the spectral circle, from i to -1: the lower half plane mirrors the upper one
+RESTARTS, LONGEST = 12, 10.0  # restarts of ARPACK at each place; time limit of all places [s]
 POLES = (
     Column("real", "real [1/s]", ".6g"),
     Column("imaginary", "imaginary [1/s]", lambda pole: f"±{pole['imaginary']:.6g}" if pole["pair"] else "-"),
@@ -24,46 +24,48 @@ POLES = (
     Column("damping", words=".4f"),
     Column("time_constant", "time constant [s]", ".4g"),
 )
-ZERO = 1e-10  # of the greatest modulus: an eigenvalue, or a real part, below is round-off
+ZERO = 1e-10  # of the greatest modulus: smaller eigenvalues and real or imaginary parts are round-off
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Eigenvalues [1/s], those nearest zero first, and which of them these are, in words."""
+    """Eigenvalues [1/s], by rising modulus; complete : True if these are all; description : of the selection."""
 
     values: np.ndarray
     complete: bool
     said: str
 
     def poles(self) -> list[dict]:
-        """One row for each real pole and each pair: s, |s| / 2 pi [Hz], damping -Re s / |s|, 1 / |Re s| [s]."""
-        found = []
+        """Row for each real pole and each pair: s, |s| / 2 pi [Hz], damping -Re s / |s|, 1 / |Re s| [s]."""
+        rows = []
         for s in self.values[self.values.imag >= 0.0]:
             size = abs(s)
-            found.append({
+            rows.append({
                 "real": float(s.real), "imaginary": float(s.imag), "pair": bool(s.imag > 0.0),
                 "frequency": float(size / (2.0 * np.pi)), "damping": float(0.0 - s.real / size) if size > 0.0 else None,
                 "time_constant": float(1.0 / abs(s.real)) if s.real != 0.0 else None,
             })  # fmt: skip
-        return found
+        return rows
 
 
 def poles_of(a: Any, form: EnergyForm) -> Spectrum:
-    """Eigenvalues of A in the energy norm, those of idle motions among them."""
+    """Eigenvalues of A in the energy norm, with those of motions that store no energy."""
     form = form.fitting(a)
-    found = spectrum(form.seen(a))
+    moving = spectrum(form.seen(a))
     if form.idle.shape[1] == 0:
-        return found
+        return moving
     idle = np.linalg.eigvals(form.idle_rows @ (a @ form.idle))
-    values = tidy(np.concatenate([found.values, idle]))
-    said = f"all {values.size}" if found.complete else f"{found.said}, and {idle.size} of motions that store no energy"
-    return Spectrum(values, found.complete, said)
+    values = tidy(np.concatenate([moving.values, idle]))
+    text = (
+        f"all {values.size}" if moving.complete else f"{moving.said}, and {idle.size} of motions that store no energy"
+    )
+    return Spectrum(values, moving.complete, text)
 
 
 def spectrum(e: Any) -> Spectrum:
-    """Eigenvalues of a matrix : float64[n, n] or sparse; all up to 1500 states, else some by ARPACK in 10 s.
+    """Eigenvalues of a matrix : float64[n, n] or sparse; all for up to 1500 states, else some by ARPACK in 10 s.
 
-    Raises FvsolveError where ARPACK finds none.
+    Raises FvsolveError if ARPACK finds none.
     """
     n = e.shape[0]
     if n <= MANY:
@@ -71,27 +73,27 @@ def spectrum(e: Any) -> Spectrum:
 
         values = eigvals(e if isinstance(e, np.ndarray) else e.toarray(), check_finite=False)
         return Spectrum(tidy(values), True, f"all {n}")
-    reach = radius(e)
-    rim = [reach * np.exp(1j * angle) for angle in np.linspace(0.5 * np.pi, np.pi, RIM)]
+    rim_radius = radius(e)
+    rim = [rim_radius * np.exp(1j * angle) for angle in np.linspace(0.5 * np.pi, np.pi, RIM)]
     latest = time.monotonic() + LONGEST
-    each = [near(e, place, latest) for place in (1e-6 * reach, *rim)]
-    values = np.concatenate(each)
+    by_place = [near(e, place, latest) for place in (1e-6 * rim_radius, *rim)]
+    values = np.concatenate(by_place)
     if not values.size:
         raise FvsolveError(
-            f"ARPACK found no eigenvalue of {n} states in time; up to {MANY} states all are found: fewer cells, "
+            f"ARPACK found no eigenvalue of {n} states in time; up to {MANY} states all are computed: use fewer cells, "
             "--set links.NAME.cells=100"
         )
     digits = 9 - int(np.log10(np.abs(values).max()))
-    kept = tidy(np.unique(np.round(np.concatenate([values, values.conj()]), digits)))
-    on_rim = sum(part.size > 0 for part in each[1:])
-    zero = "those nearest 0" if each[0].size else "none near 0 converged"
-    others = f"nearest {on_rim} of {RIM} places" if on_rim else f"none of {RIM} places converged"
-    where = f"{zero}; on the rim |s| = {reach:.4g} 1/s {others}"
-    return Spectrum(kept, False, f"{kept.size} of {n}: {where}; by ARPACK")
+    distinct = tidy(np.unique(np.round(np.concatenate([values, values.conj()]), digits)))
+    on_rim = sum(part.size > 0 for part in by_place[1:])
+    zero = "those nearest 0" if by_place[0].size else "none near 0 converged"
+    on_circle = f"nearest {on_rim} of {RIM} places" if on_rim else f"none of {RIM} places converged"
+    where = f"{zero}; on the circle |s| = {rim_radius:.4g} 1/s {on_circle}"
+    return Spectrum(distinct, False, f"{distinct.size} of {n}: {where}; by ARPACK")
 
 
 def radius(e: Any) -> float:
-    """The spectral radius [1/s], about: the mean growth of a vector that is multiplied again and again."""
+    """Estimate of the spectral radius [1/s]: mean growth of a vector in a power iteration."""
     v, sizes = np.random.default_rng(1).standard_normal(e.shape[0]), []
     for _ in range(200):
         v = e @ (v / np.linalg.norm(v))
@@ -100,7 +102,7 @@ def radius(e: Any) -> float:
 
 
 def near(e: Any, place: complex, latest: float = np.inf) -> np.ndarray:
-    """Some eigenvalues of a sparse matrix, nearest a place; none where ARPACK does not converge, or not by `latest`."""
+    """Eigenvalues of a sparse matrix nearest a place; none if ARPACK does not converge, or not before `latest`."""
     from scipy.sparse import eye_array
     from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
 
@@ -126,7 +128,7 @@ def near(e: Any, place: complex, latest: float = np.inf) -> np.ndarray:
 
 
 def tidy(values: np.ndarray) -> np.ndarray:
-    """Nearest zero first; what is round-off beside the greatest is zero, as are such real and imaginary parts."""
+    """Sort eigenvalues by modulus; set values, real and imaginary parts to zero that are round-off of the greatest."""
     values = np.asarray(values, dtype=complex)
     floor = ZERO * np.max(np.abs(values), initial=0.0)
     real, imaginary = (np.where(np.abs(part) <= floor, 0.0, part) for part in (values.real, values.imag))

@@ -1,1 +1,1 @@
-"""The greatest step that does not fail, for cases and for grids without a case. Knows powers of a step."""
+"""Greatest stable step, predicted and measured, for cases and for periodic grids."""

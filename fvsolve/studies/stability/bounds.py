@@ -1,4 +1,4 @@
-"""What eigenvalues and the field of values say of the greatest step (13). Knows matrices; knows no case."""
+"""Bounds on the greatest step (13) by eigenvalues and by the field of values."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from fvsolve.steppers.tableau import Method
 from fvsolve.studies.linear.spectrum import ZERO
 from fvsolve.studies.stability.bracket import limit
 
-ON = 1e-9  # |R| may exceed one by this much: round-off of the eigenvalues
+ON = 1e-9  # |R| may exceed 1 by this: round-off of eigenvalues
 SIDE = 8  # points along each side of the polygon inscribed in a field of values
-ANGLES = 49  # of its tangents in the upper half plane
-WIDE = 400  # states up to which a field of values is computed
-FAR = 1e5  # of h |s|, up to which an end is looked for
+ANGLES = 49  # tangents to a field of values in the upper half plane
+WIDE = 400  # greatest number of states for which a field of values is computed
+FAR = 1e5  # greatest h |s| of the search
 
 
 def region_limit(method: Method, points: np.ndarray) -> float:
-    """The greatest h with |R(h' s)| <= 1 for all the points s and all h' <= h; 0 where none, inf where all [s].
+    """Greatest h [s] with |R(h' s)| <= 1 for all points s [1/s] and all h' <= h; 0 for none, inf for all steps.
 
-    Points that round-off leaves within 1e-10 of the imaginary axis lie on it; points right of it allow no step.
+    Points within 1e-10 of the imaginary axis (round-off) are moved onto it. Points to its right allow no step.
     """
     size = np.max(np.abs(points), initial=0.0)
     points = points[np.abs(points) > ZERO * size]
@@ -42,27 +42,27 @@ def region_limit(method: Method, points: np.ndarray) -> float:
 
 
 def field_of_values(e: np.ndarray) -> np.ndarray:
-    """Points of the boundary of {x* E x : |x| = 1} : complex[m], sides of an inscribed polygon included.
+    """Points of the boundary of {x* E x : |x| = 1} : complex[m], on the sides of an inscribed polygon.
 
-    Each angle's tangent touches at x* E x, x the top eigenvector of the Hermitian part of exp(i angle) E (Johnson
-    1978); E is real, so the upper half is mirrored.
+    The tangent at an angle touches at x* E x, where x is the eigenvector of the greatest eigenvalue of the Hermitian
+    part of exp(-i angle) E (Johnson 1978). E is real, so the lower half mirrors the upper half.
     """
     from scipy.linalg import eigh
 
     n = e.shape[0]
-    found = []
+    points = []
     for angle in np.linspace(0.0, np.pi, ANGLES):
-        turned = np.exp(-1j * angle) * e
-        x = eigh(0.5 * (turned + turned.conj().T), subset_by_index=[n - 1, n - 1], check_finite=False)[1][:, 0]
-        found.append(np.vdot(x, e @ x))
-    upper = np.array(found)
+        rotated = np.exp(-1j * angle) * e
+        x = eigh(0.5 * (rotated + rotated.conj().T), subset_by_index=[n - 1, n - 1], check_finite=False)[1][:, 0]
+        points.append(np.vdot(x, e @ x))
+    upper = np.array(points)
     corners = np.concatenate([upper, upper[::-1].conj()])
     share = np.arange(SIDE) / SIDE
     return np.concatenate([a + (b - a) * share for a, b in zip(corners, np.roll(corners, -1), strict=True)])
 
 
 def numerical_abscissa(e: np.ndarray) -> float:
-    """The greatest Re x* E x: how fast energy can grow at first [1/s]."""
+    """Greatest Re x* E x, the initial growth rate of the norm [1/s]."""
     from scipy.linalg import eigh
 
     n = e.shape[0]

@@ -1,4 +1,4 @@
-"""The least step that fails, bracketed and halved. Knows a question with yes and no; asks nothing else."""
+"""Bisection for the least step that fails."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-FINE = 1e-4  # relative width of the bracket around a limit
-RISE = 1.3  # between steps that are tried on the way up
+FINE = 1e-4  # relative width of the final bracket
+RISE = 1.3  # ratio of consecutive steps of the search upwards
 
 
 class Limit(NamedTuple):
-    """The greatest step [s] up to which none fails (inf: none found that does), and the bracket's failing end."""
+    """Greatest step [s] below which none fails (inf: no failure found), and the failing end of the bracket [s]."""
 
     step: float
     fails: float
 
 
 def limit(fails: Callable[[float], bool], first: float, far: float, rise: float = RISE, fine: float = FINE) -> Limit:
-    """The least h at which `fails` turns true, from below: `first` times `rise` each, then halved to `fine`.
+    """Search upwards for the least h at which `fails` is true, by factors `rise` from `first`; then bisect to `fine`.
 
-    Where `first` fails, smaller ones are tried, halved, down to 1e-9 of it: then the limit is 0.
+    If `first` fails, it is halved down to 1e-9 of its value; if all these fail, the limit is 0. Above `far` it is inf.
     """
     low, high = 0.0, first
     if fails(high):
@@ -42,7 +42,7 @@ def limit(fails: Callable[[float], bool], first: float, far: float, rise: float 
 
 
 def halved(fails: Callable[[float], bool], low: float, high: float, fine: float = FINE) -> Limit:
-    """A bracket (safe, failing) halved until its relative width is `fine`."""
+    """Bisect a bracket (`low` safe, `high` failing) to the relative width `fine`."""
     while high - low > fine * high:
         middle = 0.5 * (low + high)
         if fails(middle):

@@ -1,4 +1,4 @@
-"""The row of a case with delay lines: the greatest step by the linear system of steps, and by real runs."""
+"""Stability of a case with delay lines: greatest step by the linear system of steps, and by real runs."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from fvsolve.studies.stability.delayed_runs import DelayedRuns
 from fvsolve.studies.stability.measured import too_long
 from fvsolve.studies.stability.row import StabilityRow
 
-PARTS, FAR = 32.0, 2.0  # steps that are looked at: from a part of the slowest line, or from where stores let nothing
-SLOW = 0.1  # grow, nor rates of all else, to times the slowest line
-LINES = 4  # at stores, whose whole parts are looked at
-RISE, FINE = 1.6, 1e-3  # between them, and of the bracket around the limit
-MOST = 400  # states
-UNKNOWN = "stages of Rosenbrock's methods see what arrives by its slope, which is not followed"
+PARTS, FAR = 32.0, 2.0  # first step: this part of the longest travel time at most; last step: times that time
+SLOW = 0.1  # greatest product of the first step and the rates of other states
+LINES = 4  # greatest number of lines at stores for which integer parts of the delay are checked
+RISE, FINE = 1.6, 1e-3  # ratio of consecutive steps of the search, relative width of the final bracket
+MOST = 400  # greatest number of states
+UNKNOWN = "stages of Rosenbrock methods use the slope of arriving waves, which the linear system does not model"
 NONE = "no step up to twice the slowest line's travel time fails"
 
 
 class DelayedLimits:
-    """Steps of one case and method: models cut for each, the linear systems of these, and whether they fail."""
+    """Limit of the step of one case and method, by models divided for each step and their linear systems."""
 
     def __init__(self, case, scheme: str, method, steps: int, threshold: float) -> None:
         self.case, self.method, self.steps, self.threshold = case, method, steps, threshold
@@ -43,23 +43,23 @@ class DelayedLimits:
             self.first = min(self.first, float(np.sqrt(2.0 * travel / (LITTLE * rate * steps))))
 
     def model(self, h: float | None):
-        """The case at its start, lines cut for steps of h [s] or of its own, schedules held."""
+        """Model at the start with held schedules, lines divided for steps of h [s]; for None for those of the case."""
         step = {} if h is None else {"numerics.step": h}
         model = prepared(self.case, self.set | step)
         if model.case.numerics.scheme in LIMITED and (model.tables.pipes["delay"] < 0).any():
-            raise FvsolveError(f"beside delay lines stability wants a linear scheme; {model.case.numerics.scheme} "
-                               "limits slopes: give scheme = \"upwind5\", say")  # fmt: skip
+            raise FvsolveError(f"with delay lines stability needs a linear scheme; {model.case.numerics.scheme} "
+                               "limits slopes: use for example scheme = \"upwind5\"")  # fmt: skip
         if model.y_size > MOST:
-            raise FvsolveError(f"{model.y_size} states, each delay line one of them; with lines stability follows "
-                               f"{MOST}: take fewer cells, or a part of the network")  # fmt: skip
+            raise FvsolveError(f"{model.y_size} states, one for each delay line; with lines stability is computed for "
+                               f"at most {MOST}: use fewer cells, or a part of the network")  # fmt: skip
         return stopped(model, model.case.numerics.start)
 
     def system(self, h: float) -> Delayed:
-        """The linear system of steps of h [s]."""
+        """Linear system of steps of h [s]."""
         return Delayed(self.model(h), self.method, h)
 
     def fails(self, h: float) -> bool:
-        """Whether a deviation grows beyond the threshold, or the case is refused with such steps."""
+        """True if the growth of a deviation exceeds the threshold, or the case is refused with steps of h [s]."""
         try:
             return not self.system(h).growth(self.steps, self.threshold).size <= self.threshold
         except CaseError as error:
@@ -67,21 +67,21 @@ class DelayedLimits:
             return True
 
     def predicted(self) -> Limit:
-        """The greatest step [s] below which none fails; nan where steps of the method are not known."""
+        """Greatest step [s] below which none fails; nan for a method whose steps are not modelled."""
         if self.method.kind == "linear":
             return Limit(np.nan, np.nan)
         rough = limit(self.fails, self.first, self.far, RISE, FINE)
-        least = min([rough, *(self.whole(one, rough.fails) for one in self.delays(rough))], key=lambda one: one.fails)
+        least = min([rough, *(self.whole(d, rough.fails) for d in self.delays(rough))], key=lambda b: b.fails)
         return least
 
     def delays(self, rough: Limit) -> list[float]:
-        """Delays of lines at stores [s], the longest few: steps that divide one let its waves grow most."""
-        touched = [line for _, i, _ in stores(self.own, 1.0) for line in lines_at(self.own, i)]
-        found = {float(line["tau"] * line["stretches"]) for line in touched} if 0.0 < rough.step < np.inf else set()
-        return sorted(found, reverse=True)[:LINES]
+        """Longest delays of lines at stores [s]; waves grow most with steps that divide such a delay."""
+        at_stores = [line for _, i, _ in stores(self.own, 1.0) for line in lines_at(self.own, i)]
+        delays = {float(line["tau"] * line["stretches"]) for line in at_stores} if 0.0 < rough.step < np.inf else set()
+        return sorted(delays, reverse=True)[:LINES]
 
     def whole(self, delay: float, fails: float) -> Limit:
-        """The least step that fails among those near whole parts of a delay; none of these is damped by reading."""
+        """Least step that fails near integer parts of a delay, where interpolation does not damp waves."""
         low = int(np.ceil(delay / fails))
         if low < 1 or not self.fails(delay / low):
             return Limit(np.inf, np.inf)
@@ -96,36 +96,36 @@ class DelayedLimits:
 
 
 def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> StabilityRow:
-    """Limits of a scheme and method about the start: predicted by powers of the linear step, and measured."""
-    made, left_out, notes = DelayedLimits(case, scheme, method, steps, threshold), {}, []
-    found, model = made.predicted(), made.own
+    """Limits of a scheme and method about the start: predicted by the linear system of steps, and measured."""
+    limits, left_out, notes = DelayedLimits(case, scheme, method, steps, threshold), {}, []
+    predicted, model = limits.predicted(), limits.own
     rate = float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0))
     row = {
         "scheme": scheme, "method": method.name, "when": "the start, delay lines as they are", "states": model.y_size,
-        "steps": steps, "threshold": threshold, "rate": rate, "predicted": found.step, "lines": True,
+        "steps": steps, "threshold": threshold, "rate": rate, "predicted": predicted.step, "lines": True,
     }  # fmt: skip
-    if np.isnan(found.step):
+    if np.isnan(predicted.step):
         left_out["predicted"] = UNKNOWN
-    elif np.isinf(found.step):
+    elif np.isinf(predicted.step):
         notes.append(NONE)
-    if np.isfinite(found.fails) and found.fails not in made.refused:
-        one = made.system(found.fails)
-        grown = one.growth(steps, threshold)
-        where, share = one.place(grown)
-        row |= {"growth": grown.size, "after": grown.steps, "where": where, "share": share}
-    if made.refused:
-        h = min(made.refused)
-        notes.append(f"steps from {h:.4g} s on are refused: {made.refused[h]}")
-    if not made.refused or found.fails not in made.refused:
-        row |= seen(DelayedRuns(made, steps, threshold, found.fails), found.step, left_out)
+    if np.isfinite(predicted.fails) and predicted.fails not in limits.refused:
+        linear = limits.system(predicted.fails)
+        growth = linear.growth(steps, threshold)
+        where, share = linear.place(growth)
+        row |= {"growth": growth.size, "after": growth.steps, "where": where, "share": share}
+    if limits.refused:
+        h = min(limits.refused)
+        notes.append(f"steps from {h:.4g} s on are refused: {limits.refused[h]}")
+    if not limits.refused or predicted.fails not in limits.refused:
+        row |= seen(DelayedRuns(limits, steps, threshold, predicted.fails), predicted.step, left_out)
     return StabilityRow(**row, left_out=left_out, notes=tuple(notes))
 
 
 def seen(runs: DelayedRuns, guess: float, left_out: dict[str, str]) -> dict:
-    """The limit of real runs; where it is not found in time, why, in `left_out`."""
+    """Columns of a row with the limit of real runs; if it is not found in time, `left_out` gets the reason."""
     try:
-        found = runs.limit(guess)
+        measured = runs.limit(guess)
     except TimeoutError:
         left_out["measured"] = too_long(runs)
         return {}
-    return {"measured": found.step, "measured_up_to": found.fails if np.isfinite(found.fails) else runs.tried}
+    return {"measured": measured.step, "measured_up_to": measured.fails if np.isfinite(measured.fails) else runs.tried}

@@ -1,4 +1,4 @@
-"""Growth of a small deviation in real runs with delay lines, what is on its way in them included. Knows runs."""
+"""Growth of small deviations in real runs with delay lines, including the waves in the lines."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from fvsolve.studies.stability.delayed import BAR, Delayed
 from fvsolve.studies.stability.growth import looked_at
 from fvsolve.studies.stability.measured import BELOW, LONGEST, Runs
 
-CLOSE, TWICE = 0.99, 2.0  # of the prediction; between steps where there is none
-SMALL = 1e-5  # of a wave of a bar in one step: the deviation at the start
+CLOSE, TWICE = 0.99, 2.0  # lower end of the bracket over the prediction; ratio of steps if all are predicted safe
+SMALL = 1e-5  # deviation at the start, in units of a wave of 1 bar over one step
 
 
 class DelayedRuns(Runs):
-    """Real runs at fixed steps, each from what the linear system of that step says to grow most.
+    """Real runs at fixed steps, each from the deviation with the greatest growth in the linear system of the step.
 
-    limits : see `delayed_row.DelayedLimits`; end : a step that is predicted to fail [s], nan for none
+    limits : see `delay_line_row.DelayLineLimits`; failing_step : a step that is predicted to fail [s], nan for none
     """
 
     def __init__(self, limits, steps: int, threshold: float, end: float) -> None:
@@ -33,23 +33,23 @@ class DelayedRuns(Runs):
         self.strides = np.diff([0, *self.looks]).astype(float)
         self.latest = time.monotonic() + LONGEST
 
-    def begun(self, one: Delayed, x: np.ndarray, before: np.ndarray) -> Loop:
-        """A run whose lines remember these entries."""
-        model, t = one.model, float(one.model.case.numerics.start)
-        changes = {"method": one.method.name, "step": one.h, "courant": None, "rtol": None}
+    def begun(self, system: Delayed, x: np.ndarray, history: np.ndarray) -> Loop:
+        """Run from the start plus x, with entries `history` in its lines."""
+        model, t = system.model, float(system.model.case.numerics.start)
+        changes = {"method": system.method.name, "step": system.h, "courant": None, "rtol": None}
         numerics = model.case.numerics.model_copy(update=changes)
-        made = Loop(replace(model, case=replace(model.case, numerics=numerics)), lambda: model.structure)
-        made.now[:] = model.start
-        made.now[one.kept] += x
-        made.memory[slots.T] = t
-        remember(made.slate.past, model.tables.delays, t, one.h, before)
-        made.begin(t + 2.0 * self.steps * one.h, NO_LIMIT)
-        return made
+        loop = Loop(replace(model, case=replace(model.case, numerics=numerics)), lambda: model.structure)
+        loop.now[:] = model.start
+        loop.now[system.kept] += x
+        loop.memory[slots.T] = t
+        remember(loop.slate.past, model.tables.delays, t, system.h, history)
+        loop.begin(t + 2.0 * self.steps * system.h, NO_LIMIT)
+        return loop
 
     def limit(self, guess: float) -> Limit:
-        """As of all runs, but close about the prediction: beside whole parts of delays steps hold again.
+        """Measured limit, searched close to the prediction: steps beside integer parts of delays may be safe again.
 
-        Where none is predicted they are looked for among all.
+        Without a prediction all steps are searched.
         """
         if not np.isfinite(guess):
             return limit(self.fails, self.first, self.far, RISE if np.isnan(guess) else TWICE)
@@ -58,54 +58,54 @@ class DelayedRuns(Runs):
         return halved(self.fails, CLOSE * guess if self.safe(CLOSE * guess) else BELOW[-1] * guess, self.end)
 
     def growth(self, h: float) -> tuple[float, int]:
-        """(greatest growth, after how many steps); a run that breaks off: infinite."""
-        one = self.system(h)
-        found = one.growth(self.steps, self.threshold)
-        small = SMALL * float(one.weight.max()) * widest(one)
-        runs = [self.begun(one, width * found.x, width * found.before) for width in (small, 0.0)]
+        """(greatest growth, its number of steps); infinite for a run that stops."""
+        system = self.system(h)
+        predicted = system.growth(self.steps, self.threshold)
+        small = SMALL * float(system.weight.max()) * widest(system)
+        runs = [self.begun(system, width * predicted.x, width * predicted.before) for width in (small, 0.0)]
         size, after = 1.0, 0
-        for n, more in zip(self.looks, self.strides, strict=True):
+        for n, budget in zip(self.looks, self.strides, strict=True):
             if time.monotonic() > self.latest:
                 raise TimeoutError
-            if any(run.run(more) != slots.CHUNK for run in runs):
+            if any(run.run(budget) != slots.CHUNK for run in runs):
                 return np.inf, n
-            moved, still = ((run.now[one.kept], entries(run.slate.past, one)) for run in runs)
-            here = float(one.size((moved[0] - still[0])[:, None], (moved[1] - still[1])[..., None])[0]) / small
-            if not here <= self.threshold:
-                return here if here > self.threshold else np.inf, n
-            if here > size:
-                size, after = here, n
+            moved, base = ((run.now[system.kept], entries(run.slate.past, system)) for run in runs)
+            growth = float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small
+            if not growth <= self.threshold:
+                return growth if growth > self.threshold else np.inf, n
+            if growth > size:
+                size, after = growth, n
         return size, after
 
 
-def widest(one: Delayed) -> float:
-    """Wave of a bar in the widest line [kg/s]."""
-    tables = one.model.tables
+def widest(system: Delayed) -> float:
+    """Wave of 1 bar in the line with the greatest admittance [kg/s]."""
+    tables = system.model.tables
     return BAR * float(tables.pipes["admittance"][tables.delays["pipe"]].max())
 
 
-def remember(past: np.ndarray, delays: np.ndarray, t: float, h: float, before: np.ndarray) -> None:
-    """Have lines remember entries : float64[many, 2, stretches] at t - many h, ..., t - h."""
-    many, places = before.shape[0], at.places_of(past)
-    numbers = at.ZEROS + np.arange(many)
-    past[at.COUNT] = at.ZEROS + many
+def remember(past: np.ndarray, delays: np.ndarray, t: float, h: float, history: np.ndarray) -> None:
+    """Write entries of lines : float64[count, 2, stretches] at t - count h, ..., t - h."""
+    count, places = history.shape[0], at.places_of(past)
+    numbers = at.ZEROS + np.arange(count)
+    past[at.COUNT] = at.ZEROS + count
     past[[at.STEP, at.STEP_BEFORE]], past[[at.EVEN, at.EVEN_BEFORE]] = h, 1e18
-    past[at.HEAD + (numbers & (int(past[at.CAPACITY]) - 1))] = t + h * np.arange(-many, 0)
+    past[at.HEAD + (numbers & (int(past[at.CAPACITY]) - 1))] = t + h * np.arange(-count, 0)
     for where, s, wave in rings(places, delays, numbers):
-        past[where] = before[:, wave, s]
+        past[where] = history[:, wave, s]
 
 
-def entries(past: np.ndarray, one: Delayed) -> np.ndarray:
-    """The last entries but one, of all stretches : float64[many, 2, stretches]."""
-    found = np.zeros((one.many, 2, one.holds.size))
-    numbers = int(past[at.COUNT]) - 1 - one.many + np.arange(one.many)
-    for where, s, wave in rings(at.places_of(past), one.model.tables.delays, numbers):
-        found[:, wave, s] = past[where]
-    return found
+def entries(past: np.ndarray, system: Delayed) -> np.ndarray:
+    """Entries of all stretches before the last entry : float64[history_steps, 2, stretches]."""
+    values = np.zeros((system.many, 2, system.holds.size))
+    numbers = int(past[at.COUNT]) - 1 - system.many + np.arange(system.many)
+    for where, s, wave in rings(at.places_of(past), system.model.tables.delays, numbers):
+        values[:, wave, s] = past[where]
+    return values
 
 
 def rings(places, delays: np.ndarray, numbers: np.ndarray):
-    """(places of entries of these numbers, stretch, wave) of all stretches and waves."""
+    """(offsets of entries with given numbers, stretch, wave) for all stretches and waves."""
     for row in delays:
         for q in range(row["stretches"]):
             ring, mask = at.ring_of(places, row, q)

@@ -1,6 +1,6 @@
-"""How far powers of one step grow, and the greatest step at which they do not. Knows matrices; runs nothing.
+"""Growth of powers of the matrix of a step, and the greatest step without growth above the threshold.
 
-growth = max over n <= N of ||R(h J)^n|| in the energy norm; a step fails where it exceeds 1e3.
+growth = max over n <= N of ||R(h J)^n|| in the energy norm; a step fails if it exceeds 1e3.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from fvsolve.studies.stability.bracket import Limit, halved, limit
 
 THRESHOLD = 1e3
 STEPS = 1000
-DENSE = 500  # states up to which powers are squared; beyond, vectors are propagated
-FAR = 1e4  # of h ||J||, up to which a step that does not fail is looked for
-SOME = 11  # steps at which all powers are looked at, where few of them never fail
+DENSE = 500  # greatest number of states for which powers are matrices; above, vectors are propagated
+FAR = 1e4  # greatest h ||J|| of the search
+SOME = 11  # steps whose powers are all checked if a few powers show no failure
 
 
 class Growth(NamedTuple):
-    """The greatest norm found (inf: none that is finite), after how many steps, the start that grows so, its end.
+    """Greatest norm found (inf: not finite), its number of steps, the start with this growth, and its end.
 
     start, end : float64[n], unit vectors
     """
@@ -34,15 +34,15 @@ class Growth(NamedTuple):
 
 
 def step_matrix(method: Method, e: np.ndarray) -> np.ndarray:
-    """R(E) : float64[n, n] for E = h J : Horner for explicit methods, else the stages' linear system as it stands."""
+    """R(E) : float64[n, n] for E = h J, by Horner's rule for explicit methods, else by the linear system of stages."""
     n = e.shape[0]
     if method.explicit:
         coefficients = [float(x) for x in stability_function(method).numerator.coefficients]
-        found = coefficients[-1] * np.eye(n)
+        result = coefficients[-1] * np.eye(n)
         for x in coefficients[-2::-1]:
-            found = e @ found
-            found[np.diag_indices(n)] += x
-        return found
+            result = e @ result
+            result[np.diag_indices(n)] += x
+        return result
     a, b, s = method.a, method.b, method.stages
     if not np.any(np.triu(a, 1)):
         stages: list[np.ndarray] = []
@@ -50,13 +50,13 @@ def step_matrix(method: Method, e: np.ndarray) -> np.ndarray:
             right = e + e @ sum((a[i, j] * stages[j] for j in range(i) if a[i, j] != 0.0), np.zeros((n, n)))
             stages.append(np.linalg.solve(np.eye(n) - a[i, i] * e, right) if a[i, i] != 0.0 else right)
     else:
-        whole = np.linalg.solve(np.eye(s * n) - np.kron(a, e), np.tile(e, (s, 1)))
-        stages = [whole[i * n : (i + 1) * n] for i in range(s)]
+        solved = np.linalg.solve(np.eye(s * n) - np.kron(a, e), np.tile(e, (s, 1)))
+        stages = [solved[i * n : (i + 1) * n] for i in range(s)]
     return np.eye(n) + sum(b[i] * stages[i] for i in range(s))
 
 
 def norm_exceeds(m: np.ndarray, threshold: float) -> bool:
-    """Whether ||M||_2 > threshold; cheap bounds first."""
+    """True if ||M||_2 > threshold; cheap bounds are checked first."""
     if not np.all(np.isfinite(m)):
         return True
     squares = np.einsum("ij,ij->j", m, m)
@@ -65,91 +65,91 @@ def norm_exceeds(m: np.ndarray, threshold: float) -> bool:
     return bool(np.max(squares) > threshold**2) or float(np.linalg.norm(m, 2)) > threshold
 
 
-ALL = 64  # powers up to this one and the last ones are all looked at, between them sixteen for each doubling
-FEW = 64  # states up to which every power is
+ALL = 64  # number of first and of last powers that are all checked; between, sixteen for each doubling
+FEW = 64  # greatest number of states for which every power is checked
 
 
 def looked_at(steps: int, few: bool = False) -> list[int]:
-    """After how many steps growth is looked at: 1 .. 64, 16 .. 31 times each power of two, the last 64; rising.
+    """Increasing numbers of steps at which growth is checked: 1 .. 64, 16 .. 31 times powers of two, the last 64.
 
-    few : powers of two and `steps` alone
+    few : powers of two and `steps` only
     """
-    wanted = {1 << k for k in range(64)} | {steps}
+    numbers = {1 << k for k in range(64)} | {steps}
     if not few:
-        wanted |= {*range(2, ALL + 1), *range(steps - ALL + 1, steps)}
-        wanted |= {j << k for k in range(2, 59) for j in range(16, 32)}
-    return sorted(n for n in wanted if 1 <= n <= steps)
+        numbers |= {*range(2, ALL + 1), *range(steps - ALL + 1, steps)}
+        numbers |= {j << k for k in range(2, 59) for j in range(16, 32)}
+    return sorted(n for n in numbers if 1 <= n <= steps)
 
 
 def powers(m: np.ndarray, steps: int, few: bool = False) -> Iterator[tuple[int, np.ndarray]]:
-    """(n, M^n) for the n that are `looked_at`, of a small M all n; ends with the first that is not finite.
+    """(n, M^n) for the n of `checked_powers`, for a small M all n; ends with the first power that is not finite.
 
-    Each from the one before, or from two lower ones.
+    A power is the product of M and the power before, or of two lower powers.
     """
-    found, last, power = {1: m}, 1, m
+    known, last, power = {1: m}, 1, m
     yield 1, m
-    every = m.shape[0] <= FEW and not few
-    for n in range(2, steps + 1) if every else looked_at(steps, few)[1:]:
+    all_powers = m.shape[0] <= FEW and not few
+    for n in range(2, steps + 1) if all_powers else looked_at(steps, few)[1:]:
         high = 1 << (n.bit_length() - 1)
         high = n // 2 if high == n else high
-        if every or n == last + 1:
+        if all_powers or n == last + 1:
             power = power @ m
         else:
             rest = n - high
-            power = found[high] @ (found[rest] if rest in found else assembled(found, rest))
+            power = known[high] @ (known[rest] if rest in known else assembled(known, rest))
         last = n
         if n <= ALL or n & (n - 1) == 0:
-            found[n] = power
+            known[n] = power
         yield n, power
         if not np.all(np.isfinite(power)):
             return
 
 
-def assembled(found: dict[int, np.ndarray], n: int) -> np.ndarray:
-    """M^n from the powers of two that are there."""
-    whole = None
+def assembled(known: dict[int, np.ndarray], n: int) -> np.ndarray:
+    """M^n as a product of known powers M^(2^k)."""
+    product = None
     for k in range(n.bit_length()):
         if n >> k & 1:
-            whole = found[1 << k] if whole is None else whole @ found[1 << k]
-    return whole
+            product = known[1 << k] if product is None else product @ known[1 << k]
+    return product
 
 
 def growth(m: np.ndarray, steps: int = STEPS) -> Growth:
-    """The greatest ||M^n||_2 over the n <= steps of `powers`, and the start that grows so (unit length)."""
-    size, at, kept = 1.0, 0, np.eye(m.shape[0])
+    """Greatest ||M^n||_2 over the n <= steps of `matrix_powers`, and the unit vector with this growth."""
+    size, after, greatest = 1.0, 0, np.eye(m.shape[0])
     for n, power in powers(m, steps):
         if not np.all(np.isfinite(power)):
-            size, at = np.inf, n
+            size, after = np.inf, n
             break
         if np.linalg.norm(power) > size:
-            here = float(np.linalg.norm(power, 2))
-            if here > size:
-                size, at, kept = here, n, power
-    ends, _, starts = np.linalg.svd(kept)
-    return Growth(size, at, starts[0], ends[:, 0])
+            norm = float(np.linalg.norm(power, 2))
+            if norm > size:
+                size, after, greatest = norm, n, power
+    ends, _, starts = np.linalg.svd(greatest)
+    return Growth(size, after, starts[0], ends[:, 0])
 
 
 class DenseGrowth:
-    """Steps of one method on a small system; `e` is J in the energy norm."""
+    """Growth of steps of one method on a small system; e : J in the energy norm."""
 
     def __init__(self, method: Method, e: np.ndarray, steps: int, threshold: float = THRESHOLD) -> None:
         self.method, self.e, self.steps, self.threshold = method, e, steps, threshold
         self.size = float(np.linalg.norm(e, 2))
 
     def fails(self, h: float, few: bool = False) -> bool:
-        """Whether some power n <= steps of R(h J) exceeds the threshold; `few`: some of those of `powers` that are."""
+        """True if a power n <= steps of R(h J) exceeds the threshold; few : check only powers of two and `steps`."""
         m = self.matrix(h)
         with np.errstate(over="ignore", invalid="ignore"):
             return any(norm_exceeds(power, self.threshold) for _, power in powers(m, self.steps, few))
 
     def limit(self) -> Limit:
-        """The greatest step below which none fails: by few powers first, which it cannot exceed, then by all."""
+        """Limit of the step: first by few powers, which give an upper bound, then by all."""
         rough = limit(lambda h: self.fails(h, few=True), 0.1 / self.size, FAR / self.size)
         if rough.step == 0.0:
             return rough
         if np.isinf(rough.step):
-            some = any(self.fails(h) for h in np.geomspace(0.1, FAR, SOME) / self.size)
-            return limit(self.fails, 0.1 / self.size, FAR / self.size) if some else rough
+            fails_somewhere = any(self.fails(h) for h in np.geomspace(0.1, FAR, SOME) / self.size)
+            return limit(self.fails, 0.1 / self.size, FAR / self.size) if fails_somewhere else rough
         if not self.fails(rough.step):
             return rough
         low, high = 0.97 * rough.step, rough.step
@@ -158,13 +158,13 @@ class DenseGrowth:
         return halved(self.fails, low, high)
 
     def failing_after(self, h: float) -> int:
-        """After how many steps growth is first seen beyond the threshold; 0 where it is not."""
+        """Number of steps after which growth first exceeds the threshold; 0 if it does not."""
         with np.errstate(over="ignore", invalid="ignore"):
-            found = (n for n, power in powers(self.matrix(h), self.steps) if norm_exceeds(power, self.threshold))
-            return next(found, 0)
+            failing = (n for n, power in powers(self.matrix(h), self.steps) if norm_exceeds(power, self.threshold))
+            return next(failing, 0)
 
     def growth(self, h: float) -> Growth:
-        """Greatest growth at a step; far beyond the threshold repeated squaring is round-off."""
+        """Greatest growth with steps of h [s]; far above the threshold repeated squaring is dominated by round-off."""
         with np.errstate(over="ignore", invalid="ignore"):
             return growth(self.matrix(h), self.steps)
 

@@ -1,9 +1,10 @@
-"""Courant limits of limited schemes on a periodic grid: frozen weights, bounds, real runs. Knows no exact limit.
+"""Courant limits of limited schemes on a periodic grid: frozen weights, bounds and real runs.
 
-A limited scheme has no derivative at a constant state: its weights go with the solution. What can be said: the exact
-limits of the linear schemes that it is where its switches stand still; for slopes, up to which Courant number total
-variation cannot grow, r / (1 + phi / 2) with phi the greatest slope in differences (1 for minmod, 2 for the others)
-and r the method's SSP radius (Harten 1983); and where real runs grow, from three starts, in more and more steps.
+A limited scheme has no derivative at a constant state, since its weights depend on the solution, and no exact limit.
+Known are: the exact limits of the linear schemes that result from fixed weights; for slope limiters the Courant number
+up to which total variation cannot grow, r / (1 + phi / 2) with phi the greatest slope in differences (1 for minmod, 2
+for the others) and r the SSP radius of the method (Harten 1983); limits of real runs from three starts for increasing
+numbers of steps.
 """
 
 from __future__ import annotations
@@ -25,23 +26,23 @@ from fvsolve.studies.sheet import Plain
 from fvsolve.studies.stability.periodic import THRESHOLD, Circle, check_size, first_failure
 
 CELLS, STEPS, TIMES = 50, 500, (1, 10, 100)
-CLOSE = 1e-3  # of a measured limit: it does not hang on the Courant number smoothly
-SMALLEST = 0.3  # Courant number that is tried, where no bound says that less cannot fail
-RATIO = 1.02  # of the next: what fails may pass again at a greater one
+CLOSE = 1e-3  # relative width of a measured limit; growth is not a smooth function of the Courant number
+SMALLEST = 0.3  # least Courant number that is run, unless a bound excludes failure up to a greater one
+RATIO = 1.02  # of consecutive Courant numbers; above a failure, a greater one may be stable again
 METHODS = ("euler", "ssp-rk2", "ssp-rk3", "rk4")  # by default
-LOOKS = 25  # at the norm during a run
-FALLS = 0.05  # of the limit between the fewest and the most steps, more than an exponential explains: not sharp
+LOOKS = 25  # number of checks of the norm during a run
+FALLS = 0.05  # relative fall of the limit from the fewest to the most steps above which it is not sharp
 SEED = 1
 
 
 @dataclass(frozen=True)
 class LimitedLimit(Plain):
-    """What is known of a limited scheme with a method.
+    """Courant limits of a limited scheme with a method.
 
-    frozen : limits of the linear schemes by name; monotone : up to which Courant number total variation cannot grow,
-    None where nothing is known; measured : by start, the least Courant number found to fail in steps[i] steps (None:
-    none up to 20); least : over the starts; sharp : False where it falls by more than 5 % from the fewest to the most
-    steps, None where nothing failed.
+    frozen : limits of the linear schemes by name; monotone : Courant number up to which total variation cannot grow,
+    None if unknown; measured : for each start, the least Courant number found to fail in steps[i] steps (None: none up
+    to 20); least : least value over the starts; sharp : False if it falls by more than 5 % from the fewest to the most
+    steps (more than exponential growth explains), None if no run failed.
     """
 
     scheme: str
@@ -57,7 +58,7 @@ class LimitedLimit(Plain):
 
     @property
     def least(self) -> tuple[float | None, ...]:
-        """Over the starts, for each count of steps."""
+        """Least limit over the starts, for each number of steps."""
         columns = zip(*self.measured.values(), strict=True)
         return tuple(min((x for x in column if x is not None), default=None) for column in columns)
 
@@ -67,12 +68,12 @@ class LimitedLimit(Plain):
         return None if first is None or last is None else last >= (1 - FALLS) * first
 
     def flat(self) -> dict:
-        """As one row of a table."""
-        found = {"scheme": self.scheme, "limiter": self.limiter, "method": self.method, "monotone": self.monotone}
-        found |= {"cells": self.cells, "sharp": self.sharp}
+        """Row of a table."""
+        cells = {"scheme": self.scheme, "limiter": self.limiter, "method": self.method, "monotone": self.monotone}
+        cells |= {"cells": self.cells, "sharp": self.sharp}
         for start, row in self.measured.items():
-            found |= {f"{start}, {n} steps": x for n, x in zip(self.steps, row, strict=True)}
-        return found
+            cells |= {f"{start}, {n} steps": x for n, x in zip(self.steps, row, strict=True)}
+        return cells
 
 
 @door(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=CALL)
@@ -80,33 +81,33 @@ def limited_limits(
     schemes: Sequence[str] = tuple(LIMITED), methods: Sequence[str] | None = None, cells: int = CELLS,
     steps: int = STEPS, progress: Progress | None = None,
 ) -> list[LimitedLimit]:  # fmt: skip
-    """Limited schemes, muscl with each limiter, and explicit methods; runs of `steps`, 10 and 100 times as many.
+    """Limits of limited schemes (muscl with each limiter) and explicit methods, for 1, 10 and 100 times `steps`.
 
-    Raises FvsolveError for names that are none, implicit methods, and a circle or a run that is too short.
+    Raises FvsolveError for unknown names, implicit methods, and for too few cells or steps.
     """
     check_size(cells, steps)
-    tell = progress or (lambda *_: None)
-    schemes, named = names(schemes) or tuple(LIMITED), [method_named(name) for name in names(methods) or METHODS]
-    implicit = [one.name for one in named if not one.explicit]
+    report = progress or (lambda *_: None)
+    schemes, chosen = names(schemes) or tuple(LIMITED), [method_named(name) for name in names(methods) or METHODS]
+    implicit = [tableau.name for tableau in chosen if not tableau.explicit]
     if implicit:
         raise FvsolveError(f"{implicit[0]} is implicit: limited schemes are measured with explicit methods")
     for name in schemes:
         if name not in LIMITED:
-            wanted = did_you_mean(name, LIMITED) or f"; limited schemes are {', '.join(LIMITED)}"
-            raise FvsolveError(f'no limited scheme named "{name}"{wanted}')
+            hint = did_you_mean(name, LIMITED) or f"; limited schemes are {', '.join(LIMITED)}"
+            raise FvsolveError(f'no limited scheme named "{name}"{hint}')
     kinds = [(name, limiter) for name in schemes for limiter in (LIMITERS if name == "muscl" else (None,))]
-    pairs = [(*kind, one.name) for one in dict.fromkeys(named) for kind in kinds]
-    found = []
+    pairs = [(*kind, tableau.name) for tableau in dict.fromkeys(chosen) for kind in kinds]
+    limits = []
     for scheme, limiter, method in pairs:
-        tell(len(found), len(pairs), f"{scheme} {limiter or ''} with {method}")
-        found.append(limited_limit(scheme, limiter, method, cells, steps))
-    return found
+        report(len(limits), len(pairs), f"{scheme} {limiter or ''} with {method}")
+        limits.append(limited_limit(scheme, limiter, method, cells, steps))
+    return limits
 
 
 def limited_limit(
     scheme: str, limiter: str | None, method: str, cells: int = CELLS, steps: int = STEPS
 ) -> LimitedLimit:
-    """One limited scheme and method."""
+    """Courant limits of a limited scheme with a method."""
     name = limiter or scheme
     counts = tuple(n * steps for n in TIMES)
     return LimitedLimit(
@@ -118,35 +119,35 @@ def limited_limit(
 
 
 def monotone_limit(limiter: str, method: str) -> float | None:
-    """The Courant number up to which total variation cannot grow; None where nothing is known."""
+    """Courant number up to which total variation cannot grow; None if unknown."""
     radius = analyse(method).ssp_radius
     return radius / (1 + LIMITERS[limiter].steepest / 2) if limiter in LIMITERS and radius > 0 else None
 
 
 def starts(cells: int) -> dict[str, np.ndarray]:
-    """Fields of mean zero: one wave, a front up and down, noise."""
+    """Start fields with mean zero: a sine wave, a square wave, noise."""
     j = np.arange(cells)
     noise = np.random.default_rng(SEED).standard_normal(cells)
-    found = {"wave": np.sin(2 * np.pi * j / cells), "front": np.where(j < cells // 2, 1.0, -1.0), "noise": noise}
-    return {name: u - u.mean() for name, u in found.items()}
+    fields = {"wave": np.sin(2 * np.pi * j / cells), "front": np.where(j < cells // 2, 1.0, -1.0), "noise": noise}
+    return {name: u - u.mean() for name, u in fields.items()}
 
 
 def measured(scheme: str, limiter: str | None, method: str, start: np.ndarray, steps: int) -> float | None:
-    """The least Courant number found at which the L2 norm of a real run grows past the threshold within the steps."""
+    """Least Courant number found at which the L2 norm of a real run exceeds the threshold within `steps`."""
     circle = Circle(scheme, method, start.size, limiter or "minmod")
     smallest = monotone_limit(limiter or scheme, method) or SMALLEST
     return first_failure(lambda courant: _growth(circle, start, courant, steps), CLOSE, smallest, RATIO)
 
 
 def _growth(circle: Circle, start: np.ndarray, courant: float, steps: int) -> float:
-    """log10 of the greatest norm seen in a run over that of its start; inf once past the threshold."""
-    u, most, done = start, 0.0, 0
+    """log10 of the greatest norm in a run over that of its start; inf above the threshold."""
+    u, greatest, done = start, 0.0, 0
     for k in range(1, LOOKS + 1):
         count, done = steps * k // LOOKS - done, steps * k // LOOKS
         u = circle.run(u, courant, count) if count else u
         if u is None:
             return math.inf
-        most = max(most, float(np.linalg.norm(u) / np.linalg.norm(start)))
-        if most > THRESHOLD:
+        greatest = max(greatest, float(np.linalg.norm(u) / np.linalg.norm(start)))
+        if greatest > THRESHOLD:
             return math.inf
-    return math.log10(most) if most > 0 else -math.inf
+    return math.log10(greatest) if greatest > 0 else -math.inf

@@ -1,8 +1,8 @@
-"""Where real runs of a periodic pipe grow: predicted wave by wave, and measured. Knows the package's own stepper.
+"""Courant limits of linear schemes on a periodic pipe: predicted for each wave, and measured by real runs.
 
-Failure: the L2 norm of some start grows more than THRESHOLD-fold within n steps. On a circle the matrix of a step is
-normal, so the greatest growth over all starts is max_k |R(nu z(theta_k))|^n, theta_k = 2 pi k / cells: exactly. The
-same growth is measured from one impulse, whose waves are all of one size: max_k |u_k(n)| / |u_k(0)| of its run.
+Failure: the L2 norm of some start grows by more than `THRESHOLD` within n steps. On a periodic grid the matrix of a
+step is normal, so the greatest growth over all starts is exactly max_k |R(nu z(theta_k))|^n, theta_k = 2 pi k / cells.
+This growth is measured from one impulse, all of whose waves have equal size: max_k |u_k(n)| / |u_k(0)|.
 """
 
 from __future__ import annotations
@@ -30,15 +30,15 @@ from fvsolve.studies.sheet import Plain
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
-SMALLEST, LARGEST, RATIO = 0.05, 20.0, 1.1  # Courant numbers that are tried in turn
-CLOSE = 1e-8  # of the limit
+SMALLEST, LARGEST, RATIO = 0.05, 20.0, 1.1  # first and last Courant number of the search, ratio of consecutive numbers
+CLOSE = 1e-8  # relative width of the bracket of a limit
 NO_END = 1e300
-SMALL = 1e-18  # WENO's, against values of one
+SMALL = 1e-18  # small number of WENO, for values of size 1
 
 
 @dataclass(frozen=True)
 class Measured(Plain):
-    """One pair on a circle of cells: least Courant number that fails, predicted and measured; None where none does."""
+    """Least Courant number that fails on a periodic grid, predicted and measured; None if none fails."""
 
     scheme: str
     method: str
@@ -56,7 +56,7 @@ class Measured(Plain):
 
 
 class Circle:
-    """Linear advection on a circle of cells by one scheme and one method; a run is one call of compiled code."""
+    """Linear advection on a periodic grid by one scheme and one method; a run is one call of compiled code."""
 
     def __init__(self, scheme: str, method: str, cells: int, limiter: str = "minmod") -> None:
         self.tables = _tables(scheme, limiter, cells)
@@ -64,7 +64,7 @@ class Circle:
         self.handle, self.functions = make_handle(self.tables), (*watchers(), _rhs())
 
     def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
-        """The cells after so many steps at a Courant number; None where they do not stay finite."""
+        """Cell values after `steps` at a Courant number; None if they do not remain finite."""
         stepper = self.stepper
         stepper.memory[:], stepper.orders[slots.CONTROL] = 0.0, slots.FIXED_STEP
         stepper.orders[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT]] = courant, NO_END, NO_END
@@ -82,26 +82,26 @@ def measured_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
     progress: Progress | None = None,
 ) -> list[Measured]:  # fmt: skip
-    """Predicted and measured limits of linear schemes and explicit methods, all of them by default.
+    """Predicted and measured limits of linear schemes and explicit methods, by default of all.
 
-    Raises FvsolveError for names that are none, and for a circle or a run that is too short.
+    Raises FvsolveError for unknown names, and for too few cells or steps.
     """
     check_size(cells, steps)
-    slots = progress or (lambda *_: None)
+    report = progress or (lambda *_: None)
     schemes = names(schemes) or list(WEIGHTS)
-    named = [method_named(name) for name in names(methods) or ()] or list(METHODS.values())
-    pairs = [(scheme, one.name) for one in dict.fromkeys(named) if one.explicit for scheme in schemes]
+    chosen = [method_named(name) for name in names(methods) or ()] or list(METHODS.values())
+    pairs = [(scheme, tableau.name) for tableau in dict.fromkeys(chosen) if tableau.explicit for scheme in schemes]
     for scheme in schemes:
         weights_of(scheme)
-    found = []
+    limits = []
     for scheme, method in pairs:
-        slots(len(found), len(pairs), f"{scheme} with {method}")
-        found.append(measured_limit(scheme, method, cells, steps))
-    return found
+        report(len(limits), len(pairs), f"{scheme} with {method}")
+        limits.append(measured_limit(scheme, method, cells, steps))
+    return limits
 
 
 def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = STEPS) -> Measured:
-    """One pair: the least Courant number at which growth passes the threshold, predicted and measured alike."""
+    """Least Courant number at which growth exceeds the threshold, predicted and measured."""
     predicted = first_failure(lambda courant: predicted_growth(scheme, method, cells, steps, courant))
     circle = Circle(scheme, method, cells)
     measured = first_failure(lambda courant: measured_growth(circle, cells, steps, courant))
@@ -109,14 +109,14 @@ def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = ST
 
 
 def predicted_growth(scheme: str, method: str, cells: int, steps: int, courant: float) -> float:
-    """log10 of the greatest |R(nu z(theta_k))|^n over the waves of the circle."""
+    """log10 of the greatest |R(nu z(theta_k))|^n over the waves of the periodic grid."""
     theta = 2 * np.pi * np.arange(cells // 2 + 1) / cells
     r = analyse(method).stability_function
     return steps * math.log10(np.abs(r(courant * symbol(weights_of(scheme), theta))).max())
 
 
 def measured_growth(circle: Circle, cells: int, steps: int, courant: float) -> float:
-    """log10 of the greatest growth of a wave in a run from one impulse; inf where it does not stay finite."""
+    """log10 of the greatest growth of a wave in a run from one impulse; inf if values do not remain finite."""
     start = np.zeros(cells)
     start[0] = 1.0
     end = circle.run(start, courant, steps)
@@ -124,15 +124,15 @@ def measured_growth(circle: Circle, cells: int, steps: int, courant: float) -> f
 
 
 def first_failure(
-    growth: Callable[[float], float], close: float = CLOSE, smallest: float = SMALLEST, ratio: float = RATIO
+    growth: Callable[[float], float], width: float = CLOSE, smallest: float = SMALLEST, ratio: float = RATIO
 ) -> float | None:
-    """The least Courant number whose growth (log10) passes the threshold, to `close`; tried upward, then halved."""
+    """Least Courant number whose growth (log10) exceeds the threshold: search upwards, then bisection to `width`."""
     low, high = 0.0, smallest
     while growth(high) <= math.log10(THRESHOLD):
         low, high = high, high * ratio
         if high > LARGEST:
             return None
-    while high - low > close * high:
+    while high - low > width * high:
         middle = (low + high) / 2
         if growth(middle) <= math.log10(THRESHOLD):
             low = middle
@@ -142,20 +142,20 @@ def first_failure(
 
 
 def check_size(cells: int, steps: int) -> None:
-    """Raises FvsolveError for a circle or a run that says nothing."""
+    """Raise FvsolveError for too few cells or steps."""
     if cells < 6:
-        raise FvsolveError(f"cells = {cells}: wanted 6 or more, the widest scheme reaches over 5 cells")
+        raise FvsolveError(f"cells = {cells}: expected 6 or more, the widest scheme uses 5 cells")
     if steps < 10:
-        raise FvsolveError(f"steps = {steps}: wanted 10 or more, failure is growth over many steps")
+        raise FvsolveError(f"steps = {steps}: expected 10 or more, failure is growth over many steps")
 
 
 def _tables(scheme: str, limiter: str, cells: int) -> tuple:
-    """What a handle opens where there is nothing but the scheme's settings, a pipe's small number and scratch."""
-    found = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in (*rec.Tables._fields, *rec.Written._fields)}
-    found["scratch"] = np.zeros(2 * cells + 7)
-    scheme_settings(found["settings"][0], scheme, limiter)
-    found["pipes"]["noise"] = SMALL
-    return tuple(found.values())
+    """Tables of a handle: settings of the scheme, small number of the pipe and work space; all else empty."""
+    tables = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in (*rec.Tables._fields, *rec.Written._fields)}
+    tables["scratch"] = np.zeros(2 * cells + 7)
+    scheme_settings(tables["settings"][0], scheme, limiter)
+    tables["pipes"]["noise"] = SMALL
+    return tuple(tables.values())
 
 
 def _rhs():

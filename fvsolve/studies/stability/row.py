@@ -1,4 +1,4 @@
-"""One row of a study of stability, and the way to JSON and back. Knows numbers; computes none."""
+"""Row of a stability study, with conversion to and from JSON."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 
 @dataclass(frozen=True)
 class StabilityRow:
-    """One scheme with one method. Steps in s; inf: no failing step was found, nan: not known (`left_out` says why).
+    """Limits of a scheme with a method. Steps in s; inf: no failing step found, nan: unknown (reason in `left_out`).
 
-    predicted : greatest step with growth <= threshold in `steps` steps; growth, after : of a step just beyond, the
-    greatest growth and after how many steps; where, share : the part that holds most energy of what has grown, and its
-    share; measured : the same limit on real runs, measured_up_to : the longest step that was run
-    eigenvalues, field_of_values, von_neumann : greatest step that keeps these in the method's region
-    rate : greatest wave rate [1/s], a step times it is the Courant number; 0 without cells
-    frozen : of a limited scheme, the predictions with its weights standing still at their extremes
-    lines : whether it is of delay lines, whose steps are followed themselves: there are no bounds
-    longer : of a limited scheme with Euler, the measured step for ten times as many steps
+    predicted : greatest step with growth <= threshold in `steps` steps; growth, after : greatest growth with a slightly
+    greater step, and its number of steps; where, share : part with the most energy of the grown deviation, its share
+    measured : limit of real runs, measured_up_to : longest step that was run
+    eigenvalues, field_of_values, von_neumann : greatest step that keeps these in the region of the method
+    rate : greatest wave rate [1/s], the Courant number is step times rate; 0 without cells
+    frozen : for a limited scheme, predictions with its weights fixed at their extremes
+    lines : True for a case with delay lines, for which there are no bounds
+    longer : for a limited scheme with Euler, the measured limit for ten times as many steps
     """
 
     scheme: str
@@ -47,12 +47,12 @@ class StabilityRow:
 
     @property
     def limited(self) -> bool:
-        """Whether it is of a limited scheme: of that nothing is predicted but with weights that stand still."""
+        """True for a limited scheme, whose predictions have fixed weights."""
         return bool(self.frozen) or "frozen weights" in self.left_out
 
     @property
     def difference(self) -> float:
-        """measured / predicted - 1; nan where there is none."""
+        """measured / predicted - 1; nan if either is missing."""
         known = np.isfinite(self.measured) and np.isfinite(self.predicted) and self.predicted > 0.0
         return self.measured / self.predicted - 1.0 if known else np.nan
 
@@ -61,26 +61,26 @@ class StabilityRow:
         return step * self.rate if self.rate > 0.0 else np.nan
 
     def plain(self) -> dict:
-        """As JSON says it: steps [s] and Courant numbers; "none" where no failing step was found, null: not known."""
-        found = asdict(self) | {"difference": self.difference}
+        """Data for JSON: steps [s] and Courant numbers; "none" if no failing step was found, null if unknown."""
+        data = asdict(self) | {"difference": self.difference}
         for name in ("predicted", "measured", "eigenvalues", "field_of_values", "von_neumann", "longer"):
-            found[name] = said(getattr(self, name))
-            found[f"{name}_courant"] = said(self.courant(getattr(self, name)))
-        found["frozen"] = {name: said(step) for name, step in self.frozen.items()}
-        return found
+            data[name] = said(getattr(self, name))
+            data[f"{name}_courant"] = said(self.courant(getattr(self, name)))
+        data["frozen"] = {name: said(step) for name, step in self.frozen.items()}
+        return data
 
 
 def said(x: float):
-    """A number, "none" for infinity, None for what is not known."""
+    """Number for JSON: "none" for infinity, None for NaN."""
     return None if np.isnan(x) else "none" if np.isinf(x) else x
 
 
-def read(found: dict) -> StabilityRow:
-    """A row from what `Row.plain` said."""
-    heard = {"none": np.inf, None: np.nan}
-    kept = {name: found[name] for name in StabilityRow.__dataclass_fields__}
-    for name, value in kept.items():
+def read(data: dict) -> StabilityRow:
+    """Row from the data of `StabilityRow.plain`."""
+    values = {"none": np.inf, None: np.nan}
+    fields = {name: data[name] for name in StabilityRow.__dataclass_fields__}
+    for name, value in fields.items():
         if value is None or value == "none":
-            kept[name] = heard[value]
-    kept["frozen"] = {name: heard.get(step, step) for name, step in kept["frozen"].items()}
-    return StabilityRow(**kept | {"notes": tuple(kept["notes"])})
+            fields[name] = values[value]
+    fields["frozen"] = {name: values.get(step, step) for name, step in fields["frozen"].items()}
+    return StabilityRow(**fields | {"notes": tuple(fields["notes"])})

@@ -1,6 +1,6 @@
-"""Where a case fails: the greatest safe step, predicted, measured on real runs, and beside it what bounds say.
+"""Greatest safe step of a case: predicted by powers of a step, measured by real runs, and bounds.
 
-Knows cases, matrices and runs; draws nothing. Failure: max over n <= N of ||R(h J)^n|| > 1e3 in the energy norm.
+Failure: max over n <= N of ||R(h J)^n|| > 1e3 in the energy norm.
 """
 
 from __future__ import annotations
@@ -39,16 +39,16 @@ from fvsolve.studies.stability.row import StabilityRow, read
 from fvsolve.studies.stability.system import predicted, system
 
 AUTOMATIC = (
-    f"auto begins with {automatic.EXPLICIT}, of which its row is; a run goes on with {automatic.IMPLICIT} or "
-    f"{automatic.TIGHT} where that is cheaper, which its row does not say"
+    f"auto starts with {automatic.EXPLICIT}, for which its row holds; a run continues with {automatic.IMPLICIT} or "
+    f"{automatic.TIGHT} if that is cheaper, which is not in its row"
 )
-VISIBLE = 1e-3  # of a small deviation: what limited schemes are tried with, above what WENO takes for round-off
-LONGER = 10  # times as many steps, for Euler with a limiter
+VISIBLE = 1e-3  # of the small deviation: start for limited schemes, above the round-off level of WENO
+LONGER = 10  # factor of the number of steps in longer runs of Euler with a limiter
 
 
 @dataclass(frozen=True)
 class Stability:
-    """Rows of a study, what is to be said of it; sides : scheme -> what makes its linear system, on first use."""
+    """Rows of a study with notes; systems : scheme -> function that makes its linear system on first use."""
 
     case: str
     rows: tuple[StabilityRow, ...]
@@ -56,16 +56,16 @@ class Stability:
     sides: dict[str, Callable[[str], Side]] = field(repr=False)
 
     def side(self, scheme: str) -> Side:
-        """The linear system with a linear scheme among those asked for."""
+        """Linear system with one of the requested linear schemes."""
         return self.sides[scheme](scheme)
 
     def plain(self) -> dict:
-        """As JSON says it."""
+        """Data for JSON."""
         return {"case": self.case, "rows": [row.plain() for row in self.rows], "said": self.said}
 
 
 class Side:
-    """A case with one linear scheme about its state: J in the energy norm, and what does not hang on the method."""
+    """Case with one linear scheme about a state: J in the energy norm, and data that do not depend on the method."""
 
     def __init__(self, at: Frozen) -> None:
         self.at = at
@@ -76,17 +76,17 @@ class Side:
 
     @property
     def idle(self) -> list[str]:
-        """States that move without any energy."""
+        """Names of states with motions that store no energy."""
         return [self.at.model.state_names[i] for i in np.flatnonzero(np.any(self.whole.idle, axis=1))]
 
     @cached_property
     def spectrum(self) -> Spectrum:
-        """Eigenvalues."""
+        """Eigenvalues of J."""
         return spectrum(self.e)
 
     @cached_property
     def field(self) -> np.ndarray:
-        """Boundary of the field of values."""
+        """Boundary of the field of values of J."""
         return field_of_values(self.e)
 
     @property
@@ -113,52 +113,54 @@ def stability(
     before: bool = False, steps: int = STEPS, threshold: float = THRESHOLD, set=None, out: str | Path | None = None,
     progress: Progress | None = None, jobs: int = 1, dask: str | None = None,
 ) -> Stability:  # fmt: skip
-    """One row for each scheme and method, those of the case if None, about its start or the state at `at` [s].
+    """Compute a row for each scheme and method (those of the case if None) about the start or the state at `at` [s].
 
-    Finished rows are kept in `out` and reused; jobs, dask : who makes them, as in `sweep`. Raises CaseError, and
-    FvsolveError for a state that cannot be linearised or counts of steps that say nothing.
+    Finished rows are stored in `out` and reused; jobs, dask : processes, as in `sweep`. Raises CaseError, and
+    FvsolveError for a state that cannot be linearised, and for too few steps or too small a threshold.
     """
     if steps < 10 or not threshold > 1.0:
-        raise FvsolveError(f"steps = {steps}, threshold = {threshold:g}: wanted at least 10 steps and growth above 1")
+        raise FvsolveError(
+            f"steps = {steps}, threshold = {threshold:g}: expected at least 10 steps and a threshold above 1"
+        )
     case = load(case, dict(set or {}))
     case = load(case, settled(case))
     if lines(case) and at is not None:
-        raise FvsolveError("stability of delay lines is about the start, for what is on its way later is not carried; "
-                           'leave out --at, or say numerics.line = "cells"')  # fmt: skip
+        raise FvsolveError("stability of delay lines is computed about the start only: later waves in lines are not "
+                           'included; leave out --at, or set numerics.line = "cells"')  # fmt: skip
     schemes = names(schemes) or [case.numerics.scheme]
-    asked = names(methods) or [case.numerics.method]
-    methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in asked))
-    said = (AUTOMATIC,) if AUTO in asked else ()
-    asked = {"at": at, "before": before, "steps": steps, "threshold": threshold}
-    work, pairs = StabilityWork(case, **asked), [*itertools.product(schemes, methods)]
-    with Points(out) as points, Bench(work, jobs, dask) as bench:
-        found = kept_rows(points, case, asked, pairs, bench, progress or (lambda *_: None))
-    return Stability(case.name, tuple(map(read, found)), said, {one: work.maker(one).side for one in schemes})
+    requested = names(methods) or [case.numerics.method]
+    methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in requested))
+    texts = (AUTOMATIC,) if AUTO in requested else ()
+    requested = {"at": at, "before": before, "steps": steps, "threshold": threshold}
+    work, pairs = StabilityWork(case, **requested), [*itertools.product(schemes, methods)]
+    with Points(out) as points, Bench(work, jobs, dask) as pool:
+        rows = kept_rows(points, case, requested, pairs, pool, progress or (lambda *_: None))
+    return Stability(case.name, tuple(map(read, rows)), texts, {scheme: work.maker(scheme).side for scheme in schemes})
 
 
-def kept_rows(points: Points, case, asked: dict, pairs: list, bench: Bench, tell: Progress) -> list[dict]:
-    """Rows of pairs of a scheme and a method, those that are not known made by `bench` and kept as they come."""
-    extras = [{"study": "stability", "scheme": scheme, "method": method, **asked} for scheme, method in pairs]
-    found = [points.find(case, extra) for extra in extras]
-    new = [k for k, row in enumerate(found) if row is None]
+def kept_rows(points: Points, case, options: dict, pairs: list, pool: Bench, report: Progress) -> list[dict]:
+    """Rows of pairs (scheme, method); missing rows are computed by `pool` and stored as they are finished."""
+    keys = [{"study": "stability", "scheme": scheme, "method": method, **options} for scheme, method in pairs]
+    rows = [points.find(case, extra) for extra in keys]
+    new = [k for k, row in enumerate(rows) if row is None]
 
-    def said(count: int) -> None:
+    def progress(count: int) -> None:
         known = len(pairs) - len(new)
-        tell(known + count, len(pairs), "".join(" with ".join(pairs[k]) for k in new[count : count + 1]))
+        report(known + count, len(pairs), "".join(" with ".join(pairs[k]) for k in new[count : count + 1]))
 
-    said(0)
-    for count, (number, row) in enumerate(bench.do([pairs[k] for k in new]), 1):
-        at = new[number]
-        found[at] = points.keep(key_of(case, extras[at]), extras[at], row)
-        said(count)
-    return found
+    progress(0)
+    for count, (number, row) in enumerate(pool.do([pairs[k] for k in new]), 1):
+        index = new[number]
+        rows[index] = points.keep(key_of(case, keys[index]), keys[index], row)
+        progress(count)
+    return rows
 
 
 class StabilityWork:
-    """What makes rows of one case about one state, wherever."""
+    """Task that computes rows of a case about one state, in any process."""
 
-    def __init__(self, case, **asked) -> None:
-        self.sent, self.asked = Sent(case), asked
+    def __init__(self, case, **options) -> None:
+        self.sent, self.asked = Sent(case), options
         self.makers: dict[str, Maker] = {}
 
     def __call__(self, pair: tuple[str, str]) -> dict:
@@ -166,14 +168,14 @@ class StabilityWork:
         return self.maker(scheme).row(method).plain()
 
     def maker(self, scheme: str) -> Maker:
-        """What makes the rows of a scheme."""
+        """Object that computes the rows of a scheme."""
         if scheme not in self.makers:
             self.makers[scheme] = Maker(load(self.sent.source), scheme, **self.asked)
         return self.makers[scheme]
 
     def lost(self, pair: tuple[str, str]) -> dict:
-        """Nothing can stand for it."""
-        raise RunError(f"the process that made the row of {' with '.join(pair)} has ended, again and again; was memory "
+        """Raise RunError for a row whose process has ended."""
+        raise RunError(f"the process for the row of {' with '.join(pair)} has ended repeatedly; was memory "
                        "too small?")  # fmt: skip
 
     def __getstate__(self) -> dict:
@@ -181,7 +183,7 @@ class StabilityWork:
 
 
 class Maker:
-    """Rows of one scheme; what they share is made once, on first use."""
+    """Rows of one scheme; shared data are computed once, on first use."""
 
     def __init__(self, case, scheme: str, at: float | None, before: bool, steps: int, threshold: float) -> None:
         self.case, self.scheme, self.time, self.before = case, scheme, at, before
@@ -190,54 +192,55 @@ class Maker:
         self.sides: dict[str, Side] = {}
 
     def at(self, scheme: str) -> Frozen:
-        """The state with a scheme."""
+        """Operating point with a scheme."""
         if scheme not in self.states:
             self.states[scheme] = frozen(self.case, {"numerics.scheme": scheme}, self.time, self.before)
         return self.states[scheme]
 
     def side(self, scheme: str) -> Side:
-        """The linear system of a scheme."""
+        """Linear system with a scheme."""
         if scheme not in self.sides:
             self.sides[scheme] = Side(self.at(scheme))
         return self.sides[scheme]
 
     def frozen_sides(self) -> Iterator[tuple[str, Side]]:
-        """Linear systems with the weights of the limited scheme standing still; same cells, same state."""
+        """Linear systems with fixed weights of the limited scheme, for equal cells and state."""
         at = self.at(self.scheme)
-        if at.model.cavitates or at.model.basins:  # which have no linear scheme but this
+        if at.model.cavitates or at.model.basins:  # their only linear scheme is upwind
             yield "upwind", Side(replace(self.at("upwind"), y=at.y))
             return
         for name, weights in branches(self.scheme, at.model.case.numerics.limiter).items():
             if name not in self.sides:
                 cells = sum(weight != 0 for weight in weights)
-                degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")  # of the ends
-                wide = replace(self.at("upwind5"), y=at.y)
-                self.sides[name] = Side(reweighted(wide, tuple(map(float, weights)), degree))
+                # degree of the polynomials at pipe ends
+                degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")
+                point = replace(self.at("upwind5"), y=at.y)
+                self.sides[name] = Side(reweighted(point, tuple(map(float, weights)), degree))
             yield name, self.sides[name]
 
     def row(self, name: str) -> StabilityRow:
-        """The row of a method."""
+        """Row of a method."""
         method = method_named(name)
         if lines(self.case):
             return delayed_row(self.case, self.scheme, method, self.steps, self.threshold)
         if has_limiter(self.at(self.scheme).model):
             return self.limited(method)
         side = self.side(self.scheme)
-        one = system(method, side.e, self.steps, self.threshold)
-        limit = predicted(one)
-        grown = one.growth(limit.fails) if np.isfinite(limit.fails) else None
-        worst = grown and grown.start
+        growth = system(method, side.e, self.steps, self.threshold)
+        limit = predicted(growth)
+        greatest = growth.growth(limit.fails) if np.isfinite(limit.fails) else None
+        worst = greatest and greatest.start
         runs = Runs(side.at, method.name, side.form, worst, self.steps, self.threshold, a=side.linear.a)
         row = self.bounded(side, method) | {"predicted": limit.step}
-        if grown:
-            where, share = place(side.form, grown.end)
-            row |= {"growth": grown.size, "after": grown.steps, "where": where, "share": share}
-        row |= measure(runs, limit.step, one.size, row["left_out"])
-        found = StabilityRow(**row)
-        return StabilityRow(**row | {"notes": tuple(notes(found, side, one))})
+        if greatest:
+            where, share = place(side.form, greatest.end)
+            row |= {"growth": greatest.size, "after": greatest.steps, "where": where, "share": share}
+        row |= measure(runs, limit.step, growth.size, row["left_out"])
+        result = StabilityRow(**row)
+        return StabilityRow(**row | {"notes": tuple(notes(result, side, growth))})
 
     def bounded(self, side: Side, method) -> dict:
-        """What is known without a power: names, sizes, bounds."""
+        """Columns of a row that need no powers: names, sizes, bounds."""
         model, left_out = side.at.model, {}
         values = side.spectrum
         row = {
@@ -247,7 +250,7 @@ class Maker:
             "greatest_real": float(values.values.real.max(initial=0.0)),
         }  # fmt: skip
         if not values.complete:
-            left_out["eigenvalues"] = f"the limit may be lower, from {values.said}"
+            left_out["eigenvalues"] = f"the limit may be lower; it is computed from {values.said}"
         if model.y_size <= WIDE:
             row["field_of_values"] = region_limit(method, side.field)
         else:
@@ -255,31 +258,33 @@ class Maker:
         if model.cells:
             row["von_neumann"] = on_a_long_pipe(self.scheme, method) / float(model.wave_rates.max())
         if model.y_size > DENSE:
-            left_out["squaring"] = f"{model.y_size} states: predicted by {VECTORS} vectors carried along"
+            left_out["squaring"] = f"{model.y_size} states: predicted by powers applied to {VECTORS} vectors"
         return row | {"left_out": left_out}
 
     def limited(self, method) -> StabilityRow:
-        """The row of a limited scheme: limits with its weights frozen, and the measured one."""
+        """Row of a limited scheme: limits with frozen weights, and the measured limit."""
         at = self.at(self.scheme)
-        found, starts, left_out, latest = {}, {}, {}, time.monotonic() + LONGEST
+        limits, starts, left_out, latest = {}, {}, {}, time.monotonic() + LONGEST
         try:
             for name, side in self.frozen_sides():
-                one = system(method, side.e, self.steps, self.threshold, latest)
-                limit = predicted(one)
-                found[name] = limit.step
+                growth = system(method, side.e, self.steps, self.threshold, latest)
+                limit = predicted(growth)
+                limits[name] = limit.step
                 if 0.0 < limit.step < np.inf:
-                    starts[limit.step] = one.growth(limit.fails).start
+                    starts[limit.step] = growth.growth(limit.fails).start
         except TooLarge as error:
             left_out["frozen weights"] = str(error)
-        guess = sorted(starts)[len(starts) // 2] if starts else np.inf  # between the flat and the steep ones
+        guess = (
+            sorted(starts)[len(starts) // 2] if starts else np.inf
+        )  # the middle value, between those of small and large slopes
         if left_out and not starts:
             guess = on_a_long_pipe(SCHEMES[self.scheme].smooth.name, method) / side.rate or np.inf
         runs = Runs(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, VISIBLE)
         row = {
             "scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
-            "steps": self.steps, "threshold": self.threshold, "rate": side.rate, "frozen": found, "left_out": left_out,
+            "steps": self.steps, "threshold": self.threshold, "rate": side.rate, "frozen": limits, "left_out": left_out,
         }  # fmt: skip
-        row |= measure(runs, guess, one.size, row["left_out"])
+        row |= measure(runs, guess, growth.size, row["left_out"])
         if method.stages == 1 and method.explicit and np.isfinite(row.get("measured", np.nan)):
             longer = Runs(at, method.name, side.form, starts.get(guess), LONGER * self.steps, self.threshold, VISIBLE)
             row["longer"] = measure(longer, row["measured"], 0.0, row["left_out"], "longer").get("measured", np.nan)
@@ -287,14 +292,14 @@ class Maker:
 
 
 def on_a_long_pipe(scheme: str, method) -> float:
-    """Von Neumann's limit, a Courant number."""
+    """Von Neumann's limit of the Courant number."""
     from fvsolve.limits.grid import advection_limit
 
     return advection_limit(scheme, method.name).limit
 
 
 def place(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
-    """(part with most of the energy of a unit vector, its share)."""
+    """(part with the most energy of a unit vector, its share)."""
     shares: dict[str, float] = {}
     for part, root in zip(form.parts, form.rows @ (form.back @ end), strict=True):
         shares[part] = shares.get(part, 0.0) + float(root**2)

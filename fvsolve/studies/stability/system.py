@@ -1,4 +1,4 @@
-"""Which way the powers of a step are looked at, by size, and the limit that they give. Knows sizes."""
+"""Choice of the method for powers of a step by the number of states, and the predicted limit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD, DenseGrowt
 def system(
     method: Method, e: Any, steps: int = STEPS, threshold: float = THRESHOLD, latest: float | None = None
 ) -> Any:
-    """The kind that fits the size; a large one answers until `latest` on the monotonic clock."""
+    """Growth of steps by full matrices, or by vectors above `DENSE` states; latest : end on the monotonic clock [s]."""
     if e.shape[0] <= DENSE:
         return DenseGrowth(method, e if isinstance(e, np.ndarray) else e.toarray(), steps, threshold)
     from scipy.sparse import csr_array
@@ -24,8 +24,8 @@ def system(
     return Sparse(method, csr_array(e), steps, threshold, latest)
 
 
-def predicted(one: Any) -> Limit:
-    """The greatest step below which none fails, for a linear system; looked for from 0.1 to 1e4 over ||J||."""
-    if one.size == 0.0:
+def predicted(growth: Any) -> Limit:
+    """Limit of the step of a linear system, below which no step fails; searched from 0.1 to 1e4 over ||J||."""
+    if growth.size == 0.0:
         return Limit(np.inf, np.inf)
-    return one.limit()
+    return growth.limit()
