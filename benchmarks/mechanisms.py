@@ -36,7 +36,7 @@ WHOLE = "import fvsolve; m = fvsolve.build(fvsolve.load({case!r})); m.rhs(0.0, m
 
 def chain(many: int) -> dict:
     """Revolute joints about random axes, each body on the one before."""
-    from truth.trees import random_tree
+    from reference.trees import random_tree
 
     found = random_tree(np.random.default_rng(many), many, "revolute", kinds=("revolute",))
     for k in range(1, many):
@@ -61,7 +61,7 @@ def calls(call) -> float:
 
 def rates(bodies: dict):
     """A call of the compiled rates of a chain, as a stepper makes it, so many calls, and where the rates are."""
-    from truth.bodies import bodies as scene_of
+    from reference.bodies import bodies as scene_of
 
     import fvsolve
     from fvsolve.steppers.signatures import addresses, rhs_at
@@ -89,7 +89,7 @@ def beside(call, peer) -> tuple[float, float]:
 
 def speed() -> None:
     """Accelerations of chains."""
-    from truth.trees import pinocchio_of
+    from reference.trees import pinocchio_of
 
     print(f"{'bodies':>6} {'in a loop':>10} {'from Python':>12} {'pin.aba from Python':>20} {'ratios (goal 0.75)':>20}")
     for many in SIZES:
@@ -168,8 +168,8 @@ def at_error(name: str, solve, settings, finest) -> tuple[float, np.ndarray]:
 
 def compiling() -> None:
     """A pendulum in an empty cache, beside a scene of two masses there."""
-    from truth.bodies import bodies, pendulum
-    from truth.scenes import scene
+    from reference.bodies import bodies, pendulum
+    from reference.scenes import scene
 
     masses = scene({"a": {"type": "mass", "mass": 1.0}, "b": {"type": "frame"}},
                    {"s": {"type": "spring", "from": "b", "to": "a", "stiffness": 1.0}}, 1.0, {})  # fmt: skip

@@ -24,8 +24,8 @@ OPENS = ((0.1, 0.0), (0.12, 1.0), (0.5, 1.0), (0.52, 0.0))
 
 def chain_case(steps: int) -> dict:
     """Three even rods, one below the other, as a case of rk4."""
-    from truth.bodies import bodies
-    from truth.trees import body
+    from reference.bodies import bodies
+    from reference.trees import body
 
     found, half = {}, [0, 0, -LINK["length"] / 2]
     for k, angle in enumerate(CHAIN):
@@ -68,9 +68,9 @@ def held() -> float:
 
 def arm_case(rtol: float) -> dict:
     """An arm lifted through a valve that opens for 0.4 s, as a case."""
-    from truth.bodies import bodies
-    from truth.scenes import AMBIENT, reservoir
-    from truth.trees import body
+    from reference.bodies import bodies
+    from reference.scenes import AMBIENT, reservoir
+    from reference.trees import body
 
     hinge = {"kind": "revolute", "axis": [0, -1, 0]}
     nodes = {

@@ -38,7 +38,7 @@ def beside(name: str, tolerances, rounds: int, methods: list[str]) -> float:
     """Print what each error costs in a case; returns what `auto` costs beside the best, at worst."""
     path = next(
         p
-        for p in (HERE.parent / "cases" / f"{name}.toml", HERE.parent / "tests" / "truth" / f"{name}.toml")
+        for p in (HERE.parent / "cases" / f"{name}.toml", HERE.parent / "tests" / "reference" / f"{name}.toml")
         if p.exists()
     )
     case, truth = load(path), outcome(path, TRUTH)

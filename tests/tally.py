@@ -6,7 +6,7 @@ import functools
 from collections import defaultdict
 from importlib import import_module
 
-from truth import folders
+from reference import folders
 
 
 class Tally:

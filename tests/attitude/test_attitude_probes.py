@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from truth.scenes import scene
+from reference.scenes import scene
 
 from fvsolve import attitude as at
 from fvsolve import build, load

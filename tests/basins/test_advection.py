@@ -7,8 +7,8 @@ import copy
 import numpy as np
 import pytest
 from pytest import approx
+from reference.carried import NONE, SCHEMES, Carried, carried, means, ring_rates
 from scipy.special import erfc
-from truth.carried import NONE, SCHEMES, Carried, carried, means, ring_rates
 
 from fvsolve.basins import diffusion
 from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows

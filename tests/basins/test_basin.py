@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
+from reference.scenes import AMBIENT, GRAVITY, WATER, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 from scipy.optimize import brentq
-from truth.scenes import AMBIENT, GRAVITY, WATER, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.errors import CaseError, FvsolveError

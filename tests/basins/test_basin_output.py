@@ -10,10 +10,10 @@ import meshio
 import numpy as np
 import pytest
 from pytest import approx
+from reference.meshes import delaunay, shaken, write
+from reference.scenes import AMBIENT, GRAVITY, RHO, lake, pipe, ramp, reservoir, scene, valve
 from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial import Delaunay
-from truth.meshes import delaunay, shaken, write
-from truth.scenes import AMBIENT, GRAVITY, RHO, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.basins.liquid.observe import observe_liquid

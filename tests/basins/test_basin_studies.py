@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from model.test_sparsity import stray
 from pytest import approx
-from truth.folders import CASES
-from truth.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
+from reference.folders import CASES
+from reference.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.basins.free_surface.lower import FreeSurfaceRows

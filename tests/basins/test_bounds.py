@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from basins.test_faces import triangles
-from truth.scenes import pipe, reservoir, scene
+from reference.scenes import pipe, reservoir, scene
 
 import fvsolve
 

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from pytest import approx
+from reference.log_law import LogFluid, Riemann
+from reference.meshes import corner_lists, shaken, write
+from reference.orders import observed_order
 from scipy.optimize import brentq
 from scipy.special import erfc
-from truth.log_law import LogFluid, Riemann
-from truth.meshes import corner_lists, shaken, write
-from truth.orders import observed_order
 
 from fvsolve.basins import advection_faces
 from fvsolve.basins.free_surface import faces as shallow_faces

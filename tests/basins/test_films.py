@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth.meshes import write
-from truth.scenes import GRAVITY as G
-from truth.scenes import reservoir, scene
+from reference.meshes import write
+from reference.scenes import GRAVITY as G
+from reference.scenes import reservoir, scene
 
 import fvsolve
 

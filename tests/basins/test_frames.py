@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from truth.scenes import GRAVITY, scene
+from reference.scenes import GRAVITY, scene
 
 from fvsolve import advance, build, load, run
 from fvsolve.errors import CaseError

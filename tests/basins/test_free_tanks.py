@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from reference.scenes import GRAVITY, RHO, scene
 from scipy.optimize import brentq
-from truth.scenes import GRAVITY, RHO, scene
 
 from fvsolve import advance, build, load, run
 from fvsolve.model.model import State

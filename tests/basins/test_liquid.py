@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from pytest import approx
+from reference.log_law import LogFluid, Riemann, SimpleWave
+from reference.orders import mean_error, observed_order
+from reference.scenes import NO_FRICTION, junction, reservoir, scene, stiff_pipe
 from scipy.integrate import quad_vec
 from scipy.interpolate import CubicSpline
 from scipy.special import j0
-from truth.log_law import LogFluid, Riemann, SimpleWave
-from truth.orders import mean_error, observed_order
-from truth.scenes import NO_FRICTION, junction, reservoir, scene, stiff_pipe
 
 import fvsolve
 from fvsolve.basins.liquid import grid as liquid

@@ -7,10 +7,10 @@ import pytest
 from basins import test_faces
 from basins.test_liquid import RHO, SCHEMES, Box, C, noise
 from pytest import approx
-from truth.isentrope import Isentrope, Riemann
-from truth.meshes import write
-from truth.plain import boundary, triangles
-from truth.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
+from reference.isentrope import Isentrope, Riemann
+from reference.meshes import write
+from reference.plain import boundary, triangles
+from reference.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
 from fvsolve.basins.liquid import waves

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from reference.meshes import write
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, ramp, scene, smooth_ramp, smooth_step
 from scipy.integrate import trapezoid
 from scipy.optimize import brentq
-from truth.meshes import write
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, ramp, scene, smooth_ramp, smooth_step
 
 from fvsolve import advance, build, load, run
 from fvsolve.basins.lower_mesh import lower_mesh

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from model.test_sparsity import stray
 from pytest import approx
-from truth.meshes import write
-from truth.plain import boundary, triangles
-from truth.scenes import RHO, WATER, scene
+from reference.meshes import write
+from reference.plain import boundary, triangles
+from reference.scenes import RHO, WATER, scene
 
 import fvsolve
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import pytest
 from pytest import approx
-from truth.scenes import WATER
+from reference.scenes import WATER
 
 import fvsolve
 from fvsolve.basins.lower import lowered_by

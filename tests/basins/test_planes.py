@@ -8,9 +8,9 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth.meshes import write
-from truth.plain import boundary, triangles
-from truth.scenes import AMBIENT, RHO, lake, pipe, ramp, reservoir, scene, valve
+from reference.meshes import write
+from reference.plain import boundary, triangles
+from reference.scenes import AMBIENT, RHO, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import CaseError

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from reference.scenes import scene
 from scipy.interpolate import CubicSpline
-from truth.scenes import scene
 
 from fvsolve import advance, build, load
 from fvsolve.model.model import State

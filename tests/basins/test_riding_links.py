@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 from model.test_sparsity import stray
+from reference.meshes import write
+from reference.plain import boundary, triangles
+from reference.scenes import AMBIENT, GRAVITY, RHO, scene
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
-from truth.meshes import write
-from truth.plain import boundary, triangles
-from truth.scenes import AMBIENT, GRAVITY, RHO, scene
 
 import fvsolve as fv
 from fvsolve.errors import CaseError, FvsolveError

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from reference.meshes import shaken, write
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, scene
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import j0
-from truth.meshes import shaken, write
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, scene
 
 from fvsolve import advance, build, load, run
 from fvsolve.errors import CaseError, FvsolveError

@@ -7,9 +7,9 @@ import math
 import meshio
 import numpy as np
 import pytest
+from reference.potential import added
+from reference.scenes import GRAVITY, RHO, scene, smooth_ramp
 from scipy.optimize import brentq
-from truth.potential import added
-from truth.scenes import GRAVITY, RHO, scene, smooth_ramp
 
 from fvsolve import advance, build, load, run
 from fvsolve.case import sloshing

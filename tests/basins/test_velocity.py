@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth.meshes import shaken, write
-from truth.plain import triangles, write_msh
-from truth.scenes import scene
+from reference.meshes import shaken, write
+from reference.plain import triangles, write_msh
+from reference.scenes import scene
 
 import fvsolve
 from fvsolve.basins.transport.lower_velocity import EXPRESSIONS, face_flows, grid_flows

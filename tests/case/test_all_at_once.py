@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from case.test_placing import placed
-from truth.folders import DOCS
+from reference.folders import DOCS
 
 import fvsolve
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pytest import approx
-from truth import folders
+from reference import folders
 
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
 from fvsolve.case import sections as defaults

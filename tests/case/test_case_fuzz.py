@@ -9,7 +9,7 @@ from case.test_placing import placed
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis_profiles import examples
-from truth import folders
+from reference import folders
 
 from fvsolve.case import Case, load
 from fvsolve.case.lines import key_lines

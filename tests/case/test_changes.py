@@ -6,8 +6,8 @@ import tomllib
 from collections import Counter
 
 import pytest
-from truth.folders import CASES
-from truth.scenes import pipe, reservoir, scene
+from reference.folders import CASES
+from reference.scenes import pipe, reservoir, scene
 
 import fvsolve
 from fvsolve.case.changes import CLASSES, changes, declared

@@ -1,7 +1,7 @@
 """[defaults.pipe]: what pipes are that do not say it themselves; faults stand where they were written, once."""
 
 import pytest
-from truth.scenes import junction, lake, scene
+from reference.scenes import junction, lake, scene
 
 from fvsolve import load
 from fvsolve.case.changes import changes

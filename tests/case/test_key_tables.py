@@ -1,7 +1,7 @@
 """The key tables of docs/parts.md are the declarations: each table as it is made now, each part with one."""
 
 import pytest
-from truth.folders import page as page_of
+from reference.folders import page as page_of
 
 from fvsolve.case.key_tables import MARK, key_table, main, page
 from fvsolve.errors import FvsolveError

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
+from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
 
 import fvsolve
 from fvsolve.report.legs import ways

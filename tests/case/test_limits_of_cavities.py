@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, GRAVITY, RHO, SHARP, area, junction, lake, pipe, ramp, reservoir, scene, valve
+from reference.scenes import AMBIENT, GRAVITY, RHO, SHARP, area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import FvsolveError

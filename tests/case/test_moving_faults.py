@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from truth.scenes import scene
+from reference.scenes import scene
 
 import fvsolve
 from fvsolve.errors import CaseError

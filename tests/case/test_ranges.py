@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from case.test_faults import SCENE
-from truth import scenes
+from reference import scenes
 
 from fvsolve import run
 from fvsolve.case import load

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from truth.scenes import chamber, lake, pipe, scene, tank, valve
+from reference.scenes import chamber, lake, pipe, scene, tank, valve
 
 import fvsolve
 from fvsolve import build, load

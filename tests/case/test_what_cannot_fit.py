@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 
 import pytest
-from truth.fork import branched
-from truth.scenes import still
+from reference.fork import branched
+from reference.scenes import still
 
 import fvsolve
 from fvsolve.case.size import free_memory, on_disk

@@ -11,7 +11,7 @@ import time
 
 import numpy as np
 import pytest
-from truth import folders
+from reference import folders
 
 from fvsolve.cli import main
 

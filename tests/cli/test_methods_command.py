@@ -7,7 +7,7 @@ import math
 import re
 
 import pytest
-from truth import folders
+from reference import folders
 
 from fvsolve.steppers import METHODS, Facts, analyse
 

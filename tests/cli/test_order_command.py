@@ -7,8 +7,8 @@ import json
 
 import pytest
 from pytest import approx
-from truth import pulses, scenes
-from truth.order_json import call, studies
+from reference import pulses, scenes
+from reference.order_json import call, studies
 
 from fvsolve.studies import order
 from fvsolve.studies.outcome import grown

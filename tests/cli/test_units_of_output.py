@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from truth.scenes import junction, lake, pipe, ramp, reservoir, scene, valve
+from reference.scenes import junction, lake, pipe, ramp, reservoir, scene, valve
 
 from fvsolve.case import load
 from fvsolve.cli.response import unit_in

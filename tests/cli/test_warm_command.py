@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from truth.folders import CASES
+from reference.folders import CASES
 
 from fvsolve import jit
 

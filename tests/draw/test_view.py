@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import lake, pipe, scene, valve
+from reference.scenes import lake, pipe, scene, valve
 
 import fvsolve
 from fvsolve.draw import water

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pytest import approx
+from reference import pulses, rays, scenes, vessels
+from reference.allievi import relative_drop
 from scipy.integrate import quad, solve_ivp
-from truth import pulses, rays, scenes, vessels
-from truth.allievi import relative_drop
 
 from fvsolve import exact
 from fvsolve.case import load

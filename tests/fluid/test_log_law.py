@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference import scenes
+from reference.log_law import LogFluid, Riemann, SimpleWave
+from reference.orders import observed_order
+from reference.scenes import AMBIENT, chamber, junction, lake, pipe, reservoir, scene, stiff_pipe, valve
 from scipy.optimize import brentq
-from truth import scenes
-from truth.log_law import LogFluid, Riemann, SimpleWave
-from truth.orders import observed_order
-from truth.scenes import AMBIENT, chamber, junction, lake, pipe, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
+from reference.air import ATM, AirOil, follow, orifice
+from reference.scenes import chamber, junction, pipe, ramp, reservoir, scene, valve
 from scipy.integrate import quad
-from truth.air import ATM, AirOil, follow, orifice
-from truth.scenes import chamber, junction, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import CaseError

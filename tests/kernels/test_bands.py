@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from truth.folders import CASES
+from reference.folders import CASES
 
 import fvsolve
 from fvsolve.kernels.handle import make_handle

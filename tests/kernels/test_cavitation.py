@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth import column_separation, scenes, summit
-from truth.column_separation import cavity
-from truth.folders import CASES
-from truth.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, valve
+from reference import column_separation, scenes, summit
+from reference.column_separation import cavity
+from reference.folders import CASES
+from reference.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import CaseError

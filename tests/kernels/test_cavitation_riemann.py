@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth import scenes
-from truth.mixture import Mixture, Riemann
-from truth.orders import observed_order
-from truth.scenes import AMBIENT, junction, reservoir, scene, stiff_pipe
+from reference import scenes
+from reference.mixture import Mixture, Riemann
+from reference.orders import observed_order
+from reference.scenes import AMBIENT, junction, reservoir, scene, stiff_pipe
 
 import fvsolve
 from fvsolve.kernels.riemann import face_flux, side_at, star

@@ -6,8 +6,8 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from truth.folders import CASES
-from truth.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservoir, scene, tank, valve
+from reference.folders import CASES
+from reference.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.case import load

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.scenes import GRAVITY, scene
-from truth.trees import pinocchio_of, random_tree
+from reference.scenes import GRAVITY, scene
+from reference.trees import pinocchio_of, random_tree
 
 import fvsolve
 from fvsolve.kernels.mechanism.room import ACCELERATION, ATTITUDE, PLACE, TURNING

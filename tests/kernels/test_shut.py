@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from reference.scenes import junction, lake, ramp, scene, valve
 from scipy.optimize import brentq
-from truth.scenes import junction, lake, ramp, scene, valve
 
 import fvsolve
 

@@ -6,7 +6,7 @@ from math import factorial
 
 import numpy as np
 import pytest
-from truth.scenes import NO_FRICTION, junction, lake, pipe, scene
+from reference.scenes import NO_FRICTION, junction, lake, pipe, scene
 
 import fvsolve
 from fvsolve.limits.ends import pipe_limit

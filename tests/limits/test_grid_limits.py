@@ -12,7 +12,7 @@ import pytest
 from hypothesis import Phase, given
 from hypothesis import strategies as st
 from hypothesis_profiles import examples
-from truth import folders
+from reference import folders
 
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError

@@ -10,8 +10,8 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, WATER, chamber, junction, lake, pipe, ramp, reservoir, scene, step, tank
 from scipy.optimize import brentq
-from truth.scenes import AMBIENT, WATER, chamber, junction, lake, pipe, ramp, reservoir, scene, step, tank
 
 import fvsolve
 from fvsolve.limits.lumped import lumped_modes

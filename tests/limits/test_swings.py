@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from truth.bodies import pendulum
-from truth.scenes import scene
+from reference.bodies import pendulum
+from reference.scenes import scene
 
 import fvsolve
 

@@ -6,8 +6,8 @@ import meshio
 import numpy as np
 import pytest
 from pytest import approx
+from reference.meshes import MSH4, SQUARE, TWO, corner_lists, delaunay, sets, shaken, write
 from scipy.spatial import ConvexHull
-from truth.meshes import MSH4, SQUARE, TWO, corner_lists, delaunay, sets, shaken, write
 
 from fvsolve.errors import MeshError
 from fvsolve.mesh import quality, read, rectangle

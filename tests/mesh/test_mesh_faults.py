@@ -6,7 +6,7 @@ import meshio
 import numpy as np
 import pytest
 from pytest import approx
-from truth.meshes import MSH4, SQUARE, TWO, write
+from reference.meshes import MSH4, SQUARE, TWO, write
 
 from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import contact, read, rectangle

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from truth.delays import (
+from reference.delays import (
     AREA,
     BORE,
     FLOW,
@@ -22,7 +22,7 @@ from truth.delays import (
     square,
     turned,
 )
-from truth.scenes import RHO, scene
+from reference.scenes import RHO, scene
 
 import fvsolve
 from fvsolve import studies

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, chamber, junction, lake, pipe, scene, step, valve
 from scipy.integrate import solve_ivp
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, area, chamber, junction, lake, pipe, scene, step, valve
 
 import fvsolve
 

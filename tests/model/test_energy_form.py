@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from truth.scenes import scene
+from reference.scenes import scene
 
 from fvsolve.model.energy import energy_form, form_of
 from fvsolve.steppers import method_named, stability_function

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
+from reference.bodies import Crane, bodies, pendulum
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, reservoir, valve
+from reference.trees import body
 from scipy.optimize import brentq, minimize, root
 from scipy.spatial.transform import Rotation
-from truth.bodies import Crane, bodies, pendulum
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, reservoir, valve
-from truth.trees import body
 
 import fvsolve
 from fvsolve.case.changes import changes

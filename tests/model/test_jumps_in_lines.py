@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.delays import turned
-from truth.scenes import AMBIENT, NO_FRICTION, RHO, junction, lake, scene, step, valve
+from reference.delays import turned
+from reference.scenes import AMBIENT, NO_FRICTION, RHO, junction, lake, scene, step, valve
 
 import fvsolve
 

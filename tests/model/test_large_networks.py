@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truth.scenes import junction, lake, pipe, scene
+from reference.scenes import junction, lake, pipe, scene
 
 import fvsolve
 

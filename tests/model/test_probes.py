@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.scenes import WATER, junction, pipe, reservoir, scene, valve
+from reference.scenes import WATER, junction, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.model.reading import around

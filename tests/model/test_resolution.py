@@ -5,8 +5,8 @@ from __future__ import annotations
 from copy import deepcopy
 
 import pytest
-from truth import scenes
-from truth.scenes import junction, lake, pipe, ramp, reservoir, scene, step, valve
+from reference import scenes
+from reference.scenes import junction, lake, pipe, ramp, reservoir, scene, step, valve
 
 import fvsolve
 from fvsolve.case import load, shipped

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth import scenes
-from truth.scenes import AMBIENT, NO_FRICTION, junction, lake, pipe, reservoir, scene, step, tank, valve
+from reference import scenes
+from reference.scenes import AMBIENT, NO_FRICTION, junction, lake, pipe, reservoir, scene, step, tank, valve
 
 import fvsolve
 

@@ -8,7 +8,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from truth.folders import CASES
+from reference.folders import CASES
 
 import fvsolve
 from fvsolve.model import Model, Slate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import AMBIENT, GRAVITY, RHO, reservoir, scene, valve
+from reference.scenes import AMBIENT, GRAVITY, RHO, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.errors import CaseError

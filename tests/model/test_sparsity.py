@@ -6,10 +6,10 @@ import functools
 
 import numpy as np
 import pytest
+from reference import folders
+from reference.random_networks import random_network
+from reference.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 from scipy.sparse import csc_array
-from truth import folders
-from truth.random_networks import random_network
-from truth.scenes import NO_FRICTION, SHARP, lake, pipe, scene
 
 import fvsolve
 from fvsolve.jit import COMPILING, njit

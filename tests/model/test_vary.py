@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 from case.test_changes import DYED, LARGE, OTHERS, leaves, others, raw_case, spoken
-from truth.folders import CASES
+from reference.folders import CASES
 
 import fvsolve
 from fvsolve.case.changes import declared

@@ -7,7 +7,7 @@ import math
 import meshio
 import numpy as np
 import pytest
-from truth.scenes import scene
+from reference.scenes import scene
 
 from fvsolve import run
 from fvsolve.errors import RunError

@@ -7,7 +7,7 @@ import subprocess
 import sys
 
 import pytest
-from truth.scenes import still
+from reference.scenes import still
 
 import fvsolve
 from fvsolve.errors import RunError

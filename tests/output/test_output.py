@@ -10,8 +10,8 @@ from types import SimpleNamespace
 import meshio
 import numpy as np
 import pytest
-from truth.fork import PROBES, branched
-from truth.scenes import AMBIENT
+from reference.fork import PROBES, branched
+from reference.scenes import AMBIENT
 
 import fvsolve
 from fvsolve.output import layout

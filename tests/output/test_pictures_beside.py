@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from truth.fork import branched
+from reference.fork import branched
 
 import fvsolve
 from fvsolve.draw.beside import processors

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, RHO, WATER, area, lake, reservoir, scene
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from truth.scenes import AMBIENT, RHO, WATER, area, lake, reservoir, scene
 
 import fvsolve
 from fvsolve.model.dependence import sparsity

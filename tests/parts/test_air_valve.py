@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from reference.bores import HEAT, SMALL, bores
+from reference.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 from scipy.integrate import solve_ivp
-from truth.bores import HEAT, SMALL, bores
-from truth.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.model import Slate

@@ -7,11 +7,24 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from reference.bores import HEAT, bores
+from reference.scenes import (
+    AMBIENT,
+    GRAVITY,
+    NO_FRICTION,
+    RHO,
+    WATER,
+    area,
+    junction,
+    ramp,
+    reservoir,
+    scene,
+    step,
+    tank,
+)
+from reference.scenes import valve as gate
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from truth.bores import HEAT, bores
-from truth.scenes import AMBIENT, GRAVITY, NO_FRICTION, RHO, WATER, area, junction, ramp, reservoir, scene, step, tank
-from truth.scenes import valve as gate
 
 import fvsolve
 from fvsolve.model import State

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from truth import rays, scenes
-from truth.allievi import relative_drop
-from truth.scenes import AMBIENT, RHO, SHARP, junction, pipe, ramp, reservoir, scene, valve
+from reference import rays, scenes
+from reference.allievi import relative_drop
+from reference.scenes import AMBIENT, RHO, SHARP, junction, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
+from reference.scenes import scene
 from scipy.spatial.transform import Rotation
-from truth.scenes import scene
 
 from fvsolve import load
 from fvsolve.errors import CaseError

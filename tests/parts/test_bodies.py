@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from model.test_sparsity import stray
 from pytest import approx
+from reference.bodies import CLOSE, OIL, Crane, bodies, pendulum
+from reference.cylinders import valve_flow
+from reference.scenes import AMBIENT, GRAVITY, scene
+from reference.trees import body, random_tree, turn
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipk
-from truth.bodies import CLOSE, OIL, Crane, bodies, pendulum
-from truth.cylinders import valve_flow
-from truth.scenes import AMBIENT, GRAVITY, scene
-from truth.trees import body, random_tree, turn
 
 import fvsolve
 from fvsolve.studies import energy, linearise, stability

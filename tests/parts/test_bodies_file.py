@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 from parts.test_bodies import parallelogram
-from truth.bodies import Crane, bodies, pendulum
-from truth.trees import body
+from reference.bodies import Crane, bodies, pendulum
+from reference.trees import body
 
 import fvsolve
 from fvsolve.errors import CaseError

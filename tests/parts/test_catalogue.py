@@ -4,7 +4,7 @@ import math
 
 import pytest
 from pytest import approx
-from truth.scenes import junction, lake, pipe, scene
+from reference.scenes import junction, lake, pipe, scene
 
 import fvsolve
 from fvsolve import load

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from reference import vessels
+from reference.scenes import RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, valve
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from truth import vessels
-from truth.scenes import RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 

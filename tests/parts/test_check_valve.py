@@ -7,12 +7,10 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
-from truth import discs
-from truth.folders import CASES
-from truth.pairs import pairs
-from truth.scenes import (
+from reference import discs
+from reference.folders import CASES
+from reference.pairs import pairs
+from reference.scenes import (
     GRAVITY,
     RHO,
     SHARP,
@@ -28,6 +26,8 @@ from truth.scenes import (
     scene,
     valve,
 )
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from model.test_sparsity import random_state, stray
 from pytest import approx
-from truth import creeping, laminar
-from truth.scenes import WATER, area, junction, reservoir, scene
+from reference import creeping, laminar
+from reference.scenes import WATER, area, junction, reservoir, scene
 
 import fvsolve
 from fvsolve import exact

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import scene
+from reference.scenes import scene
 
 import fvsolve
 from fvsolve.errors import CaseError

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from model.test_sparsity import stray
 from parts.test_riding_networks import BORE, DEPTH, HALF, LEVEL, ROLL, TANK, said, u_tube
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, least_squares
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 
 import fvsolve as fv
 from fvsolve.errors import CaseError

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from reference import scenes
+from reference.characteristics import ValvePipe, darcy, hazen_williams
+from reference.network import Line, Network
+from reference.orders import observed_order
+from reference.scenes import AMBIENT, GRAVITY, RHO, junction, lake, pipe, ramp, reservoir, scene, step, valve
 from scipy.optimize import brentq
-from truth import scenes
-from truth.characteristics import ValvePipe, darcy, hazen_williams
-from truth.network import Line, Network
-from truth.orders import observed_order
-from truth.scenes import AMBIENT, GRAVITY, RHO, junction, lake, pipe, ramp, reservoir, scene, step, valve
 
 import fvsolve
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from truth import scenes
-from truth.scenes import AMBIENT, RHO, SHARP, junction, pipe, reservoir, scene, step, valve
+from reference import scenes
+from reference.scenes import AMBIENT, RHO, SHARP, junction, pipe, reservoir, scene, step, valve
 
 import fvsolve
 

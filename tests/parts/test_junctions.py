@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
-from truth import rays, scenes
-from truth.bumps import gaussian_averages, scattered
-from truth.orders import mean_error, observed_order
-from truth.scenes import (
+from reference import rays, scenes
+from reference.bumps import gaussian_averages, scattered
+from reference.orders import mean_error, observed_order
+from reference.scenes import (
     AMBIENT,
     RHO,
     SHARP,

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, lake, pipe, reservoir, scene, tank, valve
 from scipy.optimize import brentq
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, lake, pipe, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.parts.outlet.law import FREE, LEAST_DROP, emitter_drop, emitter_flow, emitter_slope, emitter_step

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import lake, scene, tank, valve
+from reference.scenes import lake, scene, tank, valve
 
 import fvsolve
 from fvsolve.basins.transport.lower_velocity import face_flows

@@ -8,9 +8,9 @@ from importlib import import_module
 import numpy as np
 import pytest
 from pytest import approx
+from reference.cylinders import AMBIENT, BETA, RHO, Jack, valve_flow
+from reference.scenes import reservoir, scene
 from scipy.interpolate import CubicSpline
-from truth.cylinders import AMBIENT, BETA, RHO, Jack, valve_flow
-from truth.scenes import reservoir, scene
 
 import fvsolve
 

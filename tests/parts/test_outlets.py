@@ -10,9 +10,9 @@ import itertools
 
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, RHO, WATER, chamber, inflow, junction, reservoir, scene, valve
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
-from truth.scenes import AMBIENT, RHO, WATER, chamber, inflow, junction, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy

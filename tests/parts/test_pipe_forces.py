@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from fluids.friction import friction_factor
-from truth.scenes import AMBIENT, RHO, area, junction, lake, pipe, ramp, reservoir, scene, step, valve
+from reference.scenes import AMBIENT, RHO, area, junction, lake, pipe, ramp, reservoir, scene, step, valve
 
 import fvsolve
 from fvsolve.model.build import build

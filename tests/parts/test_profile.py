@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
+from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
 
 import fvsolve
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import GRAVITY, RHO, junction, lake, pipe, pump, scene
+from reference.scenes import GRAVITY, RHO, junction, lake, pipe, pump, scene
 
 import fvsolve
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.scenes import junction, lake, pipe, pump, scene, step
+from reference.scenes import junction, lake, pipe, pump, scene, step
 
 import fvsolve
 from fvsolve.errors import CaseError

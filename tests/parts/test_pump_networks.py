@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import junction, lake, pipe, pump, scene, valve
+from reference.scenes import junction, lake, pipe, pump, scene, valve
 
 import fvsolve
 

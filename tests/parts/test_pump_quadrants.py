@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from parts.test_pump_trip import BORE, FACTOR, LENGTH, TIGHT, column, column_truth, operating_flow
 from pytest import approx
+from reference.scenes import GRAVITY, RHO, area
 from scipy.integrate import solve_ivp
-from truth.scenes import GRAVITY, RHO, area
 
 import fvsolve
 from fvsolve.parts.pump.suter_tables import SPEEDS, SUTER_TABLES, quadrants

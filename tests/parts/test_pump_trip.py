@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
+from reference.scenes import GRAVITY, NO_FRICTION, RHO, SHARP, area, junction, lake, pipe, pump, scene, step
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from truth.scenes import GRAVITY, NO_FRICTION, RHO, SHARP, area, junction, lake, pipe, pump, scene, step
 
 import fvsolve
 from fvsolve.parts.pump.suter_tables import SUTER_TABLES

@@ -6,8 +6,21 @@ import math
 
 import numpy as np
 import pytest
-from truth import discs, stems
-from truth.scenes import AMBIENT, GRAVITY, RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
+from reference import discs, stems
+from reference.scenes import (
+    AMBIENT,
+    GRAVITY,
+    RHO,
+    SMOOTH,
+    WATER,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    valve,
+)
 
 import fvsolve
 from fvsolve.steady import union

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 import pytest
+from reference import discs
+from reference.scenes import RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 from scipy.optimize import brentq
-from truth import discs
-from truth.scenes import RHO, SMOOTH, WATER, chamber, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy

@@ -3,8 +3,8 @@
 import meshio
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 from scipy.integrate import simpson, solve_ivp
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, area, scene
 
 import fvsolve as fv
 from fvsolve.errors import CaseError, FvsolveError

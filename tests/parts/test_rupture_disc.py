@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, area, junction, pipe, reservoir, scene, tank, valve
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, junction, pipe, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy

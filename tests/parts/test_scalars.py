@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 from model.test_sparsity import random_state, stray
 from pytest import approx
-from scipy.special import erfc
-from truth.orders import observed_order
-from truth.scenes import (
+from reference.orders import observed_order
+from reference.scenes import (
     AMBIENT,
     RHO,
     area,
@@ -29,6 +28,7 @@ from truth.scenes import (
     tank,
     valve,
 )
+from scipy.special import erfc
 
 import fvsolve
 from fvsolve.errors import CaseError

@@ -9,7 +9,7 @@ import pytest
 from fluids import nearest_pipe
 from fluids.friction import ft_Crane
 from pytest import approx
-from truth.scenes import AMBIENT, WATER, reservoir, scene
+from reference.scenes import AMBIENT, WATER, reservoir, scene
 
 import fvsolve
 from fvsolve.errors import CaseError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.scenes import RHO, WATER, area, junction, pipe, reservoir, scene
+from reference.scenes import RHO, WATER, area, junction, pipe, reservoir, scene
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, pipe, reservoir, scene, tank, valve
 from scipy.integrate import solve_ivp
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, pipe, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from reference.scenes import GRAVITY, WATER, area, lake, pipe, scene, valve
 from scipy.optimize import brentq
-from truth.scenes import GRAVITY, WATER, area, lake, pipe, scene, valve
 
 import fvsolve
 from fvsolve.model.dependence import sparsity

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pytest import approx
+from reference.hydropower import chart, steady
+from reference.scenes import GRAVITY, NO_FRICTION, RHO, SHARP, WATER, area, junction, lake, pipe, scene
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from truth.hydropower import chart, steady
-from truth.scenes import GRAVITY, NO_FRICTION, RHO, SHARP, WATER, area, junction, lake, pipe, scene
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy

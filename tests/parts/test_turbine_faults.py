@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from truth.scenes import GRAVITY, RHO, lake, scene
+from reference.scenes import GRAVITY, RHO, lake, scene
 
 import fvsolve
 from fvsolve.errors import CaseError

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from model.test_sparsity import random_state, stray
 from pytest import approx
-from truth import laminar
-from truth.folders import CASES
-from truth.scenes import WATER, area, junction, reservoir, scene
+from reference import laminar
+from reference.folders import CASES
+from reference.scenes import WATER, area, junction, reservoir, scene
 
 import fvsolve
 from fvsolve import exact

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, reservoir, scene, valve
 from scipy.integrate import quad, solve_ivp
-from truth.scenes import AMBIENT, GRAVITY, RHO, WATER, area, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.model.dependence import sparsity

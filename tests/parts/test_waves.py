@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, WATER, reservoir, scene
+from reference.scenes import AMBIENT, WATER, reservoir, scene
 
 from fvsolve import run
 from fvsolve.case.load import load

@@ -4,8 +4,8 @@ import re
 from itertools import pairwise
 
 import pytest
-from truth import browser, paper
-from truth.scenes import junction, lake, pipe, ramp, scene, valve
+from reference import browser, paper
+from reference.scenes import junction, lake, pipe, ramp, scene, valve
 
 import fvsolve
 from fvsolve.draw.style import COLOURS

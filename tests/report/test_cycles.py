@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from truth.scenes import reservoir, scene, valve
+from reference.scenes import reservoir, scene, valve
 
 import fvsolve
 from fvsolve.case.text import write

@@ -10,8 +10,8 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from truth.folders import DOCS
-from truth.scenes import junction, lake, pipe, ramp, scene, tank, valve
+from reference.folders import DOCS
+from reference.scenes import junction, lake, pipe, ramp, scene, tank, valve
 
 import fvsolve
 from fvsolve.report.figures import as_it_stands

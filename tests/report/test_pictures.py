@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from truth.scenes import junction, lake, pipe, ramp, scene, valve
+from reference.scenes import junction, lake, pipe, ramp, scene, valve
 
 import fvsolve
 from fvsolve.report.pictures import chosen, write_pictures

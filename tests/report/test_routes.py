@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from truth.scenes import GRAVITY, RHO, junction, lake, pipe, scene, step, valve
+from reference.scenes import GRAVITY, RHO, junction, lake, pipe, scene, step, valve
 
 import fvsolve
 from fvsolve.draw.section import LIMITS, LINES

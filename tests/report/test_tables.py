@@ -5,7 +5,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from truth.scenes import junction, lake, pipe, scene
+from reference.scenes import junction, lake, pipe, scene
 
 import fvsolve
 from fvsolve.report.described import walls

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from reference.bumps import gaussian_averages
+from reference.orders import mean_error, observed_order
+from reference.scenes import NO_FRICTION, RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, valve
 from scipy.integrate import solve_ivp
-from truth.bumps import gaussian_averages
-from truth.orders import mean_error, observed_order
-from truth.scenes import NO_FRICTION, RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 

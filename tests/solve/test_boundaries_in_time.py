@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from truth.folders import CASES
-from truth.scenes import AMBIENT, RHO, chamber, reservoir, scene, valve
+from reference.folders import CASES
+from reference.scenes import AMBIENT, RHO, chamber, reservoir, scene, valve
 
 import fvsolve
 

@@ -10,11 +10,11 @@ import sys
 import numpy as np
 import pytest
 from model.test_rest import ROUGH, moved, still_probes, town
+from reference import vessels
+from reference.cylinders import Jack
+from reference.scenes import AMBIENT, GRAVITY, chamber, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 from scipy.integrate import solve_ivp
 from solve.test_resume import long_run, same_files
-from truth import vessels
-from truth.cylinders import Jack
-from truth.scenes import AMBIENT, GRAVITY, chamber, junction, lake, pipe, ramp, reservoir, scene, tank, valve
 
 import fvsolve
 

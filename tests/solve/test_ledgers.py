@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 import pytest
+from reference import scenes, vessels
+from reference.scenes import AMBIENT, GRAVITY, lake, reservoir, scene, tank, valve
 from scipy.integrate import solve_ivp
-from truth import scenes, vessels
-from truth.scenes import AMBIENT, GRAVITY, lake, reservoir, scene, tank, valve
 
 import fvsolve
 

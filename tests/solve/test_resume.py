@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from basins.test_basin import alone, basin
-from truth.fork import branched
+from reference.fork import branched
 
 import fvsolve
 from fvsolve.output.memory import MemorySink

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
+from reference.scenes import AMBIENT, SHARP, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
 
 import fvsolve
 

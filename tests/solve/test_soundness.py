@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truth.scenes import chamber, lake, reservoir, scene, tank, valve
+from reference.scenes import chamber, lake, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.limits.grid import advection_limit

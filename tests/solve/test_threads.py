@@ -9,7 +9,7 @@ import threading
 
 import numpy as np
 import pytest
-from truth.scenes import reservoir, scene
+from reference.scenes import reservoir, scene
 
 import fvsolve
 from fvsolve.errors import FvsolveError

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from truth.folders import CASES
-from truth.scenes import chamber, lake, pipe, reservoir, scene, tank, valve
+from reference.folders import CASES
+from reference.scenes import chamber, lake, pipe, reservoir, scene, tank, valve
 
 import fvsolve
 
@@ -86,7 +86,7 @@ def test_it_ends_where_a_single_method_does(rtol, implicit):
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 def test_a_servo_arm_takes_about_the_steps_of_radau(end, rtol):
     """Its hoses carry next to nothing for seconds, where their law bends over few pascals of 150 bar."""
-    arm, found = Path(__file__).parents[1] / "truth" / "servo-arm.toml", {}
+    arm, found = Path(__file__).parents[1] / "reference" / "servo-arm.toml", {}
     for name in ("auto", "radau-iia-5"):
         keys = {"numerics.method": name, "numerics.rtol": rtol, "numerics.end": end}
         found[name] = fvsolve.run(arm, set=keys)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numba import njit
-from truth.scenes import WATER, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
+from reference.scenes import WATER, junction, lake, pipe, ramp, reservoir, scene, step, tank, valve
 
 import fvsolve
 from fvsolve.steppers import integrate

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 from numba import njit
-from truth.folders import CASES
-from truth.scenes import WATER, chamber, scene, valve
+from reference.folders import CASES
+from reference.scenes import WATER, chamber, scene, valve
 
 import fvsolve
 from fvsolve.errors import FvsolveError

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from truth.scenes import GRAVITY, area, chamber, reservoir, scene, tank, valve
+from reference.scenes import GRAVITY, area, chamber, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.jit import njit

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 from numba import njit
-from truth import folders
+from reference import folders
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, analyse, integrate

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numba import njit
-from truth import scenes
-from truth.scenes import chamber, lake, reservoir, scene, tank, valve
+from reference import scenes
+from reference.scenes import chamber, lake, reservoir, scene, tank, valve
 
 import fvsolve
 from fvsolve.steppers import integrate

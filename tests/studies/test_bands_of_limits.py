@@ -6,7 +6,7 @@ import csv
 import json
 
 import pytest
-from truth.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
+from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.case.text import write

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import junction, pipe, reservoir, scene, valve
+from reference.scenes import junction, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.case.text import write

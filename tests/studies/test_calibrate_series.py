@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.scenes import GRAVITY, lake, scene, tank, valve
+from reference.scenes import GRAVITY, lake, scene, tank, valve
 
 from fvsolve.studies import calibrate
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from truth import rays, vessels
-from truth.scenes import (
+from reference import rays, vessels
+from reference.scenes import (
     AMBIENT,
     RHO,
     WATER,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from truth.scenes import AMBIENT, RHO, area, junction, ramp, reservoir, scene, valve
+from reference.scenes import AMBIENT, RHO, area, junction, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.case.text import write

@@ -9,8 +9,8 @@ import shutil
 
 import numpy as np
 import pytest
-from truth.folders import DOCS
-from truth.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, valve
+from reference.folders import DOCS
+from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.case.text import write

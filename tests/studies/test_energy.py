@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from scipy.stats import binom
-from truth.scenes import (
+from reference.scenes import (
     AMBIENT,
     GRAVITY,
     NO_FRICTION,
@@ -25,6 +24,7 @@ from truth.scenes import (
     tank,
     valve,
 )
+from scipy.stats import binom
 
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.energy.energy import energy

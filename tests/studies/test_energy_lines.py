@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.scenes import GRAVITY, RHO, area, chamber, junction, lake, pipe, scene, step
+from reference.scenes import GRAVITY, RHO, area, chamber, junction, lake, pipe, scene, step
 
 from fvsolve.studies import energy
 

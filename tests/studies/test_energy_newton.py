@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, WATER, chamber, reservoir, scene, valve
+from reference.scenes import AMBIENT, WATER, chamber, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.studies.energy.energy import energy

@@ -10,7 +10,20 @@ import sys
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, NO_FRICTION, area, chamber, junction, lake, pipe, reservoir, scene, step, tank, valve
+from reference.scenes import (
+    AMBIENT,
+    NO_FRICTION,
+    area,
+    chamber,
+    junction,
+    lake,
+    pipe,
+    reservoir,
+    scene,
+    step,
+    tank,
+    valve,
+)
 
 from fvsolve import jit
 from fvsolve.case import load

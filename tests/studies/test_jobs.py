@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
-from truth.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
+from reference.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
 
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError

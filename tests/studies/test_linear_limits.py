@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from truth.scenes import chamber, junction, lake, pipe, scene, valve
+from reference.scenes import chamber, junction, lake, pipe, scene, valve
 
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError

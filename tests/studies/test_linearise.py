@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.linalg import expm, matrix_balance
-from truth.scenes import (
+from reference.scenes import (
     AMBIENT,
     GRAVITY,
     RHO,
@@ -25,6 +24,7 @@ from truth.scenes import (
     tank,
     valve,
 )  # fmt: skip
+from scipy.linalg import expm, matrix_balance
 
 import fvsolve
 from fvsolve.cli import main

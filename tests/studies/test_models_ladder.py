@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from truth.scenes import AMBIENT, RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, step, valve
+from reference.scenes import AMBIENT, RHO, WATER, chamber, junction, pipe, ramp, reservoir, scene, step, valve
 
 import fvsolve
 from fvsolve.case.text import write

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from truth.scenes import scene
+from reference.scenes import scene
 
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import ladder

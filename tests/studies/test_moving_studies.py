@@ -7,11 +7,11 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from restated.moving import SCENES, flume, u_tube
+from invariance.moving import SCENES, flume, u_tube
+from reference.bodies import bodies
+from reference.scenes import GRAVITY, RHO, scene
+from reference.trees import body
 from scipy.optimize import brentq
-from truth.bodies import bodies
-from truth.scenes import GRAVITY, RHO, scene
-from truth.trees import body
 
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from pytest import approx
-from truth import scenes
+from reference import scenes
 
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import order

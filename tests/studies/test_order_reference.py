@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 from pytest import approx
-from truth import pulses, scenes
-from truth.order_json import call
+from reference import pulses, scenes
+from reference.order_json import call
 
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError

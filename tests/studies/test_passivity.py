@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 import pytest
-from truth.scenes import (
+from reference.scenes import (
     AMBIENT,
     GRAVITY,
     NO_FRICTION,
@@ -22,7 +22,7 @@ from truth.scenes import (
     tank,
     valve,
 )
-from truth.scenes import step as stepped
+from reference.scenes import step as stepped
 
 import fvsolve
 from fvsolve.errors import FvsolveError

@@ -6,7 +6,7 @@ import json
 
 import pytest
 from model.test_resolution import station
-from truth.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
+from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.studies.levels import finer

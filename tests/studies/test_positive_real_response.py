@@ -10,7 +10,7 @@ import sys
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import NO_FRICTION, RHO, area, junction, lake, pipe, reservoir, scene
+from reference.scenes import NO_FRICTION, RHO, area, junction, lake, pipe, reservoir, scene
 
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import LineImpedance, positive_real, response

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from pytest import approx
-from truth.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
+from reference.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
 
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError

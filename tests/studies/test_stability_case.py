@@ -8,8 +8,8 @@ import sys
 
 import numpy as np
 import pytest
+from reference.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
 from scipy.optimize import brentq
-from truth.scenes import AMBIENT, GRAVITY, RHO, area, chamber, junction, pipe, reservoir, scene, tank, valve
 
 from fvsolve import build, load
 from fvsolve.cli import main

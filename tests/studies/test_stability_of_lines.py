@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from model.test_delay_lines import short, vessel
-from truth.delays import main, turned
+from reference.delays import main, turned
 
 import fvsolve
 from fvsolve import studies

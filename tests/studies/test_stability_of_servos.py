@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from truth.scenes import area, chamber, reservoir, scene, valve
+from reference.scenes import area, chamber, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.studies.linear.frozen import frozen
 from fvsolve.studies.stability.measured import Runs
 from fvsolve.studies.stability.stability import Side, stability
 
-ARM = Path(__file__).parents[1] / "truth" / "servo-arm.toml"
+ARM = Path(__file__).parents[1] / "reference" / "servo-arm.toml"
 IMPLICIT = {"numerics.method": "radau-iia-5"}
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.4e9, "viscosity": 46e-6, "law": "linear"}
 THETA = "0 | 0 0\n 1 | 3/5 2/5\n ---\n | 3/5 2/5"  # |R| = 1.5 at infinity: fails from |h lambda| = 10 on

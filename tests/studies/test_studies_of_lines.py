@@ -6,8 +6,8 @@ import math
 
 import pytest
 from model.test_delay_lines import vessel
-from truth import pulses
-from truth.delays import fork, main, turned
+from reference import pulses
+from reference.delays import fork, main, turned
 
 from fvsolve import studies
 from fvsolve.errors import FvsolveError

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from truth import pump_trip
-from truth.folders import CASES
+from reference import pump_trip
+from reference.folders import CASES
 
 import fvsolve
 from fvsolve.cli.order import unit

@@ -11,7 +11,7 @@ import sys
 import time
 
 import pytest
-from truth.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
+from reference.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valve
 
 import fvsolve
 from fvsolve.case.text import write

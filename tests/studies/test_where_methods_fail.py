@@ -11,8 +11,8 @@ import math
 import numpy as np
 import pytest
 from numba import njit
-from truth.folders import CASES
-from truth.scenes import AMBIENT, RHO, WATER, chamber, ramp, reservoir, scene, step, tank, valve
+from reference.folders import CASES
+from reference.scenes import AMBIENT, RHO, WATER, chamber, ramp, reservoir, scene, step, tank, valve
 
 import fvsolve
 from fvsolve.case import load

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 import pytest
-from truth.scenes import (
+from reference.scenes import (
     AMBIENT,
     RHO,
     SHARP,

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference import folders
 from studies.test_where_methods_fail_in_pipes import LENGTH, SPEED, courant_limit, lossless, scaled
-from truth import folders
 
 from fvsolve.cli import main
 from fvsolve.cli.app import load_case

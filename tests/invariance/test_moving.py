@@ -1,0 +1,282 @@
+"""What moves, said in another way, tells the same: to the bit where the arithmetic is the same, else to round-off.
+
+Rosenbrock methods solve one linear system a stage with a Jacobian by one-sided differences, and Newton does not bring
+it right: in a mirror forward differences are backward ones, and what was rounded is 1e-8 of an entry. So they agree to
+`BY_DIFFERENCES` (4e-5 is found of a liquid's power, 1e-5 of flows, 1e-6 of basins, 1e-7 of bodies), which is below
+what a step of these scenes errs by. Implicit methods, whose Newton iterates, agree to round-off.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from reference.bodies import OIL
+from reference.scenes import scene
+from reference.trees import body
+
+import fvsolve
+from fvsolve.output.memory import MemorySink
+from fvsolve.solve.solve import Run
+from invariance import equivalent_mechanisms
+from invariance.moving import METHODS, SCENES, machine, piston, stepped
+from invariance.result_comparison import Told, alike, told
+
+EXPERIMENTAL = "ignore:First-class function type feature is experimental"  # numba says so where it compiles
+pytestmark = pytest.mark.filterwarnings("error", EXPERIMENTAL)  # of numbers that are none
+ROUND, BY_DIFFERENCES = 1e-9, 1e-4
+EACH = ["rk4", "gauss-4", "rodas-4"]
+EXPLICIT, IMPLICIT = ["ssp-rk3", "rk4", "dormand-prince"], ["gauss-4", "implicit-midpoint", "radau-iia-5"]
+# Each scene by an explicit method, an implicit method and the Rosenbrock method, in turn.
+MIXED = [(name, way) for k, name in enumerate(SCENES) for way in (EXPLICIT[k % 3], IMPLICIT[k // 3 % 3], "rodas-4")]
+IN_SPACE = ["machine", "machine log", "machine table", "machine mixture", "loop", "carried", "rocking", "frozen",
+            "modes", "full", "full log", "full free", "full table free", "u-tube free", "u-tube driven"]  # fmt: skip
+SWINGS = (".rate", ".angle", ".travel")
+
+
+@cache
+def first(name: str, method: str) -> Told:
+    """A scene as it is drawn."""
+    shown = told(SCENES[name](method))
+    assert shown.ended == "finished" and max(np.ptp(values) for values in shown.rows.values()) > 0.0
+    return shown
+
+
+def near(method: str) -> float:
+    """How far apart the same in other words may be, over the greatest value of the quantity."""
+    return {"rodas-4": BY_DIFFERENCES, "dormand-prince": 1e-5}.get(method, ROUND)
+
+
+@pytest.mark.parametrize("name, method", MIXED)
+def test_run_again_and_with_frames(name, method):
+    """The same arithmetic: the same bits, by a model that has run too."""
+    case = SCENES[name](method)
+    case["output"]["fields"] = 3
+    model = fvsolve.build(fvsolve.load(case))
+    alike(first(name, method), told(model))
+    alike(first(name, method), told(model))
+
+
+@pytest.mark.parametrize("name, method", MIXED)
+def test_broken_off_and_resumed(name, method):
+    """To the bit, ledgers too."""
+    case = SCENES[name](method)
+    case["output"]["fields"] = 0
+    model = fvsolve.build(fvsolve.load(case))
+    early = 0.3 * case["numerics"]["end"]
+
+    def late(t, seconds, steps):
+        run.budget = 1.0  # steps until it is called again
+        if t > early:
+            raise KeyboardInterrupt
+
+    run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
+    run.left = 1.0
+    assert run.go().reason.startswith("interrupted") and early < run.state().t < case["numerics"]["end"]
+    other = fvsolve.build(fvsolve.load(case))
+    again, whole = (Run(other, state, MemorySink(other), None) for state in (run.state(), fvsolve.initial_state(other)))
+    ended = again.go(), whole.go()
+    assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
+    ends = again.state(), whole.state()
+    assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
+
+
+@pytest.mark.parametrize("name, method", MIXED)
+def test_parts_in_the_reverse_order(name, method):
+    """A body stands before the one that it hangs on, a wall's mass before its basin."""
+    alike(first(name, method), told(equivalent_mechanisms.otherwise(SCENES[name](method))), near(method))
+
+
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("name", SCENES)
+def test_at_a_later_time(name, method):
+    """Times are rounded by their size, and what drives a joint is differenced over them."""
+    alike(
+        first(name, method),
+        told(equivalent_mechanisms.at_a_later_time(SCENES[name](method), 64.0)),
+        near(method),
+        later=64.0,
+    )
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_other_rows(name):
+    """Rows are read between steps and do not shorten them."""
+    case = SCENES[name]()
+    case["output"]["every"] /= 2.0
+    many, few = told(case), first(name, "rk4")
+    for probe, values in few.rows.items():
+        found = dict(zip(many.t, many.rows[probe], strict=True))
+        assert [found[t] for t in few.t] == values.tolist()
+
+
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("name", SCENES)
+def test_other_units(name, method):
+    """The factors of units round once."""
+    case = SCENES[name](method)
+    other = case | {table: equivalent_mechanisms.in_other_units(case[table]) for table in ("nodes", "links")}
+    assert other != case
+    alike(first(name, method), told(other), near(method))
+
+
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("name", [name for name in IN_SPACE if not name.startswith(("carried", "full", "u-tube"))])
+def test_ends_of_links_swapped(name, method):
+    alike(first(name, method), told(equivalent_mechanisms.swapped(SCENES[name](method))), near(method))
+
+
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_axes_the_other_way(name, method):
+    def change(probe, values):
+        return -values if probe.endswith(SWINGS) else values
+
+    alike(
+        first(name, method),
+        told(equivalent_mechanisms.reversed_axes(SCENES[name](method))),
+        near(method),
+        change=change,
+    )
+
+
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_turned_about_the_vertical(name, method):
+    one = spatial(first(name, method))
+    alike(
+        one,
+        told(equivalent_mechanisms.turned(SCENES[name](method), 0.7)),
+        near(method),
+        change=equivalent_mechanisms.as_turned(one, 0.7),
+    )
+
+
+def spatial(one: Told) -> Told:
+    """Without vectors of which single components are probes: to turn them all three are needed."""
+    whole = {probe: values for probe, values in one.rows.items() if equivalent_mechanisms.part(probe)[1] == "-"
+             or all(f"{probe[:-1]}{axis}" in one.rows for axis in "xyz")}  # fmt: skip
+    return Told(one.ended, one.t, whole, one.result)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_in_a_mirror(name, method, axis):
+    """Basins are drawn from their other corner: nothing may hang on where that is."""
+    case = SCENES[name](method)
+    sizes = {one: node["size"] for one, node in case["nodes"].items() if node["type"] == "basin"}
+    alike(first(name, method), told(equivalent_mechanisms.mirrored(case, axis)), near(method),
+          lambda probe: equivalent_mechanisms.in_mirror(probe, axis, sizes), equivalent_mechanisms.as_mirrored(axis))  # fmt: skip
+
+
+@pytest.mark.parametrize("name", IN_SPACE)
+def test_far_away(name):
+    """Accelerations are found about a point of the tree; of moments about the origin of the world those are others."""
+    by = {"x": 3000.0, "y": -4000.0}
+    one = first(name, "rk4")
+    rows = {probe: values for probe, values in one.rows.items() if "angular_momentum" not in probe}
+
+    def change(probe, values):
+        _, vector, axis = equivalent_mechanisms.part(probe)
+        return values + by.get(axis, 0.0) if vector == "" else values
+
+    other = told(equivalent_mechanisms.shifted(SCENES[name](), [by["x"], by["y"], 0.0]))
+    alike(Told(one.ended, one.t, rows, one.result), other, ROUND, change=change)
+
+
+@pytest.mark.parametrize("form", equivalent_mechanisms.FORMS)
+@pytest.mark.parametrize("name", ["machine", "loop", "carried", "rocking"])
+def test_attitudes_in_another_form(name, form):
+    alike(first(name, "rk4"), told(equivalent_mechanisms.attitudes(SCENES[name](), form)), ROUND)
+
+
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("part", ["base", "arm", "slider", "wrist", "plate", "kite"])
+def test_a_body_in_two_that_are_fixed_to_each_other(part, method):
+    """What a joint takes is of both; of the body alone are only its own energy and momenta."""
+    own = (".kinetic_energy", *(f".angular_momentum_{axis}" for axis in "xyz"))
+    one = first("machine", method)
+    rows = {probe: values for probe, values in one.rows.items() if not probe.endswith(own)}
+    if part == "kite":  # the place of a free body in its states is that of its centre of mass: so is its velocity
+        rows = {probe: values for probe, values in rows.items() if not probe.startswith("kite.momentum")}
+    alike(
+        Told(one.ended, one.t, rows, one.result), told(equivalent_mechanisms.split(machine(method), part)), near(method)
+    )
+
+
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("law", ["", "linear", "log", "table"])
+def test_a_wall_of_a_mass_is_that_of_a_body_on_a_prismatic_joint(law, method):
+    alike(told(piston(method, law)), told(piston(method, law, by="body")), near(method))
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("law", ["linear", "log", "mixture"])
+def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
+    """On the axis of masses, and along one aslant in space without weight."""
+    cylinder = {"type": "cylinder", "stroke": 0.5, "area_A": 1e-3, "area_B": 7e-4, "dead_volume_A": 1e-4,
+        "dead_volume_B": 2e-4,
+                "viscous_friction": 30.0, "closed_length": 0.1, "initial_pressure_A": 3e6,
+                    "initial_pressure_B": 3.2e6}  # fmt: skip
+    rest = {"spring": {"type": "spring", "stiffness": 5e3, "free_length": 0.2}, "stop": {"type": "end-stop",
+        "greatest": 0.31,
+            "stiffness": 1e6, "damping": 1e3}, "brake": {"type": "damper", "damping": 40.0}}  # fmt: skip
+    push = {"type": "force", "force": {"mean": 100.0, "amplitude": 500.0, "period": 0.05}}
+    probes = [
+        "jack.force",
+        "jack.position",
+        "jack.velocity",
+        "jack.A.pressure",
+        "jack.B.pressure",
+        "spring.force",
+        "stop.force",
+    ]
+
+    def case(nodes, near, far, **force):
+        links = {name: {**one, "from": near, "to": far} for name, one in rest.items()}
+        links |= {"jack": {**cylinder, "ports": {"case": near, "rod": far}}, "push": {**push, "to": far, **force}}
+        made = scene(nodes, links, 0.1, stepped(method, 5e-4), probes, 1 / 128, gravity=0.0)
+        return made | {"fluid": {**OIL, "law": law, **({"air_fraction": 1e-3} if law == "mixture" else {})}}
+
+    one = case({"m": {"type": "mass", "mass": 20.0, "initial_position": 0.3, "initial_velocity": 0.4},
+        "ground": {"type": "frame"}},
+               "ground", "m")  # fmt: skip
+    way = [0.36, 0.48, 0.8]
+    slides = {"kind": "prismatic", "axis": way, "travel": 0.3, "rate": 0.4}
+    other = case({"m": body(20.0, [1, 1, 1], slides), "ground": {"type": "frame", "points": {"eye": [0, 0, 0]}}},
+                 "ground.eye", "m", direction=way)  # fmt: skip
+    alike(told(one), told(other), near(method))
+
+
+WAVE = {"mean": 0.1, "amplitude": 0.2, "period": 0.9, "phase": 0.4}
+SAID = {
+    "below": {"mean": 0.1, "amplitude": -0.2, "period": 0.9, "phase": 0.4 - np.pi},
+    "a turn on": {"mean": 0.1, "amplitude": 0.2, "period": 0.9, "phase": 0.4 + 2 * np.pi},
+    "shared": {"signal": "swing"},
+    "in other units": {"mean": "5.729577951308232 deg", "amplitude": "11.459155902616464 deg", "period": "900 ms",
+                       "phase": "22.91831180523293 deg"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("method", EACH)
+@pytest.mark.parametrize("way", SAID)
+def test_what_drives_a_joint_in_other_words(way, method):
+    case = machine(method, signals={"swing": WAVE} if way == "shared" else {})
+    case["nodes"]["base"]["joint"]["angle"] = SAID[way]
+    alike(first("machine", method), told(case), near(method))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_slider_that_is_driven_by_a_power_or_by_its_table(method):
+    """x = (1 - t / 2)^2, as a ramp of exponent 2 and as a smooth table: its slope is right to (0.01 s)^2."""
+    found, times = [], np.linspace(-1.0, 3.0, 401)
+    for travel in ({"start": 0.0, "duration": 2.0, "value": [1.0, 0.0], "exponent": 2},
+                   {"time": times.tolist(), "value": ((1.0 - times / 2.0) ** 2).tolist(),
+                       "kind": "smooth"}):  # fmt: skip
+        nodes = {"cart": body(3.0, [1, 1, 1], {"kind": "prismatic", "axis": [1, 0, 0], "travel": travel}),
+                 "bob": body(1.0, [0.1, 0.1, 0.1], {"kind": "revolute", "on": "cart", "axis": [0, 1, 0], "angle": 0.3},
+                             centre_of_mass=[0, 0, -0.5])}  # fmt: skip
+        found.append(told(scene(nodes, {}, 1.0, stepped(method, 0.01), ["bob.angle", "cart.x"], 0.125)))
+    alike(*found, 2e-5)

@@ -1,0 +1,124 @@
+"""Reynolds' transport theorem (71) to (76), term by term; and that (73) to (75) speak of the material volume."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+
+from reference.reynolds import around, inside, on_interval, rate
+
+T = 0.3
+CORNERS = np.array([[0.0, 0.0], [2.0, 0.2], [1.8, 1.5], [-0.3, 1.1]])
+SPEEDS = np.array([[0.4, -0.2], [0.7, 0.1], [-0.3, 0.9], [0.2, 0.5]])  # of the corners, from t = 0
+
+
+def phi(x, y, t):
+    return np.sin(x + 0.5 * t) * np.exp(-0.3 * y) + t * x * y
+
+
+def flow(x, y, t):
+    """A velocity with divergence."""
+    return np.array([0.5 * x - 0.2 * y + 0.1 * t, 0.3 * x * y - 0.4 * np.ones_like(x)])
+
+
+def divergence(x, y, t):
+    return 0.5 + 0.3 * x
+
+
+def carried(x, y, t):
+    return phi(x, y, t) * flow(x, y, t)
+
+
+def phi_rate(x, y, t):
+    return rate(lambda s: phi(x, y, s), t)
+
+
+def corners(t):
+    return CORNERS + t * SPEEDS
+
+
+def test_a_volume_that_moves_on_an_interval_71():
+    def ends(t):
+        return 0.2 - 0.5 * t + t * t, 1.5 + 0.8 * t
+
+    def field(x, t):
+        return np.sin(3 * x) + t * x
+
+    whole = rate(lambda t: on_interval(lambda x: field(x, t), *ends(t)), T)
+    (a, b), (va, vb) = ends(T), (-0.5 + 2 * T, 0.8)
+    within = on_interval(lambda x: rate(lambda s: field(x, s), T), a, b)
+    assert_allclose(whole, within + vb * field(b, T) - va * field(a, T), rtol=1e-10)
+
+
+def test_a_volume_that_moves_in_the_plane_71():
+    whole = rate(lambda t: inside(lambda x, y: phi(x, y, t), corners(t)), T)
+    within = inside(lambda x, y: phi_rate(x, y, T), corners(T))
+    through = around(lambda x, y: phi(x, y, T), corners(T), SPEEDS)
+    assert_allclose(whole, within + through, rtol=1e-10)
+    assert abs(through) > 0.1 * abs(whole)
+
+
+@pytest.fixture(scope="module")
+def material() -> float:
+    """d/dt of the content of the volume of matter that is the quadrilateral at T: its points go with the flow."""
+
+    def moved(x, y, t):
+        """Points of T at t, and how much larger they are there."""
+        n = x.size
+
+        def along(s, z):
+            u, v = flow(z[:n], z[n : 2 * n], s)
+            return np.concatenate([u, v, divergence(z[:n], z[n : 2 * n], s) * z[2 * n :]])
+
+        start = np.concatenate([x.ravel(), y.ravel(), np.ones(n)])
+        end = solve_ivp(along, (T, t), start, rtol=1e-12, atol=1e-13).y[:, -1] if t != T else start
+        return [one.reshape(x.shape) for one in np.split(end, 3)]
+
+    def content(t):
+        def weighed(x, y):
+            at_x, at_y, larger = moved(x, y, t)
+            return phi(at_x, at_y, t) * larger
+
+        return inside(weighed, corners(T))
+
+    return rate(content, T)
+
+
+def test_a_volume_of_matter_72_to_75(material):
+    """Its boundary goes with the flow; a gradient of phi along the flow and its divergence say the same."""
+    within = inside(lambda x, y: phi_rate(x, y, T), corners(T))
+    assert_allclose(material, within + around(lambda x, y: carried(x, y, T), corners(T)), rtol=1e-8)  # (72), (73)
+    together = inside(lambda x, y: phi_rate(x, y, T) + spread(x, y), corners(T))
+    assert_allclose(material, together, rtol=1e-8)  # (75)
+    substantial = inside(lambda x, y: followed(x, y) + phi(x, y, T) * divergence(x, y, T), corners(T))
+    assert_allclose(material, substantial, rtol=1e-8)  # (74)
+
+
+def spread(x, y):
+    """div (phi v) by differences."""
+    return rate(lambda h: carried(x + h, y, T)[0] + carried(x, y + h, T)[1], 0.0)
+
+
+def followed(x, y):
+    """D phi / Dt: phi along the path of a point."""
+    u, v = flow(x, y, T)
+    return rate(lambda h: phi(x + h * u, y + h * v, T + h), 0.0)
+
+
+def test_a_control_volume_that_moves_is_not_the_one_of_matter_73_to_75(material):
+    """They print V_c, which moves as it likes: its d/dt is (71), and another number."""
+    whole = rate(lambda t: inside(lambda x, y: phi(x, y, t), corners(t)), T)
+    assert abs(whole - material) > 0.05 * abs(material)
+
+
+def test_a_volume_that_stands_76(material):
+    fixed = rate(lambda t: inside(lambda x, y: phi(x, y, t), corners(T)), T)
+    assert_allclose(fixed, material - around(lambda x, y: carried(x, y, T), corners(T)), rtol=1e-8)
+
+
+def test_areas_of_a_quadrilateral_grow_by_what_its_sides_sweep():
+    """(71) of phi = 1: the geometric conservation law."""
+    whole = rate(lambda t: inside(lambda x, y: np.ones_like(x), corners(t)), T)
+    assert_allclose(whole, around(lambda x, y: np.ones_like(x), corners(T), SPEEDS), rtol=1e-11)

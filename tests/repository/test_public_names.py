@@ -1,0 +1,102 @@
+"""The public names: few, documented, there, and cheap to import."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import subprocess
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from inspect import isfunction
+from pathlib import Path
+
+import pytest
+from reference import folders
+
+import fvsolve
+import fvsolve.studies
+
+DOCS = folders.page("python")
+
+
+def test_at_most_twenty():
+    assert len(fvsolve.__all__) <= 20
+
+
+@pytest.mark.parametrize("name", fvsolve.__all__)
+def test_each_is_there_and_documented(name):
+    assert getattr(fvsolve, name) is not None
+    assert re.search(rf"^\| `{name}\b", DOCS, re.MULTILINE)
+
+
+def test_the_page_names_no_other():
+    assert set(re.findall(r"^\| `(\w+)", DOCS, re.MULTILINE)) == set(fvsolve.__all__)
+
+
+def test_the_examples_of_the_page_run(tmp_path, monkeypatch):
+    shutil.copytree(folders.CASES, tmp_path / "cases")
+    monkeypatch.chdir(tmp_path)
+    found = {}
+    for example in re.findall(r"```python\n(.*?)```", DOCS, re.DOTALL):
+        exec(example, found)
+    assert found["result"].ok and Path("gate.png").exists() and found["state"].t == pytest.approx(1.0)
+    for values in (found["decay"], found["again"]):
+        assert values[:, 0] == pytest.approx([1.0, math.exp(-0.5), math.exp(-1.0)], rel=1e-6)
+
+
+def test_functions_are_not_hidden_by_the_modules_they_live_in():
+    for module in ("run", "solve"):
+        import_module(f"fvsolve.{module}")
+        assert isfunction(getattr(fvsolve, module))
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no attribute 'simulate'"):
+        fvsolve.simulate  # noqa: B018
+
+
+def test_importing_imports_nothing_heavy():
+    heavy = [
+        "numpy",
+        "numba",
+        "CoolProp",
+        "pint",
+        "matplotlib",
+        "pyvista",
+        "meshio",
+        "scipy",
+        "rich",
+        "pydantic",
+    ]
+    code = f"import fvsolve, sys; print([name for name in {heavy} if name in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+PAGES = {
+    page.name: page.read_text(encoding="utf-8")
+    for page in [*folders.DOCS.glob("*.md"), folders.DOCS.parent / "README.md"]
+}
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_what_a_page_names_can_be_imported_from_where_it_says(page):
+    imports = re.findall(r"from (fvsolve[\w.]*) import \(?([\w, ]+)", PAGES[page])
+    named = [(room, name.strip()) for room, names in imports for name in names.split(",") if name.strip()]
+    named += [text.rpartition(".")[::2] for text in re.findall(r"`(fvsolve(?:\.[a-zA-Z_]\w*)+)", PAGES[page])]
+    lost = [f"{room}.{name}" for room, name in named if not importable(room, name)]
+    assert not lost
+
+
+def importable(room, name):
+    """Whether a room has a name, as itself or as a room of its own."""
+    if hasattr(import_module(room), name):
+        return True
+    return find_spec(f"{room}.{name}") is not None
+
+
+def test_names_of_studies_are_functions_or_kinds_and_no_modules():
+    for name in fvsolve.studies.__all__:
+        assert callable(getattr(fvsolve.studies, name)), name
