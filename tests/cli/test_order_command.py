@@ -101,7 +101,7 @@ def test_what_is_no_resolution_is_refused_with_those_that_are(key, capsys):
     ("words", "told"),
     [
         (["gradual-closure", "--refine", "tiem"], 'did you mean "time"'),
-        (["gradual-closure", "--levels", "1"], "2 at least"),
+        (["gradual-closure", "--levels", "1"], "at least 2"),
         (["gradual-closure", "--levels", "20"], "fewer levels"),
         (["gradual-closure", "--scheme", "upwnd5"], 'did you mean "upwind5"'),
         (["gradual-closure", "--method", "rk5"], "numerics.method"),
