@@ -117,7 +117,7 @@ def test_a_map_of_lines_says_at_which_step_a_store_makes_waves_grow():
         assert [one.step <= one.limit for one in row] == [True] * safe + [False] * (3 - safe)
         assert [one.verdict == "blown up" for one in row] == [False] * safe + [True] * (3 - safe)
     assert found.row("weno5", "rodas-5p")[0].limit is None
-    with pytest.raises(FvsolveError, match="Courant numbers are for pipes in cells"):
+    with pytest.raises(FvsolveError, match="Courant numbers need pipes with cells"):
         studies.failures(case, courants=[0.5])
 
 
