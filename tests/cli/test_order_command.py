@@ -79,7 +79,7 @@ def test_cell_time_is_a_resolution_of_the_pipes_that_state_no_cells(capsys, tmp_
     cells = [[row["set"][f"links.{name}.cells"] for name in ("supply", "branch", "lower")] for row in rows]
     assert code == 0 and cells == [[20, 16, 7], [40, 32, 7]]
     code, _, err = call(capsys, "gradual-closure", "--key", "numerics.cell_time")
-    assert code == 2 and "no resolution" in err
+    assert code == 2 and "is not a resolution of this case" in err
 
 
 def test_settings_that_leave_no_exact_solution_are_said(capsys, tmp_path):

@@ -153,8 +153,8 @@ class Ladder:
             "change_time": self.change_time,
         }
         laws = {"strain": self.strain, "apart": self.apart and vars(self.apart), "thumb": self.thumb}
-        rungs = {"rungs": [vars(level) for level in self.rungs]}
-        return own | laws | rungs | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
+        levels = {"rungs": [vars(level) for level in self.rungs]}
+        return own | laws | levels | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
 
 
 @door(set=TABLE, target=NUMBER, progress=CALL)

@@ -200,7 +200,10 @@ class Trials:
         return self._limits[method, *at]
 
     def lines_limit(self, method: str, scheme: str, k: int) -> float | None:
-        """Predicted greatest step [s] by waves between storing nodes and delay lines; inf without these or fixed steps."""
+        """Predicted greatest step [s] by waves between storing nodes and delay lines.
+
+        inf without delay lines, or without fixed steps.
+        """
         set = {**self.base, **self.across.keys(k), "numerics.scheme": scheme}
         steps = [keys["numerics.step"] for keys in self.across.sets if "numerics.step" in keys]
         if not steps or not lines(load(self.case, set)):
