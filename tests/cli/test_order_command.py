@@ -79,7 +79,7 @@ def test_cell_time_is_a_resolution_of_the_pipes_that_state_no_cells(capsys, tmp_
     cells = [[row["set"][f"links.{name}.cells"] for name in ("supply", "branch", "lower")] for row in rows]
     assert code == 0 and cells == [[20, 16, 7], [40, 32, 7]]
     code, _, err = call(capsys, "gradual-closure", "--key", "numerics.cell_time")
-    assert code == 2 and "no resolution" in err
+    assert code == 2 and "is not a resolution of this case" in err
 
 
 def test_settings_that_leave_no_exact_solution_are_said(capsys, tmp_path):
@@ -101,7 +101,7 @@ def test_what_is_no_resolution_is_refused_with_those_that_are(key, capsys):
     ("words", "told"),
     [
         (["gradual-closure", "--refine", "tiem"], 'did you mean "time"'),
-        (["gradual-closure", "--levels", "1"], "2 at least"),
+        (["gradual-closure", "--levels", "1"], "at least 2"),
         (["gradual-closure", "--levels", "20"], "fewer levels"),
         (["gradual-closure", "--scheme", "upwnd5"], 'did you mean "upwind5"'),
         (["gradual-closure", "--method", "rk5"], "numerics.method"),

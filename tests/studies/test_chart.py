@@ -406,7 +406,7 @@ def test_a_chart_that_was_broken_off_goes_on_from_its_points(tmp_path):
 
 
 def test_a_case_in_which_nothing_moves_has_no_chart():
-    with pytest.raises(FvsolveError, match="every probe stands still"):
+    with pytest.raises(FvsolveError, match="all probes are constant"):
         chart(line(end=0.04), schemes=["upwind5"], methods=["rk4"], cells=[10, 20])
 
 

@@ -242,7 +242,7 @@ def test_what_is_watched_steps_as_any_run_does():
         ({"courants": [0.5], "steps": [0.1]}, "keep one"),
         ({"courants": [-1.0]}, "positive"),
         ({"courants": [0.5, 1.0], "key": ("links.main.diameter", [0.3])}, "columns"),
-        ({"tolerance": 1e-6, "methods": ["rk4"]}, "no better than the runs it judges"),
+        ({"tolerance": 1e-6, "methods": ["rk4"]}, "the reference is not accurate enough"),
         ({"tolerance": -1.0}, "positive"),
         ({"key": ("numerics.step", [0.1])}, "the map sets it"),
     ],

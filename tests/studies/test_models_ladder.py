@@ -99,7 +99,7 @@ def test_rungs_that_would_be_ill_posed_are_skipped_by_name():
     case = shutting(2.0, cells=8)
     case["links"]["main"]["friction"] = {"model": "none"}
     case["links"]["main"]["initial_flow"] = 0.03
-    assert "nothing is left of it" in named(ladder(case), "lumped volume").reason
+    assert "no friction, so there is no resistance" in named(ladder(case), "lumped volume").reason
     case = shutting(2.0, cells=8)
     case["nodes"]["gate"]["demand"] = 0.01
     found = ladder(case)
@@ -112,7 +112,7 @@ def test_rungs_that_would_be_ill_posed_are_skipped_by_name():
 def test_a_scene_in_which_nothing_moves_is_refused():
     case = shutting(2.0, cells=8)
     case["links"]["valve"]["opening"] = 1.0
-    with pytest.raises(FvsolveError, match="no probe moves"):
+    with pytest.raises(FvsolveError, match="no probe changes"):
         ladder(case)
 
 
@@ -241,5 +241,5 @@ def test_a_rung_is_within_the_target_of_what_many_cells_say_and_not_of_the_case(
 
 def test_where_no_refinement_reaches_the_target_the_answer_says_what_it_is_worth():
     found = ladder(coarse(), target=1e-5)
-    assert found.own > 1e-5 and f"errs by about {found.own:.2g} itself" in found.thumb[-1]
+    assert found.own > 1e-5 and f"itself has an error of about {found.own:.2g}" in found.thumb[-1]
     assert "more than the target" in found.thumb[-1] and found.plain()["own_error"] == found.own

@@ -38,8 +38,8 @@ def test_it_says_how_far_from_shallow_a_tank_is():
     found = ladder(rolling(1e-4, level=1.0), target=0.05)
     (said,) = found.deep
     assert (
-        said == "tank: k h = 1 of its slowest wave, which shallow water has 16 % fast, more than the target: modes "
-        "know better while waves are small"
+        said == "tank: its slowest wave, with k h = 1, is 16 % too fast in shallow water, more than the target: modes "
+        "are more accurate for small waves"
     )
 
 

@@ -27,25 +27,25 @@ def affordable(
 
     points : result cache, which also stores the chosen number of cells
     """
-    plan_made = plan(case, refine, key, levels, cells)
-    if cells is not None or key is not None or plan_made.way == "time" or not counts(case):
-        return plan_made
+    refinement = plan(case, refine, key, levels, cells)
+    if cells is not None or key is not None or refinement.way == "time" or not counts(case):
+        return refinement
     settings = {
         "study": "order",
         "what": "first cells",
-        "way": plan_made.way,
-        "levels": len(plan_made.levels),
+        "way": refinement.way,
+        "levels": len(refinement.levels),
         "against": against,
     }
     stored = None if points is None else points.find(case, settings)
-    first = stored["cells"] if stored else first_cells(case, plan_made, refine, levels, against)
+    first = stored["cells"] if stored else first_cells(case, refinement, refine, levels, against)
     if first == most(counts(case)):
-        return plan_made
+        return refinement
     if points is not None and stored is None:
         points.get(case, settings, lambda: {"cells": first})
     remark = f"starts with {first} of {most(counts(case))} cells, to end within minutes (change with --cells)"
-    plan_made = plan(case, refine, key, levels, first)
-    return replace(plan_made, words=f"{plan_made.words}; {remark}")
+    refinement = plan(case, refine, key, levels, first)
+    return replace(refinement, words=f"{refinement.words}; {remark}")
 
 
 def first_cells(case, rows: Plan, refine: str | None, levels: int | None, against: str) -> int:

@@ -1,4 +1,4 @@
-"""What accuracy costs: error against time and work over schemes, methods and resolution. Knows runs; draws nothing."""
+"""Work-precision study: error against CPU time and work over schemes, methods and resolutions."""
 
 from __future__ import annotations
 
@@ -34,30 +34,38 @@ FRAME = (
     "scheme", "method", "cells", "size", "trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates",
     "steps", "ok", "reason",
 )  # fmt: skip
-WRONG = 1.0  # an error as great as all that the component does
+WRONG = 1.0  # errors above the range of the component are wrong results
 
 
 @dataclass(frozen=True)
 class Aim:
-    """A setting that reaches a target, found and run: its point, and the lines that ask for it."""
+    """Setting whose run reaches a target error, with its point and its keys.
+
+    numerics : keys of [numerics] without that prefix; others : all other keys, dotted
+    """
 
     target: float
     point: Point
     numerics: dict
-    others: dict  # dotted keys outside [numerics]
+    others: dict
 
     def lines(self) -> list[str]:
-        """TOML: keys of `[numerics]`, then the tables of pipes whose cells change."""
-        found = [f"{key} = {toml(value)}" for key, value in self.numerics.items()]
+        """Lines of TOML: keys of `[numerics]`, then the tables of parts whose cells change."""
+        toml_lines = [f"{key} = {toml(value)}" for key, value in self.numerics.items()]
         for key, value in self.others.items():
             table, _, name = key.rpartition(".")
-            found += ["", f"[{table}]", f"{name} = {toml(value)}"]
-        return found
+            toml_lines += ["", f"[{table}]", f"{name} = {toml(value)}"]
+        return toml_lines
 
 
 @dataclass(frozen=True, repr=False)
 class Chart(Shown):
-    """Error against cost of a case, with the floor below which it means nothing."""
+    """Errors of a case against their cost.
+
+    reference, second : the two references in words; floor : their difference, below which errors mean nothing
+    default : name of the curve of the program's defaults; told : references that failed
+    left_out : usual schemes that do not support the fluid; aim : setting for a target error
+    """
 
     case: str
     points: list[Point]
@@ -70,7 +78,7 @@ class Chart(Shown):
     reused: int = 0
     aim: Aim | None = None
     told: tuple[str, ...] = field(default=())
-    left_out: tuple[str, ...] = field(default=())  # schemes that do not follow the fluid
+    left_out: tuple[str, ...] = field(default=())
 
     picture = "fvsolve.studies.accuracy.files:figure"
 
@@ -78,12 +86,13 @@ class Chart(Shown):
         return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
 
     def listed(self) -> dict[str, list]:
+        """Columns TABLE_COLUMNS of all points."""
         return Sheet([Column(key) for key in FRAME], self.rows).listed()
 
     @property
     def rows(self) -> list[dict]:
-        """All points, each with what its setting says."""
-        return [vars(one.setting) | vars(one) for one in self.points]
+        """All points as dicts, with the fields of their settings."""
+        return [vars(point.setting) | vars(point) for point in self.points]
 
     def curves(self) -> dict[str, list[Point]]:
         """Points by name of scheme and method, from coarse to fine."""
@@ -91,19 +100,20 @@ class Chart(Shown):
 
     @property
     def stands(self) -> Point | None:
-        """The program's defaults as they stand: 100 cells, or a tolerance of 1e-6; None where that was not run."""
+        """Point of the program's defaults, 100 cells or a tolerance of 1e-6; None if it was not run."""
         curve = self.curves().get(self.default, [])
         return next(
-            (one for one in curve if DEFAULT_CELLS == one.setting.cells or one.setting.size == DEFAULT_RTOL), None
+            (point for point in curve if DEFAULT_CELLS == point.setting.cells or point.setting.size == DEFAULT_RTOL),
+            None,
         )
 
     @property
     def failed(self) -> list[Point]:
-        """Points without a usable answer."""
+        """Points without a usable result."""
         return [point for point in self.points if not point.ok]
 
     def plain(self) -> dict:
-        """All of it as dicts and lists, SI; the lines to paste as text."""
+        """Return the chart as plain data, SI, with the lines of `aim` as text."""
         stands = None if self.stands is None else asdict(self.stands)
         return asdict(self) | {"stands": stands} | ({} if self.aim is None else {"paste": "\n".join(self.aim.lines())})
 
@@ -135,49 +145,50 @@ def chart(
     jobs: int = 1,
     dask: str | None = None,
 ) -> Chart:
-    """Run a case over schemes x methods x cells (or tolerances) and lay error against cost.
+    """Run a case over schemes x methods x cells (or tolerances) and compare errors with their cost.
 
-    cells : of the pipe a wave takes longest to cross; rtol, step : of a case without cells [-], [s]; of one whose pipes
-    are all delay lines step alone
-    target : an error over the trajectory for which a setting is to be found and run
-    out : folder where finished points are kept and found again
-    jobs, dask : who makes the runs, as in `sweep`; processes that share a processor's cache and memory take longer each
+    cells : numbers of cells of the pipe with the longest travel time of a wave, or along the longer side of a basin
+    rtol, step : tolerances [-] and steps [s] of a case without cells; if all its pipes are delay lines, steps only
+    target : error over the trajectory; the cheapest setting that reaches it is found and run
+    out : folder in which finished points are stored and found again; progress : progress(done, total, next)
+    jobs, dask : processes that make the runs, as in `sweep`; each takes longer if they share cache and memory
     Raises CaseError, FvsolveError.
     """
-    read, tell = load(case, set), progress or (lambda *_: None)
-    read = load(read, settled(read)) if settled(read) else read
-    with Points(out) as kept, Errands(read, jobs, dask) as errands:
-        return _Study(read, kept, tell, errands).go(schemes, methods, cells, rtol, step, target)
+    base_case, report = load(case, set), progress or (lambda *_: None)
+    base_case = load(base_case, settled(base_case)) if settled(base_case) else base_case
+    with Points(out) as points, Errands(base_case, jobs, dask) as queue:
+        return _Study(base_case, points, report, queue).go(schemes, methods, cells, rtol, step, target)
 
 
 def toml(value) -> str:
-    """Text or a number as TOML writes it."""
+    """Text or number in TOML."""
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
 class _Study:
-    """One chart while it is made."""
+    """Runs, reference and results of one chart."""
 
-    def __init__(self, case: Case, points: Points, progress: Progress, errands: Errands) -> None:
-        self.case, self.errands = case, errands
+    def __init__(self, case: Case, points: Points, progress: Progress, queue: Errands) -> None:
+        self.case, self.errands = case, queue
         if from_files(self.case):
-            what = f"chart refines cells, and those of {listing(from_files(self.case))} are a file's"
-            raise FvsolveError(f"{what}; order --refine time does without")
+            reason = f"chart refines cells, but the mesh of {listing(from_files(self.case))} is a file"
+            raise FvsolveError(f"{reason}. Try order --refine time, which keeps the cells")
         self.points, self.progress = points, progress
         self.celled = load(case, in_cells(lines(case))) if lines(case) else case
         self.default, self.compiling = default_curve(self.case), 0.0
-        self.coarse: Coarse | None = None  # with pipes
+        self.coarse: Coarse | None = None  # of a case with cells or delay lines
         self.done, self.total, self.least_overshoot = 0, 0, 0.0
-        self.given_up: dict[tuple, str] = {}  # curve -> the fineness at which it was
+        self.given_up: dict[tuple, str] = {}  # curve -> resolution of the run that was given up
 
     def go(self, schemes, methods, cells, rtol, step, target) -> Chart:
+        """Run all settings, and settings for the target if there is one."""
         schemes, methods = names(schemes), names(methods)
         known(schemes, methods)
         if longest(self.celled):
             self.coarse = Coarse(**self.points.get(self.case, {"study": "chart", "coarse": True}, self.coarsely))
             self.compiling += self.coarse.compile_seconds
         self.all = settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
-        self.finest = max((one.cells for one in self.all if one.cells), default=None)
+        self.finest = max((entry.cells for entry in self.all if entry.cells), default=None)
         self.total = len(self.all) + 1
         floor = self.floor()
         self.least_overshoot = floor["overshoot"] or 0.0
@@ -187,31 +198,31 @@ class _Study:
             points = self.downwards(points, target)
         if all(point.trajectory < least for point in points if point.ok):
             raise FvsolveError(_useless(self.case, points, floor))
-        rows = [row(points, one, least, self.default) for one in targets(errors_of(points), least)]
-        aim = None if target is None else self.aim(points, target, floor)
+        rows = [row(points, entry, least, self.default) for entry in targets(errors_of(points), least)]
+        target_setting = None if target is None else self.aim(points, target, floor)
         return Chart(
             self.case.name, points, floor["reference"], floor["second"], floor, self.default, self.compiling, rows,
-            self.points.reused, aim, tuple(floor["told"]), tuple(left_out(self.case, schemes)),
+            self.points.reused, target_setting, tuple(floor["told"]), tuple(left_out(self.case, schemes)),
         )  # fmt: skip
 
     @cached_property
     def truth(self) -> Truth:
-        """What judges, found only where some point is not known yet; what runs need is compiled before."""
-        for setting in {one.curve: one for one in reversed(self.all)}.values():
+        """Reference of all points, computed if some point is new, after the code of all curves is compiled."""
+        for setting in {entry.curve: entry for entry in reversed(self.all)}.values():
             self.progress(self.done, self.total, f"compiling {setting.name}")
             self.compiling += self.compile(setting)
         stiff = self.coarse is not None and self.coarse.stiff
-        found = truth(
+        reference = truth(
             self.case, self.judged(), stiff=stiff,
             tell=lambda name: self.progress(self.done, self.total, f"reference {name}"), errands=self.errands,
         )  # fmt: skip
-        if not moving(found.run, found):
-            told = "every probe stands still, so an error has no range; probe what moves, or run longer"
-            raise FvsolveError(f"{self.case.name}: {told}")
-        return found
+        if not moving(reference.run, reference):
+            reason = "all probes are constant, so errors have no range. Try a probe that changes, or a longer run"
+            raise FvsolveError(f"{self.case.name}: {reason}")
+        return reference
 
     def judged(self) -> dict | None:
-        """Keys of the finest cells that references are to judge; delay lines are judged by as fine ones."""
+        """Keys of the finest cells under study, for the references; delay lines get cells of that travel time."""
         if not lines(self.case):
             return None if self.finest is None else cell_keys(self.case, self.finest)
         main, cells = longest(self.case) or longest(self.celled), self.finest or max(self.coarse.levels)
@@ -219,135 +230,136 @@ class _Study:
         return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
 
     def coarsely(self) -> dict:
-        """The coarse run, kept, so that the same cells are found again."""
+        """Coarse run as plain data, so that a repeated study finds the same cells in the cache."""
         return asdict(coarse(self.case if longest(self.case) else self.celled))
 
     def floor(self) -> dict:
-        """What the references are called and how far they disagree."""
+        """References in words, and how far they disagree."""
 
         def make() -> dict:
-            found = self.truth
-            said = {"reference": found.words, "second": found.second, "told": found.told}
-            return said | asdict(found.doubt)
+            reference = self.truth
+            texts = {"reference": reference.words, "second": reference.second, "told": reference.told}
+            return texts | asdict(reference.doubt)
 
-        found = self.points.get(self.case, {"study": "chart", "floor": self.finest}, make)
+        floor = self.points.get(self.case, {"study": "chart", "floor": self.finest}, make)
         self.done += 1
-        return found
+        return floor
 
     def ahead(self) -> None:
-        """Have others make the runs of all settings that are not known yet, and keep what they amount to."""
+        """Run all new settings in other processes, and store their results."""
         if self.errands.alone:
             return
-        dearest_last = sorted(self.all, key=lambda one: (one.cells or 0, -one.size))
-        new = [one for one in dearest_last if self.points.find(self.case, self.extra(one)) is None]
+        by_cost = sorted(self.all, key=lambda setting: (setting.cells or 0, -setting.size))
+        new = [setting for setting in by_cost if self.points.find(self.case, self.extra(setting)) is None]
         if not new:
             return
-        self.truth  # noqa: B018  which has runs of its own made
-        errands = [Errand(quickest, one.keys) for one in new]
-        for count, at in enumerate(self.errands.ahead(errands), 1):
+        self.truth  # noqa: B018  computes the reference first, with runs of its own
+        requests = [Errand(quickest, setting.keys) for setting in new]
+        for count, at in enumerate(self.errands.ahead(requests), 1):
             self.progress(self.done + count, self.total, f"{new[at].name}, {new[at].fineness}")
-            self.points.get(self.case, self.extra(new[at]), lambda one=new[at]: self.measure(one))
+            self.points.get(self.case, self.extra(new[at]), lambda setting=new[at]: self.measure(setting))
 
     def extra(self, setting: MethodSetting) -> dict:
-        """What names a point beside the case."""
+        """Settings that identify a cached point of the case."""
         return {"study": "chart", "keys": setting.keys, "judged by": self.finest}
 
     def point(self, setting: MethodSetting) -> Point:
-        """A setting run and measured, or as it was found before; none that costs more than one that was given up."""
+        """Result of a setting, from a run or the cache; not run if a cheaper setting of its curve was given up."""
         self.progress(self.done, self.total, f"{setting.name}, {setting.fineness}")
-        dearer = self.given_up
-        if setting.curve in dearer:
-            found = nothing(f"not tried: already {dearer[setting.curve]} was given up")
+        given_up = self.given_up
+        if setting.curve in given_up:
+            data = nothing(f"not run: {given_up[setting.curve]} was given up already")
         else:
-            found = self.points.get(self.case, self.extra(setting), lambda: self.measure(setting))
+            data = self.points.get(self.case, self.extra(setting), lambda: self.measure(setting))
         self.done += 1
-        if found["reason"].startswith(GIVEN_UP) and grows(setting):
-            dearer[setting.curve] = setting.fineness
-        told = {key: math.nan if value is None else value for key, value in found.items()}
-        if told["overshoot"] < self.least_overshoot:
-            told["overshoot"] = 0.0
-        return Point(setting, **told)
+        if data["reason"].startswith(GIVEN_UP) and grows(setting):
+            given_up[setting.curve] = setting.fineness
+        values = {key: math.nan if value is None else value for key, value in data.items()}
+        if values["overshoot"] < self.least_overshoot:
+            values["overshoot"] = 0.0
+        return Point(setting, **values)
 
     def downwards(self, points: list[Point], target: float) -> list[Point]:
-        """All points, and before those of each curve that are all good enough coarser ones, until one is not."""
-        found = []
+        """All points, with coarser points before each curve until its coarsest point exceeds the target."""
+        all_points = []
         for curve in curves(points).values():
-            wider = list(curve)
-            while wider[0].ok and wider[0].trajectory <= target:
-                setting = coarser(self.case, wider[0].setting)
+            extended = list(curve)
+            while extended[0].ok and extended[0].trajectory <= target:
+                setting = coarser(self.case, extended[0].setting)
                 if setting is None:
                     break
                 self.total += 1
-                wider.insert(0, self.point(setting))
-            found += wider
-        return found
+                extended.insert(0, self.point(setting))
+            all_points += extended
+        return all_points
 
     def compile(self, setting: MethodSetting) -> float:
-        """Seconds that the first run of a curve takes beyond its second; none for what is refused."""
+        """Wall time of the first run of a curve less that of the second [s]; 0 for a refused setting."""
         try:
             return compile_seconds(prepared(self.case, setting.keys))
         except CaseError:
             return 0.0
 
     def measure(self, setting: MethodSetting) -> dict:
-        """What a point stores: errors and cost of a run, or why there are none."""
-        judge, found = self.truth, self.errands(self.case, Errand(quickest, setting.keys))
-        if found.refused:
-            return nothing(found.reason)
-        errors = asdict(distance(found, judge))
-        ok, reason = found.ok, found.reason
+        """Data of a point: errors and cost of a run, or the reason why there are none."""
+        reference, run = self.truth, self.errands(self.case, Errand(quickest, setting.keys))
+        if run.refused:
+            return nothing(run.reason)
+        errors = asdict(distance(run, reference))
+        ok, reason = run.ok, run.reason
         if ok and not errors["trajectory"] <= WRONG:
-            ok, reason = False, f"wrong: off by {errors['trajectory']:.3g} times the range of {errors['worst']}"
-        cost = {"seconds": found.processor, "rhs": found.counts["rhs"], "updates": found.cell_updates}
-        return {"ok": ok, "reason": reason, **errors, **cost, "steps": found.counts["steps"]}
+            ok, reason = False, f"wrong: the error is {errors['trajectory']:.3g} times the range of {errors['worst']}"
+        cost = {"seconds": run.processor, "rhs": run.counts["rhs"], "updates": run.cell_updates}
+        return {"ok": ok, "reason": reason, **errors, **cost, "steps": run.counts["steps"]}
 
     def aim(self, points: list[Point], target: float, floor: dict) -> Aim:
-        """The cheapest setting for a target, run; made finer until it holds."""
+        """Cheapest setting for a target error, run and refined until its error is within the target."""
         if not target >= floor["trajectory"]:
             raise FvsolveError(
-                f"a target of {target:g} lies below the floor: the two references ({floor['reference']}; "
-                f"{floor['second']}) disagree by {floor['trajectory']:.2g}; ask for a larger one, or give more cells"
+                f"a target of {target:g} is below the floor: the two references ({floor['reference']}; "
+                f"{floor['second']}) disagree by {floor['trajectory']:.2g}. Try a larger target, or more cells"
             )
-        found = cheapest(points, target, floor["trajectory"], "seconds")
-        if found is None:
+        best = cheapest(points, target, floor["trajectory"], "seconds")
+        if best is None:
             finer = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
             raise FvsolveError(
-                f"no setting reaches {target:g}; the best is at {min(errors_of(points)):.2g}: give {finer}"
+                f"no setting reaches an error of {target:g}, the least is {min(errors_of(points)):.2g}. Try {finer}"
             )
-        name, where = found
+        name, crossing = best
         curve = curves(points)[name]
-        for share in (where.share, 0.5 * (1.0 + where.share)) if where.within else ():
-            made = self.point(
-                setting_between(self.case, curve[where.coarser].setting, curve[where.finer].setting, share)
+        for share in (crossing.share, 0.5 * (1.0 + crossing.share)) if crossing.within else ():
+            point = self.point(
+                setting_between(self.case, curve[crossing.coarser].setting, curve[crossing.finer].setting, share)
             )
-            if made.ok and made.trajectory <= target:
-                return _aim(target, made, self.case)
-        return _aim(target, curve[where.finer], self.case)
+            if point.ok and point.trajectory <= target:
+                return _aim(target, point, self.case)
+        return _aim(target, curve[crossing.finer], self.case)
 
 
 def nothing(reason: str) -> dict:
-    """What a point stores that was not run."""
+    """Data of a point without a run."""
     cost = {"seconds": math.nan, "rhs": 0, "updates": 0, "steps": 0}
     return {"ok": False, "reason": reason, **asdict(Distance()), **cost}
 
 
 def grows(setting: MethodSetting) -> bool:
-    """Whether the finer settings of a curve cost more: an implicit method may gain by a smaller tolerance."""
+    """True if finer settings of a curve cost more; an implicit method may be faster with a smaller tolerance."""
     if setting.cells is not None or setting.control == "step" or not adaptive(setting.method):
         return True
     return setting.method != AUTO and METHODS[setting.method].explicit
 
 
 def _aim(target: float, point: Point, case: Case) -> Aim:
+    """Setting of a point, with a method from a file as the path of that file."""
     keys = point.setting.keys
     if "numerics.method" in keys:
         keys = keys | {"numerics.method": _written(keys["numerics.method"], case)}
-    own = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
-    return Aim(target, point, own, {key: value for key, value in keys.items() if not key.startswith("numerics.")})
+    numerics = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
+    return Aim(target, point, numerics, {key: value for key, value in keys.items() if not key.startswith("numerics.")})
 
 
 def _written(method: str, case: Case) -> str:
-    """A method as the case file says it: of a tableau in a file the path, relative to the case where it lies below."""
+    """Method as in a case file: for a tableau in a file its path, relative to the case if it is below its folder."""
     path = Path(METHODS[method].source) if method in METHODS and method not in OWN else None
     if path is None or not path.is_file():
         return method
@@ -356,9 +368,10 @@ def _written(method: str, case: Case) -> str:
 
 
 def _useless(case: Case, points: list[Point], floor: dict) -> str:
-    finest = min(errors_of(points), default=math.nan)
-    told = f"all errors (least {finest:.2g})" if math.isfinite(finest) else "what can be told, for no run came near"
-    way = "a larger --step (where delay lines are exact any step will do)" if lines(case) else "a larger --rtol"
-    way = "fewer --cells (references have four times the finest)" if longest(case) else way
+    """Message for references that are not accurate enough for any point."""
+    least = min(errors_of(points), default=math.nan)
+    errors = f"all errors (least {least:.2g})" if math.isfinite(least) else "any useful error, and no run succeeded"
+    remedy = "a larger --step (if delay lines are exact, any step will do)" if lines(case) else "a larger --rtol"
+    remedy = "fewer --cells (references have four times the cells of the finest run)" if longest(case) else remedy
     return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
-            f"{floor['trajectory']:.2g}, more than {told}; try {way}, or end the run earlier")  # fmt: skip
+            f"{floor['trajectory']:.2g}, more than {errors}. Try {remedy}, or an earlier end of the run")  # fmt: skip

@@ -1,8 +1,8 @@
-"""How fast errors fall: a fitted order, or a sentence why there is none. Knows sizes and errors; knows no run.
+"""Order of convergence fitted to errors, or the reason why there is none.
 
-The fit is the least-squares slope of log error over log size over a window of successive rows. The window ends at the
-last row that is not at the floor and begins where the orders between rows come near the slope: rows before it are
-pre-asymptotic, rows behind it at the floor. What is neither is no order, and then no number is given.
+The fit is the least-squares slope of log error over log size in a window of successive rows. The window ends at the
+last row above the floor. It begins where the orders between rows come near the slope. Rows before the window are
+pre-asymptotic, rows after it are at the floor. If other rows remain, there is no order, and no number is given.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from fvsolve.doors import NUMBER, SERIES, Kind, door, is_array
 from fvsolve.errors import FvsolveError
 
 LEAST_ROWS = 3
-ABOVE_FLOOR = 10.0  # times the floor that an error must be to say anything of the order
+ABOVE_FLOOR = 10.0  # an error below this multiple of the floor is not used
 FLAT = 10.0  # errors at the floor lie within this factor of each other
-RISE = 1.5  # factor by which an error before the window may lie below the next
-STEEPER = 3.0  # times a slope, which rows before it may fall
-CLEAR = 0.03  # spread of a line that shows what lies above it, times 1 + order
+RISE = 1.5  # greatest factor by which errors before the window may rise from row to row
+STEEPER = 3.0  # greatest ratio of the orders before a short window to its slope
+CLEAR = 0.03  # greatest spread of a clear line, times 1 + order
 LEAST_FALL = 1.8  # factor by which errors must fall over the window
 LEAST_ORDER = 0.2
-DRIFT = 1.5, 3.0  # last steps by which orders that drift may still go on: where steps get less, and where not
+DRIFT = 1.5, 3.0  # further drift of orders, least and greatest, as a multiple of their last change
 NO_ERROR = "no order: no row has an error above zero"
 PRE, FLOOR, ASIDE, FAILED = "pre-asymptotic", "floor", "off the line", "failed"
 
@@ -33,9 +33,10 @@ class Fit:
     """An order with its spread, or the reason why there is none.
 
     pairwise : order between each row and the next, NaN where there is none
-    order, spread : slope over the window, and how far from it its rows' pairwise orders lie or drift; NaN with a reason
+    order, spread : slope in the window, and greatest distance of its pairwise orders from it, with the expected further
+    drift; NaN if there is a reason
     marks : per row "", "pre-asymptotic", "floor", "off the line" or "failed"; rows without a mark are fitted
-    constant : of error = constant size^order; reason : "" where there is a number; note : what is to be said beside it
+    constant : of error = constant size^order; reason : "" if there is an order; note : remark on the order
     """
 
     pairwise: tuple[float, ...]
@@ -47,41 +48,41 @@ class Fit:
     note: str = ""
 
     def plain(self) -> dict:
-        """As plain data."""
+        """Return the fit as plain data."""
         return {
             "order": self.order, "spread": self.spread, "constant": self.constant, "pairwise": list(self.pairwise),
             "marks": list(self.marks), "reason": self.reason, "note": self.note,
         }  # fmt: skip
 
 
-ERRORS = Kind(lambda given: is_array(given, "fiu", 1, 1, finite=False), "a row of numbers")
+ERRORS = Kind(lambda value: is_array(value, "fiu", 1, 1, finite=False), "a row of numbers")
 
 
 @door(sizes=SERIES, errors=ERRORS, floor=NUMBER)
 def fit(sizes, errors, floor: float = 0.0) -> Fit:
-    """The order p of errors ~ C sizes^p, sizes falling; errors below ten times `floor` mean nothing.
+    """Fit the order p of errors ~ C sizes^p, sizes falling; errors below ten times `floor` are not used.
 
-    sizes : float64[n]  of cells or steps; errors : float64[n]  not negative, NaN where a run failed
-    Raises FvsolveError for sizes that do not fall, or errors below zero.
+    sizes : float64[n]  of cells or steps; errors : float64[n]  not negative, NaN if a run failed
+    Raises FvsolveError for sizes that do not fall, for negative errors, and for a negative floor.
     """
     h, e = np.asarray(sizes, dtype=float), np.asarray(errors, dtype=float)
     if floor < 0.0:
-        raise FvsolveError(f"floor = {floor:g}; wanted a number from 0 on")
+        raise FvsolveError(f"floor = {floor:g} is negative. Expected a number of at least 0")
     if h.shape != e.shape:
-        raise FvsolveError(f"{h.size} sizes and {e.size} errors; wanted one error for each size")
+        raise FvsolveError(f"{h.size} sizes and {e.size} errors. Expected one error for each size")
     if np.any(~np.isfinite(h)) or np.any(h <= 0.0) or np.any(np.diff(h) >= 0.0):
         raise FvsolveError("sizes must be positive and fall from row to row")
     if np.any(e < 0.0):
-        raise FvsolveError("errors must not be negative; give their absolute values")
+        raise FvsolveError("errors must not be negative. Try their absolute values")
     rows = FitRows(h, e, floor)
     if rows.good.size < LEAST_ROWS:
         return rows.none(rows.too_few())
-    found = rows.whole() or rows.without_one() or rows.whole(strict=False) or rows.none(rows.why())
-    return rows.none(rows.drifting()) if found.spread >= found.order else found
+    result = rows.whole() or rows.without_one() or rows.whole(strict=False) or rows.none(rows.why())
+    return rows.none(rows.drifting()) if result.spread >= result.order else result
 
 
 class FitRows:
-    """The rows of one fit."""
+    """Rows of a fit: sizes h, errors e, and their marks."""
 
     def __init__(self, h: np.ndarray, e: np.ndarray, floor: float) -> None:
         self.h, self.e, self.floor = h, e, floor
@@ -93,108 +94,125 @@ class FitRows:
             self.marks[i] = FLOOR if i >= last else ASIDE
         self.good = np.array([i for i, mark in enumerate(self.marks) if not mark], dtype=int)
 
-    # answers ---------------------------------------------------------------------------------------------------
+    # fits ---------------------------------------------------------------------------------------------------
 
     def whole(self, strict: bool = True) -> Fit | None:
-        """A window among all rows; not strict: one whose last order steps off, which its spread then covers."""
-        found = window(self.h[self.good], self.e[self.good], strict)
-        return None if found is None else self.made(self.good, *found)
+        """Fit a window of all good rows; None if there is no window.
+
+        If not strict, the last order of the window may deviate from the others; the spread then includes it.
+        """
+        limits = window(self.h[self.good], self.e[self.good], strict)
+        return None if limits is None else self.made(self.good, *limits)
 
     def without_one(self) -> Fit | None:
-        """A window among all rows but one that lies far below the line of the others: an error that changes sign."""
+        """Fit a window without one row that lies far below the line of the other rows; None if there is none.
+
+        Such a row occurs where an error changes sign.
+        """
         best = None
         for i in range(1, len(self.good) - 1):
             rest = np.delete(self.good, i)
-            found = window(self.h[rest], self.e[rest])
-            if found is None or found[1] - found[0] < LEAST_ROWS + 1 or not found[0] < i < found[1]:
+            limits = window(self.h[rest], self.e[rest])
+            if limits is None or limits[1] - limits[0] < LEAST_ROWS + 1 or not limits[0] < i < limits[1]:
                 continue
-            made = self.made(rest, *found, aside=int(self.good[i]))
-            line = made.constant * self.h[self.good[i]] ** made.order
-            if self.e[self.good[i]] < 0.5 * line and (best is None or made.spread < best.spread):
-                best = made
+            candidate = self.made(rest, *limits, outlier=int(self.good[i]))
+            line = candidate.constant * self.h[self.good[i]] ** candidate.order
+            if self.e[self.good[i]] < 0.5 * line and (best is None or candidate.spread < best.spread):
+                best = candidate
         return best
 
-    def made(self, rows: np.ndarray, first: int, stop: int, note: str = "", aside: int | None = None) -> Fit:
+    def made(self, rows: np.ndarray, first: int, stop: int, note: str = "", outlier: int | None = None) -> Fit:
+        """Fit the rows first to stop - 1 of `rows`; outlier : row that lies off the line."""
         marks = list(self.marks)
         for k, i in enumerate(rows):
             marks[i] = PRE if k < first else FLOOR if k >= stop and not note else ASIDE if k >= stop else ""
-        if aside is not None:
-            marks[aside] = ASIDE
-            note = note or "one error lies far below the line of the others, as where errors change sign"
+        if outlier is not None:
+            marks[outlier] = ASIDE
+            note = note or "one error lies far below the line of the other errors, as if the error changed sign there"
         h, e = self.h[rows[first:stop]], self.e[rows[first:stop]]
-        slope, height = line_of(h, e)
-        p, seen = pair_orders(h, e), rows[max(first - 1, 0) : stop]
-        still = DRIFT[0] if FLOOR in marks else still_to_go(pair_orders(self.h[seen], self.e[seen]))
-        limit = p[-1] + still * (p[-1] - p[-2])
+        slope, intercept = line_of(h, e)
+        p, recent = pair_orders(h, e), rows[max(first - 1, 0) : stop]
+        drift = DRIFT[0] if FLOOR in marks else still_to_go(pair_orders(self.h[recent], self.e[recent]))
+        limit = p[-1] + drift * (p[-1] - p[-2])
         spread = float(np.max(np.abs([*p, limit] - np.float64(slope))))
-        return Fit(self.pairwise, slope, spread, tuple(marks), math.exp(height), "", note)
+        return Fit(self.pairwise, slope, spread, tuple(marks), math.exp(intercept), "", note)
 
     def none(self, reason: str) -> Fit:
+        """Result without an order."""
         return Fit(self.pairwise, math.nan, math.nan, tuple(self.marks), math.nan, reason)
 
     # reasons ---------------------------------------------------------------------------------------------------
 
     def too_few(self) -> str:
-        """Why fewer than three rows are left."""
+        """Reason for fewer than three good rows."""
         if not np.any(self.e > 0.0):
             return NO_ERROR
         if FLOOR in self.marks or ASIDE in self.marks:
-            return f"no order: {len(self.good)} of {len(self.h)} rows are above the floor; wanted {LEAST_ROWS}"
-        return f"no order: {len(self.good)} rows; wanted {LEAST_ROWS} at least"
+            return (
+                f"no order: {len(self.good)} of {len(self.h)} rows are above the floor. Expected at least {LEAST_ROWS}"
+            )
+        return f"no order: {len(self.good)} rows. Expected at least {LEAST_ROWS}"
 
     def why(self) -> str:
-        """Why no window was found."""
+        """Reason why no window shows an order."""
         e, p = self.e[self.good], pair_orders(self.h[self.good], self.e[self.good])
         if np.any(e[1:] > RISE * e[:-1]) and not e[-1] < e[0] / LEAST_FALL:
             return "no order: the errors do not fall"
         if np.all(p < LEAST_ORDER):
-            return f"no order: the errors hardly fall, by orders below {LEAST_ORDER:g}"
+            return f"no order: the errors hardly fall; orders between rows are below {LEAST_ORDER:g}"
         if p[-1] < LEAST_ORDER:
-            return "no order: the errors reach a floor before three rows show one order; begin coarser"
-        told = ", ".join(f"{x:.2f}" for x in p[-3:])
-        return f"no order: the last orders between rows differ ({told}); refine further, or less"
+            return "no order: the errors reach a floor before three rows show one order. Try a coarser first row"
+        last_orders = ", ".join(f"{x:.2f}" for x in p[-3:])
+        return f"no order: the last orders between rows differ ({last_orders}). Try more levels, or fewer"
 
     def drifting(self) -> str:
-        """Why a window says nothing whose orders may go on to zero, or to twice what they are."""
-        told = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
+        """Reason if the spread reaches the order, so that the orders may drift on to zero or to twice their value."""
+        last_orders = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
         rows = self.good.size
-        return f"no order: orders between rows still drift ({told}); {rows} rows do not settle, ask for {rows + 2}"
+        return f"no order: orders between rows still drift ({last_orders}) after {rows} rows. Try {rows + 2} rows"
 
 
 def pair_orders(h: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """log(e[i] / e[i+1]) / log(h[i] / h[i+1]) : float64[n-1], NaN where an error is zero or not finite."""
+    """Orders between rows, log(e[i] / e[i+1]) / log(h[i] / h[i+1]); NaN where an error is zero or not finite.
+
+    h, e : float64[n]; returns float64[n-1]
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
-        found = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
-    return np.where(np.isfinite(found), found, math.nan)
+        orders = np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])
+    return np.where(np.isfinite(orders), orders, math.nan)
 
 
 def still_to_go(p: np.ndarray) -> float:
-    """How many of its last steps a drift of orders may still go on: a geometric series, where three orders show one."""
-    least, most = DRIFT
+    """Expected further drift of orders, as a multiple of their last change.
+
+    With ratio r < 1 of the last two changes it is the geometric series r / (1 - r), within the limits of DRIFT_STEPS.
+    """
+    least, greatest = DRIFT
     if len(p) < LEAST_ROWS:
-        return most
+        return greatest
     before, last = p[-2] - p[-3], p[-1] - p[-2]
     if before * last <= 0.0:
         return least
-    share = last / before
-    return most if share >= 1.0 else min(max(share / (1.0 - share), least), most)
+    ratio = last / before
+    return greatest if ratio >= 1.0 else min(max(ratio / (1.0 - ratio), least), greatest)
 
 
 def line_of(h: np.ndarray, e: np.ndarray) -> tuple[float, float]:
-    """Slope and height of the least-squares line of log e over log h."""
-    slope, height = np.polyfit(np.log(h), np.log(e), 1)
-    return float(slope), float(height)
+    """Slope and intercept of the least-squares line of log e over log h."""
+    slope, intercept = np.polyfit(np.log(h), np.log(e), 1)
+    return float(slope), float(intercept)
 
 
 def near(order: float) -> float:
-    """How far orders between rows may lie from the slope that they share."""
+    """Greatest distance of the orders between rows from the slope of their line."""
     return 0.12 + 0.04 * order
 
 
 def window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int, int, str] | None:
-    """(first, stop, note) of the rows that show one order, all others explained; None where there are none.
+    """(first, stop, note) of the last window of rows that shows one order; None if there is none.
 
-    The latest window wins. Behind it the errors must be flat, or a single row leaves a line of four rows at least.
+    Errors after the window must be flat, or a single row after at least four rows may leave their line. Errors before
+    it must not rise by a factor of ALLOWED_RISE.
     """
     p = pair_orders(h, e)
     for stop in range(len(h), LEAST_ROWS - 1, -1):
@@ -211,14 +229,14 @@ def window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int, int,
 
 
 def agrees(h, e, first: int, stop: int) -> bool:
-    """Whether rows lie on one falling line."""
+    """True if rows lie on a falling line."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     spread = np.max(np.abs(pair_orders(h[first:stop], e[first:stop]) - slope))
     return slope >= LEAST_ORDER and spread <= near(slope)
 
 
 def leaves(p: np.ndarray) -> bool:
-    """Whether the last of some orders steps off from the others: what converges steps less and less."""
+    """True if the last order deviates from the orders before it: the changes of converging orders decrease."""
     if len(p) < LEAST_ROWS:
         return False
     before, last = np.abs(np.diff(p[-3:]))
@@ -226,47 +244,47 @@ def leaves(p: np.ndarray) -> bool:
 
 
 def hides(h, e, first: int, stop: int) -> bool:
-    """Whether a short or rough window follows rows that fell much faster: it may be nothing but their floor."""
+    """True if a short or rough window follows rows that fall much faster: it may be their floor."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     before = np.max(pair_orders(h[: first + 1], e[: first + 1]), initial=0.0)
     return bool(before > STEEPER * slope + 0.3) and not (stop - first > LEAST_ROWS and clear(h, e, first, stop))
 
 
 def clear(h, e, first: int, stop: int) -> bool:
-    """Whether rows lie so well on a line that what lies above it behind them can be seen."""
+    """True if rows lie so close to a line that an excess of later rows above the line is visible."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     spread = np.max(np.abs(pair_orders(h[first:stop], e[first:stop]) - slope))
     return bool(spread < CLEAR * (1.0 + slope))
 
 
 def widened(h, e, p, first: int, stop: int) -> tuple[int, int]:
-    """The window with the rows before it that lie on its line, and without a last one that begins to leave it."""
+    """Window extended by earlier rows on its line, and without a last row that begins to leave the line."""
     while first > 0 and agrees(h, e, first - 1, stop) and abs(p[first - 1] - line_of(h[first:stop], e[first:stop])[0]) \
             <= near(0.5 * (p[first - 1] + p[first])):  # fmt: skip
         first -= 1
-    whole = np.max(np.abs(np.diff(p[first : stop - 1])), initial=0.0)
-    inner = np.max(np.abs(np.diff(p[first : stop - 2])), initial=0.0)
+    all_changes = np.max(np.abs(np.diff(p[first : stop - 1])), initial=0.0)
+    inner_changes = np.max(np.abs(np.diff(p[first : stop - 2])), initial=0.0)
     leaving = p[stop - 2] < np.min(p[first : stop - 2], initial=math.inf)
-    if stop < len(h) and stop - first > LEAST_ROWS and leaving and inner < whole / 3.0:
+    if stop < len(h) and stop - first > LEAST_ROWS and leaving and inner_changes < all_changes / 3.0:
         return first, stop - 1
     return first, stop
 
 
 def behind(h, e, first: int, stop: int) -> str | None:
-    """What the rows behind a window are: "" a floor, a note for one that leaves the line, None for neither."""
+    """Kind of the rows after a window: "" for none or a floor, a note if a row leaves the line, else None."""
     rest = e[stop:]
     if rest.size == 0:
         return ""
-    slope, height = line_of(h[first:stop], e[first:stop])
-    over = rest - np.exp(height) * h[stop:] ** slope  # what the line does not explain
+    slope, intercept = line_of(h[first:stop], e[first:stop])
+    excess = rest - np.exp(intercept) * h[stop:] ** slope  # above the line
     last = e[stop - 1]
-    if rest.size >= 2 and np.all(over > 0.0) and over.max() < FLAT * over.min() and rest.max() < FLAT * last:
-        falls = math.log(over[0] / over[-1]) / math.log(h[stop] / h[-1])
+    if rest.size >= 2 and np.all(excess > 0.0) and excess.max() < FLAT * excess.min() and rest.max() < FLAT * last:
+        falls = math.log(excess[0] / excess[-1]) / math.log(h[stop] / h[-1])
         settled = pair_orders(h[-2:], e[-2:])[0] < 0.5 * slope
         if falls < min(0.3 * slope, 0.4) and (settled or clear(h, e, first, stop)):
             return ""
     if rest.size == 1 and stop - first > LEAST_ROWS:
-        if 0.0 < over[0] and rest[0] < RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
-            return ""  # no longer falls at all
-        return "the last row leaves the line: a floor, or another order, begins there"
+        if 0.0 < excess[0] and rest[0] < RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
+            return ""  # the error no longer falls
+        return "the last row leaves the line: a floor or another order begins there"
     return None

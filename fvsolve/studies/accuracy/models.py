@@ -1,7 +1,4 @@
-"""The ladder of models of one case, from a rigid column to the full line, linear to tabled: what each one errs, costs.
-
-Knows rungs and laws; leaves the runs to `outcome`.
-"""
+"""Hierarchy of models of a case, from rigid columns to cells, under every density law: errors and computing times."""
 
 from __future__ import annotations
 
@@ -26,22 +23,22 @@ from fvsolve.studies.outcome import Outcome, outcome, without_basins
 from fvsolve.studies.truth import of_run
 
 TARGET = 1e-2
-BEST_OF, BRIEF = 3, 0.3  # timings of a rung; [s] that the first may take for there to be others
-PATIENCE = 8.0  # [s] of CPU time after which a rung is given up
-BEYOND = 3.0  # times dp/K: from there on the laws differ by something else
-DOUBLINGS = 6  # of the richest rung's cells, to see what it errs itself
-DEARER = 4.0  # times, of twice the cells and twice the steps
-SAMPLES = 4001  # of each schedule, to find how quickly it changes
+BEST_OF, BRIEF = 3, 0.3  # timed runs of a level; time of the first run above which it is not repeated [s]
+PATIENCE = 8.0  # CPU time after which a level is given up [s]
+BEYOND = 3.0  # a difference of the laws above this multiple of dp/K has another cause
+DOUBLINGS = 6  # greatest number of doublings of the cells, to find the error of the richest level itself
+DEARER = 4.0  # ratio of computing times, for twice the cells and twice the steps
+SAMPLES = 4001  # sample times of each schedule, to find its steepest slope
 
 
 @dataclass(frozen=True)
 class Rung:
-    """One model of the scene: its name and law, states, what it errs against the richest and what it costs.
+    """Model of a case: its name and law, number of states, errors against the richest level, and cost.
 
-    errors : of each probe, root mean square over time of the difference to the richest rung, over the range there [-]
-    error : the greatest of them, None where the rung is skipped, and then `reason` says why
-    greatest : the greatest difference at any time over the range, of all probes
-    seconds : of stepping, best of three; rhs : calls of the rates
+    errors : probe -> root mean square over time of the difference to the richest level, over the range there [-]
+    error : greatest of these errors, None if the level is skipped; `reason` then explains it
+    greatest : greatest difference of any probe at any time, over its range [-]
+    seconds : time of the steps, the best of three runs [s]; rhs : calls of the rates
     """
 
     name: str
@@ -56,17 +53,17 @@ class Rung:
 
     @property
     def worst(self) -> str:
-        """The probe that errs most."""
+        """Probe with the greatest error."""
         return max(self.errors, key=self.errors.get, default="")
 
 
 @dataclass(frozen=True)
 class Apart:
-    """How the linear law differs from the richest one, by the probe that shows it most, over its range [-].
+    """Difference of the linear law from the richest law, of the probe with the greatest difference, over its range [-].
 
-    error : root mean square over time; start : at the start of the run; moves : the range over the greatest value [-]
+    error : root mean square over time; start : at the start of the run; moves : range over the greatest value [-]
     level : greatest pressure at the start over the stiffness [-]
-    swift : velocity head of the quickest pipe at the start, rho v^2 / 2 [Pa], which the linear law leaves out
+    swift : greatest velocity head of a pipe at the start, rho v^2 / 2 [Pa], which the linear law neglects
     """
 
     probe: str
@@ -79,15 +76,15 @@ class Apart:
 
 @dataclass(frozen=True)
 class Ladder:
-    """All rungs, poorest first, and what chooses among them.
+    """All levels, simplest first, with the cheapest sufficient level and rules for the choice.
 
-    richest : the one that the others are measured against, refined until what it errs itself is within the target
-    deep : of water in tanks that ride, how deep it is beside its longest waves, in words; case : whose units these use
-    own : about what the richest errs by its cells [-], None where it has none or no finer one was run
-    cheapest : the quickest rung whose error is within the target; travel_time : of a wave along the longest pipe [s]
-    change_time : of the quickest schedule, its range over its steepest slope [s]
-    strain : greatest change of pressure from the start over the stiffness of what it acts on [-]
-    apart : how the linear law differs from the richest on its structure, None where it was not run
+    richest : reference of all other levels, refined until its own error is within the target
+    deep : notes on shallow-water theory for tanks on bodies; case : gives the units of all texts
+    own : approximate error of the richest level from its cells [-]; None without cells or without a finer run
+    cheapest : fastest level with an error within the target; travel_time : greatest of a wave along a pipe [s]
+    change_time : range of the fastest schedule over its steepest slope [s]
+    strain : greatest change of pressure from the start, over the stiffness of the softest pipe or of the fluid [-]
+    apart : difference of the linear law from the richest law on the same structure, None if it was not run
     """
 
     rungs: list[Rung]
@@ -104,46 +101,51 @@ class Ladder:
 
     @property
     def worth(self) -> str:
-        """What the errors mean, by the richest rung's own one; nothing where it has no cells."""
+        """Note on the richest level's own error; empty if the case has no cells."""
         if self.richest.name == "as it is":
             return ""
         if self.own is None:
-            return f"what {self.richest.name} errs itself is not known: twice its cells could not be run"
-        said = f"{self.richest.name} errs by about {self.own:.2g} itself, by its cells"
+            return f"the error of {self.richest.name} itself is not known: twice its cells could not be run"
+        text = f"{self.richest.name} itself has an error of about {self.own:.2g} from its cells"
         if self.own <= self.target:
-            return said
-        return f"{said}: more than the target, so no error in this table is worth more; refine the case (fvsolve order)"
+            return text
+        return f"{text}, more than the target, so all errors of the table are uncertain by that. Try `fvsolve order`"
 
     @property
     def thumb(self) -> list[str]:
-        """The rules of thumb that the choice follows."""
-        found = list(self.deep) + ([] if self.apart is None else [self._of_laws(self.apart)])
+        """Rules of thumb for the choice of a model, in words."""
+        rules = list(self.deep) + ([] if self.apart is None else [self._of_laws(self.apart)])
         if self.travel_time > 0.0 and math.isfinite(self.change_time):
             ratio = self.change_time / self.travel_time
             kind = "waves matter" if ratio < 2.0 else "waves fade" if ratio < 20.0 else "waves hardly matter"
-            crossing, change = (self.case.amount(one, "time", 3) for one in (self.travel_time, self.change_time))
-            found.append(
-                f"a wave crosses the longest pipe in {crossing}, what acts changes in "
+            crossing, change = (
+                self.case.amount(seconds, "time", 3) for seconds in (self.travel_time, self.change_time)
+            )
+            rules.append(
+                f"a wave travels along a pipe for up to {crossing}, the fastest input changes in "
                 f"{change}, {ratio:.3g} times that: {kind}"
             )
-        return [*found, self.worth] if self.worth else found
+        return [*rules, self.worth] if self.worth else rules
 
     def _of_laws(self, apart: Apart) -> str:
+        """Rule of thumb for the density law: its difference against dp/K."""
         side = "within" if apart.error <= self.target else "above"
-        said = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
-        said += f", {side} the target"
+        text = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
+        text += f", {side} the target"
         if apart.error <= BEYOND * self.strain:
-            return f"dp/K = {self.strain:.2g}: of a change of pressure the laws differ by about that; here {said}"
-        why = f"it is {apart.start:.3g} at the start and grows from there"
+            return f"dp/K = {self.strain:.2g}: the laws differ by about this part of a change of pressure; here {text}"
+        reason = f"it is {apart.start:.3g} at the start and grows from there"
         if apart.start >= 0.5 * apart.error:
-            why = f"{apart.start:.3g} is there from the start: pressures of {apart.level:.2g} K put the laws that far "
-            why += f"apart, and all that {apart.probe} moves is {apart.moves:.2g} of itself"
-        swift = self.case.amount(apart.swift, "pressure", 3, span=True)
-        why += f"; linear leaves out the velocity head, {swift} at the start" if apart.swift > 0.0 else ""
-        return f"{said}, more than dp/K = {self.strain:.2g}: {why}"
+            reason = (
+                f"{apart.start:.3g} is there from the start: at pressures of {apart.level:.2g} K the laws differ by "
+            )
+            reason += f"that part, and the range of {apart.probe} is only {apart.moves:.2g} of its value"
+        head = self.case.amount(apart.swift, "pressure", 3, span=True)
+        reason += f"; linear neglects the velocity head, {head} at the start" if apart.swift > 0.0 else ""
+        return f"{text}, more than dp/K = {self.strain:.2g}: {reason}"
 
     def plain(self) -> dict[str, Any]:
-        """As JSON says it."""
+        """Return the hierarchy as plain data, SI."""
         own = {
             "target": self.target,
             "own_error": self.own,
@@ -151,13 +153,13 @@ class Ladder:
             "change_time": self.change_time,
         }
         laws = {"strain": self.strain, "apart": self.apart and vars(self.apart), "thumb": self.thumb}
-        rungs = {"rungs": [vars(one) for one in self.rungs]}
-        return own | laws | rungs | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
+        levels = {"rungs": [vars(level) for level in self.rungs]}
+        return own | laws | levels | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
 
 
 @door(set=TABLE, target=NUMBER, progress=CALL)
 def whole_pipes(case):
-    """The case, of one whose pipes are cut by what stands along them the one that says their pieces."""
+    """Return the case; if parts placed along pipes divide these, with the pieces as its pipes."""
     from fvsolve.case import load
 
     return load(case.table()) if placed(bent(case.raw)) else case
@@ -169,160 +171,170 @@ def ladder(
     target: float = TARGET,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> Ladder:
-    """Run a case as rigid columns, lumped volumes, few cells, many cells, under every law it can have.
+    """Run a case as rigid columns, lumped volumes, delay lines, few cells and many cells, under every possible law.
 
-    One with water that rides on bodies is run with it frozen, in modes, and in cells, all tanks alike.
+    A case with water in tanks on bodies is run with frozen water, modes and cells, the same for all tanks.
 
-    A rung that does not fit the scene is skipped and says why. The richest has the case's own cells and the richest law
-    that runs; errors are of the probes that a rung has too. Raises FvsolveError where the case itself does not run, and
-    where none of its probes moves.
+    A level that does not suit the case is skipped, with a reason. The richest level has at least the case's own cells
+    and the richest law that runs. Errors are those of the probes that a level has. Raises FvsolveError if the case
+    itself does not run, or if all its probes are constant.
     """
     from fvsolve.case import load
 
-    case, tell = whole_pipes(load(case, dict(set or {}))), progress or (lambda *_: None)
+    case, report = whole_pipes(load(case, dict(set or {}))), progress or (lambda *_: None)
     without_basins(case, "chart --models", riding=True)
-    asked = [(rung, law) for rung in structures(case) for law in laws(case)]
-    runs, dear = [], {}  # dear: law -> the rung with cells that was given up under it
-    for at, (rung, law) in enumerate(asked):
-        tell(at, len(asked), f"{rung}, {law}")
-        late = f"not tried: already {dear[law]} was given up" if law in dear else ""
-        runs.append(Outcome(late, refused=True) if late else _run(case, rung, law))
-        if runs[-1].reason.startswith(GIVEN_UP) and rung.endswith(("cell", "cells")):
-            dear[law] = rung
-    at = max((k for k, one in enumerate(runs) if one.ok and asked[k][0] == asked[-1][0]), default=None)
+    models = [(name, law) for name in structures(case) for law in laws(case)]
+    runs, given_up = [], {}  # given_up: law -> level with cells that was given up under it
+    for at, (name, law) in enumerate(models):
+        report(at, len(models), f"{name}, {law}")
+        reason = f"not run: {given_up[law]} was given up already" if law in given_up else ""
+        runs.append(Outcome(reason, refused=True) if reason else _run(case, name, law))
+        if runs[-1].reason.startswith(GIVEN_UP) and name.endswith(("cell", "cells")):
+            given_up[law] = name
+    at = max((k for k, entry in enumerate(runs) if entry.ok and models[k][0] == models[-1][0]), default=None)
     if at is None:
         raise FvsolveError(f"the case itself does not run: {runs[-1].reason}")
-    whole, law = runs[at], asked[at][1]
-    more, own = refined(case, law, whole, target, lambda rung: tell(len(asked), len(asked) + 1, f"{rung}, {law}"))
-    richest = more[-1][1] if more else whole
-    asked, runs = [*asked, *((rung, law) for rung, _ in more)], [*runs, *(one for _, one in more)]
-    rungs = [_rung(*names, one, richest) for names, one in zip(asked, runs, strict=True)]
-    able = [one for one in rungs if one.error is not None and one.error <= target]
-    if not able:
-        raise FvsolveError("no probe moves, so no model errs; probe what does, or let something act")
-    cheapest = min(able, key=lambda one: one.seconds)
+    own_run, law = runs[at], models[at][1]
+    finer_runs, own = refined(
+        case, law, own_run, target, lambda name: report(len(models), len(models) + 1, f"{name}, {law}")
+    )
+    richest = finer_runs[-1][1] if finer_runs else own_run
+    models, runs = [*models, *((name, law) for name, _ in finer_runs)], [*runs, *(entry for _, entry in finer_runs)]
+    levels = [_rung(*names, entry, richest) for names, entry in zip(models, runs, strict=True)]
+    accurate = [entry for entry in levels if entry.error is not None and entry.error <= target]
+    if not accurate:
+        raise FvsolveError(
+            "no probe changes, so models have no errors. Try a probe that changes, or an input that does"
+        )
+    cheapest = min(accurate, key=lambda level: level.seconds)
     travel, change = travel_time(richest.model), change_time(richest.model)
-    plain = next((one for one, said in zip(runs, asked, strict=True) if said == (asked[at][0], "linear")), whole)
-    top = rungs[-1] if more else rungs[at]
-    about = travel, change, strain(richest), apart(plain, whole), own, tuple(said_of_tanks(case, target))
-    return Ladder(rungs, top, target, cheapest, *about, case)
+    linear = next(
+        (entry for entry, pair in zip(runs, models, strict=True) if pair == (models[at][0], "linear")), own_run
+    )
+    top = levels[-1] if finer_runs else levels[at]
+    rules = travel, change, strain(richest), apart(linear, own_run), own, tuple(said_of_tanks(case, target))
+    return Ladder(levels, top, target, cheapest, *rules, case)
 
 
-def refined(case, law: str, whole: Outcome, target: float, tell: Callable[[str], None]) -> tuple[list, float | None]:
-    """(rungs with 2, 4, ... times the cells as (name, run), own error of the last of them, or of `whole` without any).
+def refined(
+    case, law: str, own_run: Outcome, target: float, report: Callable[[str], None]
+) -> tuple[list, float | None]:
+    """(levels with 2, 4, ... times the cells as (name, run), own error of the last level, or of `own_run` without any).
 
-    The error of a rung is its difference d to the next over 1 - r, where differences fall by r each time, 1/2 until
-    there are two. The rung that only served to find it is left out. Ends where the error is within the target, or a
-    finer one cannot be run: then the last rung errs about r times as much as the one before.
+    The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
+    differences (1/2 for the first). A level that only served to find this error is left out. Refinement ends if the
+    error is within the target, or if no finer level can be run: then the last error is r times the error before it.
     """
-    runs, gaps, ratio = [("full line", whole)], [], 0.5
+    runs, differences, ratio = [("full line", own_run)], [], 0.5
     for name in finer(case, DOUBLINGS):
-        tell(name)
+        report(name)
         if DEARER * runs[-1][1].processor > PATIENCE:
             break
-        one = _run(case, name, law)
-        if not one.ok:
+        run = _run(case, name, law)
+        if not run.ok:
             break
-        gaps.append(max((_rms(gap) for gap in moving(runs[-1][1], of_run(one)).values()), default=0.0))
-        if len(gaps) > 1 and gaps[-2] > 0.0:
-            ratio = min(max(gaps[-1] / gaps[-2], 0.1), 0.9)
-        if gaps[-1] <= target * (1.0 - ratio):
-            return runs[1:], gaps[-1] / (1.0 - ratio)
-        runs.append((name, one))
-    return runs[1:], gaps[-1] * ratio / (1.0 - ratio) if gaps else None
+        differences.append(max((_rms(gap) for gap in moving(runs[-1][1], of_run(run)).values()), default=0.0))
+        if len(differences) > 1 and differences[-2] > 0.0:
+            ratio = min(max(differences[-1] / differences[-2], 0.1), 0.9)
+        if differences[-1] <= target * (1.0 - ratio):
+            return runs[1:], differences[-1] / (1.0 - ratio)
+        runs.append((name, run))
+    return runs[1:], differences[-1] * ratio / (1.0 - ratio) if differences else None
 
 
 def laws(case) -> list[str]:
-    """The density laws that its fluid can have; its own alone where no place holds any."""
+    """Density laws that the fluid of a case can have; only its own law if the case contains no fluid."""
     from fvsolve.case import load
 
     if not case.places:
         return [case.fluid.law]
-    found = [case.fluid.law]
+    names = [case.fluid.law]
     for law in LAWS:
-        if LAWS[law].keys:  # a case's own: without them it is another
+        if LAWS[law].keys:  # a law with keys is possible only as the case's own
             continue
         try:
             load(case, {"fluid.law": law})
         except CaseError:
             continue
-        found.append(law)
-    return [law for law in LAWS if law in found]
+        names.append(law)
+    return [law for law in LAWS if law in names]
 
 
-def _run(case, rung: str, law: str) -> Outcome:
+def _run(case, name: str, law: str) -> Outcome:
+    """Run of a level under a law; a level that the case cannot have gives an outcome with the reason."""
     try:
-        return outcome(case, {**restated(case, rung), "fluid.law": law}, best_of=BEST_OF, run=patient, budget=BRIEF)
+        return outcome(case, {**restated(case, name), "fluid.law": law}, best_of=BEST_OF, run=patient, budget=BRIEF)
     except (CaseError, Unsayable) as error:
         return Outcome(f"skipped: {error}", refused=True)
 
 
 def patient(model, state, sink, progress) -> Capped:
-    """A run of PATIENCE at most."""
-    made = Capped(model, state, sink, progress)
-    made.most_seconds = PATIENCE
-    return made
+    """Run with at most LEVEL_CPU_LIMIT seconds of CPU time."""
+    run = Capped(model, state, sink, progress)
+    run.most_seconds = PATIENCE
+    return run
 
 
-# what a rung amounts to -------------------------------------------------------------------------------------
+# errors of a level, and rules of thumb ------------------------------------------------------------------------
 
 
-def _rung(name: str, law: str, one: Outcome, richest: Outcome) -> Rung:
-    if not one.ok:
-        return Rung(name, law, one.reason)
-    gaps = moving(one, of_run(richest))
+def _rung(name: str, law: str, run: Outcome, richest: Outcome) -> Rung:
+    """Level of a run, with its errors against the richest run."""
+    if not run.ok:
+        return Rung(name, law, run.reason)
+    gaps = moving(run, of_run(richest))
     errors = {name: _rms(gap) for name, gap in gaps.items()}
     worst = max(errors.values(), default=None)
     greatest = max((gap.ranges()["max"] for gap in gaps.values()), default=None)
-    reason = "" if errors else "none of the probes is left in it"
-    return Rung(name, law, reason, one.model.y_size, worst, greatest, errors, one.seconds, one.counts["rhs"])
+    reason = "" if errors else "the level has none of the probes"
+    return Rung(name, law, reason, run.model.y_size, worst, greatest, errors, run.seconds, run.counts["rhs"])
 
 
 def _rms(gap: Gap) -> float:
     return gap.ranges()["L2"]
 
 
-def apart(plain: Outcome, richest: Outcome) -> Apart | None:
-    """How one law differs from another on the same structure; None where that is the same run, or one failed."""
-    if plain is richest or not plain.ok:
+def apart(linear: Outcome, richest: Outcome) -> Apart | None:
+    """Difference of the linear law from the richest law, same structure; None for the same run or a failed run."""
+    if linear is richest or not linear.ok:
         return None
-    gaps = moving(plain, of_run(richest))
+    gaps = moving(linear, of_run(richest))
     probe = max(gaps, key=lambda name: _rms(gaps[name]))
-    truth = richest.rows[:, 1 + richest.probes.index(probe)]
+    values = richest.rows[:, 1 + richest.probes.index(probe)]
     level = max((float(abs(change[0])) for change in pressures(richest)), default=0.0) / stiffness(richest)
-    moves = float(np.ptp(truth) / np.max(np.abs(truth)))
+    moves = float(np.ptp(values) / np.max(np.abs(values)))
     start = float(abs(gaps[probe].off[0]) / gaps[probe].span)
     return Apart(probe, _rms(gaps[probe]), start, moves, level, velocity_head(richest.model))
 
 
 def velocity_head(model) -> float:
-    """Greatest rho v^2 / 2 of a pipe at the start [Pa]; 0 without pipes."""
+    """Greatest velocity head of a pipe at the start, rho v^2 / 2 [Pa]; 0 without pipes."""
     return 0.5 * model.case.properties.density * float(velocities(model).max(initial=0.0)) ** 2
 
 
 def said_of_tanks(case, target: float) -> Iterator[str]:
-    """Of water in tanks that ride, by how much shallow water runs too fast in its slowest mode, where that is known."""
+    """Notes for tanks on bodies: excess of the frequency of the slowest mode in shallow-water theory, if known."""
     share = 100.0 * target
     for name, basin in tanks(case).items():
         mesh = {**case.meshes, **case.lumped}[name]
-        if (found := slowest(basin, mesh)) is not None:
-            said = (
-                f"{name}: k h = {found.deep:.2g} of its slowest wave, which shallow water has {found.fast:.2g} % fast"
+        if (mode := slowest(basin, mesh)) is not None:
+            text = (
+                f"{name}: its slowest wave, with k h = {mode.deep:.2g}, is {mode.fast:.2g} % too fast in shallow water"
             )
             yield (
-                f"{said}, more than the target: modes know better while waves are small" if found.fast > share else said
+                f"{text}, more than the target: modes are more accurate for small waves" if mode.fast > share else text
             )
 
 
 def travel_time(model) -> float:
-    """Of a wave along the pipe that takes it longest [s]; 0 without pipes."""
+    """Greatest travel time of a wave along a pipe [s]; 0 without pipes."""
     return max((pipe.length / pipe.wave_speed for pipe in model.pipes), default=0.0)
 
 
 def change_time(model) -> float:
-    """Of what acts quickest: a schedule, its range over its steepest slope, or a pump that trips, by its run-down.
+    """Time of the fastest change of an input [s]: range of a schedule over its steepest slope, or run-down of a pump.
 
-    0 where a schedule jumps, infinite where nothing acts [s].
+    0 if a schedule jumps, infinite if nothing changes.
     """
     numerics = model.case.numerics
     if any(jump for t, jump in model.breaks if t > numerics.start):
@@ -332,7 +344,7 @@ def change_time(model) -> float:
     quickest = min((run_down_time(model, name, t) for name, t in trips.items()), default=math.inf)
     for index in range(len(model.tables.schedules)):
         if any(np.ptp(given(model, index, [before(t), t])) for t in trips.values()):
-            continue  # it says that a pump has tripped
+            continue  # a jump at the trip of a pump, whose run-down time counts instead
         values = given(model, index, times)
         steepest = float(np.max(np.abs(np.diff(values) / np.diff(times))))
         if steepest > 0.0:
@@ -341,37 +353,37 @@ def change_time(model) -> float:
 
 
 def given(model, index: int, times) -> np.ndarray:
-    """Values of a schedule at times."""
+    """Values of a schedule at the given times."""
     return np.array([value_until(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
 
 
 def before(t: float) -> float:
-    """A time just before another [s]."""
+    """Greatest float below a time [s]."""
     return math.nextafter(t, -math.inf)
 
 
 def run_down_time(model, name: str, t: float) -> float:
-    """In which a pump that trips would stand still, were its torque to stay [s]."""
+    """Time in which a tripped pump would stop under constant torque [s]."""
     rate = model.rhs(t, np.zeros(model.y_size))[model.state_names.index(f"{name}.speed")]
     return float(model.case.links[name].speed.value[0]) / abs(rate) if rate != 0.0 else math.inf
 
 
-def strain(one: Outcome) -> float:
+def strain(run: Outcome) -> float:
     """Greatest change of a pressure or head probe from the start, over the stiffness [-]."""
-    return max((float(np.max(np.abs(p - p[0]))) for p in pressures(one)), default=0.0) / stiffness(one)
+    return max((float(np.max(np.abs(p - p[0]))) for p in pressures(run)), default=0.0) / stiffness(run)
 
 
-def pressures(one: Outcome) -> list[np.ndarray]:
-    """What its probes show of pressure, a head as rho g h [Pa]."""
-    weight = one.model.case.properties.density * one.model.case.gravity
-    found = []
-    for k, probe in enumerate(one.model.case.probes, 1):
+def pressures(run: Outcome) -> list[np.ndarray]:
+    """Histories of the probes of pressure and head, a head as rho g h [Pa]."""
+    weight = run.model.case.properties.density * run.model.case.gravity
+    histories = []
+    for k, probe in enumerate(run.model.case.probes, 1):
         if probe.quantity == "head" or probe.quantity.endswith("pressure"):
-            found.append(one.rows[:, k] * (weight if probe.quantity == "head" else 1.0))
-    return found
+            histories.append(run.rows[:, k] * (weight if probe.quantity == "head" else 1.0))
+    return histories
 
 
-def stiffness(one: Outcome) -> float:
-    """Of the softest pipe, wall and all, K = rho a^2; the fluid's own bulk modulus without pipes [Pa]."""
-    fluid = one.model.case.properties
-    return min((fluid.density * pipe.wave_speed**2 for pipe in one.model.pipes), default=fluid.bulk_modulus)
+def stiffness(run: Outcome) -> float:
+    """Stiffness of the softest pipe, fluid and wall, K = rho a^2 [Pa]; without pipes the bulk modulus of the fluid."""
+    fluid = run.model.case.properties
+    return min((fluid.density * pipe.wave_speed**2 for pipe in run.model.pipes), default=fluid.bulk_modulus)

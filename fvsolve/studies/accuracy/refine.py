@@ -1,4 +1,4 @@
-"""The rows of a refinement: which keys a case is given, from coarse to fine. Knows cases; runs nothing."""
+"""Rows of a refinement, as keys of a case, from coarse to fine."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ from fvsolve.studies.outcome import prepared
 WAYS = ("both", "space", "time")
 TIME_KEYS = ("numerics.step", "numerics.courant", "numerics.rtol")
 LEVELS = {"both": 4, "space": 4, "time": 6}
-LOOSE = 1e-4  # tolerance that a refinement of it begins with, unless the case is looser
-MOST_CELLS = 10**6  # of a row
-STEP_SHARE = 0.01  # of what cells do wrong on the finest row that its step may, about, where space alone is refined
-LEAST_COURANT = 0.02  # below which that is not worth its time
+LOOSE = 1e-4  # first tolerance of a refinement of rtol, unless that of the case is greater
+MOST_CELLS = 10**6  # greatest number of cells of a row
+STEP_SHARE = 0.01  # approximate ratio of time error to space error on the finest row, if space alone is refined
+LEAST_COURANT = 0.02  # smaller Courant numbers would take too long
 
 
 @dataclass(frozen=True)
 class Level:
-    """One row: what is set on the case, the size that halves from row to row, and the words of the table.
+    """One row of a refinement: the keys that it sets, and its size.
 
-    set : dotted keys -> values; size : of cells [m], steps [s] or a tolerance; cells : of all pipes and basins
-    step : fixed step [s], NaN where steps follow a tolerance
+    set : dotted keys -> values; size : cell size [m], step or stretch [s], or tolerance, falling from row to row
+    cells : number of cells of all pipes and basins; step : fixed step [s], NaN if steps follow a tolerance
     """
 
     set: dict
@@ -54,65 +54,71 @@ class Level:
 
 @dataclass(frozen=True)
 class Plan:
-    """A refinement: way "both" | "space" | "time", what `size` is, the rows, and what is to be said of it."""
+    """Refinement of a case.
+
+    way : "both" | "space" | "time"; measure : meaning and unit of the sizes; words : description of the refinement
+    """
 
     way: str
-    measure: str  # "cell size [m]" | "step [s]" | "rtol"
+    measure: str  # "cell size [m]" | "step [s]" | "longest step [s]" | "stretch [s]" | "rtol"
     levels: tuple[Level, ...]
     words: str
 
 
 def resolutions(case) -> dict[str, str]:
-    """Key -> the way it refines, of every key of a case that is a resolution."""
-    found = dict.fromkeys(counts(case), "both")
+    """Keys of a case that set its resolution, with their kind of refinement: "both", "space" or "time"."""
+    ways = dict.fromkeys(counts(case), "both")
     if lines(case):
-        found["numerics.accuracy"] = "space"
+        ways["numerics.accuracy"] = "space"
     if pipes(case) or basins(case):
-        found["numerics.courant"] = "time"
+        ways["numerics.courant"] = "time"
     if by_cell_time(case):
-        found["numerics.cell_time"] = "both"
-    return found | {"numerics.step": "time", "numerics.rtol": "time"}
+        ways["numerics.cell_time"] = "both"
+    return ways | {"numerics.step": "time", "numerics.rtol": "time"}
 
 
 def by_cell_time(case) -> list[str]:
-    """Pipes that state no cells."""
+    """Names of pipes that do not state their cells."""
     return [name for name in in_cells(case) if "cells" not in link_said(case.raw, name)]
 
 
 def plan(
     case, refine: str | None = None, key: str | None = None, levels: int | None = None, cells: int | None = None
 ) -> Plan:
-    """The rows of a refinement of a case, coarsest first.
+    """Rows of a refinement of a case, coarsest first.
 
-    refine : "both" (cells, stretches of delay lines and steps halved together, the default with any), "space" (cells
-    and stretches halved, one step that suits the finest), "time" (steps halved, or rtol where the case steps by error;
-    the default without cells)
-    key : one resolution in place of all; cells : of the coarsest row, along the pipe or side with most (the others in
-    proportion). Raises FvsolveError for a way, key or number of levels that cannot be.
+    refine : "both" (cells, stretches of delay lines and steps halved together; the default with cells or delay lines),
+    "space" (cells and stretches halved, one step suitable for the finest row) or "time" (steps halved, or rtol divided
+    by ten if the case states it; the default for other cases)
+    key : single resolution that is refined instead of all; levels : number of rows
+    cells : cells of the coarsest row, along the pipe or side with most cells; other numbers change in proportion
+    Raises FvsolveError for an unknown or impossible refinement, key, or number of levels or cells.
     """
     known = resolutions(case)
     if key is not None and key not in known:
-        near = did_you_mean(key, known)
-        raise FvsolveError(f"{key} is no resolution{near}; those of this case are {', '.join(known)}")
+        nearest = did_you_mean(key, known)
+        raise FvsolveError(f"{key} is not a resolution of this case{nearest}. Expected one of {', '.join(known)}")
     refine = refine or (known[key] if key else "both" if counts(case) or lines(case) else "time")
     if refine not in WAYS:
-        raise FvsolveError(f'refine = "{refine}" is unknown{did_you_mean(refine, WAYS)}; wanted {", ".join(WAYS)}')
+        raise FvsolveError(f'refine = "{refine}" is unknown{did_you_mean(refine, WAYS)}. Expected {", ".join(WAYS)}')
     if refine != "time" and not lines(case):
         refinable(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
-        raise FvsolveError(f'{key} refines {"time" if known[key] == "time" else "space"}, not "{refine}"')
+        raise FvsolveError(
+            f'{key} refines {"time" if known[key] == "time" else "space"}, so refine = "{refine}" is impossible'
+        )
     levels = LEVELS[refine] if levels is None else levels
     if levels < 2:
-        raise FvsolveError(f"levels = {levels}; wanted 2 at least, and 3 for a fitted order")
+        raise FvsolveError(f"levels = {levels} is too few. Expected at least 2, and at least 3 for a fitted order")
     if refine == "time" and cells is not None:
         raise FvsolveError(
-            f"cells = {cells}: here steps alone are refined, cells stay; leave it out, or set the case's"
+            f"cells = {cells}: only steps are refined here, so cells stay. Leave it out, or set the cells of the case"
         )
     if refine == "time":
         return time_plan(case, key, levels)
     if lines(case) and (key == "numerics.accuracy" or not counts(case)):
         if cells is not None:
-            raise FvsolveError(f"cells = {cells}: those of delay lines are places where fields are told; leave it out")
+            raise FvsolveError(f"cells = {cells}: cells of delay lines are only places of output. Leave it out")
         return lines_plan(case, refine, levels)
     return space_plan(case, refine, key, levels, cells)
 
@@ -121,85 +127,87 @@ def plan(
 
 
 def lines_plan(case, way: str, levels: int) -> Plan:
-    """What lines may be off by halved from row to row, which cuts them into twice the stretches; steps with it, or not.
+    """Rows with half the tolerance of delay lines from row to row, so with twice the stretches.
 
-    Sizes are steps, or without these the stretches themselves of the line that has most in the last row.
+    For "both" steps are halved too, and are the sizes [s]. Else sizes are the travel times of a stretch [s], of the
+    line with most stretches in the last row.
     """
     count, step = total(case, counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
     rows = [lines_keys(case, way, k) for k in range(levels)]
     if way == "both":
         by_error = math.isnan(step)
         first = 1.0 / greatest_rate(case, counts(case)) if by_error else step
-        made = [Level(row if by_error else row | {"numerics.step": step / 2**k}, first / 2**k, count, step / 2**k)
-                for k, row in enumerate(rows)]  # fmt: skip
-        return Plan(way, "longest step [s]" if by_error else "step [s]", tuple(made), STRETCHED[by_error])
-    stretches = [prepared(case, row).tables.delays for row in rows]
-    most = int(np.argmax(stretches[-1]["stretches"]))
-    if stretches[0]["stretches"][most] == stretches[-1]["stretches"][most]:
-        raise FvsolveError("a smaller numerics.accuracy cuts no delay line of this case into more stretches, for want "
-                           'of friction or because steps are as long; wanted refine "both" or "time"')  # fmt: skip
-    made = [Level(row, float(one["tau"][most]), count, step) for row, one in zip(rows, stretches, strict=True)]
-    return Plan(way, "stretch [s]", tuple(made), f"{STRETCHES}, one step for all rows")
+        refined = [Level(row if by_error else row | {"numerics.step": step / 2**k}, first / 2**k, count, step / 2**k)
+                   for k, row in enumerate(rows)]  # fmt: skip
+        return Plan(way, "longest step [s]" if by_error else "step [s]", tuple(refined), STRETCHED[by_error])
+    tables = [prepared(case, row).tables.delays for row in rows]
+    line = int(np.argmax(tables[-1]["stretches"]))
+    if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
+        raise FvsolveError("a smaller numerics.accuracy cuts no delay line of this case into more stretches: there is "
+                           'no friction, or stretches are as short as a step. Expected "both" or "time"')  # fmt: skip
+    refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
+    return Plan(way, "stretch [s]", tuple(refined), f"{STRETCHES}, one step for all rows")
 
 
-STRETCHES = "what delay lines may be off by halved, which cuts them into twice the stretches"
-STRETCHED = {False: f"{STRETCHES}, and steps with it", True: f"{STRETCHES}, and their longest step with it"}
+STRETCHES = "tolerance of delay lines halved, so that they have twice the stretches"
+STRETCHED = {False: f"{STRETCHES}, and steps halved", True: f"{STRETCHES}, and their longest step halved"}
 
 
 def lines_keys(case, way: str, k: int) -> dict:
-    """Keys by which row k has delay lines cut into stretches 2^-k as long, and steps that go by their cells too."""
-    found = {"numerics.accuracy": case.numerics.accuracy / 2**k} if lines(case) else {}
+    """Keys of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if these set the step."""
+    keys = {"numerics.accuracy": case.numerics.accuracy / 2**k} if lines(case) else {}
     if way == "both" and (case.numerics.rtol is not None or (counts(case) and case.numerics.courant is not None)):
-        found |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in lines(case)}
-    return found
+        keys |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in lines(case)}
+    return keys
 
 
 # space ------------------------------------------------------------------------------------------------------------
 
 
 def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) -> Plan:
-    """Cells of all pipes and basins, or of the one that the key names, doubled from row to row."""
+    """Rows with twice the cells from row to row, of all pipes and basins or of the part that the key names."""
     first = coarsest(case, key, cells)
-    moving = [name for name in first if key in (None, name)]
+    refined = [name for name in first if key in (None, name)]
     if key == "numerics.cell_time":
-        moving = [f"links.{name}.cells" for name in by_cell_time(case)]
-    now = [{name: tuple(n * 2**k for n in numbers) if name in moving else numbers for name, numbers in first.items()}
-           for k in range(levels)]  # fmt: skip
-    finest = total(case, now[-1])
+        refined = [f"links.{name}.cells" for name in by_cell_time(case)]
+    all_counts = [{name: tuple(n * 2**k for n in numbers) if name in refined else numbers
+                   for name, numbers in first.items()} for k in range(levels)]  # fmt: skip
+    finest = total(case, all_counts[-1])
     if finest > MOST_CELLS:
-        raise FvsolveError(f"the finest of {levels} levels would have {finest:.3g} cells; {MOST_CELLS:.0e} at most: "
-                           "fewer levels, or fewer cells to begin with")  # fmt: skip
+        raise FvsolveError(f"the finest of {levels} levels would have {finest:.3g} cells. Expected at most "
+                           f"{MOST_CELLS:.0e}; try fewer levels, or fewer cells in the first row")  # fmt: skip
     rows, courant = [], space_courant(case, levels) if way == "space" else case.numerics.courant
-    for k, own in enumerate(now):
-        step, stepping = stepping_of(case, own, own if way == "both" else {**now[-1]}, k, courant)
-        length = max(size(case, name, own[name]) for name in moving)
+    for k, row_counts in enumerate(all_counts):
+        step, stepping = stepping_of(case, row_counts, row_counts if way == "both" else {**all_counts[-1]}, k, courant)
+        length = max(size(case, name, row_counts[name]) for name in refined)
         stretched = lines_keys(case, way, k) if key is None else {}
         if stretched and way == "both" and courant is not None:
             step = courant / greatest_rate(case, first) / 2**k
-        rows.append(Level(keys(own) | stepping | stretched, length, total(case, own), step))
-    names = ", ".join(name.split(".")[1] for name in moving)
-    everything = " and ".join(word for word, there in (("pipes", in_cells(case)), ("basins", basins(case))) if there)
-    what = f"cells of all {everything}" if len(moving) == len(first) and not from_files(case) else f"cells of {names}"
-    what += " and stretches of delay lines" if lines(case) and key is None else ""
-    return Plan(way, "cell size [m]", tuple(rows), f"{what} doubled, {time_words(case, way, courant)}")
+        rows.append(Level(keys(row_counts) | stepping | stretched, length, total(case, row_counts), step))
+    names = ", ".join(name.split(".")[1] for name in refined)
+    kinds = " and ".join(kind for kind, parts in (("pipes", in_cells(case)), ("basins", basins(case))) if parts)
+    text = f"cells of all {kinds}" if len(refined) == len(first) and not from_files(case) else f"cells of {names}"
+    text += " and stretches of delay lines" if lines(case) and key is None else ""
+    return Plan(way, "cell size [m]", tuple(rows), f"{text} doubled, {time_words(case, way, courant)}")
 
 
 def coarsest(case, key: str | None, cells: int | None) -> Counts:
-    """Cells of the first row."""
-    found = counts(case)
+    """Numbers of cells of the first row."""
+    own_counts = counts(case)
     if cells is None:
-        return found
+        return own_counts
     if cells < 1:
-        raise FvsolveError(f"cells = {cells}; wanted 1 at least")
-    if key in found:
-        return found | scaled({key: found[key]}, cells / max(found[key]))
-    return scaled(found, cells / most(found))
+        raise FvsolveError(f"cells = {cells} is too few. Expected at least 1")
+    if key in own_counts:
+        return own_counts | scaled({key: own_counts[key]}, cells / max(own_counts[key]))
+    return scaled(own_counts, cells / most(own_counts))
 
 
 def space_courant(case, levels: int) -> float | None:
-    """Courant number of the finest row that makes its step err about a hundredth as much as its cells, or the case's.
+    """Courant number of the finest row for a time error of about a hundredth of its space error, at most the case's.
 
-    The step errs by C^q dx^q, the cells by dx^p; where p > q the share of the step doubles p - q times a level.
+    The time error is C^q dx^q and the space error dx^p; if p > q, their ratio grows by 2^(p - q) from row to row.
+    None if the case states no Courant number.
     """
     numerics = case.numerics
     if numerics.courant is None:
@@ -209,29 +217,33 @@ def space_courant(case, levels: int) -> float | None:
     return min(numerics.courant, max(LEAST_COURANT, float(f"{share ** (1.0 / q):.2g}")))
 
 
-def stepping_of(case, cells: Counts, kept: Counts, k: int, courant: float | None) -> tuple[float, dict]:
-    """(step [s], keys) of a row: at a Courant number on the cells `kept`, or the case's step halved k times."""
+def stepping_of(case, cells: Counts, step_cells: Counts, k: int, courant: float | None) -> tuple[float, dict]:
+    """(step [s], keys) of row k: by the Courant number on the cells `step_cells`, or from the case's step.
+
+    step_cells : `cells` itself if the step is refined with the cells, so that the case's step is halved k times
+    """
     numerics = case.numerics
     if numerics.rtol is not None:
         return math.nan, {}
     if numerics.step is not None:
-        halved = kept is cells
-        finest = numerics.step if halved else min(numerics.step, 1.0 / greatest_rate(case, kept))
+        halved = step_cells is cells
+        finest = numerics.step if halved else min(numerics.step, 1.0 / greatest_rate(case, step_cells))
         step = finest / 2**k if halved else finest
         return step, {"numerics.step": step}
-    step = courant / greatest_rate(case, kept)
-    return step, {} if kept is cells else {"numerics.step": step}
+    step = courant / greatest_rate(case, step_cells)
+    return step, {} if step_cells is cells else {"numerics.step": step}
 
 
 def time_words(case, way: str, courant: float | None) -> str:
+    """Description of the steps of a refinement."""
     numerics = case.numerics
     if numerics.rtol is not None:
         return f"steps by error, rtol = {numerics.rtol:g} in all rows"
     if way == "space":
         finest = "" if courant is None else f": Courant number {courant:g}"
-        return f"one step for all rows, that of the finest{finest}"
+        return f"one step for all rows, the step of the finest row{finest}"
     if numerics.step is not None or lines(case):
-        return "steps halved with them"
+        return "steps halved too"
     return f"Courant number {numerics.courant:g} in all rows"
 
 
@@ -239,19 +251,19 @@ def time_words(case, way: str, courant: float | None) -> str:
 
 
 def time_plan(case, key: str | None, levels: int) -> Plan:
-    """Steps halved from row to row on one grid, or tolerances divided by ten."""
+    """Rows with half the step from row to row on one grid, or with a tenth of the tolerance."""
     numerics, count = case.numerics, total(case, counts(case))
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
     if by_error:
         if numerics.method != AUTO and not METHODS[numerics.method].adaptive:
-            raise FvsolveError(f"{numerics.method} estimates no error, so rtol is no resolution of it; "
-                               "wanted numerics.step, or another method")  # fmt: skip
+            raise FvsolveError(f"{numerics.method} estimates no error, so rtol cannot be refined. Expected "
+                               "numerics.step, or another method")  # fmt: skip
         first = max(LOOSE, numerics.rtol or 0.0)
         tolerances = [first / 10.0**k for k in range(levels)]
         rows = tuple(Level({"numerics.rtol": rtol}, rtol, count, math.nan) for rtol in tolerances)
         return Plan("time", "rtol", rows, "rtol divided by ten, on one grid" if count else "rtol divided by ten")
     if numerics.method == AUTO:
-        raise FvsolveError('method "auto" goes by the error of its steps; refine numerics.rtol')
+        raise FvsolveError('method "auto" chooses its steps by their error. Expected the key numerics.rtol')
     step = first_step(case)
     steps = [step / 2**k for k in range(levels)]
     rows = tuple(Level({"numerics.step": h}, h, count, h) for h in steps)
@@ -259,7 +271,10 @@ def time_plan(case, key: str | None, levels: int) -> Plan:
 
 
 def first_step(case) -> float:
-    """The longest step of a time refinement [s]: the case's, made to fit between two rows of its history."""
+    """Longest step of a time refinement [s]: that of the case, shortened to a whole fraction of the output interval.
+
+    A step that the case states is not shortened; without cells the output interval is the step.
+    """
     numerics, every = case.numerics, case.output.every
     if numerics.step is not None:
         return numerics.step

@@ -88,9 +88,9 @@ def sloshing(case, level: str) -> dict[str, Any]:
     """Keys of a level for all tanks on bodies: frozen water, modes, or cells (the case's own, or a multiple)."""
     basins, keys = tanks(case), {"expect": {}, "compare": {}, "routes": {}, "limits": {}}
     if level in ("frozen", "modes"):
-        kept_quantities = {"frozen": (), "modes": ("depth",)}[level]
+        quantities = {"frozen": (), "modes": ("depth",)}[level]
         keys["output.probes"] = [
-            entry.text for entry in case.output.probes if entry.name not in basins or entry.quantity in kept_quantities
+            entry.text for entry in case.output.probes if entry.name not in basins or entry.quantity in quantities
         ]
         return keys | {f"nodes.{name}.sloshing": level for name in basins} | WITHOUT_CELLS
     keys |= {f"nodes.{name}.sloshing": "cells" for name in basins}

@@ -1,1 +1,1 @@
-"""What becomes of runs, square by square. Knows runs; predicts only what eigenvalues say."""
+"""Failure maps: verdicts on runs of a case over methods and steps, with predicted limits of the step."""

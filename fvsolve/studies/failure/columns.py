@@ -1,4 +1,4 @@
-"""The columns of a failure map: steps around the predicted limits, or values of a key. Knows rates; runs nothing."""
+"""Columns of a failure map: steps around the predicted limits, or values of a key."""
 
 from __future__ import annotations
 
@@ -15,17 +15,19 @@ from fvsolve.studies.lines import cells_for_lines, lines
 from fvsolve.studies.outcome import prepared
 
 COURANTS = (0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0)
-COLUMNS = 10
-STIFF = 8.0  # times the wave rate: a scene whose fastest rate is above
-STIFF_STEPS = 1e5  # times the fastest rate that a run without pipes is long
+COLUMNS = 10  # default number of steps, if waves are not the fastest
+STIFF = 8.0  # a case is stiff if its fastest rate is above this multiple of the wave rate
+STIFF_STEPS = 1e5  # without pipes a case is stiff if its fastest rate times the time span is above this
 TAKEN = tuple(f"numerics.{name}" for name in ("scheme", "method", "courant", "step", "rtol"))
 
 
 @dataclass(frozen=True)
 class Columns:
-    """What the columns set; `rates` : fastest rate and wave rate [1/s] of each, or of all, delay lines as cells.
+    """Columns: their key and values, and the keys that they set.
 
-    wave_rate : cells that a wave crosses in a second [1/s], of the first column; None without any
+    name : "step" or the varied key; sets : all keys of each column; span : time span of the run [s]
+    rates : fastest rate and wave rate [1/s] of each column, or of all columns; delay lines count as cells
+    wave_rate : cells that a wave crosses per second in the first column [1/s]; None without cells
     """
 
     name: str
@@ -36,22 +38,22 @@ class Columns:
     wave_rate: float | None
 
     def keys(self, k: int) -> dict:
-        """What column k changes in the scene itself."""
+        """Keys of column k that change the case itself, not the step."""
         return {} if self.name == "step" else {self.name: self.values[k]}
 
     def stiff(self, k: int) -> bool:
-        """Whether something is far faster than the waves of column k, or, without pipes, than the run is long."""
+        """True if column k is stiff: its fastest rate is far above that of waves or, without pipes, of the run."""
         fastest, waves = self.rates[min(k, len(self.rates) - 1)]
         return fastest > STIFF * waves if waves else fastest * self.span > STIFF_STEPS
 
     def label(self, k: int) -> str:
-        """Column k in words."""
+        """Key and value of column k in words."""
         value = self.values[k]
         return f"{self.name} = {value:.3g}" if isinstance(value, float) else f"{self.name} = {value}"
 
 
 def columns(case, base: dict, courants, steps, key) -> Columns:
-    """The columns asked for, or around the predicted limits; FvsolveError for what cannot be columns."""
+    """Requested columns, or steps around the predicted limits. Raises FvsolveError for impossible columns."""
     _check(courants, steps, key)
     span = case.numerics.end - case.numerics.start
     if key is not None:
@@ -62,50 +64,52 @@ def columns(case, base: dict, courants, steps, key) -> Columns:
         return Columns(name, list(values), sets, rates, span, _wave_rate(case, {**base, name: values[0]}))
     rates, waves = _rates(case, base), _wave_rate(case, base)
     if courants is not None and waves is None:
-        raise FvsolveError("Courant numbers are for pipes in cells, and this case has none; give --step")
+        raise FvsolveError("Courant numbers need pipes with cells, but this case has none. Expected --step")
     chosen = [c / waves for c in courants] if courants is not None else steps
     chosen = list(chosen if chosen is not None else _default_steps(case, rates, waves))
     return Columns("step", chosen, [{"numerics.step": h} for h in chosen], [rates], span, waves)
 
 
 def _control(courants, steps) -> dict:
+    """Step control of all columns with values of a key; empty for that of the case."""
     if courants is not None:
         return {"numerics.courant": courants[0]}
     return {} if steps is None else {"numerics.step": steps[0]}
 
 
 def _rates(case, set: dict) -> tuple[float, float | None]:
-    """(fastest rate, wave rate) [1/s] of a case; of many states the fastest is taken as that of the waves."""
+    """(fastest rate, wave rate) [1/s] of a case; with too many states the fastest is the wave rate."""
     set = set | as_cells(case, set)
     model = prepared(case, set)
     waves = float(model.wave_rates.max()) if model.cells else None
-    found = spectrum(case, set)
-    fastest = float(np.abs(found).max(initial=0.0)) if found is not None else (waves or math.inf)
+    eigenvalues = spectrum(case, set)
+    fastest = float(np.abs(eigenvalues).max(initial=0.0)) if eigenvalues is not None else (waves or math.inf)
     return fastest, waves
 
 
 def _wave_rate(case, set: dict) -> float | None:
-    """Cells that a wave crosses in a second [1/s], in pipes that are no delay lines; None without any."""
+    """Cells that a wave crosses per second in pipes with cells [1/s]; None without such pipes."""
     model = prepared(case, set)
     return float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0)) or None
 
 
 def as_cells(case, set: dict) -> dict:
-    """Keys by which delay lines of a case with keys set are cells, as many in the slowest as a case has by default."""
+    """Keys that replace delay lines by cells, with the default number of cells in the slowest line."""
     case = load(case, set)
     travel = _travel(case)
     return cells_for_lines(case, travel / DEFAULT_CELLS) if travel else {}
 
 
 def _travel(case) -> float:
-    """The time that a wave takes along the slowest delay line [s]; 0 without any."""
+    """Travel time of a wave along the slowest delay line [s]; 0 without delay lines."""
     return max((case.links[name].length / case.wave_speed(name) for name in lines(case)), default=0.0)
 
 
 def _default_steps(case, rates, waves: float | None) -> list[float]:
-    """Around Courant 1 where waves are the fastest; else from below 2 / |lambda| to the longest of any use.
+    """Default steps [s]: around Courant number 1 if waves are the fastest, else from below 2 / |lambda| upwards.
 
-    Of delay lines alone from a hundredth of the slowest one, or where something stores less, to all of it.
+    The longest step is a tenth of the run or Courant number 1.5. For delay lines alone the steps go from a hundredth
+    of the slowest travel time, or 0.3 / |lambda| of storing parts if that is less, to this travel time.
     """
     fastest, span, travel = rates[0], case.numerics.end - case.numerics.start, _travel(case)
     if not waves and travel:
@@ -120,22 +124,24 @@ def _default_steps(case, rates, waves: float | None) -> list[float]:
 
 
 def default_schemes(case, columns: Columns) -> list[str]:
-    """The case's own; where waves are the fastest, beside `upwind`, which shows what a scheme alone gets wrong."""
+    """Scheme of the case; if waves are the fastest also `upwind`, to compare the error of the scheme."""
     own = case.numerics.scheme
     return [own] if columns.wave_rate is None or columns.stiff(0) else ["upwind", own]
 
 
 def _check(courants, steps, key) -> None:
     if courants is not None and steps is not None:
-        raise FvsolveError("--courant and --step both set the step; keep one")
-    for what, given in (("--courant", courants), ("--step", steps)):
-        if given is not None and not all(math.isfinite(one) and one > 0 for one in given):
-            raise FvsolveError(f"{what} must be positive numbers")
-        if given is not None and len(given) == 0:
-            raise FvsolveError(f"{what} is empty; wanted at least one number")
+        raise FvsolveError("--courant and --step are given; keep one")
+    for option, values in (("--courant", courants), ("--step", steps)):
+        if values is not None and not all(math.isfinite(value) and value > 0 for value in values):
+            raise FvsolveError(f"{option} must be positive numbers")
+        if values is not None and len(values) == 0:
+            raise FvsolveError(f"{option} is empty. Expected at least one number")
     if key is not None and len(courants or steps or [0]) > 1:
-        raise FvsolveError("with --key its values are the columns; give one --step or one --courant for all")
+        raise FvsolveError(
+            "with --key its values are the columns. Expected at most one --step or one --courant, for all columns"
+        )
     if key is not None and not key[1]:
-        raise FvsolveError("--key wants KEY=a,b,c with at least one value")
+        raise FvsolveError("--key has no values. Expected KEY=a,b,c with at least one value")
     if key is not None and key[0] in TAKEN:
-        raise FvsolveError(f"--key {key[0]} is none: the map sets it by --scheme, --method, --courant and --step")
+        raise FvsolveError(f"--key {key[0]} is impossible: the map sets it by --scheme, --method, --courant and --step")

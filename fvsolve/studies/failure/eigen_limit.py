@@ -1,4 +1,4 @@
-"""The greatest step at which no eigenvalue grows, equation (13). Knows a model and R(s); runs nothing."""
+"""Greatest step at which no eigenvalue grows, equation (13)."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ import numpy as np
 
 from fvsolve.schemes import LIMITED, SCHEMES
 
-GROWTH = 1e3  # within the run: what grows less is not seen
-MOST_STATES = 1200  # of a dense spectrum
+GROWTH = 1e3  # factor within the run; less growth is not visible
+MOST_STATES = 1200  # greatest number for a dense spectrum
 
 
 def spectrum(case, set: dict) -> np.ndarray | None:
-    """Eigenvalues [1/s] of the rates at the profile, by the schedules of the start and of the end, in one array.
+    """Eigenvalues [1/s] of the rates at the initial profile, for schedules at the start and at the end, in one array.
 
-    A limited scheme is taken by its weights in smooth flow, what arrives from delay lines as if it stood still. None
-    where there are too many states.
+    A limited scheme counts with its weights in smooth flow, and waves that arrive from delay lines are constant. None
+    for more than MAX_STATES states.
     """
     from fvsolve.studies.outcome import prepared
 
@@ -31,14 +31,15 @@ def spectrum(case, set: dict) -> np.ndarray | None:
 
 
 def twin(case, scheme: str) -> str:
-    """The linear scheme that stands for a limited one: what it is where all is smooth, or at its steepest."""
+    """Linear scheme in place of a limited one: its weights in smooth flow or, if not supported, at steep fronts."""
     return SCHEMES[scheme].twin if SCHEMES[scheme].twin in case.schemes else "upwind"
 
 
 def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
-    """The first step [s] at which R(h lambda) grows by GROWTH within `span` [s] more than the truth does.
+    """First step [s] at which R(h lambda) grows within `span` [s] by VISIBLE_GROWTH more than the exact solution.
 
-    inf where there is none up to a thousand times 1 / |lambda|; 0 where each step of any use is too long.
+    eigenvalues : complex128[n] [1/s]. Returns inf if there is no such step up to 1000 / |lambda| of the fastest
+    eigenvalue, and 0 if there is growth at 0.01 / |lambda| already.
     """
     from fvsolve.steppers import method_named, stability_function
 
@@ -46,11 +47,11 @@ def greatest_step(method: str, eigenvalues: np.ndarray, span: float) -> float:
     fastest = float(np.abs(eigenvalues).max(initial=0.0))
     if fastest == 0.0:
         return math.inf
-    true = span * max(0.0, float(eigenvalues.real.max()))
+    exact_growth = span * max(0.0, float(eigenvalues.real.max()))
 
     def grows(h: float) -> bool:
         with np.errstate(all="ignore"):
-            return span / h * math.log(max(np.abs(r(h * eigenvalues)).max(), 1e-300)) - true > math.log(GROWTH)
+            return span / h * math.log(max(np.abs(r(h * eigenvalues)).max(), 1e-300)) - exact_growth > math.log(GROWTH)
 
     steps = np.geomspace(1e-2, 1e3, 1201) / fastest
     first = next((k for k, h in enumerate(steps) if grows(h)), None)

@@ -1,4 +1,4 @@
-"""A failure map: methods against steps, or against a key, each square run for real. Knows cases; leaves the verdict."""
+"""Failure map of a case: verdicts on runs of all methods over steps, or over values of a key."""
 
 from __future__ import annotations
 
@@ -25,14 +25,18 @@ from fvsolve.studies.points import OUT, Points, kept_in
 from fvsolve.studies.truth import Truth, truth
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
-TOLERANCE = 0.02  # mean error over the range of a probe
-MOST_IMPLICIT = 50_000  # steps
-ROWS = 1000
+TOLERANCE = 0.02  # greatest mean error, over the range of a probe
+MOST_IMPLICIT = 50_000  # greatest number of steps of an implicit method
+ROWS = 1000  # rows of the history of each run
 
 
 @dataclass(frozen=True)
 class Square:
-    """One run of the map; `limit` is the greatest stable step [s] by eigenvalues, None where there was no spectrum."""
+    """One run of the map, with its verdict.
+
+    step, courant : None unless the step is fixed; halved_error : error with half the step, None if it was not run
+    limit : predicted greatest stable step [s], None if it is not known
+    """
 
     scheme: str
     method: str
@@ -47,11 +51,13 @@ class Square:
 
 @dataclass(frozen=True)
 class FailureMap:
-    """key : what changes along the columns ("step" [s] or a key of the case); values : the columns.
+    """Verdicts on runs of a case over schemes, methods and columns.
 
-    squares : schemes x methods x columns, in that order; reference : what errors are measured against; doubt : how
-    far its check is from it; limited : the schemes whose limits are those of their weights in smooth flow; lines :
-    whether there are delay lines
+    key : "step" [s] or the key of the case that changes along the columns; values : its values
+    squares : schemes x methods x columns, in that order; tolerance : greatest mean error, over the range of a probe
+    reference : the reference in words; doubt : uncertainty of its errors, over ranges
+    wave_rate : cells that a wave crosses per second [1/s], None without cells
+    limited : schemes whose limits are those of their weights in smooth flow; lines : True with delay lines
     """
 
     case: str
@@ -68,17 +74,17 @@ class FailureMap:
     lines: bool = False
 
     def row(self, scheme: str, method: str) -> list[Square]:
-        """The squares of a method under a scheme, by column."""
-        return [one for one in self.squares if (one.scheme, one.method) == (scheme, method)]
+        """Squares of a scheme and a method, by column."""
+        return [square for square in self.squares if (square.scheme, square.method) == (scheme, method)]
 
     def plain(self) -> dict:
-        """As JSON says it: SI, None where there is no number."""
-        said = {one.name: getattr(self, one.name) for one in fields(self) if one.name != "squares"}
-        return said | {"squares": [_plain(one) for one in self.squares]}
+        """Return the map as plain data, SI; None for unknown or infinite limits."""
+        data = {entry.name: getattr(self, entry.name) for entry in fields(self) if entry.name != "squares"}
+        return data | {"squares": [_plain(entry) for entry in self.squares]}
 
 
 KEY = Kind(
-    lambda given: is_row(given, lambda one: True) and len(given) == 2 and TEXT.holds(given[0]) and ROW.holds(given[1]),
+    lambda value: is_row(value, lambda item: True) and len(value) == 2 and TEXT.holds(value[0]) and ROW.holds(value[1]),
     'a key and its values, for example ("links.main.cells", [20, 40])',
 )
 
@@ -102,49 +108,52 @@ def failures(
     key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, out: str | Path | Points | None = None,
     progress: Progress | None = None, set: Mapping | None = None, jobs: int = 1, dask: str | None = None,
 ) -> FailureMap:  # fmt: skip
-    """Run every method, under every scheme, at every step (or value of a key), and say what became of each run.
+    """Run a case with every scheme and method at every step (or value of a key), and give a verdict on each run.
 
-    case : what `load` takes; schemes, methods : see `default_schemes` and METHODS; courants or steps [s] : the
-    columns; with key = (NAME, values) these are the columns, and one step, one Courant number, or else the case's own
-    control holds.
-    out : folder where finished squares are kept and found again; progress(done, total, next)
-    tolerance : mean error over the range of a probe; jobs, dask : who makes the runs, as in `sweep`
-    Raises FvsolveError for names and numbers that are none, and where the reference is no better than the tolerance
-    asks.
+    case, set : as in `run`; schemes, methods : default `default_schemes` and METHODS
+    courants or steps [s] : the columns; with key = (NAME, values) the values are the columns, and a single step or
+    Courant number, or else the case's own step control, holds for all
+    tolerance : greatest mean error, over the range of a probe
+    out : folder in which finished squares are stored and found again; progress : progress(done, total, next)
+    jobs, dask : processes that make the runs, as in `sweep`
+    Raises FvsolveError for unknown names, for numbers out of range, and if the reference is not accurate enough.
     """
     case = load(case, dict(set or {}))
     without_basins(case, "map")
     case = load(case, settled(case))
     if not (math.isfinite(tolerance) and tolerance > 0):
-        raise FvsolveError(f"--tolerance {tolerance} is none; wanted a positive number, for example 0.02")
+        raise FvsolveError(f"--tolerance {tolerance} is out of range. Expected a positive number, for example 0.02")
     base = {"output.every": (case.numerics.end - case.numerics.start) / ROWS}
-    across = columns(case, base, courants, steps, key)
-    schemes, methods = _known(names(schemes) or default_schemes(case, across), names(methods) or METHODS)
-    asked = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(across.sets))]
-    squares, tell = [], progress or (lambda *_: None)
-    with kept_in(out) as points, Errands(case, jobs, dask) as errands:
-        trials = Trials(case, base, across, tolerance, points, errands)
-        if not errands.alone:
-            trials.ahead(asked, tell)
-        for scheme, method, k in asked:
-            tell(len(squares), len(asked), f"{scheme}, {method}, {across.label(k)}")
+    column_set = columns(case, base, courants, steps, key)
+    schemes, methods = _known(names(schemes) or default_schemes(case, column_set), names(methods) or METHODS)
+    places = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(column_set.sets))]
+    squares, report = [], progress or (lambda *_: None)
+    with kept_in(out) as points, Errands(case, jobs, dask) as queue:
+        trials = Trials(case, base, column_set, tolerance, points, queue)
+        if not queue.alone:
+            trials.ahead(places, report)
+        for scheme, method, k in places:
+            report(len(squares), len(places), f"{scheme}, {method}, {column_set.label(k)}")
             squares.append(trials.square(scheme, method, k))
-        found = trials.reference(0)
-        words = f"{found.words}, checked by {found.second}"
-    limited = tuple(name for name in schemes if name in LIMITED and across.wave_rate)
+        reference = trials.reference(0)
+        words = f"{reference.words}, checked by {reference.second}"
+    limited = tuple(name for name in schemes if name in LIMITED and column_set.wave_rate)
     return FailureMap(
-        case.name, across.name, tuple(across.values), schemes, methods, tuple(squares), tolerance,
-        words, trials.doubt, across.wave_rate, limited, bool(lines(case)),
+        case.name, column_set.name, tuple(column_set.values), schemes, methods, tuple(squares), tolerance,
+        words, trials.doubt, column_set.wave_rate, limited, bool(lines(case)),
     )  # fmt: skip
 
 
 class Trials:
-    """Runs of one map: what they are measured against, and what becomes of them."""
+    """Runs of one map, with their references, predicted limits and verdicts.
 
-    def __init__(self, case, base: dict, across: Columns, tolerance: float, points: Points, errands: Errands) -> None:
-        self.case, self.base, self.across, self.tolerance, self.points = case, base, across, tolerance, points
-        self.errands, self.looking = errands, False
-        self.span = across.span
+    base : keys of all runs; looking : True while missing runs are collected, so that none is made
+    """
+
+    def __init__(self, case, base: dict, column_set: Columns, tolerance: float, points: Points, queue: Errands) -> None:
+        self.case, self.base, self.across, self.tolerance, self.points = case, base, column_set, tolerance, points
+        self.errands, self.looking = queue, False
+        self.span = column_set.span
         self._references: dict[int, Truth] = {}
         self._spectra: dict[tuple, np.ndarray | None] = {}
         self._limits: dict[tuple, float | None] = {}
@@ -152,43 +161,51 @@ class Trials:
 
     @property
     def doubt(self) -> float:
-        """The greatest of all references."""
-        return max(one.doubt.trajectory for one in self._references.values())
+        """Greatest uncertainty of all references, over ranges."""
+        return max(reference.doubt.trajectory for reference in self._references.values())
 
     def reference(self, k: int) -> Truth:
-        """Of column k; one for all where only the step changes. FvsolveError where it is worth too little."""
+        """Reference of column k, or of all columns of steps. Raises FvsolveError if it is not accurate enough."""
         at = k if self.across.keys(k) else 0
         if at not in self._references:
             finest, stiff = {**self.base, **self.across.keys(k)}, self.across.stiff(k)
             finest |= as_cells(self.case, finest)
-            found = truth(self.case, finest, stiff=stiff, errands=self.errands)
-            doubt = found.doubt.trajectory
-            if doubt > self.tolerance / 2:
+            reference = truth(self.case, finest, stiff=stiff, errands=self.errands)
+            uncertainty = reference.doubt.trajectory
+            if uncertainty > self.tolerance / 2:
                 raise FvsolveError(
-                    "the reference is no better than the runs it judges: it may be off by "
-                    f"{doubt:.2g} of the range of {found.doubt.worst or 'a probe'}, the tolerance is "
-                    f"{self.tolerance:g}; give --tolerance {4 * doubt:.1g}, or more cells; or leave it out of "
-                    "output.probes, if what it shows is rounding"
+                    "the reference is not accurate enough: its error may be "
+                    f"{uncertainty:.2g} of the range of {reference.doubt.worst or 'a probe'}, but the tolerance is "
+                    f"{self.tolerance:g}. Try --tolerance {4 * uncertainty:.1g}, or more cells; if this probe shows "
+                    "only rounding, remove it from output.probes"
                 )
-            self._references[at] = found
+            self._references[at] = reference
         return self._references[at]
 
     def limit(self, scheme: str, method: str, k: int) -> float | None:
-        """The predicted greatest step [s], by eigenvalues and by what stores give back to delay lines; None where there
-        is no spectrum."""
+        """Predicted greatest step [s], by eigenvalues and by waves between storing nodes and delay lines.
+
+        None if either is not known.
+        """
         at = scheme, k if self.across.keys(k) else 0
         if at not in self._spectra:
             self._spectra[at] = spectrum(self.case, {**self.base, **self.across.keys(k), "numerics.scheme": scheme})
-        found = self._spectra[at]
+        eigenvalues = self._spectra[at]
         if (method, *at) not in self._limits:
-            both = None if found is None else greatest_step(method, found, self.span), self.lines_limit(method, *at)
+            both = (
+                None if eigenvalues is None else greatest_step(method, eigenvalues, self.span),
+                self.lines_limit(method, *at),
+            )
             self._limits[method, *at] = None if None in both else min(both)
         return self._limits[method, *at]
 
     def lines_limit(self, method: str, scheme: str, k: int) -> float | None:
-        """The same by waves between stores and delay lines; inf where there are no lines, or no fixed steps."""
+        """Predicted greatest step [s] by waves between storing nodes and delay lines.
+
+        inf without delay lines, or without fixed steps.
+        """
         set = {**self.base, **self.across.keys(k), "numerics.scheme": scheme}
-        steps = [one["numerics.step"] for one in self.across.sets if "numerics.step" in one]
+        steps = [keys["numerics.step"] for keys in self.across.sets if "numerics.step" in keys]
         if not steps or not lines(load(self.case, set)):
             return math.inf
         if k not in self._of_lines:
@@ -196,48 +213,50 @@ class Trials:
         return self._of_lines[k](method)
 
     def square(self, scheme: str, method: str, k: int) -> Square:
-        """One run, and where its error is too great the same by shorter steps."""
+        """Square of a run, with runs at shorter steps if its error is too great."""
         trial = {**self.base, **self.across.sets[k], "numerics.scheme": scheme, "numerics.method": method}
         step, waves = trial.get("numerics.step"), self.across.wave_rate
         limit, errors = self.limit(scheme, method, k), []
 
         def shorter() -> Measures:
-            found = self.measure({**trial, **_shorter(self.case, trial, 2 ** (len(errors) + 1))}, k)
-            errors.append(found.error)
-            return found
+            measures = self.measure({**trial, **_shorter(self.case, trial, 2 ** (len(errors) + 1))}, k)
+            errors.append(measures.error)
+            return measures
 
         if step and self.span / step > MOST_IMPLICIT and not _explicit(method):
-            one, word = Measures(f"{self.span / step:.0f} implicit steps", False), SKIPPED
+            run, word = Measures(f"{self.span / step:.0f} implicit steps", False), SKIPPED
         else:
-            one = self.measure(trial, k)
-            word = verdict(one, shorter, self.tolerance)
+            run = self.measure(trial, k)
+            word = verdict(run, shorter, self.tolerance)
         courant = step * waves if step and waves else None
-        return Square(scheme, method, k, step, courant, word, one, errors[0] if errors else None, limit)
+        return Square(scheme, method, k, step, courant, word, run, errors[0] if errors else None, limit)
 
-    def ahead(self, asked: Sequence[tuple[str, str, int]], tell: Progress) -> None:
-        """Have others make the runs that squares ask for: all that is known to be wanted, then by what came of these
-        the same with shorter steps."""
-        while wanted := self.wanted(asked):
-            wanted.sort(key=lambda one: -one.trial.get("numerics.step", 0.0))  # the dearest last
-            errands = [Errand(watched, one.keys) for one in wanted]
-            for count, at in enumerate(self.errands.ahead(errands), 1):
-                self.measure(wanted[at].trial, wanted[at].column)
-                tell(count, len(wanted), f"{len(asked)} squares")
+    def ahead(self, places: Sequence[tuple[str, str, int]], report: Progress) -> None:
+        """Make all runs in other processes: first the runs of all squares, then those with shorter steps.
 
-    def wanted(self, asked: Sequence[tuple[str, str, int]]) -> list[Wanted]:
-        """Runs that are not known and that squares want next, each once."""
-        found, self.looking = {}, True
-        for one in asked:
+        places : scheme, method and column of each square
+        """
+        while missing := self.wanted(places):
+            missing.sort(key=lambda run: -run.trial.get("numerics.step", 0.0))  # the most expensive last
+            requests = [Errand(watched, run.keys) for run in missing]
+            for count, at in enumerate(self.errands.ahead(requests), 1):
+                self.measure(missing[at].trial, missing[at].column)
+                report(count, len(missing), f"{len(places)} squares")
+
+    def wanted(self, places: Sequence[tuple[str, str, int]]) -> list[Wanted]:
+        """New runs that squares need next, each once."""
+        missing, self.looking = {}, True
+        for place in places:
             try:
-                self.square(*one)
+                self.square(*place)
             except Wanted as run:
-                found[repr(run.trial)] = run
+                missing[repr(run.trial)] = run
         self.looking = False
-        return [*found.values()]
+        return [*missing.values()]
 
     def measure(self, trial: dict, k: int) -> Measures:
-        """A run against its reference, or what was found of it before; `Wanted` where that is to be made first."""
-        every = max(trial["output.every"], trial.get("numerics.step", 0.0))  # not what is read between two steps
+        """Measures of a run, or those in the cache. Raises MissingRun for a new run while runs are collected."""
+        every = max(trial["output.every"], trial.get("numerics.step", 0.0))  # no rows between two steps
         reference, run = self.reference(k), {**trial, "output.every": every}
         extra = {"study": "map", "set": trial, "reference": reference.words}
         if self.looking and self.points.find(self.case, extra) is None:
@@ -246,25 +265,28 @@ class Trials:
         def make() -> dict:
             return asdict(measured(*self.errands(self.case, Errand(watched, run)), reference))
 
-        found = self.points.get(self.case, extra, make)
-        return Measures(**{name: math.nan if value is None else value for name, value in found.items()})
+        data = self.points.get(self.case, extra, make)
+        return Measures(**{name: math.nan if value is None else value for name, value in data.items()})
 
 
 class Wanted(Exception):
-    """A trial whose run, with these keys, is to be made first; column : whose reference it is measured against."""
+    """Raised for a trial without a run in the cache.
+
+    keys : keys of the run; column : column of its reference
+    """
 
     def __init__(self, trial: dict, keys: dict, column: int) -> None:
         super().__init__(repr(trial))
         self.trial, self.keys, self.column = trial, keys, column
 
 
-def _shorter(case, trial: dict, times: int) -> dict:
-    """The same, with steps `times` shorter; where the error rules, with as much less of it, squared."""
+def _shorter(case, trial: dict, ratio: int) -> dict:
+    """Keys for steps shorter by a factor; a tolerance is divided by its square."""
     numerics = case.numerics
-    for name, factor in (("step", times), ("courant", times), ("rtol", times**2)):
+    for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
         if f"numerics.{name}" in trial:
             return {f"numerics.{name}": trial[f"numerics.{name}"] / factor}
-    for name, factor in (("step", times), ("courant", times), ("rtol", times**2)):
+    for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
         if getattr(numerics, name) is not None:
             return {f"numerics.{name}": getattr(numerics, name) / factor}
     return {}
@@ -276,20 +298,22 @@ def _explicit(method: str) -> bool:
     return method not in KNOWN or KNOWN[method].explicit
 
 
-def _known(*asked: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _known(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Schemes and methods without repetition. Raises FvsolveError for an unknown name."""
     from fvsolve.case.sections import MethodNames
     from fvsolve.schemes import SCHEMES
 
-    for what, given, known in zip(("scheme", "method"), asked, (tuple(SCHEMES), tuple(MethodNames())), strict=True):
-        for name in given:
+    for kind, requested, known in zip(("scheme", "method"), given, (tuple(SCHEMES), tuple(MethodNames())), strict=True):
+        for name in requested:
             if name not in known:
-                raise FvsolveError(f'no {what} named "{name}"{did_you_mean(name, known)}')
-    return tuple(dict.fromkeys(asked[0])), tuple(dict.fromkeys(asked[1]))
+                raise FvsolveError(f'no {kind} named "{name}"{did_you_mean(name, known)}')
+    return tuple(dict.fromkeys(given[0])), tuple(dict.fromkeys(given[1]))
 
 
-def _plain(one: Square) -> dict:
-    said = asdict(one)
-    said |= said.pop("measures")
-    limit = one.limit
-    said["limit"] = None if limit is None or math.isinf(limit) else limit
-    return said
+def _plain(square: Square) -> dict:
+    """Square as plain data, with its measures; None for an infinite limit."""
+    data = asdict(square)
+    data |= data.pop("measures")
+    limit = square.limit
+    data["limit"] = None if limit is None or math.isinf(limit) else limit
+    return data

@@ -1,4 +1,4 @@
-"""The greatest step at which no wave grows between a store and a delay line. Knows models; runs nothing."""
+"""Greatest step at which no wave grows between a storing node and a delay line."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.failure.eigen_limit import GROWTH
 from fvsolve.studies.outcome import prepared
 
-STEPS, HALVINGS = 33, 12  # looked at, and of the bracket that is found
-FARTHER = 4.0  # than the steps that are run, up and down
+STEPS, HALVINGS = 33, 12  # number of steps tried, and of bisections between two of them
+FARTHER = 4.0  # ratio of the limits of these steps to those of the map, up and down
 
 
 class LinesLimit:
-    """Limits of one case with keys set; a model is cut for each step that is looked at, once for all methods."""
+    """Limits of a case with changed keys, for any method; each step has a model of its own, used by all methods."""
 
     def __init__(self, case, set: dict, steps: list[float]) -> None:
         self.case, self.set = case, set
@@ -24,20 +24,20 @@ class LinesLimit:
         self.models: dict[float, object] = {}
 
     def model(self, h: float):
-        """The model whose lines are cut for a step [s]."""
+        """Model with delay lines divided for a step [s]."""
         if h not in self.models:
             self.models[h] = prepared(self.case, {**self.set, "numerics.step": h, "numerics.method": "euler"})
         return self.models[h]
 
     def grows(self, method: str, h: float) -> bool:
-        """Whether waves grow by GROWTH in a run with this step [s]."""
+        """True if waves grow by VISIBLE_GROWTH in a run with this step [s]."""
         numerics = self.case.numerics
         return wave_growth(self.model(h), method_named(method), h, numerics.end - numerics.start)[0] >= GROWTH
 
     def __call__(self, method: str) -> float | None:
-        """The greatest step [s] before the first at which they do; inf where there is none, 0 where each does.
+        """Greatest step [s] below the first at which waves grow; inf if they never grow, 0 if they grow at all steps.
 
-        None where it is not known: of Rosenbrock's methods where lines touch a store.
+        None if it is not known, for Rosenbrock methods with delay lines at storing nodes.
         """
         if method_named(method).kind == "linear" and any(stores(self.model(self.steps[0]), 1.0)):
             return None

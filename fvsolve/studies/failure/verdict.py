@@ -1,4 +1,4 @@
-"""What became of a run, in one word: stable, ringing, coarse, wrong, blown up, refused. Knows rows; runs nothing."""
+"""Verdict on a run, in a word: stable, ringing, coarse, wrong, blown up, refused or not run."""
 
 from __future__ import annotations
 
@@ -17,27 +17,28 @@ STABLE, RINGING, COARSE, WRONG, BLOWN, REFUSED, SKIPPED = (
 )  # fmt: skip
 VERDICTS = {
     STABLE: "error within the tolerance, and smooth",
-    RINGING: "finite, but it swings from step to step, or more than the reference and quicker",
+    RINGING: "finite, but it oscillates from step to step, or more than the reference and faster",
     COARSE: "error above the tolerance, but a shorter step helps",
     WRONG: "finite, error above the tolerance, and neither half nor a quarter of the step helps",
-    BLOWN: "not finite, or three ranges of a probe beyond what the reference reaches",
-    REFUSED: "the program refused the case, or stopped by name",
-    SKIPPED: "would take too many implicit steps, or was given up after too long",
+    BLOWN: "not finite, or more than three ranges of a probe outside the values of the reference",
+    REFUSED: "fvsolve refused the case, or stopped with a reason",
+    SKIPPED: "too many implicit steps, or given up after too much time",
 }
-FAR = 3.0  # ranges of a probe outside the reference's span: beyond, a run has blown up
-SWINGS = 8  # changes in a row that alternate in sign: ringing
-SWING, FAINT = 0.02, 1e-3  # ranges: swings of a run that count, and those of the reference, which may have decayed
-HASTE = 0.5
-MORE = 0.25  # of the reference's variation: what a probe may swing more
-HELPS = 0.75  # of the error is left at most where a shorter step helps
+FAR = 3.0  # a run farther outside the values of the reference, in ranges of a probe, has blown up
+SWINGS = 8  # successive changes of alternating sign that count as ringing
+SWING, FAINT = 0.02, 1e-3  # least swings that count [range]: of a run, and of the reference, which may decay
+HASTE = 0.5  # swings count if they follow in less than this fraction of the time of those of the reference
+MORE = 0.25  # greatest excess of the variation of a probe, as a fraction of that of the reference
+HELPS = 0.75  # a shorter step helps if at most this fraction of the error remains
 
 
 @dataclass(frozen=True)
 class Measures:
-    """A run measured against the reference, in ranges of each probe, worst probe; nan where it did not finish.
+    """Measures of a run against the reference, of the worst probe, in ranges of the probe; nan if it did not finish.
 
-    error : mean distance over the rows; farthest : how far steps lie outside the reference's span
-    ringing, variation : see `ringing` and `excess`; reason : why the run ended; refused : before it began
+    error : mean distance over the rows; farthest : greatest distance of steps outside the values of the reference
+    ringing, variation : see `ringing_amplitude` and `excess_variation`; reason : reason for the end of the run
+    refused : True if the run did not begin; seconds : time of the steps [s]
     """
 
     reason: str
@@ -51,77 +52,78 @@ class Measures:
     seconds: float = math.nan
 
 
-def verdict(one: Measures, shorter: Callable[[], Measures], tolerance: float) -> str:
-    """The word for a run; `shorter()` gives the same run at half the step, then at a quarter.
+def verdict(run: Measures, shorter: Callable[[], Measures], tolerance: float) -> str:
+    """Verdict on a run; `shorter()` gives the run with half the step, then with a quarter.
 
-    It is asked only where the error is above the tolerance.
+    It is called only if the error is above the tolerance.
     """
-    if one.reason.startswith(GIVEN_UP):
+    if run.reason.startswith(GIVEN_UP):
         return SKIPPED
-    if one.refused or (not one.ok and not grown(one.reason)):
+    if run.refused or (not run.ok and not grown(run.reason)):
         return REFUSED
-    if not one.ok or not one.farthest <= FAR:
+    if not run.ok or not run.farthest <= FAR:
         return BLOWN
-    if one.ringing > tolerance or one.variation > MORE:
+    if run.ringing > tolerance or run.variation > MORE:
         return RINGING
-    if one.error <= tolerance:
+    if run.error <= tolerance:
         return STABLE
-    enough = max(tolerance, HELPS * one.error)
+    enough = max(tolerance, HELPS * run.error)
     for _ in range(2):
-        half = shorter()
-        if half.reason.startswith(GIVEN_UP):
+        shorter_run = shorter()
+        if shorter_run.reason.startswith(GIVEN_UP):
             return SKIPPED
-        if half.error <= enough:
+        if shorter_run.error <= enough:
             return COARSE
     return WRONG
 
 
-def ringing(bursts: Sequence[np.ndarray], ranges: np.ndarray) -> float:
-    """The greatest amplitude, in ranges, that a probe keeps up from step to step for SWINGS steps.
+def ringing(windows: Sequence[np.ndarray], ranges: np.ndarray) -> float:
+    """Greatest amplitude of an oscillation from step to step over MIN_SWINGS steps, in ranges of the probe.
 
-    bursts : float64[steps, probes] each; ranges : float64[probes]. A swing is half a change u[n+1] - u[n]; SWINGS
-    changes in a row must alternate in sign, and the least of them counts.
+    windows : float64[steps, probes] each; ranges : float64[probes]. A swing is half a change u[n+1] - u[n]. MIN_SWINGS
+    successive changes must alternate in sign, and the least of them counts.
     """
     worst = 0.0
-    for burst in bursts:
-        change = np.diff(burst, axis=0) / ranges
+    for window in windows:
+        change = np.diff(window, axis=0) / ranges
         if len(change) < SWINGS:
             continue
         turns = change[1:] * change[:-1] < 0.0
-        windows = np.lib.stride_tricks.sliding_window_view
-        alternate = windows(turns, SWINGS - 1, axis=0).all(axis=-1)
-        least = 0.5 * windows(np.abs(change), SWINGS, axis=0).min(axis=-1)
+        sliding = np.lib.stride_tricks.sliding_window_view
+        alternate = sliding(turns, SWINGS - 1, axis=0).all(axis=-1)
+        least = 0.5 * sliding(np.abs(change), SWINGS, axis=0).min(axis=-1)
         worst = max(worst, float(np.max(least[alternate], initial=0.0)))
     return worst
 
 
 def excess(rows: np.ndarray, reference: np.ndarray, ranges: np.ndarray) -> float:
-    """By what part a probe varies more than the reference: (TV - TV_ref) / max(TV_ref, range), worst probe.
+    """Excess of the variation of a probe over the reference, (TV - TV_ref) / max(TV_ref, range), of the worst probe.
 
-    It counts only where the swings follow each other in less than HASTE of the time of the reference's: one that a
-    method amplifies or does not damp is no ringing. TV is the sum of |changes| from row to row, after each row has been
-    replaced by the median of itself and its neighbours: one row that sticks out, read within the step after a jump, is
-    no swing.
-    rows, reference : float64[k, probes], ranges : float64[probes]
+    It counts only if swings follow in less than PACE_RATIO of the time of those of the reference: a swing that a
+    method amplifies or does not damp is no ringing. TV is the sum of |changes| from row to row. Before, each row is
+    replaced by the median of itself and its neighbours, since a single outlier in the step after a jump is no swing.
+    rows, reference : float64[k, probes]; ranges : float64[probes]
     """
-    one, other = (_medians(values) / ranges for values in (rows, reference))
-    varies, known = (np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (one, other))
-    found = (varies - known) / np.maximum(known, 1.0)
-    quick = [pace(a, SWING) < HASTE * pace(b, FAINT) for a, b in zip(one.T, other.T, strict=True)]
-    return float(np.max(found[quick], initial=0.0))
+    smooth, smooth_reference = (_medians(values) / ranges for values in (rows, reference))
+    variation, reference_variation = (
+        np.abs(np.diff(values, axis=0)).sum(axis=0) for values in (smooth, smooth_reference)
+    )
+    excesses = (variation - reference_variation) / np.maximum(reference_variation, 1.0)
+    quick = [pace(a, SWING) < HASTE * pace(b, FAINT) for a, b in zip(smooth.T, smooth_reference.T, strict=True)]
+    return float(np.max(excesses[quick], initial=0.0))
 
 
 def pace(values: np.ndarray, height: float) -> float:
-    """Rows from one turn to the next, the median over turns between swings of `height` at least; inf with one turn."""
-    turns, low, high, rises = [], 0, 0, 0
+    """Median number of rows between turning points of swings of at least `height`; inf for fewer than two of them."""
+    turns, low, high, direction = [], 0, 0, 0
     for i, value in enumerate(values):
         low, high = (i if value < values[low] else low), (i if value > values[high] else high)
-        if rises >= 0 and value < values[high] - height:
-            turns += [high] * rises
-            rises, low = -1, i
-        elif rises <= 0 and value > values[low] + height:
-            turns += [low] * -rises
-            rises, high = 1, i
+        if direction >= 0 and value < values[high] - height:
+            turns += [high] * direction
+            direction, low = -1, i
+        elif direction <= 0 and value > values[low] + height:
+            turns += [low] * -direction
+            direction, high = 1, i
     return float(np.median(np.diff(turns))) if len(turns) > 1 else np.inf
 
 
@@ -130,21 +132,23 @@ def _medians(rows: np.ndarray) -> np.ndarray:
 
 
 def ranges_of(reference: np.ndarray) -> np.ndarray:
-    """Greatest less least value of each probe; inf for one that stands still : float64[probes]."""
+    """Range of each probe in the reference, inf for constant probes : float64[probes]."""
     return np.nan_to_num(ranges(reference), nan=np.inf)
 
 
-def measured(outcome, bursts: Sequence[np.ndarray], truth) -> Measures:
-    """A run against the truth's rows, read at the run's own times."""
+def measured(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
+    """Measures of a run against the rows of a reference, interpolated to the times of the run."""
     if not outcome.ok:
         return Measures(outcome.reason, False, outcome.refused, steps=outcome.counts.get("steps", 0))
-    t, rows, known = outcome.rows[:, 0], outcome.rows[:, 1:], truth.rows(truth.run)
-    true = np.column_stack([np.interp(t, truth.run.rows[:, 0], column) for column in known.T])
-    wide, seen = ranges_of(known), np.concatenate([rows[-1:], *bursts])
+    t, rows, reference_rows = outcome.rows[:, 0], outcome.rows[:, 1:], reference.rows(reference.run)
+    expected = np.column_stack([np.interp(t, reference.run.rows[:, 0], column) for column in reference_rows.T])
+    widths, steps = ranges_of(reference_rows), np.concatenate([rows[-1:], *windows])
     with np.errstate(over="ignore", invalid="ignore"):
-        error = [Gap(off, times(t), width).ranges()["L1"] for off, width in zip((rows - true).T, wide, strict=True)]
-        outside = np.maximum(seen - known.max(axis=0), known.min(axis=0) - seen) / wide
+        error = [
+            Gap(off, times(t), width).ranges()["L1"] for off, width in zip((rows - expected).T, widths, strict=True)
+        ]
+        outside = np.maximum(steps - reference_rows.max(axis=0), reference_rows.min(axis=0) - steps) / widths
         return Measures(
-            outcome.reason, True, False, float(np.max(error)), max(0.0, float(outside.max())), ringing(bursts, wide),
-            excess(rows, true, wide), outcome.counts["steps"], outcome.seconds,
+            outcome.reason, True, False, float(np.max(error)), max(0.0, float(outside.max())), ringing(windows, widths),
+            excess(rows, expected, widths), outcome.counts["steps"], outcome.seconds,
         )  # fmt: skip

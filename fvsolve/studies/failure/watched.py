@@ -1,4 +1,4 @@
-"""A run looked at step by step: what its probes are after each step of a window. Knows runs; judges nothing."""
+"""Run that records its probes after every step of some windows."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from fvsolve.steppers import slots
 from fvsolve.studies.accuracy.timing import Capped
 from fvsolve.studies.outcome import Outcome, outcome
 
-WINDOW = 9  # steps looked at in a row, at least
-LONGEST = 10.0  # [s] of CPU time after which a run is given up
-SPARSE = 30  # windows of long runs lie a thirtieth of the steps so far apart
+WINDOW = 9  # least number of successive steps in a window
+LONGEST = 10.0  # CPU time after which a run is given up [s]
+SPARSE = 30  # in long runs the distance of windows is this fraction of the steps taken: 1 / 30
 
 
 class Watched(Capped):
-    """A run that stops after every step of a window and notes its probes; the steps are those of any run.
+    """Run that pauses after every step of a window and records its probes; its steps are those of a usual run.
 
-    bursts : lists of float64[probes] [SI], the probes after steps that follow each other
+    windows : lists of float64[probes] [SI], the probes after successive steps
     """
 
-    def __init__(self, *given) -> None:
-        super().__init__(*given)
+    def __init__(self, *arguments) -> None:
+        super().__init__(*arguments)
         self.bursts: list[list[np.ndarray]] = [[]]
         self.budget = self.left = 1.0
         self.most_seconds = LONGEST
 
     def pause(self) -> None:
-        """Note the probes; after a window of a long run, let it run on to the next one, or give it up."""
+        """Record the probes, and in a long run skip the steps between two windows. Raises GivenUp at the CPU limit."""
         self.check()
         self.bursts[-1].append(self.slate.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
         apart = int(self.loop.memory[slots.STEPS]) // SPARSE
@@ -39,13 +39,13 @@ class Watched(Capped):
 
 
 def watched(case, set: Mapping | None = None) -> tuple[Outcome, list[np.ndarray]]:
-    """(how a case with keys changed ran, its bursts : float64[steps, probes] [SI] each); see `outcome`."""
-    made: list[Watched] = []
+    """(outcome of a run with changed keys, its windows : float64[steps, probes] [SI] each)."""
+    runs: list[Watched] = []
 
-    def run(*given) -> Watched:
-        made.append(Watched(*given))
-        return made[-1]
+    def run(*arguments) -> Watched:
+        runs.append(Watched(*arguments))
+        return runs[-1]
 
-    found = outcome(case, set, run=run)
-    bursts = made[-1].bursts if made else []
-    return found, [np.array(burst) for burst in bursts if len(burst) > 1]
+    result = outcome(case, set, run=run)
+    windows = runs[-1].bursts if runs else []
+    return result, [np.array(window) for window in windows if len(window) > 1]
