@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis_profiles import examples
 
 import fvsolve
-from invariance import equivalent_networks
+from invariance import equivalent_networks as equivalent
 from invariance.random_scenes import SEEDS, networks, shuffled, some_of
 from invariance.result_comparison import alike, told
 from invariance.test_networks import EXPERIMENTAL, near
@@ -31,7 +31,7 @@ def nearly(case: dict) -> float:
 
 def followed(case: dict, line: str) -> dict:
     """All pipes as lines, or as `auto` finds them."""
-    return equivalent_networks.changed(case, "numerics", line=line, accuracy=SMALL if line == "delay" else 1e-2)
+    return equivalent.changed(case, "numerics", line=line, accuracy=SMALL if line == "delay" else 1e-2)
 
 
 def lines(*ways: str) -> st.SearchStrategy[dict]:
@@ -76,8 +76,8 @@ def test_run_again(case):
 @given(case=lines())
 def test_other_rows(case):
     """Common ones agree to the bit."""
-    few = told_lines(equivalent_networks.changed(case, "output", every=1 / 16))
-    many = told_lines(equivalent_networks.changed(case, "output", every=1 / 64))
+    few = told_lines(equivalent.changed(case, "output", every=1 / 16))
+    many = told_lines(equivalent.changed(case, "output", every=1 / 64))
     assert (few is None) == (many is None)
     if few is not None and few.result:
         assert few.ended == many.ended
@@ -91,31 +91,31 @@ def test_other_rows(case):
 @given(case=given_steps(), seed=SEEDS)
 def test_other_order(case, seed):
     nodes, links = shuffled(case["nodes"], seed), shuffled(case["links"], seed)
-    same(told_lines(case), told_lines(equivalent_networks.reordered(case, nodes, links)), nearly(case))
+    same(told_lines(case), told_lines(equivalent.reordered(case, nodes, links)), nearly(case))
 
 
 @examples(4)
 @given(case=given_steps(), seed=SEEDS)
 def test_links_drawn_from_the_other_end(case, seed):
-    able = [name for name, link in case["links"].items() if link["type"] in equivalent_networks.STRAIGHT]
+    able = [name for name, link in case["links"].items() if link["type"] in equivalent.STRAIGHT]
     chosen = some_of(able, seed)
 
     def sign(probe, values):
         return -values if ".flow" in probe and probe.split(".")[1] in chosen else values
 
     def name(probe):
-        return equivalent_networks.from_other_end(probe, case, chosen)
+        return equivalent.from_other_end(probe, case, chosen)
 
-    same(told_lines(case), told_lines(equivalent_networks.swapped(case, chosen)), nearly(case), name=name, change=sign)
+    same(told_lines(case), told_lines(equivalent.swapped(case, chosen)), nearly(case), name=name, change=sign)
 
 
 @examples(3)
 @given(case=given_steps(), height=st.sampled_from([16.0, 1000.0]))
 def test_everything_higher(case, height):
-    same(told_lines(case), told_lines(equivalent_networks.raised(case, height)), nearly(case))
+    same(told_lines(case), told_lines(equivalent.raised(case, height)), nearly(case))
 
 
 @examples(3)
 @given(case=given_steps())
 def test_other_units(case):
-    same(told_lines(case), told_lines(equivalent_networks.in_other_units(case)), nearly(case))
+    same(told_lines(case), told_lines(equivalent.in_other_units(case)), nearly(case))

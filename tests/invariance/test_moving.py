@@ -19,7 +19,7 @@ from reference.trees import body
 import fvsolve
 from fvsolve.output.memory import MemorySink
 from fvsolve.solve.solve import Run
-from invariance import equivalent_mechanisms
+from invariance import equivalent_mechanisms as equivalent
 from invariance.moving import METHODS, SCENES, machine, piston, stepped
 from invariance.result_comparison import Told, alike, told
 
@@ -85,7 +85,7 @@ def test_broken_off_and_resumed(name, method):
 @pytest.mark.parametrize("name, method", MIXED)
 def test_parts_in_the_reverse_order(name, method):
     """A body stands before the one that it hangs on, a wall's mass before its basin."""
-    alike(first(name, method), told(equivalent_mechanisms.otherwise(SCENES[name](method))), near(method))
+    alike(first(name, method), told(equivalent.otherwise(SCENES[name](method))), near(method))
 
 
 @pytest.mark.parametrize("method", EACH)
@@ -94,7 +94,7 @@ def test_at_a_later_time(name, method):
     """Times are rounded by their size, and what drives a joint is differenced over them."""
     alike(
         first(name, method),
-        told(equivalent_mechanisms.at_a_later_time(SCENES[name](method), 64.0)),
+        told(equivalent.at_a_later_time(SCENES[name](method), 64.0)),
         near(method),
         later=64.0,
     )
@@ -116,7 +116,7 @@ def test_other_rows(name):
 def test_other_units(name, method):
     """The factors of units round once."""
     case = SCENES[name](method)
-    other = case | {table: equivalent_mechanisms.in_other_units(case[table]) for table in ("nodes", "links")}
+    other = case | {table: equivalent.in_other_units(case[table]) for table in ("nodes", "links")}
     assert other != case
     alike(first(name, method), told(other), near(method))
 
@@ -124,7 +124,7 @@ def test_other_units(name, method):
 @pytest.mark.parametrize("method", EACH)
 @pytest.mark.parametrize("name", [name for name in IN_SPACE if not name.startswith(("carried", "full", "u-tube"))])
 def test_ends_of_links_swapped(name, method):
-    alike(first(name, method), told(equivalent_mechanisms.swapped(SCENES[name](method))), near(method))
+    alike(first(name, method), told(equivalent.swapped(SCENES[name](method))), near(method))
 
 
 @pytest.mark.parametrize("method", EACH)
@@ -135,7 +135,7 @@ def test_axes_the_other_way(name, method):
 
     alike(
         first(name, method),
-        told(equivalent_mechanisms.reversed_axes(SCENES[name](method))),
+        told(equivalent.reversed_axes(SCENES[name](method))),
         near(method),
         change=change,
     )
@@ -147,15 +147,15 @@ def test_turned_about_the_vertical(name, method):
     one = spatial(first(name, method))
     alike(
         one,
-        told(equivalent_mechanisms.turned(SCENES[name](method), 0.7)),
+        told(equivalent.turned(SCENES[name](method), 0.7)),
         near(method),
-        change=equivalent_mechanisms.as_turned(one, 0.7),
+        change=equivalent.as_turned(one, 0.7),
     )
 
 
 def spatial(one: Told) -> Told:
     """Without vectors of which single components are probes: to turn them all three are needed."""
-    whole = {probe: values for probe, values in one.rows.items() if equivalent_mechanisms.part(probe)[1] == "-"
+    whole = {probe: values for probe, values in one.rows.items() if equivalent.part(probe)[1] == "-"
              or all(f"{probe[:-1]}{axis}" in one.rows for axis in "xyz")}  # fmt: skip
     return Told(one.ended, one.t, whole, one.result)
 
@@ -167,8 +167,8 @@ def test_in_a_mirror(name, method, axis):
     """Basins are drawn from their other corner: nothing may hang on where that is."""
     case = SCENES[name](method)
     sizes = {one: node["size"] for one, node in case["nodes"].items() if node["type"] == "basin"}
-    alike(first(name, method), told(equivalent_mechanisms.mirrored(case, axis)), near(method),
-          lambda probe: equivalent_mechanisms.in_mirror(probe, axis, sizes), equivalent_mechanisms.as_mirrored(axis))  # fmt: skip
+    alike(first(name, method), told(equivalent.mirrored(case, axis)), near(method),
+          lambda probe: equivalent.in_mirror(probe, axis, sizes), equivalent.as_mirrored(axis))  # fmt: skip
 
 
 @pytest.mark.parametrize("name", IN_SPACE)
@@ -179,17 +179,17 @@ def test_far_away(name):
     rows = {probe: values for probe, values in one.rows.items() if "angular_momentum" not in probe}
 
     def change(probe, values):
-        _, vector, axis = equivalent_mechanisms.part(probe)
+        _, vector, axis = equivalent.part(probe)
         return values + by.get(axis, 0.0) if vector == "" else values
 
-    other = told(equivalent_mechanisms.shifted(SCENES[name](), [by["x"], by["y"], 0.0]))
+    other = told(equivalent.shifted(SCENES[name](), [by["x"], by["y"], 0.0]))
     alike(Told(one.ended, one.t, rows, one.result), other, ROUND, change=change)
 
 
-@pytest.mark.parametrize("form", equivalent_mechanisms.FORMS)
+@pytest.mark.parametrize("form", equivalent.FORMS)
 @pytest.mark.parametrize("name", ["machine", "loop", "carried", "rocking"])
 def test_attitudes_in_another_form(name, form):
-    alike(first(name, "rk4"), told(equivalent_mechanisms.attitudes(SCENES[name](), form)), ROUND)
+    alike(first(name, "rk4"), told(equivalent.attitudes(SCENES[name](), form)), ROUND)
 
 
 @pytest.mark.parametrize("method", EACH)
@@ -201,9 +201,7 @@ def test_a_body_in_two_that_are_fixed_to_each_other(part, method):
     rows = {probe: values for probe, values in one.rows.items() if not probe.endswith(own)}
     if part == "kite":  # the place of a free body in its states is that of its centre of mass: so is its velocity
         rows = {probe: values for probe, values in rows.items() if not probe.startswith("kite.momentum")}
-    alike(
-        Told(one.ended, one.t, rows, one.result), told(equivalent_mechanisms.split(machine(method), part)), near(method)
-    )
+    alike(Told(one.ended, one.t, rows, one.result), told(equivalent.split(machine(method), part)), near(method))
 
 
 @pytest.mark.parametrize("method", EACH)

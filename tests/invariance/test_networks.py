@@ -18,7 +18,7 @@ from reference.scenes import GRAVITY, WATER
 
 import fvsolve
 from fvsolve.case.text import write
-from invariance import equivalent_networks
+from invariance import equivalent_networks as equivalent
 from invariance.random_scenes import IMPLICIT, SEEDS, networks, shuffled, some_of
 from invariance.result_comparison import IN_PARTS, alike, told
 
@@ -54,8 +54,8 @@ def test_run_again(case):
 @given(case=networks())
 def test_other_rows(case):
     """Rows are read between steps and do not shorten them: common ones agree to the bit, as 1/32 s is exact."""
-    few = told(equivalent_networks.changed(case, "output", every=1 / 16))
-    many = told(equivalent_networks.changed(case, "output", every=1 / 64))
+    few = told(equivalent.changed(case, "output", every=1 / 16))
+    many = told(equivalent.changed(case, "output", every=1 / 64))
     assert few.ended == many.ended
     assert set(few.t) <= set(many.t)
     for name, values in few.rows.items():
@@ -67,7 +67,7 @@ def test_other_rows(case):
 @examples(6)
 @given(case=networks(), frames=st.integers(1, 9))
 def test_other_frames(case, frames):
-    alike(told(case), told(equivalent_networks.changed(case, "output", fields=frames)))
+    alike(told(case), told(equivalent.changed(case, "output", fields=frames)))
 
 
 @examples(6)
@@ -80,8 +80,8 @@ def test_other_names(case):
 
     alike(
         told(case),
-        told(equivalent_networks.renamed(case, call)),
-        name=lambda probe: equivalent_networks.called(probe, call),
+        told(equivalent.renamed(case, call)),
+        name=lambda probe: equivalent.called(probe, call),
     )
 
 
@@ -90,30 +90,30 @@ def test_other_names(case):
 def test_other_order(case, seed):
     """Sums over the links of a place are taken in another order."""
     nodes, links = shuffled(case["nodes"], seed), shuffled(case["links"], seed)
-    alike(told(case), told(equivalent_networks.reordered(case, nodes, links)), near(case))
+    alike(told(case), told(equivalent.reordered(case, nodes, links)), near(case))
 
 
 @examples(6)
 @given(case=networks(), seed=SEEDS)
 def test_links_drawn_from_the_other_end(case, seed):
     """Cells and faces are the same, counted from the other end: fluxes change sign."""
-    able = [name for name, link in case["links"].items() if link["type"] in equivalent_networks.STRAIGHT]
+    able = [name for name, link in case["links"].items() if link["type"] in equivalent.STRAIGHT]
     chosen = some_of(able, seed)
 
     def sign(probe, values):
         return -values if ".flow" in probe and probe.split(".")[1] in chosen else values
 
     def name(probe):
-        return equivalent_networks.from_other_end(probe, case, chosen)
+        return equivalent.from_other_end(probe, case, chosen)
 
-    alike(told(case), told(equivalent_networks.swapped(case, chosen)), near(case), name, sign)
+    alike(told(case), told(equivalent.swapped(case, chosen)), near(case), name, sign)
 
 
 @examples(6)
 @given(case=networks(), height=st.sampled_from([16.0, 1000.0, -3.7]))
 def test_everything_higher(case, height):
     """Only differences of elevation drive; these are rounded by the height."""
-    alike(told(case), told(equivalent_networks.raised(case, height)), near(case))
+    alike(told(case), told(equivalent.raised(case, height)), near(case))
 
 
 @examples(6)
@@ -130,7 +130,7 @@ def test_without_profiles(case):
         bent = np.interp(x[0] + 0.37 * link["length"], x, z)
         return values - weight * (bent - (z[0] + 0.37 * (z[-1] - z[0])))
 
-    alike(told(equivalent_networks.straight(case)), told(case), near(case), change=change)
+    alike(told(equivalent.straight(case)), told(case), near(case), change=change)
 
 
 @examples(6)
@@ -150,7 +150,7 @@ def test_limits_and_points_that_are_watched_change_nothing(case):
 @given(case=networks())
 def test_other_units(case):
     """The factors of units round once."""
-    alike(told(case), told(equivalent_networks.in_other_units(case)), near(case))
+    alike(told(case), told(equivalent.in_other_units(case)), near(case))
 
 
 @examples(6)
@@ -158,16 +158,16 @@ def test_other_units(case):
 def test_two_copies_with_a_shut_valve_between(case):
     """Norms over twice as many states and systems of twice the size round otherwise."""
     one = told(case)
-    both = told(equivalent_networks.twice(case, "n0"))
+    both = told(equivalent.twice(case, "n0"))
     alike(one, both, near(case))
-    alike(one, both, near(case), name=lambda probe: equivalent_networks.called(probe, lambda part: f"{part}-too"))
+    alike(one, both, near(case), name=lambda probe: equivalent.called(probe, lambda part: f"{part}-too"))
 
 
 @examples(6)
 @given(case=networks(), wait=st.sampled_from([64.0, 1000.0]))
 def test_at_a_later_time(case, wait):
     """Times are rounded by their size, and with them lengths of steps and what schedules say."""
-    alike(told(case), told(equivalent_networks.later(case, wait)), 1e3 * near(case), later=wait)
+    alike(told(case), told(equivalent.later(case, wait)), 1e3 * near(case), later=wait)
 
 
 @examples(6)
@@ -179,8 +179,8 @@ def test_a_denser_fluid(case):
         return 2.0 * values if ".pressure" in probe else values
 
     alike(
-        told(equivalent_networks.denser(case, 1.0)),
-        told(equivalent_networks.denser(case, 2.0)),
+        told(equivalent.denser(case, 1.0)),
+        told(equivalent.denser(case, 2.0)),
         near(case),
         change=twice,
     )
@@ -191,7 +191,7 @@ def test_a_denser_fluid(case):
 def test_a_demand_is_an_inflow_backwards(case):
     """The same junction by another name."""
     assume(any("demand" in node for node in case["nodes"].values()))
-    alike(told(case), told(equivalent_networks.drawn_backwards(case)))
+    alike(told(case), told(equivalent.drawn_backwards(case)))
 
 
 @examples(6)
@@ -209,7 +209,7 @@ def test_the_resolved_file(case):
 @given(case=networks())
 def test_a_file_and_settings(case, tmp_path_factory):
     """What the file says otherwise and `set` puts right."""
-    wrong = equivalent_networks.changed(case, "numerics", end=77.0)
+    wrong = equivalent.changed(case, "numerics", end=77.0)
     wrong["links"]["p0"] |= {"length": 1.0, "cells": 1}
     path = tmp_path_factory.mktemp("said") / "case.toml"
     path.write_text(write(wrong))

@@ -1,7 +1,7 @@
 """The plant of cases/hydropower.toml by the method of characteristics, and the formula of its hill chart.
 
-Knows no line of fvsolve. `python tests/reference/hydropower.py chart` writes the points of the chart, without an argument
-it prints what the case is held to.
+Imports no module of fvsolve. `python tests/reference/hydropower.py chart` writes the points of the chart; without an
+argument it prints the reference values of the case.
 """
 
 from __future__ import annotations
