@@ -55,7 +55,7 @@ def key_table(name: str) -> str:
     if name == "materials":
         return materials_table()
     if name == "case":
-        top = {"ambient_pressure": (Quantity("pressure", about="absolute"), 101325.0), **TOP}
+        top = {"ambient_pressure": (Quantity("pressure", about="absolute ambient pressure"), 101325.0), **TOP}
         rows = [row(key, value, default) for key, (value, default) in top.items()]
     else:
         rows = rows_of(name, model_of(name))

@@ -29,7 +29,7 @@ class Force(Coupling, kind="force"):
     force: Annotated[Schedule, Scheduled("force", about="force on `to`, positive forward [N]")]
     direction: Annotated[
         tuple[float, ...] | None,
-        Rows("number", length=3, about="direction in world axes, for points; the line from `from` to `to` if left out"),
+        Rows("number", length=3, about="direction in world axes, on points; the line from `from` to `to` if left out"),
     ] = None
 
     @property

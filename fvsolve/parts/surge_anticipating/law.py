@@ -3,8 +3,8 @@
 Flags, with at = event + mode: armed[at] to armed[at + 3] for the stages SHUT, OPENING, OPEN and CLOSING; if all are 0,
 the states give the stage. armed[at + 4]: opened by high pressure; armed[at + 5]: the pressure has exceeded low_set
 since the valve shut, so that a pressure below low_set opens it; armed[at + 6]: after the trip. Flags change on accepted
-states only. The states are the opening and the time spent fully open; their rates are constant in a stage, so that every method
-integrates them to rounding. To ambient, `mode` numbers and flags of an outlet precede those of the valve.
+states only. The states are the opening and the time spent fully open; their rates are constant in a stage, so that
+every method integrates them to rounding. To ambient, `mode` numbers and flags of an outlet precede those of the valve.
 """
 
 from fvsolve.jit import njit

@@ -60,8 +60,8 @@ class HillChartValue(Value):
     """Curves of openings, inline or as columns of a CSV file."""
 
     about = (
-        "n11 = N D / sqrt(H) [rpm m^(1/2)], Q11 = Q / (D^2 sqrt(H)) [m^(1/2)/s] and efficiency, or T11 = T / (D^3 H) "
-        "[N/m3], of each opening"
+        "for each opening, points of n11 = N D / sqrt(H) [rpm m^(1/2)], Q11 = Q / (D^2 sqrt(H)) [m^(1/2)/s] and "
+        "efficiency, or T11 = T / (D^3 H) [N/m3]"
     )
     takes = (
         "list of `{ opening, unit_speed = [...], unit_flow = [...], efficiency or unit_torque = [...] }`, or `{ file }`"

@@ -42,7 +42,10 @@ class Turbine(TwoPort, kind="turbine"):
     inertia: Annotated[
         float | None,
         Quantity(
-            "inertia", positive, "inertia of runner, its water and generator [kg m2]; needed with trip", changes=VALUE
+            "inertia",
+            positive,
+            "inertia of runner, the water in it and generator [kg m2]; required with trip",
+            changes=VALUE,
         ),
     ] = None
     trip: Annotated[
@@ -77,5 +80,5 @@ def overdrawn(curve: OpeningCurve, weight: float) -> str | None:
         # power lost on the line, fractions a + b = 1: a^2 (w q - t n) + a b (w (q + r) - t m - s n) + b^2 (w r - s m)
         ends, both = (weight * q - t * n, weight * r - s * m), weight * (q + r) - t * m - s * n
         if both < 0.0 and both * both > 4.0 * ends[0] * ends[1] * (1.0 + ROUNDING):
-            return f"between ({n:g}, {q:g}) and ({m:g}, {r:g}) the efficiency would pass 1; give more points there"
+            return f"between ({n:g}, {q:g}) and ({m:g}, {r:g}) the efficiency would exceed 1; give more points there"
     return None
