@@ -17,7 +17,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Column, Sheet, text
 
 Asked = Annotated[
-    str | None, typer.Argument(metavar="[CASE]", help="case to run (default: judge schemes and methods without a case)")
+    str | None, typer.Argument(metavar="[CASE]", help="case to run (without a case: schemes and methods are judged)")
 ]
 Port = Annotated[str | None, typer.Option(metavar="NODE", help="port at which passivity of the network is checked")]
 Schemes = Annotated[str | None, typer.Option(metavar="S,S,...", help="schemes to run or to judge")]

@@ -27,7 +27,7 @@ def map_(
         str | None, typer.Option(metavar="KEY=A,B", help="values of a key of the case, one column for each")
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="X", help="greatest mean error of a probe, as a fraction of its range")
+        float, typer.Option(metavar="X", help="greatest accepted mean error of a probe, over its range")
     ] = 0.02,
     jobs: Jobs = 1,
     dask: Dask = None,

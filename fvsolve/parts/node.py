@@ -84,7 +84,7 @@ class Rider(Node):
         Rows(
             "position",
             length=3,
-            about="position (of a basin: of its origin) in the axes of the body, instead of elevation [m]; 0 if left out",
+            about="position (of a basin: of its origin) in axes of the body, instead of elevation [m]; 0 if left out",
         ),
     ] = None
 

@@ -75,7 +75,7 @@ class Patch(Table):
     zone: Annotated[
         float | None,
         Quantity(
-            "length", positive, "width of the zone in which grid lines move with the wall [m]; the whole basin if left out",
+            "length", positive, "width of the zone whose grid lines follow the wall [m]; the whole basin if left out",
             changes=VALUE,
         ),
     ] = None  # fmt: skip

@@ -55,7 +55,10 @@ class Torque(Link, kind="torque"):
             if given is not None:
                 yield (key,), f"is a key for bodies, but {self.to} is a shaft; remove it"
         if turned.inertia is None:
-            yield ("to",), f"{self.to} has no inertia, so no torque can turn it; give the {turned.kind} inertia"
+            yield (
+                ("to",),
+                f"{self.to} has no inertia, so its speed cannot follow from a torque; give the {turned.kind} inertia",
+            )
         if turned.trip is not None:
             text = "is held by its motor until it trips; remove trip, and let the torque fall to 0 at that time"
             yield ("to",), f"{self.to} {text}"

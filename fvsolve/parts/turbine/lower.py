@@ -92,7 +92,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
             drop = rho * start.case.gravity * charts.chart_head(*at, float(valve["flow"]) / rho)[0]
             ratio = rho / draft.fluid.density
             if abs(drop - valve["drop"] * ratio) > SMALL * (abs(drop) + abs(valve["drop"])) + 1e-3:
-                moving.append(f"turbine {name}: its flow is not that of its hill chart")
+                moving.append(f"turbine {name}: its flow at the start is not on its hill chart")
                 valve["open"] = 0.0
             elif draft.case.law.linear:
                 valve["drop"] = drop

@@ -74,7 +74,7 @@ def overdrawn(curve: OpeningCurve, weight: float) -> str | None:
     for n, q, t in points:
         if t * n > weight * q + ROUNDING * weight * abs(q):
             most = t * n / (weight * q) if q > 0.0 else 0.0
-            excess = f"an efficiency of {most:.4g}" if q > 0.0 else "less power than the pumped water takes up"
+            excess = f"an efficiency of {most:.4g}" if q > 0.0 else "less shaft power than the pumped water takes up"
             return f"torque at ({n:g}, {q:g}) means {excess}; expected {'at most 1' if q > 0.0 else 'more'}"
     for (n, q, t), (m, r, s) in pairwise(points):
         # power lost on the line, fractions a + b = 1: a^2 (w q - t n) + a b (w (q + r) - t m - s n) + b^2 (w r - s m)
