@@ -112,8 +112,8 @@ def find_marks(run_data: Slate) -> list[Mark]:
         ),
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would stop it",
         "below vapor pressure": (
-            "pressure falls below vapour pressure; the liquid column would separate; "
-            f"{model.case.law.to_cavitate}cavitation = true in [fluid] models it"
+            "pressure falls below vapour pressure; the liquid column would separate; to model this, set "
+            f"{model.case.law.to_cavitate}cavitation = true in [fluid]"
         ),
         "dry": "no water is left for the outflow; the missing water is added and booked as made_up",
     }
