@@ -24,13 +24,22 @@ def chart(
     ] = None,
     cells: Annotated[
         str | None,
-        typer.Option(metavar="LIST", help="numbers of cells of the longest pipe, or of a basin side: 50,100,200"),
+        typer.Option(
+            metavar="LIST",
+            help="numbers of cells of the longest pipe, or of a basin side: 50,100,200 (default five, to 400)",
+        ),
     ] = None,
     rtol: Annotated[
-        str | None, typer.Option(metavar="LIST", help="relative tolerances, for a case without pipes: 1e-3,1e-6")
+        str | None,
+        typer.Option(
+            metavar="LIST", help="relative tolerances, for a case without pipes: 1e-3,1e-6 (default 1e-2 to 1e-10)"
+        ),
     ] = None,
     step: Annotated[
-        str | None, typer.Option(metavar="LIST", help="steps [s], for methods without an error estimate: 1e-3,1e-4")
+        str | None,
+        typer.Option(
+            metavar="LIST", help="steps [s], for methods without an error estimate: 1e-3,1e-4 (default seven steps)"
+        ),
     ] = None,
     target: Annotated[
         float | None,

@@ -17,9 +17,16 @@ from fvsolve.units import parse
 @app.command("map")
 def map_(
     case: One,
-    scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes, one panel for each")] = None,
-    method: Annotated[str | None, typer.Option(metavar="A,B", help="methods, one row for each")] = None,
-    courant: Annotated[str | None, typer.Option(metavar="A,B", help="Courant numbers, one column for each")] = None,
+    scheme: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="schemes, one panel for each (default upwind and that of the case)"),
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="A,B", help="methods, one row for each (default seven methods)")
+    ] = None,
+    courant: Annotated[
+        str | None, typer.Option(metavar="A,B", help="Courant numbers, one column for each (default 0.25 to 3)")
+    ] = None,
     step: Annotated[
         str | None, typer.Option(metavar="A,B", help='time steps, one column for each: "1 ms,2 ms"')
     ] = None,
