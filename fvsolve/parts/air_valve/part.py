@@ -42,7 +42,7 @@ class AirValve(Node, kind="air-valve"):
         Quantity(
             "pressure_drop",
             positive,
-            "air pressure above ambient above which air leaves through throttled_outlet instead of outlet",
+            "gauge pressure of the air above which it leaves through throttled_outlet instead of outlet",
             Usual(100.0, 1e5, "anti-slam discs"),
         ),
     ] = None

@@ -58,9 +58,7 @@ class Patch(Table):
     ] = None
     boundary: Annotated[
         str | None,
-        Choice(
-            "boundary", ("wall", "open"), "boundary condition; open: waves leave without reflection; a wall if left out"
-        ),
+        Choice("boundary", ("wall", "open"), "boundary condition: open (waves leave); a wall if left out"),
     ] = None
     impedance: Annotated[
         float | None,
