@@ -32,13 +32,13 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, part.hold + part.opening_time]
 
-    def settle(self, slate, row, t, y, scale) -> None:
+    def settle(self, run_data, row, t, y, scale) -> None:
         at, o = row["event"] + row["mode"], row["y"]
-        if slate.armed[at + law.SHUT] > 0.0:
+        if run_data.armed[at + law.SHUT] > 0.0:
             y[o] = 0.0
-        elif slate.armed[at + law.OPENING] > 0.0:
+        elif run_data.armed[at + law.OPENING] > 0.0:
             y[o + 1] = 0.0
-        elif slate.armed[at + law.OPEN] > 0.0:
+        elif run_data.armed[at + law.OPEN] > 0.0:
             y[o] = 1.0
 
     def begin(self, start, part, row) -> list[str]:
