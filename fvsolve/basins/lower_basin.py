@@ -367,7 +367,7 @@ class BasinRows:
         """Reason why scalars may leave the bounds of the case: (key, text, value, limit); None if they cannot."""
         numerics, method = self.case.numerics, METHODS.get(self.case.numerics.method)
         if row["scheme"] == rec.LINEAR:
-            return "scheme", "upwind5 keeps no bounds; upwind, muscl and weno5 do", None, None
+            return "scheme", "upwind5 does not keep scalars within bounds; upwind, muscl and weno5 do", None, None
         if method is None or not method.explicit or numerics.courant is None:
             key = "step" if numerics.step is not None else "rtol" if numerics.rtol is not None else "method"
             return key, f"ssp-rk3 with courant = {COURANT:g} or less keeps the bounds", None, None

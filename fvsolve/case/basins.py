@@ -177,7 +177,7 @@ def _patches(basin: Basin, known: tuple[str, ...], name: str) -> str:
     if known or basin.mesh is None:
         return f"patches are {listing(known) or 'none'}"
     file = Path(basin.mesh.file).name
-    return f"{file} names no groups of lines; Gmsh does by Physical Curve({show(name)}) = {{1, 2}};"
+    return f"{file} has no named groups of lines; in Gmsh name them by Physical Curve({show(name)}) = {{1, 2}};"
 
 
 def misfits(

@@ -181,7 +181,7 @@ def one_place(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, 
         ):
             continue
         if None not in [point_of(nodes, end) for end in ends] and ahead(nodes, poses_of, *ends) == 0.0:
-            text = f"{ends[0]} and {ends[1]} lie in one place at the start, so the line between them has no direction"
+            text = f"{ends[0]} and {ends[1]} coincide at the start, so the line between them has no direction"
             yield ("links", name), text
 
 
@@ -233,7 +233,7 @@ def misfits(nodes: dict[str, Any], named: Any) -> Found:
         text = " on ".join([*ring, ring[0]])
         yield (
             ("nodes", ring[0], "joint", "on"),
-            f"is carried by itself: {text}; leave one on out and close the loop by a pin",
+            f"is carried by itself: {text}; remove on from one of its bodies and close the loop by a pin",
         )
         loop -= {member for member in loop if set(chain(bodies, member)) & set(ring)}
 

@@ -230,8 +230,8 @@ class Case(Shown):
 
     def _known(self, name: str, known: dict[str, Any], noun: str) -> Any:
         if not isinstance(name, str) or name not in known:
-            text = f"no {noun} {show(name)}{did_you_mean(str(name), known)}"
-            raise FvsolveError(f"{text}; it has {listing(known) or 'none'}")
+            text = f"unknown {noun} {show(name)}{did_you_mean(str(name), known)}"
+            raise FvsolveError(f"{text}; expected {listing(known) or 'none: the case has none'}")
         return known[name]
 
     def resolved(self) -> str:

@@ -66,7 +66,7 @@ def declared(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
             result = outer.below(key)
         except KeyError:
             raise FvsolveError(
-                f"no key {show('.'.join(keys))}; expected a key of the case, such as numerics.end"
+                f"unknown key {show('.'.join(keys))}; expected a key of the case, such as numerics.end"
             ) from None
         if result is None:
             return outer

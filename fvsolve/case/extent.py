@@ -122,7 +122,7 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
         return matches
     known = [*kinds["nodes"], *kinds["links"], *routes, *ALL]
     raise ValueError(
-        f"no part or route named {show(name)}{did_you_mean(name, known) or f'; there are {listing(known)}'}"
+        f"unknown part or route {show(name)}{did_you_mean(name, known) or f'; there are {listing(known)}'}"
     )
 
 

@@ -55,7 +55,7 @@ def key_table(name: str) -> str:
     if name == "materials":
         return materials_table()
     if name == "case":
-        top = {"ambient_pressure": (Quantity("pressure", about="absolute"), 101325.0), **TOP}
+        top = {"ambient_pressure": (Quantity("pressure", about="absolute ambient pressure"), 101325.0), **TOP}
         rows = [row(key, value, default) for key, (value, default) in top.items()]
     else:
         rows = rows_of(name, model_of(name))
@@ -79,8 +79,8 @@ def model_of(name: str) -> type[Table]:
     """Declaration of a type of part, or of another table."""
     known = {**TABLES, **KINDS["nodes"], **KINDS["links"]}
     if name not in known:
-        raise FvsolveError(f"no keys of {show(name)}{did_you_mean(name, known)}; expected a type of part, or one of "
-                           f"{', '.join(TABLES)}, case")  # fmt: skip
+        raise FvsolveError(f"unknown table of keys {show(name)}{did_you_mean(name, known)}; expected a type of part, "
+                           f"or one of {', '.join(TABLES)}, case")  # fmt: skip
     return known[name]
 
 

@@ -165,7 +165,7 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
         if (reason := unfit(group, part)) is not None:
             yield (*key, "on"), reason
         elif "from" in part:
-            yield (*key, "from"), "on and at place it on a pipe, so it starts there; leave from out, or on and at"
+            yield (*key, "from"), "on and at place it on a pipe, so it starts there; remove from, or on and at"
 
 
 def cut(table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int], faulty: set, report: Say) -> Cutting:

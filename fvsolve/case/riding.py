@@ -77,7 +77,7 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Found:
         turn = poses[on].attitude @ getattr(node, "turn", np.eye(3))
         if turn[2, 2] <= 0.0:
             text = f"its bottom is {np.degrees(np.arccos(turn[2, 2])):.3g} deg off level on {on}, which is fixed"
-            yield ("nodes", name, "on"), f"{text}: what is in it would run out; expected less than 90 deg"
+            yield ("nodes", name, "on"), f"{text}: its contents would run out; expected less than 90 deg"
 
 
 def body_faults(on: str, nodes: dict[str, Any], named: Any) -> Iterator[str]:

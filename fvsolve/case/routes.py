@@ -40,7 +40,7 @@ class Route(Table):
     pipes: Annotated[tuple[str, ...], PipeNames()]
     start: Annotated[
         float | None,
-        Quantity("length", about="chainage of its start [m]; that of its first pipe, or 0 if left out",
+        Quantity("length", about="chainage of the start of the route [m]; that of its first pipe, or 0 if left out",
                  changes=VALUE),
     ] = None  # fmt: skip
 

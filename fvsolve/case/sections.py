@@ -72,31 +72,40 @@ class FluidSpec(Table):
 
     name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', COUNTED)]
     temperature: Annotated[
-        float, Quantity("temperature", positive, "at which properties are evaluated [K]", changes=COUNTED)
+        float, Quantity("temperature", positive, "temperature at which properties are evaluated [K]", changes=COUNTED)
     ] = 293.15
     pressure: Annotated[
-        float, Quantity("pressure", positive, "at which properties are evaluated [Pa]", changes=COUNTED)
+        float, Quantity("pressure", positive, "pressure at which properties are evaluated [Pa]", changes=COUNTED)
     ] = 101325.0
     law: Annotated[
-        str, Choice("density law", tuple(LAWS), "for the whole case; linear (with cavitation mixture) if left out")
+        str,
+        Choice(
+            "density law", tuple(LAWS), "density law of the whole case; linear (with cavitation mixture) if left out"
+        ),
     ] = "linear"
-    density: Annotated[float | None, Quantity("density", positive, "[kg/m3]", DENSITIES, COUNTED)] = None
-    bulk_modulus: Annotated[float | None, Quantity("modulus", positive, "isentropic [Pa]", MODULI, COUNTED)] = None
-    viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "[Pa s]", VISCOSITIES)] = None
-    vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "[Pa]")] = None
+    density: Annotated[float | None, Quantity("density", positive, "density [kg/m3]", DENSITIES, COUNTED)] = None
+    bulk_modulus: Annotated[
+        float | None, Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, COUNTED)
+    ] = None
+    viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "dynamic viscosity [Pa s]", VISCOSITIES)] = (
+        None
+    )
+    vapor_pressure: Annotated[float | None, Quantity("pressure", nonnegative, "vapour pressure [Pa]")] = None
     air_fraction: Annotated[
         float | None,
         Number(
             between(0, 1), f"volume fraction of air at 1 atm, law mixture; {CAVITY_AIR:g} with cavitation if left out"
         ),
     ] = None
-    gas_exponent: Annotated[float | None, Number(between(1, 2), "polytropic exponent, 1 isothermal, 1.4 adiabatic")] = (
+    gas_exponent: Annotated[
+        float | None, Number(between(1, 2), "polytropic exponent of the gas, law mixture: 1 isothermal, 1.4 adiabatic")
+    ] = None
+    saturation_pressure: Annotated[
+        float | None, Quantity("pressure", positive, "pressure above which all gas is dissolved, law mixture [Pa]")
+    ] = None
+    cavitation: Annotated[bool | None, Flag("cavitation: vapour pressure added to the gas pressure, law mixture")] = (
         None
     )
-    saturation_pressure: Annotated[
-        float | None, Quantity("pressure", positive, "above which all gas is dissolved [Pa]")
-    ] = None
-    cavitation: Annotated[bool | None, Flag("adds the vapour pressure to the gas pressure, law mixture")] = None
 
     @classmethod
     def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
@@ -179,7 +188,7 @@ class Numerics(Table):
         Choice(
             "scheme",
             tuple(SCHEMES),
-            f"reconstruction in the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
+            f"reconstruction scheme of the cells; {DEFAULT_SCHEME} (with cavitation {CAVITY_SCHEME}) if left out",
         ),
     ] = None
     limiter: Annotated[str, Choice("limiter", tuple(LIMITERS), "slope limiter of the scheme muscl")] = DEFAULT_LIMITER
@@ -197,8 +206,8 @@ class Numerics(Table):
         float | None,
         Number(
             positive,
-            f"step / shortest travel time of a wave through a cell; {DEFAULT_COURANT} with cells (with cavitation "
-            f"{CAVITY_COURANT}) if left out",
+            f"Courant number: step over the shortest wave travel time of a cell; {DEFAULT_COURANT} with cells "
+            f"(with cavitation {CAVITY_COURANT}) if left out",
             changes=VALUE,
         ),
     ] = None
@@ -207,19 +216,26 @@ class Numerics(Table):
         float | None,
         Number(
             between(0, 1, open=True),
-            f"error per step; {DEFAULT_RTOL:g} without cells, with auto or adaptive implicit methods if left out",
+            f"relative tolerance of the error per step; {DEFAULT_RTOL:g} without cells, with auto or adaptive implicit "
+            "methods if left out",
         ),
     ] = None
     linear_algebra: Annotated[
         str | None,
-        Choice("linear algebra", KINDS, "of implicit steps; by structure of the case if left out", changes=VALUE),
+        Choice(
+            "linear algebra",
+            KINDS,
+            "linear solver of implicit steps; by structure of the case if left out",
+            changes=VALUE,
+        ),
     ] = None
     cell_time: Annotated[
         float | None,
         Quantity(
             "time",
             positive,
-            f"travel time of a cell, for pipes without cells [s]; longest of a pipe / {DEFAULT_CELLS} if left out",
+            f"wave travel time of a cell, for pipes that state no cells [s]; longest travel time of a pipe / "
+            f"{DEFAULT_CELLS} if left out",
             changes=SHAPE,
         ),
     ] = None
@@ -236,9 +252,9 @@ class Numerics(Table):
             changes=SHAPE,
         ),
     ] = DEFAULT_ACCURACY
-    below_vapor: Annotated[str, Choice("choice", ("continue", "stop"), "mark it and continue, or stop the run")] = (
-        "continue"
-    )
+    below_vapor: Annotated[
+        str, Choice("choice", ("continue", "stop"), "action below vapour pressure: mark it and continue, or stop")
+    ] = "continue"
 
     def filled(self, has_cells: bool, carries: bool, rubs: bool, parts: bool) -> Numerics:
         """Fill in the default scheme, step control and method.
@@ -368,7 +384,7 @@ class Output(Table):
         DEFAULT_FRAMES
     )
     probes: Annotated[Any, Names()] = None
-    lines: Annotated[Any, Named(Line, "lines by name: { centre = { basin, from, to, points } }")] = {}
+    lines: Annotated[Any, Named(Line, "named lines across basins: { centre = { basin, from, to, points } }")] = {}
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     def table(self) -> dict[str, Any]:

@@ -208,7 +208,7 @@ def left_out(key: tuple, basin: Any) -> Found:
         yield (*key, "start", key_name), "modes start from level water at rest; leave it out"
     for patch, patch_options in basin.patches.items():
         if patch_options.boundary == "open":
-            yield (*key, "patches", patch, "boundary"), "modes hold only for closed tanks; expected a wall"
+            yield (*key, "patches", patch, "boundary"), "modes are valid only for closed tanks; expected a wall"
     for key_name in ("manning", "factor"):
         if getattr(basin, key_name) is not None:
             yield (*key, key_name), "modes have no friction; leave it out"

@@ -231,5 +231,5 @@ def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) 
     if alone.all() and wide.min() <= 0.0:
         last, first = list(driven)[-1], next(iter(driven))
         when = at[np.argmax(wide.min(axis=0) <= 0.0)]
-        text = f"collides with {first}: together they invert a cell from t = {when:.4g} s on"
+        text = f"collides with {first}: their motions together invert a cell from t = {when:.4g} s on"
         yield (last, "travel"), f"{text}; expected less travel, or a wider basin"

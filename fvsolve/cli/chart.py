@@ -23,16 +23,27 @@ def chart(
         str | None, typer.Option(metavar="LIST", help="methods to compare (default a representative selection)")
     ] = None,
     cells: Annotated[
-        str | None, typer.Option(metavar="LIST", help="cells of the longest pipe, or of a basin side: 50,100,200")
+        str | None,
+        typer.Option(
+            metavar="LIST",
+            help="numbers of cells of the longest pipe, or of a basin side: 50,100,200 (default five, to 400)",
+        ),
     ] = None,
     rtol: Annotated[
-        str | None, typer.Option(metavar="LIST", help="relative tolerances, for a case without pipes: 1e-3,1e-6")
+        str | None,
+        typer.Option(
+            metavar="LIST", help="relative tolerances, for a case without pipes: 1e-3,1e-6 (default 1e-2 to 1e-10)"
+        ),
     ] = None,
     step: Annotated[
-        str | None, typer.Option(metavar="LIST", help="steps [s], for methods without an error estimate: 1e-3,1e-4")
+        str | None,
+        typer.Option(
+            metavar="LIST", help="steps [s], for methods without an error estimate: 1e-3,1e-4 (default seven steps)"
+        ),
     ] = None,
     target: Annotated[
-        float | None, typer.Option(metavar="ERROR", help="error for which to print the cheapest [numerics] settings")
+        float | None,
+        typer.Option(metavar="ERROR", help="error, over the range, whose cheapest [numerics] settings are printed"),
     ] = None,
     models: Annotated[bool, typer.Option("--models", help="compare models of the case instead of methods")] = False,
     jobs: Jobs = 1,

@@ -138,7 +138,8 @@ def new(
         str | None, typer.Option(metavar="A", help='wave speed of all pipes (default "1200 m/s")')
     ] = None,
     shortest: Annotated[
-        str | None, typer.Option(metavar="L", help="least pipe length; shorter pipes are lengthened to it")
+        str | None,
+        typer.Option(metavar="L", help="least pipe length, to which shorter pipes are lengthened (default 0)"),
     ] = None,
 ) -> None:
     """Copy a shipped case and the files it uses; or import an EPANET network with --from as the case NAME."""
@@ -212,7 +213,10 @@ def view(
         str | None, typer.Option(metavar="T", help='time of the frame: "1.2 s" (default the last frame)')
     ] = None,
     field: Annotated[
-        str | None, typer.Option(help="quantity: pressure, head, velocity, flow, depth, a scalar, ...")
+        str | None,
+        typer.Option(
+            help="quantity: pressure, head, velocity, flow, depth, a scalar, ... (default pressure, or by parts)"
+        ),
     ] = None,
     contours: Annotated[int, typer.Option(metavar="N", min=0, max=100, help="number of contour lines")] = 0,
     animate: Annotated[

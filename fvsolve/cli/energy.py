@@ -17,11 +17,19 @@ from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Column, Sheet, text
 
 Asked = Annotated[
-    str | None, typer.Argument(metavar="[CASE]", help="case to run (default: judge schemes and methods without a case)")
+    str | None, typer.Argument(metavar="[CASE]", help="case to run (without a case: schemes and methods are judged)")
 ]
-Port = Annotated[str | None, typer.Option(metavar="NODE", help="port at which passivity of the network is checked")]
-Schemes = Annotated[str | None, typer.Option(metavar="S,S,...", help="schemes to run or to judge")]
-Methods = Annotated[str | None, typer.Option(metavar="M,M,...", help="methods to run or to judge")]
+Port = Annotated[
+    str | None, typer.Option(metavar="NODE", help="node at whose port the passivity of the network is checked")
+]
+Schemes = Annotated[
+    str | None,
+    typer.Option(metavar="S,S,...", help="schemes to run or, without a case, to judge (default that of the case; all)"),
+]
+Methods = Annotated[
+    str | None,
+    typer.Option(metavar="M,M,...", help="methods to run or, without a case, to judge (default that of the case; all)"),
+]
 LINES = 12  # greatest number of lines of a kind on the terminal; energy.csv has all
 AGAIN = "the same command starts from the beginning"
 FILES = ("energy.csv", "energy.png", "energy.svg")

@@ -17,9 +17,16 @@ from fvsolve.units import parse
 @app.command("map")
 def map_(
     case: One,
-    scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes, one panel for each")] = None,
-    method: Annotated[str | None, typer.Option(metavar="A,B", help="methods, one row for each")] = None,
-    courant: Annotated[str | None, typer.Option(metavar="A,B", help="Courant numbers, one column for each")] = None,
+    scheme: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="schemes, one panel for each (default upwind and that of the case)"),
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="A,B", help="methods, one row for each (default seven methods)")
+    ] = None,
+    courant: Annotated[
+        str | None, typer.Option(metavar="A,B", help="Courant numbers, one column for each (default 0.25 to 3)")
+    ] = None,
     step: Annotated[
         str | None, typer.Option(metavar="A,B", help='time steps, one column for each: "1 ms,2 ms"')
     ] = None,
@@ -27,7 +34,7 @@ def map_(
         str | None, typer.Option(metavar="KEY=A,B", help="values of a key of the case, one column for each")
     ] = None,
     tolerance: Annotated[
-        float, typer.Option(metavar="X", help="greatest mean error of a probe, as a fraction of its range")
+        float, typer.Option(metavar="X", help="greatest accepted mean error of a probe, over its range")
     ] = 0.02,
     jobs: Jobs = 1,
     dask: Dask = None,

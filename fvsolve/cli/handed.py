@@ -18,7 +18,7 @@ def report(
         Path | None, typer.Option(metavar="FILE", help="file of the report (default RUN_OR_STUDY/report.html)")
     ] = None,
     xlsx: Annotated[
-        bool, typer.Option("--xlsx", help="write a workbook with the tables too, beside the report")
+        bool, typer.Option("--xlsx", help="write also a workbook with the tables, in the folder of the report")
     ] = False,
 ) -> None:
     """Write an offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
@@ -58,7 +58,9 @@ def cycles(
     slope: Annotated[
         float | None, typer.Option(metavar="M", help="exponent of the strength: N (R / r)^M cycles of a range r")
     ] = None,
-    per_day: Annotated[float, typer.Option(metavar="N", help="number of such runs a day, for the service life")] = 1.0,
+    per_day: Annotated[
+        float, typer.Option(metavar="N", help="number of such runs per day, for the service life")
+    ] = 1.0,
     as_json: Json = False,
 ) -> None:
     """Count pressure cycles of a run by rainflow counting, and estimate the fatigue life of its parts."""

@@ -33,13 +33,19 @@ def order(
     case: One,
     overrides: Set = [],  # noqa: B006
     refine: Annotated[
-        str | None, typer.Option(help="resolution to refine: both (cells and steps), space or time")
+        str | None,
+        typer.Option(
+            help="resolution to refine: both (cells and steps), space or time (default both; without cells time)"
+        ),
     ] = None,
     key: Annotated[
         str | None, typer.Option(metavar="KEY", help="single resolution key to refine: links.main.cells")
     ] = None,
-    levels: Annotated[int | None, typer.Option(help="number of refinement levels")] = None,
-    cells: Annotated[int | None, typer.Option(help="number of cells at the coarsest level")] = None,
+    levels: Annotated[int | None, typer.Option(help="number of refinement levels (default 4; for time 6)")] = None,
+    cells: Annotated[
+        int | None,
+        typer.Option(help="number of cells of the longest pipe or side at the coarsest level (default from the case)"),
+    ] = None,
     scheme: Annotated[
         str | None, typer.Option(metavar="A,B", help="schemes to study (default scheme of the case)")
     ] = None,

@@ -19,9 +19,7 @@ def size(
     vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range")],
     goal: Annotated[
         str,
-        typer.Option(
-            metavar="least|greatest", help="value to find: the least or the greatest that satisfies all limits"
-        ),
+        typer.Option(metavar="least|greatest", help="goal: least or greatest value that satisfies all limits"),
     ] = "least",
     tie: Annotated[
         list[str],

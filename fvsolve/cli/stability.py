@@ -28,8 +28,12 @@ def stability(
     case: Annotated[
         str | None, typer.Argument(metavar="[CASE]", help="case file (default advection on a periodic grid)")
     ] = None,
-    scheme: Annotated[str | None, typer.Option(metavar="A,B", help="schemes (default scheme of the case)")] = None,
-    method: Annotated[str | None, typer.Option(metavar="A,B", help="methods (default method of the case)")] = None,
+    scheme: Annotated[
+        str | None, typer.Option(metavar="A,B", help="schemes to study (default scheme of the case)")
+    ] = None,
+    method: Annotated[
+        str | None, typer.Option(metavar="A,B", help="methods to study (default method of the case)")
+    ] = None,
     steps: Annotated[
         int | None, typer.Option(help="number of steps in which growth is measured (default 1000)")
     ] = None,

@@ -49,7 +49,7 @@ class Translation:
         self.options(hydraulic)
         for names in (self.node_names, self.link_names):
             for name, ours in names.changed().items():
-                self.note("has another name here", f"{name} is {ours}")
+                self.note("has a different name in fvsolve", f"{name} is {ours}")
 
     def note(self, text: str, name: str) -> None:
         names = self.noted.setdefault(text, [])

@@ -76,7 +76,7 @@ def stands(case, name: str, free: bool, pose, before) -> Iterator[Notice]:
     if free:
         own, far = case.unit_of("position"), float(np.linalg.norm(pose.place - before.place))
         x, y, z = units.convert(pose.place, "position", own)
-        text = f"[{x:.6g}, {y:.6g}, {z:.6g}] {own}, {case.amount(far, 'position')} from what is stated"
+        text = f"[{x:.6g}, {y:.6g}, {z:.6g}] {own}, {case.amount(far, 'position')} from the stated position"
         yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.at", far, 0.0)
 
 
@@ -118,5 +118,5 @@ def upset(at: Displaced, y: np.ndarray) -> None:
         return
     where = int(at.out[rec.WHERE]) - len(at.draft.basins)
     name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
-    text = "where forces balance it is turned over, and its contents would run out"
+    text = "in the equilibrium found it is turned over, and its contents would run out"
     at.draft.fault(f"nodes.{name}", f'{text}; hold its body upright, state another position, or use "steady"')

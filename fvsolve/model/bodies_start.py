@@ -23,11 +23,11 @@ def refuse_weightless(draft, at: Statics) -> None:
         for freedom in draft.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
             left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** -2.0
             if np.isnan(left) and len(draft.ride_table):
-                text = "fluid in tall tanks, whose own flow has no inertia here, outweighs what carries it"
+                text = "fluid in tall tanks, whose own flow has no inertia in the model, outweighs its carrying body"
                 remedy = "expected wider tanks, a heavier body, or a driven joint"
                 return draft.fault(f"nodes.{name}.mass", f"{text}; {remedy}")
             if not left > least:
-                text = "its inertia is 0 in a direction in which its joint lets it move"
+                text = "its inertia is 0 in a direction in which its joint allows motion"
                 return draft.fault(
                     f"nodes.{name}.inertia", f"{text}. Expected an inertia above 0 about the axis of the joint"
                 )
@@ -82,7 +82,7 @@ def start_pins(draft, at: Statics) -> np.ndarray:
     rows = pin_rows(draft, at)
     names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
     for name in dict.fromkeys(redundant(rows, names)):
-        text = "it is redundant: in some direction nothing can open it, or other pins hold it there already"
+        text = "it is redundant: in some direction joints or other pins already prevent its opening"
         draft.fault(f"links.{name}", f"{text}. For a loop in a plane give its axis, else remove one pin")
     slips = dict(zip(names, rows @ at.rates(), strict=True))
     for name, slip in slips.items():

@@ -150,7 +150,7 @@ def refuse_loose_groups(draft, members) -> None:
         if not air:
             joins = [name for name, v in zip(draft.valve_names, valves, strict=True) if int(v["from_node"]) in group]
             reason, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} it", ""
-        draft.fault(f"nodes.{place}", f"{reason} to {other}, and only rigid columns lead on, so nothing sets their "
+        draft.fault(f"nodes.{place}", f"{reason} to {other}, and only rigid columns join beyond, so nothing sets their "
                     f"pressure{span}; give {other} a chamber volume, or make one of the columns a pipe")  # fmt: skip
 
 

@@ -206,8 +206,9 @@ def cut_lines(draft) -> list[str]:
             draft.warnings.append(too_quick(case, name, chosen.longest, min(scale, ramp or scale), smoothed))
         elif bound == math.inf:
             longest = draft.case.step_amount(chosen.longest, 4)
-            draft.fault(f"links.{name}.line", f'"delay" is not possible: friction takes {attenuation:.3g} of a wave in '
-                        f'a line shorter than a step of {longest}; expected shorter steps, or "cells"')  # fmt: skip
+            draft.fault(f"links.{name}.line", f'"delay" is not possible: friction attenuates a wave by a fraction of '
+                        f"{attenuation:.3g} in a line shorter than a step of {longest}; expected shorter steps, "
+                        'or "cells"')  # fmt: skip
     shape_past(draft)
     return unfit
 

@@ -75,6 +75,7 @@ def driven_at_start(draft, start) -> list[str]:
                 push = float(drives[row["ride"] : row["ride"] + count].sum())
                 if abs(push) > SMALL:
                     texts.append(
-                        f"{kind} {name}: its body drives it with {draft.case.amount(rho * push, 'pressure', span=True)}"
+                        f"{kind} {name}: the motion of its body drives its flow with "
+                        f"{draft.case.amount(rho * push, 'pressure', span=True)}"
                     )
     return texts

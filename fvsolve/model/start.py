@@ -273,8 +273,8 @@ class Start:
         names = list(self.case.places)
         for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
             drawn = self.demand[i] / self.draft.fluid.density
-            reason = f"{self.case.amount(drawn, 'flow')} are drawn here but every way to it" if drawn > 0.0 else (
-                f"{self.case.amount(-drawn, 'flow')} come in here but every way out")  # fmt: skip
+            reason = f"the demand here is {self.case.amount(drawn, 'flow')}, but every path to it" if drawn > 0.0 else (
+                f"the inflow here is {self.case.amount(-drawn, 'flow')}, but every path out")  # fmt: skip
             self.draft.fault(
                 f"nodes.{names[i]}",
                 f'no steady state: {reason} is shut; open a valve, or use initial = "rest"',
@@ -291,8 +291,8 @@ class Start:
                     'give it friction or initial_flow, or use initial = "rest"',
                 )
         if not self.draft.faults and not self.answer.converged:
-            self.draft.fault("numerics.initial", "no steady state was found; check for demands that nothing can bring "
-                             'and frictionless ways between unequal heads, or use "rest"')  # fmt: skip
+            self.draft.fault("numerics.initial", "no steady state was found; check for demands that cannot be supplied "
+                             'and frictionless paths between unequal heads, or use "rest"')  # fmt: skip
         self.draft.check()
 
     def report_split(self) -> None:
@@ -314,14 +314,18 @@ class Start:
             and abs(self.held[int(row["from_node"])] - self.held[int(row["to_node"])]) > 1e-6 * PRESSURE_SCALE
         ]
         for name in swinging:
-            text = f"{name}: without friction between unequal heads no flow is steady; it starts from rest and swings"
+            text = (
+                f"{name}: without friction between unequal heads no flow is steady; it starts from rest and oscillates"
+            )
             self.draft.warnings.append(Notice("start", f"links.{name}", text))
         loops, before = {name: pair for name, pair in ends.items() if name not in swinging}, None
         while self.answer.split and loops != before:  # a link to a node that no other link joins is in no loop
             before, counts = loops, Counter(end for pair in loops.values() for end in pair)
             loops = {name: pair for name, pair in loops.items() if min(counts[end] for end in pair) > 1}
         if self.answer.split and (loops or not swinging):
-            text = f"{listing(loops) or 'ways'}: loops without friction, in which flow is the least-norm split"
+            text = (
+                f"{listing(loops) or 'paths'}: loops without friction, in which the flow is the solution of least norm"
+            )
             self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
 
     def freeze_factors(self) -> None:
@@ -448,11 +452,13 @@ class Start:
                 moving += [text] if text else []
         amount = self.case.amount
         for name, pressure in self.driven.items():
-            moving.append(f"pipe {name}: {amount(pressure, 'pressure', span=True)} drive it, unbalanced by friction")
+            moving.append(
+                f"pipe {name}: {amount(pressure, 'pressure', span=True)} drives its flow, not balanced by friction"
+            )
         for name, row in zip(self.draft.column_names, self.columns, strict=True):
             if row["offset"] != 0.0:
                 moving.append(
-                    f"rigid column {name}: {amount(row['offset'], 'pressure', span=True)} drive it unbalanced"
+                    f"rigid column {name}: an unbalanced {amount(row['offset'], 'pressure', span=True)} drives its flow"
                 )
         for k, (name, row) in enumerate(zip(self.draft.valve_names, self.valves, strict=True)):
             if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:

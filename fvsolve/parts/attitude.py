@@ -41,15 +41,17 @@ class Attitude(Table):
     ] = None
     zyz: Annotated[
         tuple[float, ...] | None,
-        Rows("angle", length=3, about="[psi, theta, phi], classical Euler angles [rad]", usual=TURNS),
+        Rows("angle", length=3, about="classical Euler angles [psi, theta, phi] about z, y and z [rad]", usual=TURNS),
     ] = None
-    axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of the rotation by angle")] = None
-    angle: Annotated[float | None, Angle("angle of the rotation about axis [rad]")] = None
+    axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of a single rotation by angle")] = (
+        None
+    )
+    angle: Annotated[float | None, Angle("angle of a single rotation about axis [rad]")] = None
     euler_parameters: Annotated[
         tuple[float, ...] | None, Rows("number", length=4, about="Euler parameters [eta, e1, e2, e3]")
     ] = None
     matrix: Annotated[
-        tuple | None, Matrix("number", about="rotation matrix; its columns are the axes of b in axes a")
+        tuple | None, Matrix("number", about="rotation matrix; its columns are the rotated axes in the reference axes")
     ] = None
 
     meant: ClassVar[dict[str, str]] = {
@@ -123,7 +125,7 @@ class Attitude(Table):
             name = "roll, pitch, yaw" if first == "roll" else first
             yield (
                 key,
-                f"is {math.degrees(angle):.3g} deg away from what {name} give{'' if first == 'roll' else 's'}",
+                f"is {math.degrees(angle):.3g} deg from the attitude that {name} give{'' if first == 'roll' else 's'}",
                 angle,
             )
 

@@ -28,7 +28,7 @@ from fvsolve.units import show
 BORES = Usual(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela have 13.7 m
 LENGTH = Quantity("length", positive, "length along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"), COUNTED)
 DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES, COUNTED)
-LOSS = Number(nonnegative, "loss coefficient on its velocity, distributed along its length")
+LOSS = Number(nonnegative, "loss coefficient K referred to the velocity in the pipe, distributed along its length")
 
 
 ROUGHEST = 0.05  # relative roughness, Moody 1944
@@ -74,7 +74,9 @@ class Conduit(TwoPort):
 
     length: Annotated[float, LENGTH]
     diameter: Annotated[float, DIAMETER] = None  # nominal replaces it
-    nominal: Annotated[str | None, Text('"DN100", "NPS 4" or "NPS 1-1/2", instead of diameter', COUNTED)] = None
+    nominal: Annotated[
+        str | None, Text('nominal size, instead of diameter: "DN100", "NPS 4" or "NPS 1-1/2"', COUNTED)
+    ] = None
     schedule: Annotated[
         str | None, Text('schedule of the nominal size: "40", "80", "STD", "10S"; "40" if left out', COUNTED)
     ] = None
@@ -82,7 +84,7 @@ class Conduit(TwoPort):
     minor_loss: Annotated[float, LOSS] = 0.0
     fittings: Annotated[list[str] | None, Fittings()] = None
     initial_flow: Annotated[
-        float | None, Quantity("flow", about="flow at the start [m3/s]; that of the steady state if left out")
+        float | None, Quantity("flow", about="flow at the start [m3/s]; flow of the steady state if left out")
     ] = None
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
@@ -93,7 +95,7 @@ class Conduit(TwoPort):
             yield ("diameter",), self.diameter, self.length, text
         rough, most = self.friction.roughness or 0.0, ROUGHEST * self.diameter
         if rough > most:
-            text = f"{rough:g} m in a bore of {self.diameter:g} m; Moody's chart ends at {ROUGHEST:g} of the bore"
+            text = f"{rough:g} m in a bore of {self.diameter:g} m; Moody's chart is valid to {ROUGHEST:g} of the bore"
             likely = units.likely(rough, "length", 0.0, most) if rough <= 1e3 * most else ""
             yield ("friction", "roughness"), rough, most, text + likely
 

@@ -47,14 +47,15 @@ class Friction(Table):
 
     model: Annotated[str, Choice("friction model", MODELS, "model of the wall friction", MEANT)]
     roughness: Annotated[
-        float | None, Quantity("length", nonnegative, "roughness of the wall [m], of steady, quasi-steady and unsteady")
+        float | None,
+        Quantity("length", nonnegative, "roughness of the wall [m], models steady, quasi-steady and unsteady"),
     ] = None
     factor: Annotated[
         float | None,
         Number(nonnegative, "Darcy friction factor, four times Fanning's, instead of roughness [-]", FACTORS),
     ] = None
     coefficient: Annotated[
-        float | None, Number(positive, "C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")
+        float | None, Number(positive, "coefficient C of hazen-williams [-], or n of chezy-manning [s/m^(1/3)]")
     ] = None
 
     weighting: Annotated[
@@ -62,14 +63,14 @@ class Friction(Table):
         Choice(
             "weighting function",
             WEIGHTINGS,
-            "weighting function of the flow history, unsteady; by the initial Reynolds number if left out",
+            "weighting function of the flow history, model unsteady; by the initial Reynolds number if left out",
         ),
     ] = None
     accuracy: Annotated[
         float | None,
         Number(
             between(1e-6, 0.1),
-            "relative accuracy of the sum of exponentials, unsteady; 1e-4 if left out",
+            "relative accuracy of the sum of exponentials, model unsteady; 1e-4 if left out",
             changes=SHAPE,
         ),
     ] = None

@@ -36,15 +36,15 @@ class Node(Table):
         float | None,
         Quantity(
             "length",
-            about="elevation above datum [m], for a reservoir by head that of the far end; 0 for all if left out",
+            about="elevation above datum [m]; 0 for all nodes (reservoir with head: that of the far end) if left out",
             usual=HEIGHTS,
         ),
     ] = None
     position: Annotated[
-        tuple[float, float] | None, Rows("length", length=2, about="[x, y] for drawing [m]", changes=VALUE)
+        tuple[float, float] | None, Rows("length", length=2, about="position [x, y] in drawings [m]", changes=VALUE)
     ] = None
     scalars: Annotated[
-        dict[str, Any], Carried("values of scalars that flow in here, or that are in it at the start")
+        dict[str, Any], Carried("scalar values of the inflow (reservoir, inflow), or at the start (tank, chamber)")
     ] = {}
 
     @classmethod
@@ -78,13 +78,13 @@ class Node(Table):
 class Rider(Node):
     """Place that may be on a body."""
 
-    on: Annotated[str | None, Text("body that carries it; fixed in the world if left out")] = None
+    on: Annotated[str | None, Text("body that carries the node; fixed in the world if left out")] = None
     at: Annotated[
         tuple[float, ...] | None,
         Rows(
             "position",
             length=3,
-            about="position of its origin in axes of that body, instead of elevation [m]; 0 if left out",
+            about="position (of a basin: of its origin) in axes of the body, instead of elevation [m]; 0 if left out",
         ),
     ] = None
 

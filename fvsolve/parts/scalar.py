@@ -14,13 +14,13 @@ from fvsolve.units import show
 class Scalar(Table):
     """Quantity c per mass, transported by the fluid: (m c)_t + (M c - D m c_x)_x = -decay m (c - ambient)."""
 
-    unit: Annotated[str, Text("unit as a label in headers", VALUE)] = "-"
-    initial: Annotated[float, Number(about="initial value where no part states another")] = 0.0
+    unit: Annotated[str, Text("unit, a label in headers", VALUE)] = "-"
+    initial: Annotated[float, Number(about="initial value, unless a part states another")] = 0.0
     diffusivity: Annotated[
         float, Quantity("diffusivity", nonnegative, "diffusivity along pipes [m2/s]", changes=VALUE)
     ] = 0.0
-    decay: Annotated[float, Quantity("rate", nonnegative, "rate of decay to ambient [1/s]", changes=VALUE)] = 0.0
-    ambient: Annotated[float, Number(about="final value of the decay", changes=VALUE)] = 0.0
+    decay: Annotated[float, Quantity("rate", nonnegative, "rate of decay towards ambient [1/s]", changes=VALUE)] = 0.0
+    ambient: Annotated[float, Number(about="value towards which the scalar decays", changes=VALUE)] = 0.0
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def odd(summary: dict[str, Any]) -> Iterator[str]:
         if key in WHOLE and (
             unknown := list(dict.fromkeys(name for entry in rows for name in entry if name not in expected))
         ):
-            yield f"has {listing(unknown)} of {key}, unknown here"
+            yield f"has {listing(unknown)} of {key}, which this version does not have"
     for (key, part), expected in WITHIN.items():
         rows = [row for entry in every(summary.get(key, [])) for row in every(entry.get(part, []))]
         if missing := [name for name in expected if any(name not in entry for entry in rows)]:

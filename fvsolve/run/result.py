@@ -328,7 +328,7 @@ class Result(Shown):
         if self.directory is None:
             return "nothing was written; give the run a directory"
         if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & FIELDED:
-            return f"the case has none of {listing(sorted(FIELDED))}"
+            return f"the case has no {listing(sorted(FIELDED))}"
         if self.case.output.fields == 0:
             return "[output] fields is 0; run again with --set output.fields=20"
         return f"{self.directory / 'fields.pvd'} is missing; run again with --force"

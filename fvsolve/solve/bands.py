@@ -167,11 +167,11 @@ def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
         return 1, []
     divisible = shared(model)
     if reason := divisible["why"]:
-        return 1, [Notice("threads", "numerics", f"one thread steps it, not {threads}: {reason}", "threads")]
+        return 1, [Notice("threads", "numerics", f"threads = {threads}, but one thread is used: {reason}", "threads")]
     few = [f"{name} has {rows} rows" for name, rows in divisible["rows"].items() if rows < threads]
     if few:
         raise FvsolveError(
             f"threads = {threads}: {listing(few)}, and each thread needs a row. Expected {divisible['most']} at most"
         )
-    text = f"each thread steps the whole of {said_whole(model)}"
+    text = f"each thread computes the whole of {said_whole(model)}"
     return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []

@@ -379,7 +379,7 @@ class Run:
             return (f"stopped: Newton did not converge at {when}, however short the step, worst in {worst}; check the "
                     "parts there for jumps, or try an explicit method")  # fmt: skip
         if code == slots.TINY_STEP:
-            return f"stopped: the step became too small at {when}; try a larger rtol, or courant in its place"
+            return f"stopped: the step became too small at {when}; try a larger rtol, or courant instead"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
             return f"stopped: the demand{place} cannot be supplied at {when}; all connections to it are shut"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:

@@ -88,7 +88,7 @@ def parted(numerics, counts: dict[str, int]) -> list[Notice]:
     key = "step" if numerics.step is not None else "courant"
     text = (f"{counts['parted']} of {counts['steps']} steps were too long, for Newton or for a disc that shuts on a "
             "rigid column, and were taken in parts, which end where the full step would have ended; give a smaller "
-            f"numerics.{key}, or rtol in its place")  # fmt: skip
+            f"numerics.{key}, or rtol instead")  # fmt: skip
     return [Notice("step-limit", "numerics", text, key, float(counts["parted"]), 0.0, True)]
 
 

@@ -103,7 +103,8 @@ def find_marks(run_data: Slate) -> list[Mark]:
     kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
     texts = {
         "stopped dead": (
-            "its last outlet shut while it flowed, or it hit another column; a rigid column has no surge, a pipe does"
+            "its last outlet shut during flow, or it hit another column; a rigid column has no pressure surge: "
+            "use a pipe"
         ),
         "outside its curve": (
             "the pump works in reverse or beyond the last flow of its curve; give rated_speed to extend the curve by "
@@ -111,8 +112,8 @@ def find_marks(run_data: Slate) -> list[Mark]:
         ),
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would stop it",
         "below vapor pressure": (
-            "pressure falls below vapour pressure; the liquid column would part, and "
-            f"{model.case.law.to_cavitate}cavitation = true in [fluid] would follow it"
+            "pressure falls below vapour pressure; the liquid column would separate; to model this, set "
+            f"{model.case.law.to_cavitate}cavitation = true in [fluid]"
         ),
         "dry": "no water is left for the outflow; the missing water is added and booked as made_up",
     }

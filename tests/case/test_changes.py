@@ -255,7 +255,7 @@ def test_what_a_key_changes_depends_on_the_case_where_its_part_says_so():
 
 
 def test_a_key_that_is_not_there_changes_nothing_but_is_named():
-    with pytest.raises(FvsolveError, match='no key "links.valve.aera"; expected a key of the case'):
+    with pytest.raises(FvsolveError, match='unknown key "links.valve.aera"; expected a key of the case'):
         changes(fvsolve.load("valve-closure"), "links.valve.aera")
-    with pytest.raises(FvsolveError, match='no key "signals.strok.value"'):
+    with pytest.raises(FvsolveError, match='unknown key "signals.strok.value"'):
         changes(fvsolve.load("rigid-column"), "signals.strok.value")

@@ -769,9 +769,9 @@ CANNOT_START = {
     "an inflow before shut valves": (
         FED,
         {},
-        "line 15: nodes.gate: no steady state: 30 m3/s come in here but every way out is shut",
+        "line 15: nodes.gate: no steady state: the inflow here is 30 m3/s, but every path out is shut",
     ),
-    "a demand behind shut valves": (SHUT, {}, "line 15: nodes.gate: no steady state: 0.1 m3/s are drawn here but"),
+    "a demand behind shut valves": (SHUT, {}, "line 15: nodes.gate: no steady state: the demand here is 0.1 m3/s, but"),
     "unequal heads and no friction": (
         SCENE.replace('"steady", roughness = "0.26 mm"', '"none"').replace('"junction"', '"reservoir"\nhead = 3'),
         {},

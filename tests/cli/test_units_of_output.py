@@ -45,7 +45,7 @@ ASKED = {
 }  # fmt: skip
 TOLD = [  # command, a number and its unit as both print them, and how many of the one the other is
     ("energy", r"energy \[(?P<unit>.*?)\].*?supplied +top +(?P<number>\S+)", "J", "kJ", 1e-3),
-    ("energy", r"(?P<number>\S+) (?P<unit>\w+) that passed", "J", "kJ", 1e-3),
+    ("energy", r"energy throughput (?P<number>\S+) (?P<unit>\w+):", "J", "kJ", 1e-3),
     ("energy", r"least margin (?P<number>\S+) (?P<unit>\w+) at", "J", "kJ", 1e-3),
     ("energy", r"finished at t = (?P<number>\S+) (?P<unit>\w+);", "s", "ms", 1e3),
     ("order", r"pressure \[(?P<unit>.*?)\] at the end.*?\n +5 +\S+ +(?P<number>\S+)", "Pa", "bar", 1e-5),

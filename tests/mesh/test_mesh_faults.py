@@ -44,7 +44,7 @@ BAD_RECTANGLES = {
     "patches.a: 0 to 1 m on the west side runs along a hole; free is 0 to 0.5 m": dict(
         holes=[(0, 0.5, 0.25, 1)], patches={"a": ("west", 0.0, 1.0)}
     ),
-    "patches.a: the holes leave nothing of the west side": dict(holes=[(0, 0, 0.5, 1)], patches={"a": "west"}),
+    "patches.a: the holes remove the whole west side": dict(holes=[(0, 0, 0.5, 1)], patches={"a": "west"}),
 }
 
 

@@ -288,7 +288,7 @@ def test_a_tank_on_two_sides_and_its_duct_do_not_move_where_their_levels_agree()
     assert result["hull.angle"] == approx(0.0, abs=1e-12) and result["duct.flow"] == approx(0.0, abs=1e-9)
     nodes["hull"]["centre_of_mass"] = [0, 0.05, -1.1]
     with pytest.raises(
-        CaseError, match="expects that nothing moves, but rigid column duct: 4777 Pa drive it unbalanced"
+        CaseError, match="expects that nothing moves, but rigid column duct: an unbalanced 4777 Pa drives its flow"
     ):
         built(balanced(nodes, {"duct": duct}))
 
@@ -464,7 +464,7 @@ def test_what_nothing_holds_finds_no_balance_and_is_named():
 def test_a_hull_that_would_turn_over_with_its_water_is_a_fault():
     nodes = hull("cells", 0.1, 0.2, 10)
     nodes["hull"]["centre_of_mass"] = [0, 0, 0.8]
-    with pytest.raises(CaseError, match="nodes.pool: where forces balance it is turned over"):
+    with pytest.raises(CaseError, match="nodes.pool: in the equilibrium found it is turned over"):
         built(balanced(nodes))
 
 

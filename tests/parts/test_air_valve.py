@@ -307,7 +307,7 @@ def test_throttled_it_stops_less_and_is_wide_again_once_air_comes_in():
     twice = {"time": [0.0, 2.0, 3.0, 6.0, 7.0], "value": [0.4e5, 0.4e5, 6e5, 6e5, 0.4e5]}
     result = fvsolve.run(drained(0.04, 0.02, twice, end=12.0, **STAGES))
     assert [event["what"] for event in result.summary["events"]][:5] == [
-        "opens", "throttles", "shuts", "opens", "is wide again"
+        "opens", "throttles", "shuts", "opens", "stops throttling"
     ]  # fmt: skip
     stopped = []
     for more in ({}, STAGES):

@@ -75,11 +75,13 @@ def test_forms_that_agree_may_stand_together():
 
 def test_forms_that_disagree_are_named_with_the_angle_between_them():
     found = faults(yaw="90 deg", axis=[0, 0, 1], angle="80 deg", matrix=QUARTER)
-    assert found == {"attitude.axis": "is 10 deg away from what roll, pitch, yaw give; expected the same rotation"}
+    assert found == {
+        "attitude.axis": "is 10 deg from the attitude that roll, pitch, yaw give; expected the same rotation"
+    }
     found = faults(axis=[0, 0, 1], angle="80 deg", matrix=QUARTER, euler_parameters=[1, 0, 0, 0])
     assert found == {
-        "attitude.euler_parameters": "is 80 deg away from what axis gives; expected the same rotation",
-        "attitude.matrix": "is 10 deg away from what axis gives; expected the same rotation",
+        "attitude.euler_parameters": "is 80 deg from the attitude that axis gives; expected the same rotation",
+        "attitude.matrix": "is 10 deg from the attitude that axis gives; expected the same rotation",
     }
 
 
@@ -97,7 +99,10 @@ def test_typed_digits_are_no_fault_but_said():
     assert notes(one) == [("matrix", "R'R differs from the identity by 4.4e-05; the nearest rotation is used")]
     assert_allclose(one.rotation, Rotation.from_euler("z", np.arctan2(0.5, 0.866)).as_matrix(), rtol=0, atol=1e-15)
     one = read(matrix=typed, yaw="30.01 deg")  # of atan(0.5 / 0.866) = 30.00073 deg
-    assert notes(one)[1] == ("matrix", "is 0.00927 deg away from what roll, pitch, yaw give; the latter is used")
+    assert notes(one)[1] == (
+        "matrix",
+        "is 0.00927 deg from the attitude that roll, pitch, yaw give; the latter is used",
+    )
     assert_allclose(one.rotation, Rotation.from_euler("z", 30.01, degrees=True).as_matrix(), rtol=0, atol=1e-15)
 
 

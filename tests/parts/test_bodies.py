@@ -815,5 +815,7 @@ def test_bennetts_linkage_moves_as_its_half_angles_have_it_and_a_ball_there_is_r
     assert sines == approx(ratio * cosines, abs=1e-7)
     gap = np.array([result["three.end.x"] + 1.5, result["three.end.y"], result["three.end.z"]])
     assert np.abs(gap).max() < 1e-8  # along its axis too, where no row holds it
-    with pytest.raises(fvsolve.errors.CaseError, match="nothing can open it, or other pins hold it there already"):
+    with pytest.raises(
+        fvsolve.errors.CaseError, match="in some direction joints or other pins already prevent its opening"
+    ):
         fvsolve.build(fvsolve.load(bennett(axis=False)))

@@ -53,7 +53,7 @@ BAD = {
     "a rate along a line": (arm(joint=hinge(rate="1 m/s")), 'nodes.arm.joint.rate: "1 m/s" is a velocity'),
     "a free body on another": (
         {**arm(), "b": body(1, [1, 1, 1], {"kind": "free", "on": "arm"})},
-        "nodes.b.joint.on: does not go with a free joint",
+        "nodes.b.joint.on: is not valid for a free joint",
     ),
     "a joint on nothing": (arm(joint=hinge(on="am")), 'nodes.arm.joint.on: "am" is not a node'),
     "a joint on no point": (
@@ -81,7 +81,8 @@ def test_bodies_that_hang_in_a_loop_are_named():
     nodes = {name: body(1, [1, 1, 1], hinge(on=on)) for name, on in (("a", "c"), ("b", "a"), ("c", "b"))}
     found = told({**nodes, "d": body(1, [1, 1, 1], hinge(on="c"))})
     assert (
-        "is carried by itself: a on c on b on a; leave one on out" in found and found.count("is carried by itself") == 1
+        "is carried by itself: a on c on b on a; remove on from one of its bodies" in found
+        and found.count("is carried by itself") == 1
     )
 
 
@@ -98,7 +99,7 @@ LINKS = {
     "a force without direction": ({"f": {"type": "force", "to": "boom.eye", "force": 1}}, "direction is missing"),
     "a torque without axis": ({"t": {"type": "torque", "to": "boom", "torque": 1}}, "axis is missing"),
     "points in one place": (
-        {"s": {"type": "spring", "from": "ground.top", "to": "boom", "stiffness": 1}}, "lie in one place at the start",
+        {"s": {"type": "spring", "from": "ground.top", "to": "boom", "stiffness": 1}}, "coincide at the start",
     ),
     "a pipe to a point": (
         {"p": {"type": "valve", "from": "boom.eye", "to": "boom.tip", "area": 1}},
@@ -121,7 +122,9 @@ def test_a_loop_that_is_not_closed_is_told_by_how_much_and_one_held_twice_by_whi
     assert "links.loop: two.end and coupler.end lie 0.1 m apart across its axis at the start" in told(nodes, links)
     nodes, links = parallelogram()
     del links["loop"]["axis"]
-    assert "links.loop: it is redundant: in some direction nothing can open it" in told(nodes, links)
+    assert "links.loop: it is redundant: in some direction joints or other pins already prevent its opening" in told(
+        nodes, links
+    )
     nodes, links = parallelogram()
     nodes["two"]["joint"]["rate"] = 0.5
     assert "links.loop: velocities at the start open it at" in told(nodes, links)
@@ -245,9 +248,9 @@ step = 0.01
 TOLD = """all.toml: 11 faults
   line 11: nodes.arm.mass: 0 is out of range; expected a value above 0
   line 12: nodes.arm.inertia[0]: "1 kg m" is a quantity of [kg·m]; expected a moment of inertia, for example "12 kg m2"
-  line 13: nodes.arm.joint: axis is missing: a revolute joint moves along or about one, for example [0, 1, 0]
+  line 13: nodes.arm.joint: axis is missing: a revolute joint needs it, for example [0, 1, 0]
   line 17: nodes.boom.inertia: moments of 1, 1, 9 kg m2 are not possible: the largest exceeds the sum of the other two
-  line 23: nodes.a.joint.on: is carried by itself: a on b on a; leave one on out and close the loop by a pin
+  line 23: nodes.a.joint.on: is carried by itself: a on b on a; remove on from one of its bodies and close the loop by a pin
   line 33: nodes.c.joint.attitude.matrix: is not a rotation: R'R differs from the identity by 3; expected orthogonal columns of length 1
   line 39: nodes.pool.on: "boon" is not a node; expected a body: a, arm, b, boom, c; did you mean "boom"?
   line 40: nodes.pool.elevation: the node is on boon; give its place with at, in the axes of that body

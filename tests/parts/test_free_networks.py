@@ -453,5 +453,5 @@ def test_tall_arms_on_a_hull_of_no_weight_are_told():
     case["nodes"]["hull"] |= {"mass": 1.0, "inertia": [1.0] * 3}
     for name in ("port", "starboard"):
         case["nodes"][name] |= {"area": area(BORE), "level": 8.0}
-    with pytest.raises(CaseError, match="outweighs what carries it"):
+    with pytest.raises(CaseError, match="outweighs its carrying body"):
         fv.run(case)

@@ -41,10 +41,10 @@ def test_on_a_column_that_slows_down_evenly_it_returns_its_curve(rate):
     """It slows down for v0 / d until it turns, and for v / d until it slams, v of the curve, at its ends held."""
     result = fvsolve.run(column(rate, TIGHT))
     at = times(result)
-    slam = rate * (at["shuts"] - at["flow turns"])
-    assert at["flow turns"] == pytest.approx(1.5 / rate, rel=1e-6)
+    slam = rate * (at["shuts"] - at["flow reverses"])
+    assert at["flow reverses"] == pytest.approx(1.5 / rate, rel=1e-6)
     assert slam == pytest.approx(np.interp(rate, RATES, VELOCITIES), rel=1e-6)
-    assert ("flow turns quicker than its curve goes" in at) == (rate > 6.0)
+    assert ("flow reverses faster than its curve covers" in at) == (rate > 6.0)
     after = result.t > at["shuts"]
     assert not result["check.flow"][after].any() and not result["check.opening"][after].any()
 
@@ -58,7 +58,7 @@ WAYS = [("linear", {"method": "radau-iia-5", "rtol": 1e-8}), ("linear", {"method
 def test_so_it_does_by_every_method_and_law_however_the_column_is_drawn(law, numerics, against):
     at = times(fvsolve.run(column(3.0, numerics, law, against)))
     near = 1e-6 if law == "linear" else 1e-3  # compressibility
-    assert 3.0 * (at["shuts"] - at["flow turns"]) == pytest.approx(np.interp(3.0, RATES, VELOCITIES), rel=near)
+    assert 3.0 * (at["shuts"] - at["flow reverses"]) == pytest.approx(np.interp(3.0, RATES, VELOCITIES), rel=near)
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -72,9 +72,9 @@ def test_in_a_main_joukowskys_jump_follows_its_slam(law):
     case = scene(nodes, links, 0.5, numerics, ["check.flow", "mid.pressure"], 1e-3, fluid=WATER | {"law": law})
     result = fvsolve.run(case)
     at, wanted = times(result), float(np.interp(d, RATES, VELOCITIES))
-    assert at["flow turns"] == pytest.approx(0.1 + v / d, abs=2e-3)
+    assert at["flow reverses"] == pytest.approx(0.1 + v / d, abs=2e-3)
     near = 1e-3 if law == "linear" else 0.02
-    assert d * (at["shuts"] - at["flow turns"]) == pytest.approx(wanted, rel=near, abs=2e-3 * d)
+    assert d * (at["shuts"] - at["flow reverses"]) == pytest.approx(wanted, rel=near, abs=2e-3 * d)
     after = (result.t > at["shuts"] + 2e-3) & (result.t < 0.48)
     before = result["mid.pressure"][result.t < at["shuts"]]
     jump = result["mid.pressure"][after] - before[-1]

@@ -246,7 +246,9 @@ def test_an_s_between_given_pressures_starts_at_the_greatest_flow_and_is_noted()
     case = direct(200.0, hill_chart=[folded(160)], diameter=3.0, speed=FOLD["speed"])
     found = fvsolve.run(case)
     assert found["unit.flow"][0] == approx(85.06, rel=1e-4)
-    assert [one.key for one in found.warnings] == ["hill_chart"] and "its hill chart folds" in found.warnings[0].text
+    assert [one.key for one in found.warnings] == ["hill_chart"] and "its hill chart is folded" in found.warnings[
+        0
+    ].text
     assert not fvsolve.run(direct(HEAD, hill_chart=CHART, speed="300 rpm")).warnings
 
 

@@ -175,4 +175,4 @@ def test_what_one_process_steps_rank_0_steps_alone(tmp_path):
     found = ranks(2, sys.executable, "-c", SCRIPT, json.dumps({"run": case}), tmp_path, "{}")
     assert found.returncode == 0, found.stderr
     said = json.loads((tmp_path / "run" / "summary.json").read_text())
-    assert said["threads"] == 1 and "one thread steps it, not 2" in json.dumps(said["warnings"])
+    assert said["threads"] == 1 and "threads = 2, but one thread is used" in json.dumps(said["warnings"])

@@ -178,7 +178,7 @@ def test_two_basins_and_one_that_each_steps_whole():
     found, summary = told(case, 3)
     assert found == bits
     (notice,) = [one for one in summary.warnings if one.kind == "threads"]
-    assert notice.text == "each thread steps the whole of round: its mesh is not a full rectangle"
+    assert notice.text == "each thread computes the whole of round: its mesh is not a full rectangle"
 
 
 def stepped(case, threads: int, spoil=lambda team: None) -> bytes:
@@ -276,7 +276,7 @@ def test_what_one_thread_steps_is_said(name):
     assert why in alone(model) and shared(model)["most"] == 1
     run = fvsolve.run(model, threads=2)
     (said,) = [one for one in run.summary["warnings"] if one["kind"] == "threads"]
-    assert run.summary["threads"] == 1 and "one thread steps it, not 2" in said["text"] and why in said["text"]
+    assert run.summary["threads"] == 1 and "threads = 2, but one thread is used" in said["text"] and why in said["text"]
 
 
 @pytest.mark.parametrize("threads", [0, -1, 1.5, "2", True, None])

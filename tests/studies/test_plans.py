@@ -52,7 +52,11 @@ def test_all_that_is_wrong_of_ranges_is_said_at_once(case):
         "links.main.cells: is not a continuous quantity" in said
         and "numerics.scheme: is not a continuous quantity" in said
     )
-    assert 'no key "links.main.lengt"' in said and "[1, 2, 3] is not a range" in said and "-1.0 is out of range" in said
+    assert (
+        'unknown key "links.main.lengt"' in said
+        and "[1, 2, 3] is not a range" in said
+        and "-1.0 is out of range" in said
+    )
 
 
 @pytest.mark.parametrize("sample", ["sobol", "sobol:0", "sobol:-3", "halton:8", "lhs:1e3", "sobol:99999999999"])

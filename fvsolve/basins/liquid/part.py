@@ -32,14 +32,14 @@ class Liquid(Physics, name="liquid"):
     pressure: Annotated[
         float,
         Quantity(
-            "pressure", positive, "pressure at rest [Pa], of a basin on a body at its middle; required for a liquid"
+            "pressure", positive, "pressure at rest (on a body: at the middle of the basin) [Pa]; required for a liquid"
         ),
     ]
     thickness: Annotated[
         float, Quantity("length", positive, "thickness normal to the plane [m]; required for a liquid, else default 1")
     ]
     wave_speed: Annotated[
-        float | None, Quantity("velocity", positive, "wave speed of a liquid [m/s]; default: that of the fluid")
+        float | None, Quantity("velocity", positive, "wave speed of a liquid [m/s]; default: wave speed of the fluid")
     ] = None
 
     @classmethod

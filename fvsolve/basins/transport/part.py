@@ -48,7 +48,10 @@ PARAMETERS: dict[str, Value] = {  # of velocities by name
 class Flowing(Value):
     """Value of the key `velocity`: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
 
-    about = "{ u, v } or { stream }, formulas of x and y in SI, { expression, its parameters } or { file }; and period"
+    about = (
+        "velocity field: { u, v } or { stream } as formulas of x and y in SI, { expression } with its parameters, or "
+        "{ file }; and an optional period"
+    )
     takes = "`{ u, v }`, `{ stream }`, `{ expression, ... }` or `{ file }`, and `period`"
     changes = PROFILE
 

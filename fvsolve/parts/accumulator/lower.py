@@ -133,7 +133,7 @@ class ShapedRows(AccumulatorRows, kind=""):
                 draft.case.amount(height, "head", span=True),
             )
             text = (f"no steady state: the pressure at its place, {pressure}, is below that of the fluid column, "
-                    f"{head} high, so the gas would have none; set bottom or level lower")  # fmt: skip
+                    f"{head} high, so the gas would have no pressure; set bottom or level lower")  # fmt: skip
             draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
             return []
         floats = draft.tables.floats

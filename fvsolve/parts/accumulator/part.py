@@ -88,7 +88,9 @@ class Accumulator(Node, kind="accumulator"):
     compressor: Annotated[
         Compressor | None, Inside(Compressor, "compressor that adds gas at a high level; none if left out")
     ] = None
-    exponent: Annotated[float, Number(Range(1.0), "n in p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)] = 1.2
+    exponent: Annotated[
+        float, Number(Range(1.0), "polytropic exponent n in p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)
+    ] = 1.2
     initial_pressure: Annotated[
         float | None, Quantity("pressure", about="gas pressure at the start [Pa]; in equilibrium if left out")
     ] = None
@@ -113,11 +115,11 @@ class Accumulator(Node, kind="accumulator"):
             faults += [((key,), text) for key in OF_SHAPE if key in given]
         elif "precharge" in given:
             text = (
-                "does not go with precharge (a bladder); give gas_volume or level in place of precharge, or remove it"
+                "is not valid with precharge (a bladder); give gas_volume or level in place of precharge, or remove it"
             )
             faults += [((key,), text) for key in shapes]
         if "slope" in given and shapes == ["area"]:
-            faults.append((("slope",), "goes with diameter only; area gives the surface at all levels"))
+            faults.append((("slope",), "applies only with diameter; area gives the surface at all levels"))
         return faults
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:

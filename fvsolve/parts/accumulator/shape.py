@@ -15,9 +15,9 @@ UPRIGHT = 0.5 * math.pi
 class Compressor(Table):
     """Compressor that adds gas: starts when the level rises to `start`, stops when the level falls to `stop`."""
 
-    start: Annotated[float, Quantity("level", nonnegative, "level of the fluid at which it starts [m]", LEVELS)]
+    start: Annotated[float, Quantity("level", nonnegative, "fluid level at which the compressor starts [m]", LEVELS)]
     stop: Annotated[
-        float, Quantity("level", nonnegative, "level of the fluid at which it stops, below start [m]", LEVELS)
+        float, Quantity("level", nonnegative, "fluid level, below start, at which the compressor stops [m]", LEVELS)
     ]
     flow: Annotated[
         float,

@@ -79,7 +79,7 @@ class AirValveRows(Device, kind="air-valve"):
 class Throttling(AirValveRows, kind=""):
     """An air valve that releases air through a small bore from `switch` or `switch_velocity` on."""
 
-    events = (*AirValveRows.events, "throttles", "is wide again")
+    events = (*AirValveRows.events, "throttles", "stops throttling")
 
     def begin(self, start, part, row) -> list[str]:
         place, widest = start.valves[row["valve"]]["from_node"], 0.0

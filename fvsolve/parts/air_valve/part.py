@@ -35,14 +35,14 @@ class AirValve(Node, kind="air-valve"):
         **Node.quantities, "air_volume": "volume", "air_mass": "mass", "air_pressure": "pressure",
     }  # fmt: skip
 
-    inlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air in [m]")]
-    outlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air out [m]")]
+    inlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air inflow [m]")]
+    outlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air outflow [m]")]
     switch: Annotated[
         float | None,
         Quantity(
             "pressure_drop",
             positive,
-            "air pressure above ambient from which air leaves by throttled_outlet instead of outlet",
+            "gauge pressure of the air above which it leaves through throttled_outlet instead of outlet",
             Usual(100.0, 1e5, "anti-slam discs"),
         ),
     ] = None
@@ -51,17 +51,19 @@ class AirValve(Node, kind="air-valve"):
         Quantity(
             "velocity",
             positive,
-            "velocity of the fluid towards the valve from which it throttles, instead of switch [m/s]",
+            "fluid velocity towards the valve above which air leaves through throttled_outlet, instead of switch [m/s]",
             Usual(0.01, 20.0, "anti-slam discs"),
         ),
     ] = None
     throttled_outlet: Annotated[
-        float | None, Quantity("length", BORE, "diameter of the bore for air out while throttled [m]")
+        float | None, Quantity("length", BORE, "diameter of the bore for throttled air outflow [m]")
     ] = None
     automatic: Annotated[
-        float | None, Quantity("length", BORE, "diameter of the automatic bore, always open for air out [m]")
+        float | None, Quantity("length", BORE, "diameter of the automatic bore, always open for air outflow [m]")
     ] = None
-    discharge_coefficient: Annotated[float, Number(between(0, 1, open=True), "coefficient Cd of all bores")] = 0.6
+    discharge_coefficient: Annotated[
+        float, Number(between(0, 1, open=True), "discharge coefficient Cd of all bores")
+    ] = 0.6
     volume: Annotated[
         float | None,
         Quantity(

@@ -43,7 +43,8 @@ class Patch(Table):
     """A section of the outline: a node `BASIN.PATCH` that links may join, or a boundary other than a fixed wall."""
 
     side: Annotated[
-        str | None, Choice("side", SIDES, "side of a rectangle, needed there; mesh files name their own patches")
+        str | None,
+        Choice("side", SIDES, "side of the rectangle, required for a rectangle; a mesh file names its own patches"),
     ] = None
     span: Annotated[
         tuple[float, float] | None,
@@ -56,7 +57,8 @@ class Patch(Table):
         ),
     ] = None
     boundary: Annotated[
-        str | None, Choice("boundary", ("wall", "open"), "open lets waves leave; a wall if left out")
+        str | None,
+        Choice("boundary", ("wall", "open"), "boundary condition: open (waves leave); a wall if left out"),
     ] = None
     impedance: Annotated[
         float | None,
@@ -71,11 +73,13 @@ class Patch(Table):
     zone: Annotated[
         float | None,
         Quantity(
-            "length", positive, "depth behind a moving wall in which grid lines move [m]; the whole basin if left out",
+            "length", positive, "width of the zone whose grid lines follow the wall [m]; the whole basin if left out",
             changes=VALUE,
         ),
     ] = None  # fmt: skip
-    scalars: Annotated[dict[str, Any], Carried("values of scalars in the inflow of a given velocity")] = {}
+    scalars: Annotated[
+        dict[str, Any], Carried("scalar values of the inflow, for a given velocity or an open boundary")
+    ] = {}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"), ("body", "travel"))
 
     @property
@@ -259,7 +263,7 @@ class Basin(Rider, kind="basin"):
     fixes_pressure: ClassVar[bool] = True
     quantities: ClassVar[dict[str, str]] = {}
 
-    physics: Annotated[str, Choice("physics", Physics.kinds, "equations of its fields")] = "free-surface"
+    physics: Annotated[str, Choice("physics", Physics.kinds, "equations solved in the basin")] = "free-surface"
     size: Annotated[
         tuple[float, float] | None,
         Rows(
@@ -273,27 +277,29 @@ class Basin(Rider, kind="basin"):
             "number",
             positive,
             length=2,
-            about="ratio of last to first spacing along x and y [-]; 1 if left out",
+            about="ratio of last to first cell size along x and y [-]; 1 if left out",
             changes=SHAPE,
         ),
     ] = None
     holes: Annotated[Any, Holes()] = None
     mesh: Annotated[
         MeshFile | None,
-        Inside(MeshFile, "mesh file that meshio reads, instead of a rectangle, and the unit of its coordinates"),
+        Inside(MeshFile, "mesh file (any format of meshio) and the unit of its coordinates, instead of a rectangle"),
     ] = None
-    patches: Annotated[Any, Named(Patch, "patches by name: { outlet = { side, span } }")] = {}
+    patches: Annotated[Any, Named(Patch, "named parts of the boundary: { outlet = { side, span } }")] = {}
     start: Annotated[
         StartOfFields | None,
-        Inside(StartOfFields, "initial level, or pressure above that at rest, and velocities; at rest if left out"),
+        Inside(
+            StartOfFields, "initial level, or pressure above the pressure at rest, and velocities; at rest if left out"
+        ),
     ] = None
 
-    attitude: Annotated[Attitude | None, Inside(Attitude, "attitude of its axes in those of its body")] = None
+    attitude: Annotated[Attitude | None, Inside(Attitude, "attitude of its axes relative to those of its body")] = None
     sloshing: Annotated[
         str, Choice("sloshing", SLOSHING, "model of the water on a body: frozen (rigid), linear modes, or cells")
     ] = "cells"
     scalars: Annotated[
-        dict[str, Any], Carried("values of scalars at the start, formulas of x and y", Shaped("number"))
+        dict[str, Any], Carried("scalar values at the start, formulas of x and y", Shaped("number"))
     ] = {}
 
     @property

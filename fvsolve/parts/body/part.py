@@ -77,25 +77,28 @@ class Joint(Table):
     The origin of the body lies at its joint. At angle or travel 0 the axes of the body are those of the joint.
     """
 
-    kind: Annotated[str, Choice("joint", tuple(JOINTS), "kind of joint, its degrees of freedom", OFTEN)] = "free"
+    kind: Annotated[str, Choice("joint", tuple(JOINTS), "kind of joint (its degrees of freedom)", OFTEN)] = "free"
     on: Annotated[str | None, Text("carrier: BODY, BODY.POINT or FRAME.POINT; the world if left out")] = None
     at: Annotated[
         tuple[float, ...] | None,
         Rows("position", length=3, about="position of the joint in the axes of `on` [m]; 0 if left out"),
     ] = None
-    attitude: Annotated[Attitude, Inside(Attitude, "attitude of the joint axes in those of `on`")] = Attitude()
+    attitude: Annotated[Attitude, Inside(Attitude, "attitude of the joint axes relative to those of `on`")] = Attitude()
     axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of motion in the joint axes")] = None
     angle: Annotated[
-        Schedule | None, Scheduled("angle", about="angle at the start [rad]; a schedule drives it; 0 if left out")
+        Schedule | None,
+        Scheduled("angle", about="angle at the start, or a schedule that drives the joint [rad]; 0 if left out"),
     ] = None
     travel: Annotated[
-        Schedule | None, Scheduled("position", about="travel at the start [m]; a schedule drives it; 0 if left out")
+        Schedule | None,
+        Scheduled("position", about="travel at the start, or a schedule that drives the joint [m]; 0 if left out"),
     ] = None
     rate: Annotated[
         Any,
         OfJoint(
             "angular_velocity",
-            "rate at the start; of a ball joint or free body [x, y, z] in the axes of the body; 0 if left out",
+            "rate of angle or travel at the start; of a ball or free joint the angular velocity [x, y, z] in body axes"
+            "; 0 if left out",
         ),
     ] = None
     velocity: Annotated[
@@ -106,7 +109,7 @@ class Joint(Table):
             about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
         ),
     ] = None
-    damping: Annotated[Any, OfJoint("damping", "damping torque or force per rate; 0 if left out")] = None
+    damping: Annotated[Any, OfJoint("damping", "damping torque or force per rate of the joint; 0 if left out")] = None
     stiffness: Annotated[
         Any, OfJoint("stiffness", "stiffness of a spring towards angle or travel 0; none if left out")
     ] = None
@@ -123,9 +126,9 @@ class Joint(Table):
             ((key,), f"is not a key of joints of kind {show(kind)}; {allowed}") for key in given if key in others
         ]
         if "axis" in own and "axis" not in given:
-            faults.append(((), f"axis is missing: a {kind} joint moves along or about one, for example [0, 1, 0]"))
+            faults.append(((), f"axis is missing: a {kind} joint needs it, for example [0, 1, 0]"))
         if kind == "free" and "on" in given:
-            faults.append((("on",), "does not go with a free joint, which has no carrier; remove it"))
+            faults.append((("on",), "is not valid for a free joint, which has no carrier; remove it"))
         if isinstance(given.get("axis"), (list, tuple)) and len(given["axis"]) == 3:
             if all(isinstance(x, (int, float)) for x in given["axis"]) and no_direction(given["axis"]):
                 faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))
@@ -206,7 +209,7 @@ class Body(Node, kind="body"):
         **along("momentum_", "momentum"), **along("angular_momentum_", "angular_momentum"),
     }  # fmt: skip
 
-    mass: Annotated[float, Quantity("mass", positive, "mass of all that moves with it [kg]",
+    mass: Annotated[float, Quantity("mass", positive, "mass of the body and all that is fixed to it [kg]",
                                     Usual(1e-6, 1e9, "poppets to ships"))]  # fmt: skip
     inertia: Annotated[Any, Inertia()]
     centre_of_mass: Annotated[

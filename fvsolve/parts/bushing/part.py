@@ -27,10 +27,12 @@ class Bushing(TwoPort, kind="bushing"):
                 "is 0, like damping and both rotational coefficients; expected at least one above 0",
             )
 
-    stiffness: Annotated[float, Quantity("stiffness", nonnegative, "force per gap [N/m]", changes=VALUE)] = 0.0
-    damping: Annotated[float, Quantity("damping", nonnegative, "force per rate of the gap [N s/m]", changes=VALUE)] = (
-        0.0
-    )
+    stiffness: Annotated[
+        float, Quantity("stiffness", nonnegative, "force per displacement between the points [N/m]", changes=VALUE)
+    ] = 0.0
+    damping: Annotated[
+        float, Quantity("damping", nonnegative, "force per relative velocity of the points [N s/m]", changes=VALUE)
+    ] = 0.0
     rotational_stiffness: Annotated[
         float, Quantity("torque", nonnegative, "torque per angle, for small angles [N m]", changes=VALUE)
     ] = 0.0

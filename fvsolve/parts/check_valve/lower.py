@@ -94,7 +94,7 @@ class Slamming(CheckValveRows, kind=""):
 
     law = law_slam
     states = ("slam_velocity", "deceleration")
-    events = ("flow turns", "shuts", "runs forward again", "flow turns quicker than its curve goes")
+    events = ("flow reverses", "shuts", "flow is forward again", "flow reverses faster than its curve covers")
     remedy = "give its curve a greater reverse_velocity"
 
     def numbers(self, draft, name, part) -> list[float]:

@@ -31,7 +31,7 @@ class SlamCurve:
 class Slams(Value):
     """A manufacturer's curve of slam velocities in a case file."""
 
-    about = "reverse velocity at which it shuts over the deceleration of the flow, from the manufacturer"
+    about = "curve of the manufacturer: reverse velocity at which the valve shuts, over deceleration of the flow"
     takes = "`{ rate = [...], reverse_velocity = [...] }`, m/s2 and m/s"
     keys = {
         "rate": (Rows("acceleration", nonnegative), NEEDED),
@@ -74,14 +74,14 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
     cracking_pressure: Annotated[
-        float, Quantity("pressure_drop", nonnegative, "drop above which it opens [Pa]", DROPS)
+        float, Quantity("pressure_drop", nonnegative, "pressure drop above which the valve opens [Pa]", DROPS)
     ] = 0.0
     overpressure: Annotated[
         float | None,
         Quantity(
             "pressure_drop",
             positive,
-            "drop above cracking_pressure that opens it fully, with a time_constant or natural_frequency [Pa]",
+            "drop above cracking_pressure that opens the valve fully, with a time_constant or natural_frequency [Pa]",
             DROPS,
         ),
     ] = None
@@ -101,7 +101,7 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
         if "overpressure" in given and not moves:
             faults.append((("overpressure",), "needs a time_constant or a natural_frequency"))
         if "deceleration" in given and moves:
-            text = "does not go with time_constant or natural_frequency, which also define how it shuts; remove one"
+            text = "is not valid with time_constant or natural_frequency, which also define how it shuts; remove one"
             faults.append((("deceleration",), text))
         if "deceleration" in given and not {"area", "diameter"} & set(given):
             text = "its velocities need a bore; expected diameter or area, with loss_coefficient instead of Kv or Cv"

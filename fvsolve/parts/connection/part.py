@@ -37,7 +37,7 @@ class Connection(Table):
 class Joined(Value):
     """The table of a connection in a case file."""
 
-    about = "throat with a loss for each direction; joined without loss if left out"
+    about = "throat with a loss for each flow direction; joined without loss if left out"
     takes = "[connection](#connection)"
 
     def read(self, given: Any, setting: Setting) -> Connection:

@@ -34,7 +34,7 @@ class Cylinder(Link, kind="cylinder"):
         float, Quantity("length", positive, "stroke, from x = 0 (rod in) to x = stroke [m]", SIZES, VALUE)
     ]
     closed_length: Annotated[
-        float, Quantity("length", nonnegative, "distance from case to rod with the rod in, x = 0 [m]", changes=PROFILE)
+        float, Quantity("length", nonnegative, "distance from case to rod at x = 0 (rod in) [m]", changes=PROFILE)
     ] = 0.0
     area_A: Annotated[
         float | None,
@@ -52,26 +52,28 @@ class Cylinder(Link, kind="cylinder"):
         Quantity("length", nonnegative, "diameter of the rod, instead of area_B, with piston_diameter [m]", SIZES),
     ] = None
     dead_volume_A: Annotated[
-        float, Quantity("volume", positive, "volume of A with the rod in, lines included [m3]", changes=VALUE)
+        float, Quantity("volume", positive, "volume of chamber A with the rod in, lines included [m3]", changes=VALUE)
     ]
     dead_volume_B: Annotated[
-        float, Quantity("volume", positive, "volume of B with the rod out, lines included [m3]", changes=VALUE)
+        float, Quantity("volume", positive, "volume of chamber B with the rod out, lines included [m3]", changes=VALUE)
     ]
     initial_pressure_A: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="pressure at the start [Pa]; load pressure if shut, else that of its links if left out",
+            about="pressure of chamber A at the start [Pa]; by the load (shut chamber) or its links if left out",
         ),
     ] = None
     initial_pressure_B: Annotated[
         float | None,
         Quantity(
             "pressure",
-            about="pressure at the start [Pa]; load pressure if shut, else that of its links if left out",
+            about="pressure of chamber B at the start [Pa]; by the load (shut chamber) or its links if left out",
         ),
     ] = None
-    leakage: Annotated[float, Quantity("leakage", nonnegative, "flow from A to B per pressure [m3/s/Pa]")] = 0.0
+    leakage: Annotated[
+        float, Quantity("leakage", nonnegative, "leakage flow from A to B per pressure difference [m3/s/Pa]")
+    ] = 0.0
     viscous_friction: Annotated[
         float, Quantity("damping", nonnegative, "viscous friction of piston and rod [N s/m]", changes=VALUE)
     ] = 0.0

@@ -15,4 +15,4 @@ class Damper(Coupling, kind="damper"):
     (v_to - v_from)^2 [W].
     """
 
-    damping: Annotated[float, Quantity("damping", positive, "force per velocity [N s/m]", changes=VALUE)]
+    damping: Annotated[float, Quantity("damping", positive, "force per relative velocity [N s/m]", changes=VALUE)]

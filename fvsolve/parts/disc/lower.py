@@ -98,7 +98,11 @@ class Lifting(Device, kind=""):
         start.draft.tables.floats[row["data"] + 2] = start.law_of(k)[1]
         self.tell(start, name, x)
         target = self.felt(start, k) / part.overpressure
-        return [f"{name}: shut, though the pressure lifts it"] if start.rest and target > SMALL_LIFT else []
+        return (
+            [f"{name}: shut at the start, although its pressure would open it"]
+            if start.rest and target > SMALL_LIFT
+            else []
+        )
 
     def put_lift(self, start, row, x: float, target: float) -> None:
         """Store the lift and the target at the start."""

@@ -29,7 +29,7 @@ class Force(Coupling, kind="force"):
     force: Annotated[Schedule, Scheduled("force", about="force on `to`, positive forward [N]")]
     direction: Annotated[
         tuple[float, ...] | None,
-        Rows("number", length=3, about="direction in world axes, for points; the line from `from` to `to` if left out"),
+        Rows("number", length=3, about="direction in world axes, on points; the line from `from` to `to` if left out"),
     ] = None
 
     @property
@@ -46,7 +46,10 @@ class Force(Coupling, kind="force"):
                 "direction is missing: a force on a point without `from` needs it; [0, 0, -1] is down",
             )
         if not around.spatial(self.to) and self.direction is not None:
-            yield ("direction",), f"{self.to} moves along one axis, which is the direction of the force; remove it"
+            yield (
+                ("direction",),
+                f"{self.to} moves along a single axis, which gives the direction of the force; remove direction",
+            )
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         yield from uneven("direction", self.direction)

@@ -19,4 +19,4 @@ class Frame(Node, kind="frame"):
     quantities: ClassVar[dict[str, str]] = {"position": "position"}
 
     initial_position: Annotated[float, Quantity("position", about="position on the common axis [m]")] = 0.0
-    points: Annotated[dict[str, tuple[float, ...]], PlacesByName("points in the world for links [m]")] = {}
+    points: Annotated[dict[str, tuple[float, ...]], PlacesByName("fixed points for links, in world axes [m]")] = {}

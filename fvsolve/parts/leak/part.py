@@ -22,7 +22,7 @@ class Leak(Link, kind="leak"):
 
     joins: ClassVar[dict[str, str]] = {"from": "hydraulic"}
 
-    from_: Annotated[str, Text("place at which it leaks"), Field(alias="from")]
+    from_: Annotated[str, Text("place of the leak"), Field(alias="from")]
     coefficient: Annotated[
         float, Number(positive, "flow in m3/s at a drop of 1 Pa", Usual(1e-15, 0.1, "seeping to a main torn off"))
     ]

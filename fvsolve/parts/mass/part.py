@@ -19,7 +19,7 @@ class Mass(Node, kind="mass"):
 
     mass: Annotated[
         float,
-        Quantity("mass", positive, "mass of all that moves with it [kg]", Usual(1e-6, 1e9, "poppets to ships"), VALUE),
+        Quantity("mass", positive, "total moving mass [kg]", Usual(1e-6, 1e9, "poppets to ships"), VALUE),
     ]
     initial_position: Annotated[
         float, Quantity("position", about="position at the start, along the common axis [m]")

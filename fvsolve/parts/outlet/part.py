@@ -53,8 +53,8 @@ class Relieving(Sized, Link):
     may_lack: ClassVar[tuple[str, ...]] = ("to",)
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
-    from_: Annotated[str, Text("place that it protects"), Field(alias="from")]
-    to: Annotated[str | None, Text("place to which it opens; ambient if left out")] = None
+    from_: Annotated[str, Text("place that the valve or disc protects"), Field(alias="from")]
+    to: Annotated[str | None, Text("place of discharge; ambient if left out")] = None
 
     @property
     def ports(self) -> dict[str, str]:

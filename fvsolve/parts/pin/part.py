@@ -28,10 +28,12 @@ class Pin(TwoPort, kind="pin"):
         Rows(
             "number",
             length=3,
-            about="free direction, in the axes of `from`; if left out it constrains all three directions",
+            about="free direction, in the axes of `from`; none (all three directions constrained) if left out",
         ),
     ] = None
-    pull: Annotated[float, Quantity("rate", positive, "rate at which a gap closes [1/s]", changes=VALUE)] = 10.0
+    pull: Annotated[
+        float, Quantity("rate", positive, "rate at which a gap closes (Baumgarte stabilisation) [1/s]", changes=VALUE)
+    ] = 10.0
 
     def faults(self, name: str, around: Around) -> Faults:
         if no_direction(self.axis):

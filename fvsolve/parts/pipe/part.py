@@ -71,7 +71,7 @@ class Pipe(Conduit, kind="pipe"):
     profile: Annotated[Profile | None, ProfileValue()] = None
     bends: Annotated[
         tuple[float, ...] | None,
-        Rows("length", rising=True, about="chainages of bends, which divide it into legs", changes=SHAPE),
+        Rows("length", rising=True, about="chainages of bends, which divide the pipe into legs", changes=SHAPE),
     ] = None
     wave_speed: Annotated[
         float | None, Quantity("velocity", positive, "wave speed, instead of wall [m/s]", WAVES, COUNTED)
@@ -80,7 +80,11 @@ class Pipe(Conduit, kind="pipe"):
     material: Annotated[str | None, OfCatalogue()] = None
     class_: Annotated[
         str | None,
-        Text('"K9", "C40", "SDR11", "PN16" or "schedule 40" with nominal: bore, wall, allowable pressure', COUNTED),
+        Text(
+            'pressure class or schedule: "K9", "C40", "SDR11", "PN16", "schedule 40"; with nominal it sets bore, '
+            "wall and allowable pressure",
+            COUNTED,
+        ),
         Field(alias="class"),
     ] = None
     restraint: Annotated[str | float | None, Restraint()] = None
@@ -90,11 +94,13 @@ class Pipe(Conduit, kind="pipe"):
         Quantity(
             "gauge_pressure",
             positive,
-            "allowable pressure above ambient; that of its class if left out [Pa]",
+            "allowable pressure above ambient [Pa]; that of its class if left out",
             changes=VALUE,
         ),
     ] = None
-    source: Annotated[str | None, Text("source of its data; the sources of the catalogue if left out", VALUE)] = None
+    source: Annotated[
+        str | None, Text("source of the data of the pipe; the sources of the catalogue if left out", VALUE)
+    ] = None
     cells: Annotated[
         int | None,
         Whole(between(1, MOST_CELLS), "number of finite volumes; travel time over cell_time if left out"),
@@ -104,11 +110,11 @@ class Pipe(Conduit, kind="pipe"):
         Choice(
             "line",
             LINES,
-            "method for waves: cells, or a delay line, whose cells are only positions of output; auto: a delay line "
-            "where its error bound is below numerics.accuracy; numerics.line if left out",
+            "pipe model: cells (finite volumes), delay (a delay line, whose cells are only output positions), or auto "
+            "(a delay line where its error bound is below numerics.accuracy); numerics.line if left out",
         ),
     ] = None
-    scalars: Annotated[dict[str, Any], Carried("scalars in the pipe at the start", Number())] = {}
+    scalars: Annotated[dict[str, Any], Carried("scalar values in the pipe at the start", Number())] = {}
 
     @property
     def yielding(self) -> tuple[tuple[float, float], ...]:

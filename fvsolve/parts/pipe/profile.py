@@ -135,7 +135,7 @@ def from_file(given: dict[str, Any], setting: Setting) -> tuple[dict[str, np.nda
     if unknown:
         raise Misfit(unknown)
     if not isinstance(given["file"], str):
-        raise Misfit([(("file",), f"{show(given['file'])} is not a text")])
+        raise Misfit([(("file",), f"{show(given['file'])} is not a file name in quotes")])
     try:
         path = find_file(given["file"], setting)
         rows = read_rows(path)

@@ -21,10 +21,10 @@ POISSON = "poisson_ratio"
 class Wall(Table):
     """An elastic wall: 1/K = 1/beta + c diameter / (youngs_modulus thickness), c the factor of `restraint`."""
 
-    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the wall's material [Pa]", MODULI, COUNTED)]
-    thickness: Annotated[float, Quantity("length", positive, "of the wall [m]", THICKNESS, COUNTED)]
+    youngs_modulus: Annotated[float, Quantity("modulus", positive, "Young's modulus of the wall [Pa]", MODULI, COUNTED)]
+    thickness: Annotated[float, Quantity("length", positive, "wall thickness [m]", THICKNESS, COUNTED)]
     poisson_ratio: Annotated[
-        float | None, Number(between(0.0, 0.5), "of the wall's material, for restraint", changes=COUNTED)
+        float | None, Number(between(0.0, 0.5), "Poisson's ratio of the wall, for restraint", changes=COUNTED)
     ] = None
     creep: Annotated[Creep | None, Elements()] = None
 
@@ -32,8 +32,10 @@ class Wall(Table):
 class Lining(Table):
     """An inner layer of the wall, such as cement mortar, with the same hoop strain: E e + E' e' instead of E e."""
 
-    youngs_modulus: Annotated[float, Quantity("modulus", positive, "of the lining [Pa]", MODULI, COUNTED)]
-    thickness: Annotated[float, Quantity("length", positive, "of the lining [m]", THICKNESS, COUNTED)]
+    youngs_modulus: Annotated[
+        float, Quantity("modulus", positive, "Young's modulus of the lining [Pa]", MODULI, COUNTED)
+    ]
+    thickness: Annotated[float, Quantity("length", positive, "thickness of the lining [m]", THICKNESS, COUNTED)]
 
 
 class OfCatalogue(Value):
@@ -54,7 +56,7 @@ class OfCatalogue(Value):
         if isinstance(given, str) and given in self.names:
             return given
         if not isinstance(given, str):
-            raise ValueError(f"{show(given)} is not a text; expected one of {', '.join(self.names)}")
+            raise ValueError(f"{show(given)} is not text; expected one of {', '.join(self.names)}")
         wall = "give wall = { youngs_modulus, thickness }"
         if given in UNREAD:
             raise ValueError(f"the catalogue has no data of {given}; {wall}")
@@ -95,7 +97,7 @@ class WallOrStiff(Value):
 class Restraint(Value):
     """Axial restraint of a pipe: a word, or the factor c itself."""
 
-    about = "axial restraint; 1, a thin wall between expansion joints, if left out"
+    about = "axial restraint; 1 (thin wall between expansion joints) if left out"
     takes = "`joints`, `upstream`, `anchored`, or a number, above 0"
     changes = COUNTED
 

@@ -73,7 +73,7 @@ def keys_of(word: str, dimension: str, range=nonnegative) -> dict[str, tuple[Val
 class HeadCurve(Value):
     """A head curve: points { flow, head }, or { coefficients } of head [m] over powers of flow [m3/s]."""
 
-    about = "head [m] over flow [m3/s] at relative speed 1, coefficients over powers of flow"
+    about = "head [m] over flow [m3/s] at relative speed 1: points, or coefficients of powers of the flow"
     takes = "`{ flow = [...], head = [...] }`, or `{ coefficients = [...] }`"
     polynomial = {"coefficients": (Rows("number"), NEEDED)}
 

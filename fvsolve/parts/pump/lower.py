@@ -67,8 +67,8 @@ class PumpRows(Turning, Device, kind="pump"):
         moment = model.case.amount(time, "time", 6)
         rated = rated_point(part, weight_of(model))
         if (table := joined_table(part, *rated)) is None:
-            text = (f"{name}: it runs down, from {moment} on beyond the last flow of its curve, where its head is "
-                    "that of a parabola; give rated_speed to use a Suter table there")  # fmt: skip
+            text = (f"{name}: from {moment} on its flow is beyond the last flow of its curve, where its head "
+                    "follows a parabola; give rated_speed to use a Suter table there")  # fmt: skip
             return Notice("range", f"links.{name}", text, "curve")
         speed = specific_speed(part, *rated)
         source = table.words if FEW <= speed <= MANY else f"{table.words}, the nearest"
@@ -132,7 +132,9 @@ class PumpRows(Turning, Device, kind="pump"):
             elif draft.case.law.linear:
                 valve["drop"] = drop
         if valve["open"] == 0.0 and k not in start.shut:
-            moving.append(f"pump {name}: runs at {valve['drive']:.4g} of its rated speed without the flow of its curve")
+            moving.append(
+                f"pump {name}: runs at {valve['drive']:.4g} of its rated speed, with a flow that is not on its curve"
+            )
         draft.warnings += [
             *drawn_backwards(start, name, part, valve), *off_scale(draft, name, part), *estimated(draft, name, part),
             *at_odds(draft, name, part),

@@ -17,19 +17,19 @@ HIGHEST, LOWEST = 1000.0, 0.1  # range of heads of the curve of a constant-power
 def curve_numbers(part, weight: float) -> list[float]:
     """Numbers of the head curve of a pump, in the order of `law_curve`; weight = rho g [N/m3]."""
     if part.suter is not None:
-        one = part.suter
+        entry = part.suter
         return [
             curves.SUTER,
-            len(one.head),
+            len(entry.head),
             0.0,
             0.0,
             0.0,
             0.0,
-            one.rated_flow,
+            entry.rated_flow,
             0.0,
-            one.rated_head,
-            one.rated_flow,
-            *one.head,
+            entry.rated_head,
+            entry.rated_flow,
+            *entry.head,
         ]
     law, count, first, last, own = base_law(part, weight)
     numbers = [law, count, first, last, 0.0, 0.0, last, 0.0, *own]
@@ -39,7 +39,7 @@ def curve_numbers(part, weight: float) -> list[float]:
     numbers[curves.SCALE] = rated_point(part, weight)[0]
     joined = joined_numbers(part, *rated_point(part, weight), numbers)
     numbers[curves.JOIN] = len(numbers) if joined else 0.0
-    return [float(one) for one in (*numbers, *joined)]
+    return [float(entry) for entry in (*numbers, *joined)]
 
 
 def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
@@ -62,7 +62,7 @@ def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
 def power_law(curve: CurvePoints) -> tuple[float, float, float] | None:
     """a, b, c of H = a - b q^c through one point (4/3 of its head at no flow, 0 at twice its flow) or three from q = 0.
 
-    None of other curves, which are straight lines between their points. As EPANET has it (Rossman 2020).
+    The formula of EPANET (Rossman 2020). None for other curves, which are straight lines between their points.
     """
     if len(curve.flow) == 1:
         return 4.0 / 3.0 * curve.value[0], curve.value[0] / 3.0 / curve.flow[0] ** 2, 2.0

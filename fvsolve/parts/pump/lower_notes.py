@@ -60,7 +60,7 @@ def at_odds(draft, name: str, part) -> list[Notice]:
     if part.shaft_power is not None and part.power is None and not plausible:
         stated, fluid = (draft.case.amount(value, "power") for value in (power, taken))
         likely = units.likely(power, "power", taken, taken / LEAST_SHARE)
-        text = f"{name}: shaft_power is {stated} at its rated flow, and the fluid gets {fluid} there{likely}"
+        text = f"{name}: shaft_power is {stated} at its rated flow, but the fluid takes up {fluid} there{likely}"
         notices.append(Notice("range", f"links.{name}", text, "shaft_power", power, taken))
     return notices
 

@@ -43,13 +43,15 @@ class Pump(TwoPort, kind="pump"):
         Choice(
             "law",
             ("suter", "parabola"),
-            "head outside the flows of curve: suter, a table by specific speed, joined to the curve (default "
-            "with rated_speed); or parabola",
+            "head outside the flows of curve: suter (a table by specific speed, joined to the curve; default with "
+            "rated_speed) or parabola",
         ),
     ] = None
     speed: Annotated[
         Schedule,
-        Scheduled("number", nonnegative, "speed relative to that of the curve", Usual(0.0, 2.5, "of the rated speed")),
+        Scheduled(
+            "number", nonnegative, "relative speed, 1 at the speed of the curve", Usual(0.0, 2.5, "of the rated speed")
+        ),
     ] = Field(default_factory=lambda: constant(1.0))
     rated_speed: Annotated[
         float | None, Quantity("angular_velocity", positive, "speed at relative speed 1 [rad/s]", SPEEDS, PROFILE)
@@ -59,12 +61,12 @@ class Pump(TwoPort, kind="pump"):
         Quantity(
             "inertia",
             positive,
-            "inertia of all rotating masses, with the water in the pump [kg m2]; needs rated_speed; else estimated",
+            "inertia of all rotating masses and the water in the pump [kg m2], with rated_speed; estimated if left out",
             changes=VALUE,
         ),
     ] = None
     trip: Annotated[
-        float | None, Quantity("time", about="time at which the motor is switched off [s]; needs rated_speed")
+        float | None, Quantity("time", about="time at which the motor is switched off [s], requires rated_speed")
     ] = None
     efficiency: Annotated[Any, Efficiency()] = None
     shaft_power: Annotated[CurvePoints | None, ShaftPower()] = None

@@ -20,7 +20,7 @@ class Regulating(Sized, TwoPort):
 
     time_constant: Annotated[
         float,
-        Quantity("time", positive, "time in which an error of one band moves it from shut to open [s]", STROKES, VALUE),
+        Quantity("time", positive, "time in which an error of one band opens the shut valve [s]", STROKES, VALUE),
     ]
 
 
@@ -32,7 +32,10 @@ class PressureReducing(Regulating, kind="pressure-reducing"):
 
     set_pressure: Annotated[Schedule, Scheduled("pressure", about="set pressure at `to` [Pa]")]
     band: Annotated[
-        float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant", BANDS)
+        float,
+        Quantity(
+            "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant", BANDS
+        ),
     ] = 1e5
 
 
@@ -44,7 +47,10 @@ class PressureSustaining(Regulating, kind="pressure-sustaining"):
 
     set_pressure: Annotated[Schedule, Scheduled("pressure", about="set pressure at `from` [Pa]")]
     band: Annotated[
-        float, Quantity("pressure_drop", positive, "error that moves it fully in one time constant", BANDS)
+        float,
+        Quantity(
+            "pressure_drop", positive, "pressure error that moves the valve over its stroke in one time constant", BANDS
+        ),
     ] = 1e5
 
 

@@ -20,8 +20,12 @@ class ReliefValve(Disc, Sized, TwoPort, kind="relief-valve"):
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "opening": "number"}
 
     set_pressure: Annotated[
-        float, Quantity("pressure", about="pressure at `from` above which it opens, gauge or absolute by its unit [Pa]")
+        float,
+        Quantity(
+            "pressure", about="pressure at `from` above which the valve opens, gauge or absolute by its unit [Pa]"
+        ),
     ]
     overpressure: Annotated[
-        float, Quantity("pressure_drop", positive, "pressure above set_pressure at which it is fully open [Pa]", DROPS)
+        float,
+        Quantity("pressure_drop", positive, "pressure above set_pressure at which the valve is fully open [Pa]", DROPS),
     ]

@@ -25,7 +25,7 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
         drop, name = start.drive_of(k)[0], start.draft.valve_names[k]
         if drop >= part.burst_pressure:
             across = start.case.amount(drop, "pressure", 6, span=True)
-            text = f"{across} across it at the start, so it would have burst; set it higher or remove the disc"
+            text = f"{across} across the disc at the start would burst it; set it higher or remove the disc"
             start.draft.fault(f"links.{name}.burst_pressure", text)
         return []
 

@@ -16,4 +16,6 @@ class RuptureDisc(Relieving, kind="rupture-disc"):
     energy: none. Dissipated power: dp q [W].
     """
 
-    burst_pressure: Annotated[float, Quantity("pressure_drop", positive, "pressure drop above which it bursts", DROPS)]
+    burst_pressure: Annotated[
+        float, Quantity("pressure_drop", positive, "pressure drop above which the disc bursts", DROPS)
+    ]

@@ -17,11 +17,11 @@ class Spring(Coupling, kind="spring"):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("free_length", "preload"),)
 
-    stiffness: Annotated[float, Quantity("stiffness", positive, "force per length [N/m]", changes=VALUE)]
+    stiffness: Annotated[float, Quantity("stiffness", positive, "spring rate, force per length [N/m]", changes=VALUE)]
     free_length: Annotated[
         float | None,
         Quantity(
-            "length", nonnegative, "x_to - x_from without load [m]; 0 if left out, without preload", changes=VALUE
+            "length", nonnegative, "length x_to - x_from without load [m]; 0 without preload if left out", changes=VALUE
         ),
     ] = None
     preload: Annotated[

@@ -1,19 +1,19 @@
-"""A surge-anticipating valve. Knows one valve; knows no network.
+"""Surge-anticipating valve: opening, hold and closing by pressure or trip.
 
-It is SHUT, OPENING, OPEN or CLOSING: armed[at], at = event + mode, armed[at + 1], armed[at + 2], armed[at + 3]; without
-memory its states say which. armed[at + 4]: a high pressure opened it; armed[at + 5]: shut, it has seen a pressure above
-low_set, so that one below opens it; armed[at + 6]: its trip is past. These change on accepted states alone. Its
-opening and how long it has been open are states of even rates, which every method follows to rounding. To ambient, an
-outlet's numbers and flags stand before its own: `mode` says how many.
+Flags, with at = event + mode: armed[at] to armed[at + 3] for the stages SHUT, OPENING, OPEN and CLOSING; if all are 0,
+the states give the stage. armed[at + 4]: opened by high pressure; armed[at + 5]: the pressure has exceeded low_set
+since the valve shut, so that a pressure below low_set opens it; armed[at + 6]: after the trip. Flags change on accepted
+states only. The states are the opening and the time spent fully open; their rates are constant in a stage, so that
+every method integrates them to rounding. To ambient, `mode` numbers and flags of an outlet precede those of the valve.
 """
 
 from fvsolve.jit import njit
 
-OPENING_TIME, HOLD, CLOSING_TIME, LOW, HIGH, TRIP, PLACE = 0, 1, 2, 3, 4, 5, 6  # numbers; PLACE: node that it senses
+OPENING_TIME, HOLD, CLOSING_TIME, LOW, HIGH, TRIP, PLACE = 0, 1, 2, 3, 4, 5, 6  # numbers; PLACE: sensed node
 SHUT, OPENING, OPEN, CLOSING, BY_HIGH, READY, TRIPPED = 0, 1, 2, 3, 4, 5, 6  # flags
 FLAGS = 7
-NEVER = 1e300  # as a setting that there is none [Pa], [s]
-RELUCTANCE = 10.0  # pressure beyond a setting by which it is ready, or opens anew while it shuts [Pa]
+NEVER = 1e300  # setting left out [Pa], [s]
+RELUCTANCE = 10.0  # pressure beyond a setting that arms the low-pressure opening, or reopens a closing valve [Pa]
 LEAST = 1e-300
 
 
@@ -21,9 +21,9 @@ LEAST = 1e-300
 def stands(y, tables, device):
     """Stage of the valve: SHUT, OPENING, OPEN or CLOSING."""
     armed, at, o = tables.armed, device["event"] + device["mode"], device["y"]
-    for which in range(BY_HIGH):
-        if armed[at + which] > 0.0:
-            return which
+    for stage in range(BY_HIGH):
+        if armed[at + stage] > 0.0:
+            return stage
     if y[o] <= 0.0:
         return SHUT
     return OPEN if y[o] >= 1.0 else CLOSING if y[o + 1] > 0.0 else OPENING
@@ -63,39 +63,39 @@ def pilots(t, y, out, tables, device):
 
 @njit
 def events(t, y, out, tables, device, g):
-    """g: what is left until it does something else; and what these pilots remember."""
+    """g: margins to the next stage, and the flags of high pressure, arming and trip."""
     floats, armed, o = tables.floats, tables.armed, device["y"]
     at, flags, stage = device["data"] + device["mode"], device["event"] + device["mode"], stands(y, tables, device)
     low, high, trip, p = pilots(t, y, out, tables, device)
-    opens = min(low, high, trip)
+    opening_margin = min(low, high, trip)
     by_high, ready = armed[flags + BY_HIGH] > 0.0, armed[flags + READY] > 0.0
-    for which in range(FLAGS):
-        g[flags + which] = 1.0
+    for flag in range(FLAGS):
+        g[flags + flag] = 1.0
     g[flags + BY_HIGH] = -1.0 if by_high else 1.0
     if stage == OPENING:
         follow(g, flags, stage, OPEN, 1.0 - y[o])
     elif stage == OPEN:
-        timed = -1.0 if by_high else floats[at + HOLD] - y[o + 1]
-        follow(g, flags, stage, CLOSING, max(timed, p - floats[at + HIGH]))
+        hold_left = -1.0 if by_high else floats[at + HOLD] - y[o + 1]
+        follow(g, flags, stage, CLOSING, max(hold_left, p - floats[at + HIGH]))
     else:
         g[flags + BY_HIGH] = -1.0 if by_high else high
-        if opens <= 0.0:
+        if opening_margin <= 0.0:
             g[flags + BY_HIGH] = 1.0 if low <= 0.0 or trip <= 0.0 else -1.0
-        if stage == CLOSING and opens > 0.0:
+        if stage == CLOSING and opening_margin > 0.0:
             follow(g, flags, stage, SHUT, y[o])
-            g[flags + OPENING] = opens
+            g[flags + OPENING] = opening_margin
         else:
-            follow(g, flags, stage, OPENING, opens)
+            follow(g, flags, stage, OPENING, opening_margin)
     if stage == SHUT:
         g[flags + READY] = -1.0 if ready else floats[at + LOW] + RELUCTANCE - p
     g[flags + TRIPPED] = floats[at + TRIP] - t
 
 
 @njit
-def follow(g, flags, stage, later, left):
-    """It stands as it does while something is left, and then as `later`."""
-    left = -LEAST if left == 0.0 else left
-    g[flags + stage], g[flags + later] = -left, left
+def follow(g, flags, stage, next_stage, margin):
+    """Set g of the present stage, which lasts while the margin is positive, and of the next stage."""
+    margin = -LEAST if margin == 0.0 else margin
+    g[flags + stage], g[flags + next_stage] = -margin, margin
 
 
 @njit

@@ -22,37 +22,39 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
 
     def own_numbers(self, draft, name, part) -> list[float]:
         if part.trip is not None and part.trip < draft.case.numerics.start:
-            what = f"{part.trip:g} s lies before the start at {draft.case.numerics.start:g} s"
-            draft.fault(f"links.{name}.trip", f"{what}; wanted a later one")
+            text = f"{part.trip:g} s lies before the start at {draft.case.numerics.start:g} s"
+            draft.fault(f"links.{name}.trip", f"{text}; expected a later time")
         low = -law.NEVER if part.low_set is None else part.low_set
-        high, trip = (law.NEVER if one is None else one for one in (part.high_set, part.trip))
+        high, trip = (law.NEVER if value is None else value for value in (part.high_set, part.trip))
         place = float(draft.node_index[part.sensed])
         return [part.opening_time, part.hold, part.closing_time, low, high, trip, place]
 
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, part.hold + part.opening_time]
 
-    def settle(self, slate, row, t, y, scale) -> None:
+    def settle(self, run_data, row, t, y, scale) -> None:
         at, o = row["event"] + row["mode"], row["y"]
-        if slate.armed[at + law.SHUT] > 0.0:
+        if run_data.armed[at + law.SHUT] > 0.0:
             y[o] = 0.0
-        elif slate.armed[at + law.OPENING] > 0.0:
+        elif run_data.armed[at + law.OPENING] > 0.0:
             y[o + 1] = 0.0
-        elif slate.armed[at + law.OPEN] > 0.0:
+        elif run_data.armed[at + law.OPEN] > 0.0:
             y[o] = 1.0
 
     def begin(self, start, part, row) -> list[str]:
-        name, place = start.draft.valve_names[row["valve"]], start.nodes[start.draft.node_index[part.sensed]]
-        p, high = float(place["pressure"]), part.high_set is not None and float(place["pressure"]) >= part.high_set
-        told = start.case.amount
+        name, node = start.draft.valve_names[row["valve"]], start.nodes[start.draft.node_index[part.sensed]]
+        p, high = float(node["pressure"]), part.high_set is not None and float(node["pressure"]) >= part.high_set
+        amount = start.case.amount
         if part.low_set is not None and p < part.low_set:
-            text = (f"{name}: {part.sensed} has {told(p, 'pressure', 6)} at the start, below low_set, "
-                    f"{told(part.low_set, 'pressure', 6)}: it waits until that has been exceeded")  # fmt: skip
+            text = (f"{name}: the pressure at {part.sensed} is {amount(p, 'pressure', 6)} at the start, below low_set, "
+                    f"{amount(part.low_set, 'pressure', 6)}: a low pressure opens the valve only after the pressure "
+                    "has exceeded low_set")  # fmt: skip
             start.draft.warnings.append(Notice("start", f"links.{name}", text, "low_set", p, part.low_set))
         if not high:
             return []
         return [
-            f"{name}: opens at once, at {told(p, 'pressure', 6)} where {told(part.high_set, 'pressure', 6)} are set"
+            f"{name}: opens at the start: {amount(p, 'pressure', 6)} is not below high_set, "
+            f"{amount(part.high_set, 'pressure', 6)}"
         ]
 
 

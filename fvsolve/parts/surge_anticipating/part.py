@@ -22,14 +22,14 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
 
     low_set: Annotated[
         float | None,
-        Quantity("pressure", about="pressure at `senses` below which it opens, gauge or absolute by its unit"),
+        Quantity("pressure", about="pressure at `senses` below which the valve opens, gauge or absolute by its unit"),
     ] = None
     high_set: Annotated[
         float | None,
-        Quantity("pressure", about="pressure at `senses` above which it opens, gauge or absolute by its unit"),
+        Quantity("pressure", about="pressure at `senses` above which the valve opens, gauge or absolute by its unit"),
     ] = None
-    trip: Annotated[float | None, Quantity("time", about="time at which it opens in any case")] = None
-    senses: Annotated[str | None, Text("place of the pressure that opens it; `from` if left out")] = None
+    trip: Annotated[float | None, Quantity("time", about="time at which the valve opens regardless of pressure")] = None
+    senses: Annotated[str | None, Text("place whose pressure opens the valve; `from` if left out")] = None
     opening_time: Annotated[float, Quantity("time", positive, "time from shut to fully open", STROKES)]
     hold: Annotated[
         float, Quantity("time", nonnegative, "time for which it stays fully open after low_set or trip")

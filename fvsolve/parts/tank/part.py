@@ -55,7 +55,7 @@ class AreaTable:
 class Surface(Value):
     """A free surface: one area, or a table of areas over levels."""
 
-    about = "free surface, linear between levels and constant above the last [m2]"
+    about = "area of the free surface, linear between levels and constant above the last level [m2]"
     takes = "m2, or `{ level = [0, ...], area = [...] }`"
     usual = Usual(1e-6, 1e10, "tubes to lakes")
     dimension = "area"
@@ -99,10 +99,12 @@ class Tank(Rider, kind="tank"):
     fixes_pressure: ClassVar[bool] = True
 
     area: Annotated[Any, Surface()]
-    level: Annotated[float, Quantity("level", nonnegative, "level above its bottom at the start [m]", LEVELS)]
+    level: Annotated[float, Quantity("level", nonnegative, "water level above the bottom at the start [m]", LEVELS)]
     height: Annotated[
         float | None,
-        Quantity("level", positive, "level above its bottom at which it spills [m]; never if left out", LEVELS, VALUE),
+        Quantity(
+            "level", positive, "level above the bottom at which the tank spills [m]; never if left out", LEVELS, VALUE
+        ),
     ] = None
     connection: Annotated[Connection | None, Joined()] = None
 

@@ -17,7 +17,7 @@ from fvsolve.parts.value import Rows, Text
 class Torque(Link, kind="torque"):
     """torque(t) on the shaft `to`, whose speed follows from it and the fluid; or on a body about `axis`.
 
-    Ports: to; for bodies also from, which gets the reaction. Stored and dissipated energy: none. It supplies torque
+    Ports: to; for bodies also from, which takes the reaction. Stored and dissipated energy: none. It supplies torque
     times angular velocity [W]; for bodies the velocity of `to` relative to `from` about the axis.
     """
 
@@ -25,9 +25,14 @@ class Torque(Link, kind="torque"):
     may_lack: ClassVar[tuple[str, ...]] = ("from",)
     quantities: ClassVar[dict[str, str]] = {}
 
-    from_: Annotated[str | None, Text("body that gets the reaction, if any"), Field(alias="from")] = None
-    to: Annotated[str, Text("shaft, PUMP.shaft or TURBINE.shaft, or body")]
-    torque: Annotated[Schedule, Scheduled("torque", about="torque in the direction in which a pump is driven [N m]")]
+    from_: Annotated[str | None, Text("body that takes the reaction torque; none if left out"), Field(alias="from")] = (
+        None
+    )
+    to: Annotated[str, Text("shaft (PUMP.shaft or TURBINE.shaft) or body")]
+    torque: Annotated[
+        Schedule,
+        Scheduled("torque", about="torque on `to`, positive as that of a motor on its pump, or about axis [N m]"),
+    ]
     axis: Annotated[
         tuple[float, ...] | None,
         Rows("number", length=3, about="axis of the torque on a body, in the axes of the body"),
@@ -50,7 +55,10 @@ class Torque(Link, kind="torque"):
             if given is not None:
                 yield (key,), f"is a key for bodies, but {self.to} is a shaft; remove it"
         if turned.inertia is None:
-            yield ("to",), f"{self.to} has no inertia, so no torque can turn it; give the {turned.kind} inertia"
+            yield (
+                ("to",),
+                f"{self.to} has no inertia, so its speed cannot follow from a torque; give the {turned.kind} inertia",
+            )
         if turned.trip is not None:
             text = "is held by its motor until it trips; remove trip, and let the torque fall to 0 at that time"
             yield ("to",), f"{self.to} {text}"

@@ -42,7 +42,10 @@ class OpeningCurve(NamedTuple):
 
 
 class HillChart(NamedTuple):
-    """Curves by ascending opening above 0; still : (n11, T11) of the braking torque with shut vanes, or None."""
+    """Curves by ascending opening above 0; still : (n11, T11) of the braking torque with shut vanes, or None.
+
+    said : the value as given in the case file
+    """
 
     curves: tuple[OpeningCurve, ...]
     still: tuple[float, float] | None
@@ -57,8 +60,8 @@ class HillChartValue(Value):
     """Curves of openings, inline or as columns of a CSV file."""
 
     about = (
-        "n11 = N D / sqrt(H) [rpm m^(1/2)], Q11 = Q / (D^2 sqrt(H)) [m^(1/2)/s] and efficiency, or T11 = T / (D^3 H) "
-        "[N/m3], of each opening"
+        "for each opening, points of n11 = N D / sqrt(H) [rpm m^(1/2)], Q11 = Q / (D^2 sqrt(H)) [m^(1/2)/s] and "
+        "efficiency, or T11 = T / (D^3 H) [N/m3]"
     )
     takes = (
         "list of `{ opening, unit_speed = [...], unit_flow = [...], efficiency or unit_torque = [...] }`, or `{ file }`"
@@ -77,26 +80,26 @@ class HillChartValue(Value):
         if not isinstance(given, (list, tuple)) or not given:
             raise ValueError(f"{show(given)} is not a list of curves; expected [{EXAMPLE}, ...] or {{ file }}")
         curves, faults = {}, []
-        for k, one in enumerate(given):
+        for k, entry in enumerate(given):
             try:
-                curves[k] = self.curve(one, setting)
+                curves[k] = self.curve(entry, setting)
             except Misfit as error:
                 faults += [((k, *below), text) for below, text in error.faults]
             except ValueError as error:
                 faults.append(((k,), str(error)))
-        found = {k: (k,) for k in curves}
-        return chart_of(curves, found, faults, [one.table() for one in curves.values()])
+        places = {k: (k,) for k in curves}
+        return chart_of(curves, places, faults, [entry.table() for entry in curves.values()])
 
     def curve(self, given: Any, setting: Setting) -> OpeningCurve:
         """Read the curve of an opening."""
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table; expected for example {EXAMPLE}")
-        found = read_keys(given, self.keys, setting)
-        words = [word for word in (EFFICIENCY, TORQUE) if found[word] is not None]
+        keys = read_keys(given, self.keys, setting)
+        words = [word for word in (EFFICIENCY, TORQUE) if keys[word] is not None]
         if len(words) != 1:
-            said = f"{EFFICIENCY} and {TORQUE} are given; keep one" if words else f"{EFFICIENCY} or {TORQUE} is missing"
-            raise Misfit([(tuple(words[1:]), said)])
-        return OpeningCurve(found["opening"], found[SPEED], found[FLOW], found[words[0]], words[0])
+            text = f"{EFFICIENCY} and {TORQUE} are given; keep one" if words else f"{EFFICIENCY} or {TORQUE} is missing"
+            raise Misfit([(tuple(words[1:]), text)])
+        return OpeningCurve(keys["opening"], keys[SPEED], keys[FLOW], keys[words[0]], words[0])
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [{"type": "array", "items": keys_json(self.keys), "minItems": 1}, {"type": "object"}]}
@@ -106,7 +109,7 @@ def from_file(given: dict[str, Any], setting: Setting) -> HillChart:
     """Chart from CSV columns opening, unit_speed, unit_flow and efficiency or unit_torque, points in order."""
     unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
-        raise Misfit(unknown or [(("file",), f"{show(given['file'])} is not a text")])
+        raise Misfit(unknown or [(("file",), f"{show(given['file'])} is not a file name in quotes")])
     try:
         path = find_file(given["file"], setting)
         columns, word = columns_of(read_rows(path))
@@ -124,46 +127,46 @@ def from_file(given: dict[str, Any], setting: Setting) -> HillChart:
             faults += [
                 (("file",), f"{path.name}, opening {opening:g}: {below[0]}: {text}") for below, text in error.faults
             ]
-    said = {"file": copy_name(path, setting)}
-    return chart_of(curves, dict.fromkeys(curves, ("file",)), faults, said, f"{path.name}, ")
+    source = {"file": copy_name(path, setting)}
+    return chart_of(curves, dict.fromkeys(curves, ("file",)), faults, source, f"{path.name}, ")
 
 
 def columns_of(rows) -> tuple[list, str]:
     """(columns opening, n11, Q11 and efficiency or T11, key of the last column) by header."""
     words = [word for word in (EFFICIENCY, TORQUE) if word in rows.names]
     if len(words) != 1:
-        said = "has both; keep one" if words else "has neither"
-        raise ValueError(f"{rows.file}: expected a column {EFFICIENCY} or {TORQUE}; the file {said}")
-    found = []
+        state = "has both; keep one" if words else "has neither"
+        raise ValueError(f"{rows.file}: expected a column {EFFICIENCY} or {TORQUE}; the file {state}")
+    columns = []
     for name in ("opening", SPEED, FLOW, words[0]):
         column = rows.column(name, 0)
         unit = split(rows.header[column])[1]
         if name in UNITS and unit not in ("", UNITS[name]):
             raise Misread(rows.file, f"column {show(rows.header[column])}: expected {name} in {UNITS[name]}")
-        found.append(rows.plain(column) if name in UNITS else rows.numbers(column, "number").tolist())
-    return found, words[0]
+        columns.append(rows.plain(column) if name in UNITS else rows.numbers(column, "number").tolist())
+    return columns, words[0]
 
 
-def chart_of(curves: dict, places: dict, faults: list, said: Any, file: str = "") -> HillChart:
-    """Chart of curves; places : keys of each curve for messages; Misfit with all faults."""
+def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = "") -> HillChart:
+    """Build a chart of curves; raise Misfit with all faults. places : keys of each curve for messages."""
     seen: dict[float, Any] = {}
-    for k, one in curves.items():
-        if one.opening in seen:
-            first = seen[one.opening] + 1
+    for k, curve in curves.items():
+        if curve.opening in seen:
+            first = seen[curve.opening] + 1
             faults.append(
                 (
                     (*places[k], "opening"),
-                    f"{one.opening:g} is already the opening of curve {first}; give one for each opening",
+                    f"{curve.opening:g} is already the opening of curve {first}; give one for each opening",
                 )
             )
-        seen.setdefault(one.opening, k)
-        keys, name = places[k], f"{file}opening {one.opening:g}: "
-        found = faults_of_still(one) if one.opening == 0.0 else faults_of_curve(one)
-        faults += [((*keys, key) if not file and key else keys, (name if file else "") + text) for key, text in found]
-    open_ones = sorted((one for one in curves.values() if one.opening > 0.0), key=lambda one: one.opening)
-    if not open_ones and not faults:
+        seen.setdefault(curve.opening, k)
+        keys, name = places[k], f"{file}opening {curve.opening:g}: "
+        texts = faults_of_still(curve) if curve.opening == 0.0 else faults_of_curve(curve)
+        faults += [((*keys, key) if not file and key else keys, (name if file else "") + text) for key, text in texts]
+    open_curves = sorted((curve for curve in curves.values() if curve.opening > 0.0), key=lambda curve: curve.opening)
+    if not open_curves and not faults:
         faults.append(((), "has no curve of an opening above 0"))
     if faults:
         raise Misfit(faults)
-    still = next(((one.speed[0], one.value[0]) for one in curves.values() if one.opening == 0.0), None)
-    return HillChart(tuple(open_ones), still, said)
+    shut_point = next(((curve.speed[0], curve.value[0]) for curve in curves.values() if curve.opening == 0.0), None)
+    return HillChart(tuple(open_curves), shut_point, source)

@@ -1,7 +1,7 @@
 """Turbine: guide vanes, speed and shaft torque.
 
-While the generator holds the speed, it follows a schedule. After load rejection, or with given torques from the start,
-J d(omega)/dt = torque of the water + given torques. Its numbers are those of a pump with a rated speed of 1.
+While the generator holds the speed, the speed follows a schedule. After load rejection, or with given torques from the
+start, J d(omega)/dt = torque of the water + given torques. Its numbers are those of a pump with a rated speed of 1.
 """
 
 from math import sqrt
@@ -57,8 +57,8 @@ def point(out, tables, device):
 @njit
 def torque_now(out, tables, device):
     """Torque of the water on the shaft [N m]."""
-    opening, omega, q, dense = point(out, tables, device)
-    return dense * chart_torque(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
+    opening, omega, q, density_ratio = point(out, tables, device)
+    return density_ratio * chart_torque(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
 
 
 @njit
@@ -81,21 +81,21 @@ def move(t, y, dydt, out, tables, device):
     out[RATE] = max(out[RATE], shaft_rate(out, tables, device))
     if dydt.size == 0:
         return
-    push = torque_now(out, tables, device)
+    torque = torque_now(out, tables, device)
     if floats[at + MODE] == TURNED:
-        push = floats[at + OFFSET] + (push + floats[at + TORQUE]) + given_torque(t, tables, device, True)
-    dydt[device["y"]] = push / floats[at + INERTIA]
+        torque = floats[at + OFFSET] + (torque + floats[at + TORQUE]) + given_torque(t, tables, device, True)
+    dydt[device["y"]] = torque / floats[at + INERTIA]
 
 
 @njit
 def shaft_rate(out, tables, device):
     """Rate at which the water brakes a free shaft [1/s]."""
     floats = tables.floats
-    opening, omega, q, dense = point(out, tables, device)
+    opening, omega, q, density_ratio = point(out, tables, device)
     if opening <= 0.0:
         return 0.0
-    steep = chart_at(floats, tables.valves[device["valve"]]["data"], opening, omega, q)[4]
-    return dense * abs(steep) / floats[device["data"] + INERTIA]
+    torque_slope = chart_at(floats, tables.valves[device["valve"]]["data"], opening, omega, q)[4]
+    return density_ratio * abs(torque_slope) / floats[device["data"] + INERTIA]
 
 
 @njit
@@ -130,7 +130,7 @@ def value(t, y, out, tables, device, quantity):
 
 @njit
 def outside(out, tables, device):
-    """PASSING if it works at an angle outside its chart, else 0."""
+    """PASSING if the operating angle is outside the chart, else 0."""
     opening, omega, q, _ = point(out, tables, device)
     beyond = is_outside(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
     return PASSING if beyond else 0

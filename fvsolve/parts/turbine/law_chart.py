@@ -1,9 +1,10 @@
 """Hill charts of turbines at any speed, flow and opening.
 
-With n = omega / speed, u = flow / capacity: root = S(n, u), H = S |S| [m], straight lines of n and u between rays, so
-that at 1 m a curve is straight lines between its points; torque = H T, T straight along these lines at 1 m. Between
-openings S and T of a ray, and the capacity, are straight in the opening. Below the least the curve in n and u stays and
-its capacity goes to 0 with the opening, and so does the torque, to that of a runner behind shut vanes.
+n = omega / speed, u = flow / capacity. The root of head S(n, u) gives the head H = S |S| [m]. Between two rays S is
+linear in n and u, so that at a head of 1 m a curve is a straight line between its points. The torque is H T, with T
+linear along this line. Between two openings, S and T on a ray and the capacity are linear in the opening. Below the
+least opening the curve in n and u stays the same and its capacity is proportional to the opening; the torque tends to
+the torque behind shut vanes.
 """
 
 from math import atan2, copysign, pi, sqrt
@@ -11,38 +12,38 @@ from math import atan2, copysign, pi, sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.valves import LEAST
 
-LEAST_ROOT = 0.1  # of what weighs a ray's torque; greater wherever a chart gives points
-NEAR = 1e-9  # change of flow, relative, over which a chord is a tangent
+LEAST_ROOT = 0.1  # least root in the weight of the torque of a ray; given points have greater roots
+NEAR = 1e-9  # relative change of flow below which the tangent replaces the chord
 
-# Numbers of a chart: how many curves and rays, speed [rad/s] and flow [m3/s] at 1 m, torque behind shut vanes over
-# omega |omega| [N m s2]; then of each curve opening, capacity, least and greatest angle given; of each ray angle, its
-# cosine and sine; of each curve and ray the root, then T [N].
+# Numbers of a chart: counts of curves and rays, speed [rad/s] and flow [m3/s] at 1 m, torque behind shut vanes over
+# omega |omega| [N m s2]; then arrays: openings, capacities, least and greatest given angles of all curves; angles of
+# all rays, their cosines and sines; roots, then T [N], of each curve on all rays.
 CURVES, RAYS, SPEED, FLOW, STILL, OWN = 0, 1, 2, 3, 4, 5
 
 
 @njit
-def shared(one, two, root_one, root_two, torque_one, torque_two):
-    """T at shares of two rays, straight along the line between their points at 1 m."""
-    first, second = one * max(root_one, LEAST_ROOT), two * max(root_two, LEAST_ROOT)
-    return (first * torque_one + second * torque_two) / (first + second)
+def shared(share_1, share_2, root_1, root_2, torque_1, torque_2):
+    """T at the sum of shares of two ray directions, linear along the line between their points at 1 m."""
+    weight_1, weight_2 = share_1 * max(root_1, LEAST_ROOT), share_2 * max(root_2, LEAST_ROOT)
+    return (weight_1 * torque_1 + weight_2 * torque_2) / (weight_1 + weight_2)
 
 
 @njit
 def between(floats, at, opening):
-    """(curve at or below an opening, share of the next, share of the curve itself: below 1 under the least)."""
-    many = int(floats[at + CURVES])
+    """(curve at or below an opening, share of the next curve, opening over the least opening or 1 if it is above)."""
+    count = int(floats[at + CURVES])
     if opening <= floats[at + OWN]:
         return 0, 0.0, opening / floats[at + OWN]
-    for k in range(1, many):
+    for k in range(1, count):
         low, high = floats[at + OWN + k - 1], floats[at + OWN + k]
         if opening <= high:
             return k - 1, (opening - low) / (high - low), 1.0
-    return many - 1, 0.0, 1.0
+    return count - 1, 0.0, 1.0
 
 
 @njit
 def mixed(floats, first, stride, k, share):
-    """What stands at `first`, of curve k and, by its share, of the next."""
+    """Value of curve k at `first + k stride`, interpolated to the next curve by `share`."""
     value = floats[first + k * stride]
     if share > 0.0:
         value += share * (floats[first + (k + 1) * stride] - value)
@@ -51,15 +52,15 @@ def mixed(floats, first, stride, k, share):
 
 @njit
 def capacity(floats, at, opening):
-    """Flow of u = 1 at a head of 1 m, over `flow`."""
+    """Flow at u = 1 and a head of 1 m, over the `flow` of the chart."""
     k, share, least = between(floats, at, opening)
     return least * mixed(floats, at + OWN + int(floats[at + CURVES]), 1, k, share)
 
 
 @njit
-def ray_below(floats, first, many, angle):
-    """Index of the last of ascending angles at or below `angle`."""
-    low, high = 0, many - 1
+def ray_below(floats, first, count, angle):
+    """Index of the last of `count` ascending angles at or below `angle`."""
+    low, high = 0, count - 1
     while high - low > 1:
         middle = (low + high) // 2
         if floats[first + middle] <= angle:
@@ -81,30 +82,30 @@ def chart_at(floats, at, opening, omega, flow):
     """(root of head, its slopes over omega and flow, torque [N m], its slope over omega) at an opening above 0."""
     curves, rays = int(floats[at + CURVES]), int(floats[at + RAYS])
     k, share, least = between(floats, at, opening)
-    wide = floats[at + FLOW] * least * mixed(floats, at + OWN + curves, 1, k, share)
-    n, u = omega / floats[at + SPEED], flow / wide
+    flow_scale = floats[at + FLOW] * least * mixed(floats, at + OWN + curves, 1, k, share)
+    n, u = omega / floats[at + SPEED], flow / flow_scale
     first = at + OWN + 4 * curves
     i = ray_below(floats, first, rays, turned(n, u))
     a, b, c, d = floats[first + rays + i], floats[first + 2 * rays + i], 0.0, 0.0
     c, d = floats[first + rays + i + 1], floats[first + 2 * rays + i + 1]
     turn = a * d - b * c
-    one, two = (n * d - u * c) / turn, (a * u - b * n) / turn
+    share_1, share_2 = (n * d - u * c) / turn, (a * u - b * n) / turn
     roots = first + 3 * rays + i
     torques = roots + curves * rays
-    root_one, root_two = mixed(floats, roots, rays, k, share), mixed(floats, roots + 1, rays, k, share)
-    t_one, t_two = mixed(floats, torques, rays, k, share), mixed(floats, torques + 1, rays, k, share)
-    root = one * root_one + two * root_two
-    by_n, by_u = (root_one * d - root_two * b) / turn, (root_two * a - root_one * c) / turn
-    torque, steep = 0.0, 0.0
+    root_1, root_2 = mixed(floats, roots, rays, k, share), mixed(floats, roots + 1, rays, k, share)
+    t_1, t_2 = mixed(floats, torques, rays, k, share), mixed(floats, torques + 1, rays, k, share)
+    root = share_1 * root_1 + share_2 * root_2
+    by_n, by_u = (root_1 * d - root_2 * b) / turn, (root_2 * a - root_1 * c) / turn
+    torque, torque_slope = 0.0, 0.0
     if root > 0.0:
-        t = shared(one, two, root_one, root_two, t_one, t_two)
-        first, second = max(root_one, LEAST_ROOT), max(root_two, LEAST_ROOT)
-        bends = (first * d * (t_one - t) - second * b * (t_two - t)) / (turn * (first * one + second * two))
-        torque, steep = root * root * t, 2.0 * root * by_n * t + root * root * bends
-    speed, still = floats[at + SPEED], floats[at + STILL]
-    torque = least * torque + (1.0 - least) * still * abs(omega) * omega
-    steep = least * steep / speed + 2.0 * (1.0 - least) * still * abs(omega)
-    return root, by_n / speed, by_u / wide, torque, steep
+        t = shared(share_1, share_2, root_1, root_2, t_1, t_2)
+        first, weight_2 = max(root_1, LEAST_ROOT), max(root_2, LEAST_ROOT)
+        t_slope = (first * d * (t_1 - t) - weight_2 * b * (t_2 - t)) / (turn * (first * share_1 + weight_2 * share_2))
+        torque, torque_slope = root * root * t, 2.0 * root * by_n * t + root * root * t_slope
+    speed, shut_torque = floats[at + SPEED], floats[at + STILL]
+    torque = least * torque + (1.0 - least) * shut_torque * abs(omega) * omega
+    torque_slope = least * torque_slope / speed + 2.0 * (1.0 - least) * shut_torque * abs(omega)
+    return root, by_n / speed, by_u / flow_scale, torque, torque_slope
 
 
 @njit
@@ -124,42 +125,42 @@ def chart_head(floats, at, opening, omega, flow):
 
 @njit
 def is_outside(floats, at, opening, omega, flow):
-    """True if it works at an angle outside the chart."""
+    """True if the operating angle is outside the given points of the chart."""
     curves = int(floats[at + CURVES])
     if opening <= 0.0:
         return False
     k, share, _ = between(floats, at, opening)
-    wide = floats[at + FLOW] * capacity(floats, at, opening)
-    angle, own = turned(omega / floats[at + SPEED], flow / wide), at + OWN + 2 * curves
+    flow_scale = floats[at + FLOW] * capacity(floats, at, opening)
+    angle, own = turned(omega / floats[at + SPEED], flow / flow_scale), at + OWN + 2 * curves
     return not mixed(floats, own, 1, k, share) <= angle <= mixed(floats, own + curves, 1, k, share)
 
 
 @njit
 def greatest(floats, at, opening, weight, drop):
-    """A flow beyond those at a drop and a common speed [m3/s]."""
+    """Flow above all flows at a pressure drop and a usual speed [m3/s]."""
     return floats[at + FLOW] * capacity(floats, at, opening) * (1.0 + sqrt(abs(drop) / weight))
 
 
 @njit
 def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
-    """The flow [m3/s] at which weight H + stiff (flow - start) = drop [Pa], by safeguarded Newton from `flow`.
+    """Flow [m3/s] at which weight H + stiff (flow - start) = drop [Pa], by safeguarded Newton steps from `flow`.
 
-    weight : rho g [N/m3]; stiff : what pressures beside it fall by as it takes more [Pa s/m3]
+    weight : rho g [N/m3]; stiff : decrease of the drop per flow, by the adjacent pipes [Pa s/m3]
     """
     low, high, scale = -1e300, 1e300, greatest(floats, at, opening, weight, drop)
     for _ in range(200):
         head, slope = chart_head(floats, at, opening, omega, flow)
-        left = weight * head + stiff * (flow - start) - drop
-        if abs(left) <= 4e-16 * (weight * abs(head) + abs(drop)):
+        residual = weight * head + stiff * (flow - start) - drop
+        if abs(residual) <= 4e-16 * (weight * abs(head) + abs(drop)):
             return flow
-        if left > 0.0:
+        if residual > 0.0:
             high = flow
         else:
             low = flow
-        steep, reach = weight * slope + stiff, abs(flow) + scale
-        step = -copysign(reach, left)
-        if steep > 0.0:
-            step = max(-reach, min(reach, -left / steep))
+        total_slope, reach = weight * slope + stiff, abs(flow) + scale
+        step = -copysign(reach, residual)
+        if total_slope > 0.0:
+            step = max(-reach, min(reach, -residual / total_slope))
         new = flow + step
         if min(abs(step), high - low) <= 2e-16 * (abs(flow) + 1e-6 * scale):
             return new
@@ -171,11 +172,11 @@ def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
 
 @njit
 def chart_step(floats, at, opening, omega, rho, weight, stiff, g, m, drop, first):
-    """a, s with dM = a + s d(drop) for the next Newton step of a turbine that carries m [kg/s] at a drop [Pa].
+    """a, s with dM = a + s d(drop) for the next Newton step of a turbine with mass flow m [kg/s] at a drop [Pa].
 
-    The chord of its curve between the flow now and the flow at which it and what lies beside it agree stands for its
-    slope; where the curve falls as the flow rises, so may the chord.
-    g : its conductance, of which one is no flatter; first : flow from which that other is looked for [m3/s]
+    The slope is that of the chord between the present flow and the flow at which turbine and adjacent pipes agree. It
+    is negative where the head falls with rising flow.
+    g : conductance, which sets the least slope; first : start of the search for the flow of agreement [m3/s]
     """
     q = m / rho
     head, slope = chart_head(floats, at, opening, omega, q)

@@ -1,4 +1,4 @@
-"""Turbines in the tables of a scene, and how they start. Knows one turbine at a time; computes no chart."""
+"""Turbines in the tables of a model, and their steady state at the start."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from fvsolve.parts.turbine import law_chart as charts
 from fvsolve.parts.turbine.lower_chart import chart_numbers
 from fvsolve.steady import Edge
 
-SMALL = 1e-6  # share of a pressure that is none
+SMALL = 1e-6  # pressure difference regarded as zero, over the pressure drops
 
 
 class TurbineRows(Turning, Device, kind="turbine"):
-    """A restriction that follows its hill chart; its flow at the start is that at which pressures and chart agree."""
+    """A restriction that follows its hill chart; its initial flow satisfies the chart at the node pressures."""
 
     law = law
     quantities = ("head", "speed", "torque", "power", "opening")
     small = 1.0  # rad/s
 
     def inputs(self, model, name, part):
-        found = opening(model, name)
-        return found | {"speed": Input(TURNING, int(self.row_of(model, name)["schedule"]))}
+        opening_input = opening(model, name)
+        return opening_input | {"speed": Input(TURNING, int(self.row_of(model, name)["schedule"]))}
 
     def restriction(self, draft, name, link, row) -> None:
         density = draft.fluid.density
@@ -40,8 +40,8 @@ class TurbineRows(Turning, Device, kind="turbine"):
         row["conductance"] = density * draft.floats[row["data"] + charts.FLOW] ** 2 / draft.case.gravity
 
     def numbers(self, draft, name, part) -> list[float]:
-        found = self.turning(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
-        return numbers_of(found, self.given(draft, name), [])
+        by_index = self.turning(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
+        return numbers_of(by_index, self.given(draft, name), [])
 
     def squares(self, model, part, row, y, out) -> list[dict[int, float]]:
         return [{int(row["y"]): math.sqrt(0.5 * part.inertia)}] if row["y"] >= 0 else []
@@ -51,9 +51,9 @@ class TurbineRows(Turning, Device, kind="turbine"):
         return 0.5 * part.inertia * speed**2 if row["y"] >= 0 else 0.0
 
     def passing(self, model, name, part, time) -> Notice:
-        when = model.case.amount(time, "time", 6)
-        text = (f"{name}: it leaves its hill chart at {when}; outside of it straight lines go on to its "
-                "flow at rest and its speed without flow; more points would tell")  # fmt: skip
+        moment = model.case.amount(time, "time", 6)
+        text = (f"{name}: it leaves its hill chart at {moment}; beyond the chart its curves are straight lines to the "
+                "flow at rest and to the speed without flow; give more points there")  # fmt: skip
         return Notice("range", f"links.{name}", text, "hill_chart")
 
     def edge(self, start, k: int):
@@ -72,7 +72,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
 
         def newton(flow, present):
             present = float(present * ratio)
-            first = charts.greatest(floats, at, vanes, weight, present)  # of several flows the greatest
+            first = charts.greatest(floats, at, vanes, weight, present)  # finds the greatest of several flows
             a, s = charts.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present, first)
             return 1.0 / s, ratio, a / s
 
@@ -92,7 +92,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
             drop = rho * start.case.gravity * charts.chart_head(*at, float(valve["flow"]) / rho)[0]
             ratio = rho / draft.fluid.density
             if abs(drop - valve["drop"] * ratio) > SMALL * (abs(drop) + abs(valve["drop"])) + 1e-3:
-                moving.append(f"turbine {name}: its flow is not that of its hill chart")
+                moving.append(f"turbine {name}: its flow at the start is not on its hill chart")
                 valve["open"] = 0.0
             elif draft.case.law.linear:
                 valve["drop"] = drop
@@ -102,18 +102,20 @@ class TurbineRows(Turning, Device, kind="turbine"):
     def asked(self, start, row, valve) -> float:
         rho = start.density_at(int(valve["from_node"]))
         vanes, omega = float(start.given(valve["schedule"])), float(valve["drive"])
-        floats, dense = start.draft.tables.floats, rho / start.draft.fluid.density
-        return -dense * charts.chart_torque(floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho)
+        floats, density_ratio = start.draft.tables.floats, rho / start.draft.fluid.density
+        return -density_ratio * charts.chart_torque(
+            floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho
+        )
 
 
 def torn(start, name: str, part, valve) -> list[Notice]:
-    """Notice about a turbine with folded curves between two given pressures."""
+    """Notice about a turbine with folded curves between two nodes that are not junctions."""
     ends = (start.nodes["kind"][int(valve[key])] for key in ("from_node", "to_node"))
     if rec.JUNCTION in ends or not any(map(folds, part.hill_chart.curves)):
         return []
-    ways = f"between {part.from_} and {part.to} nothing holds its flow"
-    text = (f"{name}: its hill chart folds, and {ways}: it takes one of several and may jump to and fro; a pipe or "
-            "rigid-column that leads to it would hold it")  # fmt: skip
+    cause = f"{part.from_} and {part.to} both set their own pressures"
+    text = (f"{name}: its hill chart is folded, with several flows at one head, and {cause}: the flow may jump "
+            "between them; connect the turbine through a pipe or rigid-column")  # fmt: skip
     return [Notice("range", f"links.{name}", text, "hill_chart")]
 
 
@@ -123,15 +125,15 @@ def heavy(start, name: str, part, valve) -> list[Notice]:
     if part.inertia is None or speed == 0.0 or start.weight == 0.0:
         return []
     high, low = start.nodes["pressure"][ends] / start.weight + start.nodes["elevation"][ends]
-    unit = max(n * torque for one in part.hill_chart.curves
-               for n, torque in zip(one.speed, one.torques(start.weight), strict=True))  # fmt: skip
+    unit = max(n * torque for curve in part.hill_chart.curves
+               for n, torque in zip(curve.speed, curve.torques(start.weight), strict=True))  # fmt: skip
     power = math.pi / 30.0 * unit * part.diameter**2 * max(high - low, 0.0) ** 1.5
     return odd_inertia(start.case, name, part.inertia, power, speed) if power > 0.0 else []
 
 
-def folds(one) -> bool:
-    """True if n11 of a forward runner rises with the angle somewhere on a curve."""
-    points = list(zip(one.speed, one.flow, strict=True))
+def folds(curve) -> bool:
+    """True if unit speed in forward rotation rises with the angle somewhere on a curve."""
+    points = list(zip(curve.speed, curve.flow, strict=True))
     rising = points[0][0] * points[1][1] > points[0][1] * points[1][0]
     ahead = points if rising else points[::-1]
     return any(n < m for (n, _), (m, _) in pairwise(ahead) if n > 0.0 and m > 0.0)

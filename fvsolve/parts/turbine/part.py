@@ -42,7 +42,10 @@ class Turbine(TwoPort, kind="turbine"):
     inertia: Annotated[
         float | None,
         Quantity(
-            "inertia", positive, "inertia of runner, its water and generator [kg m2]; needed with trip", changes=VALUE
+            "inertia",
+            positive,
+            "inertia of runner, the water in it and generator [kg m2]; required with trip",
+            changes=VALUE,
         ),
     ] = None
     trip: Annotated[
@@ -71,11 +74,11 @@ def overdrawn(curve: OpeningCurve, weight: float) -> str | None:
     for n, q, t in points:
         if t * n > weight * q + ROUNDING * weight * abs(q):
             most = t * n / (weight * q) if q > 0.0 else 0.0
-            excess = f"an efficiency of {most:.4g}" if q > 0.0 else "less power than the pumped water takes up"
+            excess = f"an efficiency of {most:.4g}" if q > 0.0 else "less shaft power than the pumped water takes up"
             return f"torque at ({n:g}, {q:g}) means {excess}; expected {'at most 1' if q > 0.0 else 'more'}"
     for (n, q, t), (m, r, s) in pairwise(points):
         # power lost on the line, fractions a + b = 1: a^2 (w q - t n) + a b (w (q + r) - t m - s n) + b^2 (w r - s m)
         ends, both = (weight * q - t * n, weight * r - s * m), weight * (q + r) - t * m - s * n
         if both < 0.0 and both * both > 4.0 * ends[0] * ends[1] * (1.0 + ROUNDING):
-            return f"between ({n:g}, {q:g}) and ({m:g}, {r:g}) the efficiency would pass 1; give more points there"
+            return f"between ({n:g}, {q:g}) and ({m:g}, {r:g}) the efficiency would exceed 1; give more points there"
     return None

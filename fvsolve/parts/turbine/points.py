@@ -1,4 +1,4 @@
-"""Faults of the points of a hill chart, one opening at a time."""
+"""Faults of the points of a hill chart, for each opening."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ NEAR = 1e-6  # angle between points regarded as zero [rad]
 SPEED, FLOW, EFFICIENCY, TORQUE = "unit_speed", "unit_flow", "efficiency", "unit_torque"
 
 
-def faults_of_still(one) -> list[tuple[str, str]]:
+def faults_of_still(curve) -> list[tuple[str, str]]:
     """Faults of the curve of opening 0, shut vanes."""
-    if not len(one.speed) == len(one.flow) == len(one.value) == 1 or one.word != TORQUE:
+    if not len(curve.speed) == len(curve.flow) == len(curve.value) == 1 or curve.word != TORQUE:
         return [("", f"vanes at opening 0 are shut; expected no curve, or a single point with a {TORQUE}")]
-    faults = [(FLOW, f"{one.flow[0]:g} is a flow through shut vanes; expected 0")] * (one.flow[0] != 0.0)
-    if not one.speed[0] >= LEAST:
-        faults.append((SPEED, f"{one.speed[0]:g} is out of range; expected a value of at least {LEAST:g}"))
-    if one.value[0] > 0.0:
-        faults.append((TORQUE, f"{one.value[0]:g} drives the runner behind shut vanes; expected 0 or less"))
+    faults = [(FLOW, f"{curve.flow[0]:g} is a flow through shut vanes; expected 0")] * (curve.flow[0] != 0.0)
+    if not curve.speed[0] >= LEAST:
+        faults.append((SPEED, f"{curve.speed[0]:g} is out of range; expected a value of at least {LEAST:g}"))
+    if curve.value[0] > 0.0:
+        faults.append((TORQUE, f"{curve.value[0]:g} drives the runner behind shut vanes; expected 0 or less"))
     return faults
 
 
-def faults_of_curve(one) -> list[tuple[str, str]]:
+def faults_of_curve(curve) -> list[tuple[str, str]]:
     """Faults of the points of an opening above 0."""
-    if not len(one.speed) == len(one.flow) == len(one.value):
-        counts = f"{len(one.speed)} of {SPEED}, {len(one.flow)} of {FLOW}, {len(one.value)} of {one.word}"
+    if not len(curve.speed) == len(curve.flow) == len(curve.value):
+        counts = f"{len(curve.speed)} of {SPEED}, {len(curve.flow)} of {FLOW}, {len(curve.value)} of {curve.word}"
         return [("", f"{counts}; expected equal numbers")]
-    if len(one.speed) < 2:
+    if len(curve.speed) < 2:
         return [("", "has one point; expected at least two")]
-    points, faults = list(zip(one.speed, one.flow, strict=True)), []
-    if one.opening < LEAST:
-        faults.append(("opening", f"{one.opening:g} is almost shut; expected at least {LEAST:g}, or 0"))
-    if one.word == EFFICIENCY and not all(n > 0.0 and q > 0.0 for n, q in points):
+    points, faults = list(zip(curve.speed, curve.flow, strict=True)), []
+    if curve.opening < LEAST:
+        faults.append(("opening", f"{curve.opening:g} is almost shut; expected at least {LEAST:g}, or 0"))
+    if curve.word == EFFICIENCY and not all(n > 0.0 and q > 0.0 for n, q in points):
         k = next(k for k, (n, q) in enumerate(points) if not (n > 0.0 and q > 0.0))
         faults.append(
             (EFFICIENCY, f"gives no torque at point {k + 1}, {at(points[k])}; expected {TORQUE} for such points")
@@ -50,8 +50,8 @@ def turns(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
     for k, ((n, q), (m, r)) in enumerate(pairwise(points)):
         across = n * r - q * m
         if abs(across) <= NEAR * math.hypot(n, q) * math.hypot(m, r):
-            return [("", f"points {k + 1} and {k + 2}, {at((n, q))} and {at((m, r))}, are at one angle, atan2({FLOW}, "
-                         f"{SPEED}), where a curve has one point; or a curve has no head there")]  # fmt: skip
+            return [("", f"points {k + 1} and {k + 2}, {at((n, q))} and {at((m, r))}, are in line with the origin; "
+                         f"expected different angles, atan2({FLOW}, {SPEED})")]  # fmt: skip
         if across * way < 0.0:
             rule = f"its angle, atan2({FLOW}, {SPEED}), must rise or fall throughout: give the points in their order"
             return [("", f"turns back at point {k + 1}, {at((n, q))}; a curve may fold in {SPEED}, but {rule}")]

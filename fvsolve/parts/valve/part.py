@@ -103,10 +103,13 @@ class Sized(Table):
 
     discharge_coefficient: Annotated[
         float | None,
-        Number(between(0, 1, open=True), f"Cd, with area or diameter; {DISCHARGE_COEFFICIENT} if left out"),
+        Number(
+            between(0, 1, open=True),
+            f"discharge coefficient Cd, with area or diameter; {DISCHARGE_COEFFICIENT} if left out",
+        ),
     ] = None
     loss_coefficient: Annotated[
-        float | None, Number(positive, "loss coefficient K, on the velocity in area or diameter")
+        float | None, Number(positive, "loss coefficient K, referred to the velocity in area or diameter")
     ] = None
     Kv: Annotated[
         float | None, Number(positive, "flow coefficient Kv, m3/h of water of 1000 kg/m3 at 1 bar", COEFFICIENTS)
