@@ -217,7 +217,7 @@ def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):
 def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkeypatch):
     with pytest.raises(fvsolve.RunError, match="nowhere does not exist; wanted a run directory"):
         write_report(tmp_path / "nowhere")
-    with pytest.raises(fvsolve.RunError, match="holds no ended run"):
+    with pytest.raises(fvsolve.RunError, match="does not hold a finished run"):
         write_report(tmp_path)
     (tmp_path / "restart.npz").touch()
     with pytest.raises(fvsolve.RunError, match="holds an unfinished run: go on with it, .* --resume"):
