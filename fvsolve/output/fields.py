@@ -69,7 +69,7 @@ class FieldSeries:
         entries = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:n]
         matches = [FILE.search(line) for line in entries]
         if len(entries) < n or not all(match and (self.folder / match[1]).is_file() for match in matches):
-            raise RunError(f"{index}: frames before the checkpoint are missing; start the run again with --force")
+            raise RunError(f"{index}: frames are missing; start the run again with --force")
         (self.folder / "fields").mkdir(exist_ok=True)
         for path in (self.folder / "fields").glob("*.*vtu"):
             number = path.stem.rpartition("-")[2]

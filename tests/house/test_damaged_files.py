@@ -181,7 +181,7 @@ def test_fields_that_are_gone_are_named_and_foreign_files_left_alone(stopped, tm
     shutil.rmtree(out)
     case, out = copied(stopped, tmp_path)
     shutil.rmtree(out / "fields")
-    with pytest.raises(RunError, match=r"fields\.pvd: frames before the checkpoint are missing; start the run again with --force"):
+    with pytest.raises(RunError, match=r"fields\.pvd: frames are missing; start the run again with --force"):
         fvsolve.run(case, out=out, resume=True)
     assert fvsolve.run(case, {"numerics.end": 0.01, "output.fields": 1}, out, force=True).ok
 
