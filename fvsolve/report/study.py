@@ -38,7 +38,7 @@ def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) ->
         "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
         "words": words(study, runs), "matrix": [matrix(runs)], "events": events,
         "failing": failing(runs), "changes": changed(study), "first": name_of(runs[0][0]),
-        "model": [one for one in described.model(first) if one],
+        "model": [table for table in described.model(first) if table],
         "told": told(runs), "versions": numerics.versions(first),
     }  # fmt: skip
     return rendered("study", filled, figures)
