@@ -51,7 +51,7 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
 
 
 def positions(scene: DrawnScene, aspect: Aspect, axes, apart: float) -> dict[str, np.ndarray]:
-    """Positions of symbols [pixels]; parts not fixed by a pipe are moved until links have the length `apart`."""
+    """Positions of symbols [pixels]; parts not fixed by a pipe are moved if a link to them is shorter than `apart`."""
     nodes = [part for part in scene.parts if not part.link]
     seen = axes.transData.transform(aspect.on_sheet(scene.shown([item.at for item in scene.parts])))
     at = {part.key: place for part, place in zip(scene.parts, seen, strict=True)}
