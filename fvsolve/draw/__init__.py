@@ -1,1 +1,1 @@
-"""Pictures of runs. The only room that imports matplotlib and PyVista; knows numbers, knows no solver."""
+"""Pictures of runs; the only package that imports matplotlib and PyVista."""

@@ -1,4 +1,4 @@
-"""How a scene in space is seen on a sheet, and its axes there. Knows points and matplotlib; knows no part."""
+"""Projection of points in space to the picture plane, and axes of the projected scene."""
 
 from __future__ import annotations
 
@@ -8,20 +8,21 @@ import numpy as np
 
 from fvsolve.draw import style
 
-ASLANT = (0.6, -1.0, 0.75)  # from where one looks at water, x to the right and y away
-STEEP = (0.35, -1.0, 1.1)  # at a network
-STEEPER = (0.2, -1.0, 2.0)  # at a large one
-HIGH = 0.4  # heights of a network are drawn as this part of its width
-STRAIGHT = 1e-6  # of its length: a network that is no wider is followed in profile
-BETWEEN = 40.0  # ticks at least [points]
-TICK, LABEL, TITLE = 5.0, 9.0, 42.0  # from an edge outwards [points]
-LIKELY = (0.3, 1.02)  # drawn length of pipes over their length where a plan has their scale
+ASLANT = (0.6, -1.0, 0.75)  # direction from the scene to the observer for basins; x to the right, y away
+STEEP = (0.35, -1.0, 1.1)  # direction to the observer for networks
+STEEPER = (0.2, -1.0, 2.0)  # direction to the observer for large networks
+HIGH = 0.4  # drawn height of a network as a fraction of its width
+STRAIGHT = 1e-6  # width over length up to which a network counts as straight and is drawn in profile
+BETWEEN = 40.0  # least distance of ticks [points]
+TICK, LABEL, TITLE = 5.0, 9.0, 42.0  # distances from an edge: end of ticks, tick labels, axis name [points]
+LIKELY = (0.3, 1.02)  # range of drawn length / length of pipes for a plan that is to scale
 
 
 class Aspect:
-    """From points float64[n, 3] to a sheet float64[n, 2]: a plan, a profile, or aslant with heights drawn `rise` times.
+    """Parallel projection of points float64[n, 3] to the picture plane float64[n, 2].
 
-    right, up, back : float64[3], of the sheet and towards who looks; begin : where a profile counts from
+    kind : "plan", "profile" or "aslant" (oblique view); rise : factor on heights
+    right, up, back : float64[3], axes of the picture and direction to the observer; begin : origin of a profile
     """
 
     def __init__(self, kind: str, rise: float = 1.0, along=(1.0, 0.0), seen=STEEP) -> None:
@@ -37,15 +38,15 @@ class Aspect:
         self.back = np.cross(self.right, self.up)
 
     def on_sheet(self, points) -> np.ndarray:
-        """Where points are drawn."""
+        """Picture coordinates of points : float64[n, 2]."""
         scaled = np.asarray(points, float).reshape(-1, 3) * (1.0, 1.0, self.rise)
         return np.column_stack([scaled @ self.right - self.begin, scaled @ self.up])
 
 
-def aspect_of(points: np.ndarray, many: bool = False, slant: float = 1.0) -> Aspect:
-    """How to see a network: in profile where it runs straight, as a plan where it is level, else aslant.
+def aspect_of(points: np.ndarray, large: bool = False, slant: float = 1.0) -> Aspect:
+    """Projection of a network: profile if straight in plan, plan if level, else oblique.
 
-    many : parts, to be seen more from above; slant : a height times it is as long as a length
+    large : True for many parts, seen from a steeper angle; slant : factor from units of height to units of length
     """
     spans = np.ptp(points, axis=0)
     plan = points[:, :2] - points[0, :2]
@@ -56,12 +57,12 @@ def aspect_of(points: np.ndarray, many: bool = False, slant: float = 1.0) -> Asp
     if spans[2] <= 1e-9 * max(spans):
         return Aspect("plan")
     return Aspect(
-        "aslant", slant * rounded(HIGH * max(spans[:2]) / (slant * spans[2])), seen=STEEPER if many else STEEP
+        "aslant", slant * rounded(HIGH * max(spans[:2]) / (slant * spans[2])), seen=STEEPER if large else STEEP
     )
 
 
 def rounded(value: float) -> float:
-    """1, 2 or 5 times a power of ten, the greatest up to a value."""
+    """Greatest of 1, 2 and 5 times a power of ten that does not exceed a value."""
     power = 10.0 ** math.floor(math.log10(value))
     return next(step * power for step in (5.0, 2.0, 1.0) if step * power <= value * (1.0 + 1e-9))
 
@@ -72,12 +73,12 @@ def corners(low, high) -> np.ndarray:
 
 
 def fit(axes, seen: np.ndarray, margins: tuple[float, float, float, float]) -> None:
-    """Limits that show points float64[n, 2] of the sheet with margins [points]: left, low, right, high."""
+    """Set axis limits so that points float64[n, 2] fit with equal scales; margins [points]: left, low, right, high."""
     point = axes.figure.dpi / 72.0
-    left, low, right, high = (point * one for one in margins)
+    left, low, right, high = (point * margin for margin in margins)
     least, most = seen.min(axis=0), seen.max(axis=0)
     wide, tall = axes.bbox.width - left - right, axes.bbox.height - low - high
-    scale = max((most[0] - least[0]) / wide, (most[1] - least[1]) / tall) or 1.0  # of a pixel
+    scale = max((most[0] - least[0]) / wide, (most[1] - least[1]) / tall) or 1.0  # length per pixel
     spare = 0.5 * (np.array([wide, tall]) - (most - least) / scale)
     start = least - scale * (spare + (left, low))
     axes.set_xlim(start[0], start[0] + scale * axes.bbox.width)
@@ -85,7 +86,7 @@ def fit(axes, seen: np.ndarray, margins: tuple[float, float, float, float]) -> N
 
 
 def frame(axes, aspect: Aspect, low, high, names: tuple[str, str, str]) -> list:
-    """Edges of a box seen aslant with ticks and what they count, the floor drawn lightly; its texts.
+    """Draw the axes of a box in oblique view, with ticks and names, and its floor in a light colour; returns the texts.
 
     low, high : float64[3], corners of the box; an edge without extent has no ticks
     """
@@ -106,10 +107,10 @@ def frame(axes, aspect: Aspect, low, high, names: tuple[str, str, str]) -> list:
         out = np.array([along[1], -along[0]])
         out *= 1.0 if out @ (ends.mean(axis=0) - middle) > 0.0 else -1.0
         pixels = np.linalg.norm(np.diff(axes.transData.transform(ends), axis=0))
-        many = max(1, min(6, int(pixels / (axes.figure.dpi / 72.0 * (BETWEEN if axis < 2 else 0.6 * BETWEEN)))))
+        count = max(1, min(6, int(pixels / (axes.figure.dpi / 72.0 * (BETWEEN if axis < 2 else 0.6 * BETWEEN)))))
         ticks = [
             t
-            for t in MaxNLocator(many, steps=[1, 2, 2.5, 5, 10]).tick_values(a, b)
+            for t in MaxNLocator(count, steps=[1, 2, 2.5, 5, 10]).tick_values(a, b)
             if a - 1e-9 * (b - a) <= t <= b + 1e-9 * (b - a)
         ]
         for tick in ticks:

@@ -1,8 +1,8 @@
-"""Pictures drawn by a second process, which fetches matplotlib while the first computes. Knows figures; knows no run.
+"""Pictures drawn in a second process, which imports matplotlib while the first computes.
 
     python -m fvsolve.draw.beside
 
-reads pictures from standard input, one pickle each, and answers with a pickle: why it is not there, or nothing.
+reads pictures from standard input, one pickle each, and answers each with a pickle: the error text, or "".
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PACKAGE = Path(__file__).resolve().parents[1]
 
 
 class Picture(NamedTuple):
-    """A file to be, and what draws it: a function of `fvsolve.draw.plot` that gives a Figure, its arguments by name."""
+    """Request for a picture: its path, the name of a function of `fvsolve.draw.plot`, and the arguments by name."""
 
     path: Path
     function: str
@@ -31,24 +31,24 @@ class Picture(NamedTuple):
 
 
 def draw(picture: Picture) -> str:
-    """Write a picture, whole or not at all; why it could not be drawn, "" where it could."""
-    fresh = picture.path.with_name(f"fresh-{picture.path.name}")
+    """Write a picture atomically; returns the error text, or "" on success."""
+    temporary = picture.path.with_name(f"fresh-{picture.path.name}")
     try:
         figure = getattr(import_module("fvsolve.draw.plot"), picture.function)(**picture.arguments)
-        save(figure, fresh)
-        os.replace(fresh, picture.path)
-    except Exception as error:  # whatever it is, the numbers are there
+        save(figure, temporary)
+        os.replace(temporary, picture.path)
+    except Exception as error:  # a missing picture must not fail the run, whose numbers are complete
         return f"{type(error).__name__}: {error}"
     finally:
         with contextlib.suppress(OSError):
-            fresh.unlink()
+            temporary.unlink()
     return ""
 
 
 class Painter:
-    """Draws pictures, `beside` this process in a second one that is begun at once, where that gains time.
+    """Draws pictures in a second process if `beside` and if that saves time, else in this process.
 
-    A context: it leaves no process behind, nor half a picture.
+    The second process starts at once. Context manager: on exit it ends the process; no incomplete picture is left.
     """
 
     def __init__(self, beside: bool) -> None:
@@ -56,26 +56,26 @@ class Painter:
         if not beside or "matplotlib.figure" in sys.modules or processors() < 2 or not sys.executable:
             return
         path = os.pathsep.join([str(PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
-        # A group of its own: Ctrl-C is for the run, which says what becomes of pictures.
-        apart = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x200}
-        with contextlib.suppress(OSError):  # no room for a second process
+        # A process group of its own: Ctrl-C must interrupt only the run, which then reports on pictures.
+        options = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x200}
+        with contextlib.suppress(OSError):  # the system allows no second process
             self.process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "fvsolve.draw.beside"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                env=os.environ | {"PYTHONPATH": path}, **apart,
+                env=os.environ | {"PYTHONPATH": path}, **options,
             )  # fmt: skip
 
     def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
-        """Write pictures; of those that could not be drawn, why."""
+        """Write pictures; returns path -> error text for those that could not be drawn."""
         pictures = list(pictures)
         try:
-            found = {one.path: self._drawn(one) for one in pictures}
+            faults = {picture.path: self._drawn(picture) for picture in pictures}
         except BaseException:
             self.end()
-            for one in pictures:
+            for picture in pictures:
                 with contextlib.suppress(OSError):
-                    one.path.with_name(f"fresh-{one.path.name}").unlink()
+                    picture.path.with_name(f"fresh-{picture.path.name}").unlink()
             raise
-        return {path: why for path, why in found.items() if why}
+        return {path: fault for path, fault in faults.items() if fault}
 
     def _drawn(self, picture: Picture) -> str:
         if self.process is None:
@@ -89,11 +89,11 @@ class Painter:
             return draw(picture)
 
     def end(self) -> None:
-        """Leave no process behind."""
+        """End the second process, if any."""
         if self.process is not None:
             self.process.kill()
             self.process.wait()
-            with contextlib.suppress(OSError):  # what was not written is lost with it
+            with contextlib.suppress(OSError):  # unwritten requests are discarded
                 self.process.stdin.close()
             self.process.stdout.close()
             self.process = None
@@ -106,23 +106,23 @@ class Painter:
 
 
 def processors() -> int:
-    """How many this process may use."""
+    """Number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def serve() -> None:
-    """Draw what comes until nothing more can."""
+    """Draw requested pictures until standard input ends."""
     from fvsolve.draw import style
 
-    asked, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever a library prints is no answer
-    axes = style.figure(1.0).subplots()  # what all pictures want is fetched before the first
+    requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # output of libraries must not mix with the answers
+    axes = style.figure(1.0).subplots()  # imports what all pictures need before the first request
     axes.plot([0.0, 1.0], label="x")
     axes.legend()
     axes.figure.canvas.draw()
     while True:
         try:
-            picture = pickle.load(asked)
+            picture = pickle.load(requests)
         except EOFError:
             return
         pickle.dump(draw(picture), answers)

@@ -1,4 +1,4 @@
-"""The picture of a failure map: a coloured square per run. Knows squares and matplotlib; runs nothing."""
+"""Picture of a failure map, with a coloured square for each run."""
 
 from __future__ import annotations
 
@@ -12,87 +12,89 @@ COLOURS = {
     "stable": "#12876f", "ringing": "#e0b13c", "coarse": "#8fc4e8", "wrong": "#8a4fa3", "blown up": "#c2410c",
     "refused": "#6b7785", "not run": "#eef1f4",
 }  # fmt: skip
-DARK = ("stable", "wrong", "blown up", "refused")  # which white letters stand on
+DARK = ("stable", "wrong", "blown up", "refused")  # verdicts with dark colours, labelled in white
 
 
 @style.as_it_stands
-def failure_map_figure(found, title: str = "", head: str = ""):
-    """Methods down, steps or values across, one panel a scheme; a bar where eigenvalues predict the limit."""
-    tall = 0.30 * len(found.methods)
-    figure = style.figure(1.5 + len(found.schemes) * (tall + 0.75), width=max(7.0, 2.3 + 0.68 * len(found.values)))
-    panels = figure.subplots(len(found.schemes), 1, squeeze=False)[:, 0]
-    for axes, scheme in zip(panels, found.schemes, strict=True):
-        _panel(axes, found, scheme)
-    what = "step, and Courant number" if found.wave_rate else "step"
-    panels[-1].set_xlabel(what if found.key == "step" else head or found.key, fontsize=8.5, color=style.INK)
-    _legend(figure, found)
+def failure_map_figure(result, title: str = "", head: str = ""):
+    """Figure with a panel for each scheme: methods down, steps or values across, a bar at the predicted limit."""
+    tall = 0.30 * len(result.methods)
+    figure = style.figure(1.5 + len(result.schemes) * (tall + 0.75), width=max(7.0, 2.3 + 0.68 * len(result.values)))
+    panels = figure.subplots(len(result.schemes), 1, squeeze=False)[:, 0]
+    for axes, scheme in zip(panels, result.schemes, strict=True):
+        _panel(axes, result, scheme)
+    label = "step, and Courant number" if result.wave_rate else "step"
+    panels[-1].set_xlabel(label if result.key == "step" else head or result.key, fontsize=8.5, color=style.INK)
+    _legend(figure, result)
     style.title(figure, title)
     return figure
 
 
-def column_labels(found) -> list[str]:
-    """What stands under the columns: a step and its Courant number on two lines, or a value."""
-    if found.key != "step":
-        return [f"{value:.4g}" if isinstance(value, float) else str(value) for value in found.values]
-    if not found.wave_rate:
-        return [seconds(value) for value in found.values]
-    return [f"{seconds(value)}\nC {value * found.wave_rate:.3g}" for value in found.values]
+def column_labels(result) -> list[str]:
+    """Labels of the columns: a step with its Courant number on a second line, or a value."""
+    if result.key != "step":
+        return [f"{value:.4g}" if isinstance(value, float) else str(value) for value in result.values]
+    if not result.wave_rate:
+        return [seconds(value) for value in result.values]
+    return [f"{seconds(value)}\nC {value * result.wave_rate:.3g}" for value in result.values]
 
 
 def seconds(value: float) -> str:
-    """A time with a unit that keeps it short: 1.4 us, 3.75 ms, 2 s."""
+    """Text of a time in a suitable unit: 1.4 us, 3.75 ms, 2 s."""
     for unit, factor in (("s", 1.0), ("ms", 1e3), ("us", 1e6)):
         if value * factor >= 1.0 or unit == "us":
             return f"{value * factor:.3g} {unit}"
     return f"{value:.3g} s"
 
 
-def _panel(axes, found, scheme: str) -> None:
+def _panel(axes, result, scheme: str) -> None:
     from matplotlib.patches import Rectangle
 
-    for row, method in enumerate(found.methods):
-        squares = found.row(scheme, method)
-        for one in squares:
-            colour, hatch = COLOURS[one.verdict], "////" if one.verdict == "not run" else None
+    for row, method in enumerate(result.methods):
+        squares = result.row(scheme, method)
+        for square in squares:
+            colour, hatch = COLOURS[square.verdict], "////" if square.verdict == "not run" else None
             axes.add_patch(
-                Rectangle((one.column - 0.5, row - 0.5), 1, 1, facecolor=colour, edgecolor="white", hatch=hatch, lw=1.2)
+                Rectangle(
+                    (square.column - 0.5, row - 0.5), 1, 1, facecolor=colour, edgecolor="white", hatch=hatch, lw=1.2
+                )
             )
-            ink = "white" if one.verdict in DARK else style.INK
-            axes.text(one.column, row, _said(one), ha="center", va="center", fontsize=6.5, color=ink)
-        place = limit_place(found, squares)
+            ink = "white" if square.verdict in DARK else style.INK
+            axes.text(square.column, row, _said(square), ha="center", va="center", fontsize=6.5, color=ink)
+        place = limit_place(result, squares)
         if place is not None:
-            look = "dotted" if scheme in found.limited else "solid"
-            for start in (row - 0.5, row + 0.24):  # clear of the number
+            look = "dotted" if scheme in result.limited else "solid"
+            for start in (row - 0.5, row + 0.24):  # leaves the number free
                 axes.plot([place] * 2, [start, start + 0.26], color=style.INK, lw=2.2, linestyle=look, zorder=3)
-    axes.set_xlim(-0.55, len(found.values) - 0.45)
-    axes.set_ylim(len(found.methods) - 0.45, -0.55)
-    axes.set_xticks(range(len(found.values)), column_labels(found))
-    axes.set_yticks(range(len(found.methods)), found.methods)
+    axes.set_xlim(-0.55, len(result.values) - 0.45)
+    axes.set_ylim(len(result.methods) - 0.45, -0.55)
+    axes.set_xticks(range(len(result.values)), column_labels(result))
+    axes.set_yticks(range(len(result.methods)), result.methods)
     axes.tick_params(colors=style.MUTED, labelcolor=style.INK, labelsize=7.5, length=0)
     for side in axes.spines.values():
         side.set_visible(False)
-    if found.wave_rate:
+    if result.wave_rate:
         axes.set_title(scheme, fontsize=9, color=style.INK, loc="left", pad=4)
 
 
-def _said(one) -> str:
-    """The error as a percentage, where there is one."""
-    error = one.measures.error
-    if not math.isfinite(error) or one.verdict in ("blown up", "refused", "not run"):
+def _said(square) -> str:
+    """Error as a percentage; "" without an error."""
+    error = square.measures.error
+    if not math.isfinite(error) or square.verdict in ("blown up", "refused", "not run"):
         return ""
     return f"{100 * error:.2g} %"
 
 
-def limit_place(found, squares) -> float | None:
-    """Where the predicted limit lies across the columns of a row; None where none is predicted among them."""
-    limits = [one.limit for one in squares]
-    if None in limits or any(one.step is None for one in squares):
+def limit_place(result, squares) -> float | None:
+    """Position of the predicted limit across the columns of a row; None if it is not within them."""
+    limits = [square.limit for square in squares]
+    if None in limits or any(square.step is None for square in squares):
         return None
-    if found.key != "step":
-        safe = [one.step <= one.limit for one in squares]
+    if result.key != "step":
+        safe = [square.step <= square.limit for square in squares]
         flips = [k for k in range(1, len(safe)) if safe[k] != safe[k - 1]]
         return flips[0] - 0.5 if flips else (None if all(safe) else -0.5)
-    limit, steps = limits[0], np.array([one.step for one in squares])
+    limit, steps = limits[0], np.array([square.step for square in squares])
     if limit >= steps.max():
         return None
     if limit < steps.min():
@@ -101,25 +103,25 @@ def limit_place(found, squares) -> float | None:
     return float(np.interp(math.log(limit), np.log(steps[order]), np.arange(len(steps))[order]))
 
 
-def _legend(figure, found) -> None:
+def _legend(figure, result) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    seen = {one.verdict for one in found.squares}
+    seen = {square.verdict for square in result.squares}
     handles = [
         Patch(facecolor=colour, label=word, hatch="////" if word == "not run" else None)
         for word, colour in COLOURS.items()
         if word in seen
     ]
-    looks = {"dotted" if scheme in found.limited else "solid" for scheme in found.schemes}
-    said = {"solid": "predicted limit (13)", "dotted": "predicted, by weights in smooth flow"}
+    looks = {"dotted" if scheme in result.limited else "solid" for scheme in result.schemes}
+    labels = {"solid": "predicted limit (13)", "dotted": "predicted limit, with the weights of smooth flow"}
     handles += [
-        Line2D([], [], color=style.INK, lw=2.2, linestyle=look, label=said[look]) for look in said if look in looks
+        Line2D([], [], color=style.INK, lw=2.2, linestyle=look, label=labels[look]) for look in labels if look in looks
     ]
     figure.legend(
         handles=handles,
         loc="outside lower left",
-        ncols=5 if len(found.values) > 8 else 3,
+        ncols=5 if len(result.values) > 8 else 3,
         frameon=False,
         fontsize=8,
         labelcolor=style.INK,

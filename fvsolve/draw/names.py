@@ -1,22 +1,26 @@
-"""Names beside points of a picture, none over another. Knows boxes in pixels; draws nothing."""
+"""Placement of names next to points of a picture without overlap."""
 
 from __future__ import annotations
 
 import numpy as np
 
-AROUND = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)]  # places of a name, the best first
-COST = 0.5  # of a place of lower rank, in points of lines that it would cover
-STEP, PAD = 4.0, 3.0  # between points of lines, and about them [pixels]
+# Directions of a name from its point, best first.
+AROUND = [(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1), (1, -1), (-1, -1)]
+COST = 0.5  # cost of each lower rank of a direction, in covered points of lines
+STEP, PAD = 4.0, 3.0  # distance of points along lines, and free space around names [pixels]
 
 
 def beside(at, sizes, gaps, blocks, lines, within) -> list[tuple[float, float] | None]:
-    """Left lower corner of each name [pixels], None of one that finds no room; the first names choose first.
+    """Lower left corner of each name [pixels], None for a name without free space; the first names are placed first.
 
-    at, sizes : float64[n, 2]; gaps : float64[n], from a point to its name; blocks : boxes float64[b, 4] (left, low,
-    right, high) that no name covers; lines : float64[l, 2], points that names had better not cover; within : a box
+    at, sizes : float64[n, 2]  points, and sizes of the names
+    gaps : float64[n]          distance from a point to its name
+    blocks : float64[b, 4]     boxes (left, low, right, high) that no name may cover
+    lines : float64[l, 2]      points that names should not cover, with a cost for each
+    within : box that contains all names
     """
     taken = [np.asarray(block, float) for block in blocks]
-    found: list[tuple[float, float] | None] = []
+    places: list[tuple[float, float] | None] = []
     for (x, y), (wide, high), gap in zip(at, sizes, gaps, strict=True):
         best, least = None, np.inf
         for rank, (dx, dy) in enumerate(AROUND):
@@ -30,10 +34,10 @@ def beside(at, sizes, gaps, blocks, lines, within) -> list[tuple[float, float] |
             cost = COST * rank + (_inside(box, lines) if len(lines) else 0)
             if cost < least:
                 best, least = box, cost
-        found.append(None if best is None else (float(best[0]), float(best[1])))
+        places.append(None if best is None else (float(best[0]), float(best[1])))
         if best is not None:
             taken.append(best)
-    return found
+    return places
 
 
 def _over(a, b) -> bool:
@@ -50,7 +54,7 @@ def _inside(box, points) -> int:
 
 
 def dotted(segments: np.ndarray) -> np.ndarray:
-    """Points along lines float64[c, 2, 2], STEP apart : float64[k, 2]."""
+    """Points along lines float64[c, 2, 2] at distances of about POINT_SPACING : float64[k, 2]."""
     if not len(segments):
         return np.zeros((0, 2))
     lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)

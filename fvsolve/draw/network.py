@@ -1,4 +1,4 @@
-"""A network on a sheet: pipes in the colours of a field, symbols and names of parts, axes. Knows matplotlib."""
+"""Picture of a network: pipes in the colours of a field, symbols and names of parts, axes."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import COLOURS, HALF, SIZE, PictureSheet, span
 
 PIPE, CASE = 3.6, 4.8  # widths of a pipe and of its edge [points]
-LOW = 3.2  # height of a sheet whose network is one level line [inch]
-ASIDE, ABOVE = 0.11, 0.12  # about a profile, of its size
-BESIDE = 0.03  # about a plan with a box, of its size
-ROOM = (46.0, 24.0, 46.0, 24.0)  # about a network [points]
-FRAMED = (60.0, 40.0, 46.0, 16.0)  # about one with a box
+LOW = 3.2  # height of a picture of a network along a level line [inch]
+ASIDE, ABOVE = 0.11, 0.12  # margins of a profile at its sides and above it, as fractions of its size
+BESIDE = 0.03  # margin between a network and its box, as a fraction of its size
+ROOM = (46.0, 24.0, 46.0, 24.0)  # margins of a plan: left, low, right, high [points]
+FRAMED = (60.0, 40.0, 46.0, 16.0)  # margins of a network with a box [points]
 
 
 class Network:
-    """The sheet of a scene of pipes; `show` puts one of its frames on it."""
+    """Picture of a scene of pipes; `show` draws a frame."""
 
     def __init__(self, scene: DrawnScene, film: bool) -> None:
         self.scene, lines = scene, scene.pipes[0][1]
@@ -36,30 +36,30 @@ class Network:
         segments = self.aspect.on_sheet(points)[lines]
         self.lines = self._pipes(segments)
         self._axes()
-        self.sheet.figure.canvas.draw()  # limits stand from here on
+        self.sheet.figure.canvas.draw()  # axis limits are final from here on
         self.named, self.wanted = draw_parts(self, scene, segments)
         if len(lines):
-            values = np.concatenate([self._shown(one[2]) for one in scene.pipes])
+            values = np.concatenate([self._shown(pipes[2]) for pipes in scene.pipes])
             self.limits = span(float(values.min()), float(values.max()))
             self.lines.set_clim(self.limits)
             self.sheet.bar(self.limits, scene.quantity.label)
         self.sheet.legend(scene.parts)
 
     def _pipes(self, segments: np.ndarray):
-        """Pipes with their edges; the lines that take colours."""
+        """Draw pipes and their edges; returns the line collection that shows the field."""
         from matplotlib.collections import LineCollection
 
-        many = len(self.scene.names)
-        thin = 1.0 if many <= MANY else 0.6 if many <= CROWD else 0.3
+        count = len(self.scene.names)
+        thin = 1.0 if count <= MANY else 0.6 if count <= CROWD else 0.3
         round_ends = {"capstyle": "round"}
         edge = LineCollection(segments, colors=style.INK, linewidths=thin * CASE, zorder=2, **round_ends)
         inner = LineCollection(segments, cmap=COLOURS, linewidths=thin * PIPE, zorder=3, **round_ends)
-        for one in (edge, inner):
-            self.axes.add_collection(one)
+        for collection in (edge, inner):
+            self.axes.add_collection(collection)
         return inner
 
     def show(self, k: int) -> None:
-        """Put frame `k` on the sheet."""
+        """Draw frame `k`."""
         self.lines.set_array(self._shown(self.scene.pipes[k][2]))
         notes = [self.scene.frames[k][0], *self._notes()]
         self.sheet.caption(self.scene.title, "; ".join(notes))
@@ -68,28 +68,28 @@ class Network:
         return values * self.scene.quantity.factor + self.scene.quantity.shift
 
     def _notes(self) -> list[str]:
-        found = []
+        notes = []
         if self.aspect.kind == "aslant":
             own, times = self.scene.plan == "own scale", self.aspect.rise / self.scene.slant
-            found.append("heights on a scale of their own" if own else f"heights drawn {times:g} times")
+            notes.append("heights on a scale of their own" if own else f"heights drawn {times:g} times")
         if self.scene.plan == "laid out":
-            found.append("laid out by lengths")
+            notes.append("laid out by lengths")
         if self.scene.plan == "own scale":
-            found.append("the plan is not to scale")
+            notes.append("the plan is not to scale")
         if self.named < self.wanted:
-            found.append(f"{self.named} of {self.wanted} names")
-        return found
+            notes.append(f"{self.named} of {self.wanted} names")
+        return notes
 
     def _axes(self) -> None:
-        """Limits and axes with units."""
+        """Set limits and draw axes with units."""
         unit = "" if self.scene.plan == "own scale" else f" [{self.scene.length.unit}]"
         axes, seen, high = self.axes, self.aspect.on_sheet(self.all), self.scene.height.unit
         self.texts, self.cover, self.labels = [], np.zeros((0, 2)), []
         if self.aspect.kind == "aslant":
             axes.set_axis_off()
             box = self.all.min(axis=0), self.all.max(axis=0)
-            beside = BESIDE * np.ptp(self.all, axis=0).max() * np.array([1.0, 1.0, 0.0])
-            box = box[0] - beside, box[1] + beside
+            margin = BESIDE * np.ptp(self.all, axis=0).max() * np.array([1.0, 1.0, 0.0])
+            box = box[0] - margin, box[1] + margin
             fit(axes, self.aspect.on_sheet(np.vstack([corners(*box)[::2], corners(*box)[1:2], self.all])), FRAMED)
             self.texts = frame(axes, self.aspect, *box, (f"x{unit}", f"y{unit}", f"z [{high}]"))
             return self._posts()
@@ -100,21 +100,21 @@ class Network:
             names = f"x{unit}", f"y{unit}"
         else:
             low, most = seen.min(axis=0), seen.max(axis=0)
-            room = (ASIDE, ABOVE) * (most - low)
-            axes.set_xlim(low[0] - room[0], most[0] + room[0])
-            axes.set_ylim(low[1] - (room[1] or 1.0), most[1] + (room[1] or 1.0))
+            space = (ASIDE, ABOVE) * (most - low)
+            axes.set_xlim(low[0] - space[0], most[0] + space[0])
+            axes.set_ylim(low[1] - (space[1] or 1.0), most[1] + (space[1] or 1.0))
             along = "x" if tuple(self.aspect.right) == (1.0, 0.0, 0.0) and self.scene.plan != "laid out" else "distance"
             names = f"{along}{unit}", f"elevation [{high}]"
         axes.set_xlabel(names[0], fontsize=8.5, color=style.INK)
         axes.set_ylabel("" if self.level else names[1], fontsize=8.5, color=style.INK)
-        if self.scene.plan == "schematic":  # distances mean nothing
+        if self.scene.plan == "schematic":  # drawn distances have no meaning
             axes.set_axis_off()
         if self.level:
             axes.set_yticks([])
             axes.spines["left"].set_visible(False)
 
     def _posts(self) -> None:
-        """Thin lines from nodes down to the floor, and pipes on it: by these heights are seen."""
+        """Draw lines from nodes down to the floor and the pipes projected on it, which show the heights."""
         from matplotlib.collections import LineCollection
 
         floor, points, lines = self.all[:, 2].min(), self.scene.shown(self.scene.pipes[0][0]), self.scene.pipes[0][1]

@@ -1,4 +1,4 @@
-"""Pictures of a case, its states, a sweep: what `.plot()` shows. Knows numbers and matplotlib; runs nothing."""
+"""Figures of the method `plot()` of cases, models, states and sweeps."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from fvsolve.draw import style
 from fvsolve.draw.sweep import map_figure
 from fvsolve.units import convert
 
-NAMED = 40  # nodes up to which names are written
-PANELS = 4  # columns of a sweep that are drawn
+NAMED = 40  # greatest number of nodes, links or bars with names
+PANELS = 4  # greatest number of columns of a sweep that are drawn
 
 
 @style.as_it_stands
 def case_figure(case):
-    """Nodes and links of a case: at their positions where all have one, else in columns by distance from the first."""
+    """Figure of nodes and links of a case, at their positions, or in columns by distance from the first node."""
     at = places(case)
     figure = style.figure(4.5)
     axes = figure.subplots()
     axes.set_axis_off()
     for name, link in case.links.items():
         ends = [at[place] for place in link_places(link) if place in at]
-        for one in ends[1:]:
-            axes.plot(*zip(ends[0], one, strict=True), color=style.MUTED, linewidth=1.0, zorder=1)
+        for end in ends[1:]:
+            axes.plot(*zip(ends[0], end, strict=True), color=style.MUTED, linewidth=1.0, zorder=1)
         if len(ends) > 1 and len(case.links) <= NAMED:
             middle = [sum(x) / len(ends) for x in zip(*ends, strict=True)]
             axes.text(*middle, f"{name} ({link.kind})", fontsize=7, color=style.MUTED, ha="center", va="bottom")
@@ -40,60 +40,60 @@ def case_figure(case):
 
 
 def link_places(link) -> list[str]:
-    """Names of the nodes that a link touches; of a place that a node owns, the node."""
+    """Names of the nodes that a link connects; a port of a node counts as the node."""
     return [str(place).partition(".")[0] for place in link.ports.values()]
 
 
 def places(case) -> dict[str, tuple[float, float]]:
-    """Where each node is drawn."""
+    """Drawn position of each node: its position if all nodes have one, else (distance from the first node, row)."""
     given = {name: node.position for name, node in case.nodes.items()}
-    if all(one is not None for one in given.values()):
-        return {name: (float(one[0]), float(one[1])) for name, one in given.items()}
+    if all(item is not None for item in given.values()):
+        return {name: (float(item[0]), float(item[1])) for name, item in given.items()}
     near: dict[str, list[str]] = {name: [] for name in case.nodes}
     for link in case.links.values():
         touched = [name for name in link_places(link) if name in near]
-        for one in touched:
-            near[one] += [other for other in touched if other != one]
+        for item in touched:
+            near[item] += [other for other in touched if other != item]
     depth: dict[str, int] = {}
     for first in near:
         waiting = [] if first in depth else [first]
         depth.setdefault(first, 0)
         while waiting:
-            one = waiting.pop(0)
-            fresh = [other for other in near[one] if other not in depth]
-            depth |= dict.fromkeys(fresh, depth[one] + 1)
+            item = waiting.pop(0)
+            fresh = [other for other in near[item] if other not in depth]
+            depth |= dict.fromkeys(fresh, depth[item] + 1)
             waiting += fresh
     rows: dict[int, int] = {}
-    found = {}
+    positions = {}
     for name, column in depth.items():
         row = rows[column] = rows.get(column, -1) + 1
-        found[name] = (float(column), float(math.ceil(row / 2) * (1 if row % 2 else -1)))
-    return found
+        positions[name] = (float(column), float(math.ceil(row / 2) * (1 if row % 2 else -1)))
+    return positions
 
 
 @style.as_it_stands
 def model_figure(model):
-    """Heads at the nodes of a model at its start."""
+    """Figure of the heads at the nodes of a model at its start."""
     names, unit = model.node_names, model.case.unit_of("head")
-    heads = [convert(one["head"], "head", unit) for one in model.checks["nodes"].values()]
+    heads = [convert(node["head"], "head", unit) for node in model.checks["nodes"].values()]
     return bars(names, heads, f"head at the start [{unit}]", model.case.title or model.case.name)
 
 
 @style.as_it_stands
 def state_figure(state):
-    """All numbers of a state by their place in the vector."""
+    """Figure of all values of a state over their index."""
     figure = style.figure(3.0)
     axes = figure.subplots()
     axes.plot(state.y, color=style.COLOURS[0], linewidth=1.0)
     style.dress(axes)
-    axes.set_xlabel("number of the state", fontsize=8.5, color=style.INK)
+    axes.set_xlabel("index of the state", fontsize=8.5, color=style.INK)
     style.title(figure, f"state at t = {state.t:g} s")
     return figure
 
 
 @style.as_it_stands
 def sweep_figure(sweep):
-    """Extremes of the first probes over the key that varies, as maps over two, or over the runs."""
+    """Figure of extremes of the first probes over the varied key, as maps over two keys, or over the runs."""
     names = [name for name in sweep.columns if name.startswith(("max(", "min("))][:PANELS]
     if len(sweep.keys) == 2 and names:
         return map_figure(sweep, names, {key: key for key in sweep.keys})
@@ -114,7 +114,7 @@ def sweep_figure(sweep):
 
 
 def bars(names, values, label: str, title: str):
-    """One bar a name, the first of many."""
+    """Bar chart with a bar for each name, at most MAX_NAMED_NODES."""
     names, values = list(names)[:NAMED], list(values)[:NAMED]
     figure = style.figure(0.9 + 0.22 * max(len(names), 3))
     axes = figure.subplots()

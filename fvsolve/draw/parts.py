@@ -1,4 +1,4 @@
-"""Symbols and names of parts on a sheet. Knows where parts stand and matplotlib; knows no field."""
+"""Symbols and names of parts on a sheet."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from fvsolve.draw.sheet import stamp
 from fvsolve.draw.symbols import symbol_of
 from fvsolve.errors import visible
 
-APART = 4.8  # halves of a symbol between two
-MANY, FEW = 40, 14  # parts from which symbols are small, pipes up to which they are named
-CROWD = 400  # parts up to which joints have symbols and names
-HALO = 2.2  # white about a name [points]
-EDGE = 5.0  # of the sheet that stays free [pixels]
+APART = 4.8  # least distance of symbols, in half widths of a symbol
+MANY, FEW = 40, 14  # number of parts above which symbols are small; greatest number of pipes with names
+CROWD = 400  # greatest number of parts with symbols and names for plain junctions
+HALO = 2.2  # width of the white border of a name [points]
+EDGE = 5.0  # free margin of the sheet [pixels]
 
 
 def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int]:
-    """Symbols and names of a scene's parts over what is drawn; how many names are there, and how many there could be.
+    """Draw symbols and names of the parts of a scene; returns the number of names drawn and of all names.
 
-    stage : its `sheet`, `axes`, `aspect`, `half` of a symbol [points], `texts` that no name covers, `cover`,
-    float64[k, 2], points of the sheet that names had better not cover, `labels`, other names with their points
-    segments : float64[c, 2, 2], pipes on the sheet
+    stage : picture with `sheet`, `axes`, `aspect`, `half` (half width of a symbol [points]), `texts` that no name may
+            cover, `cover` (float64[k, 2], points that names should not cover) and `labels` (other names with points)
+    segments : float64[c, 2, 2]  pipes on the sheet
     """
     if not (scene.parts or scene.pipes or stage.labels):
         return 0, 0
@@ -51,9 +51,9 @@ def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int
 
 
 def positions(scene: DrawnScene, aspect: Aspect, axes, apart: float) -> dict[str, np.ndarray]:
-    """Where symbols stand [pixels]: parts that no pipe holds in its place go as far aside as their links want."""
+    """Positions of symbols [pixels]; parts not fixed by a pipe are moved if a link to them is shorter than `apart`."""
     nodes = [part for part in scene.parts if not part.link]
-    seen = axes.transData.transform(aspect.on_sheet(scene.shown([one.at for one in scene.parts])))
+    seen = axes.transData.transform(aspect.on_sheet(scene.shown([item.at for item in scene.parts])))
     at = {part.key: place for part, place in zip(scene.parts, seen, strict=True)}
     at |= dict(zip(scene.anchors, axes.transData.transform(aspect.on_sheet(
         scene.shown(list(scene.anchors.values())))), strict=True))  # fmt: skip
@@ -67,7 +67,7 @@ def positions(scene: DrawnScene, aspect: Aspect, axes, apart: float) -> dict[str
             if np.linalg.norm(way) < apart and last not in held:
                 far = way if np.linalg.norm(way) > 1.0 else at[first] - middle
                 far = far if np.linalg.norm(far) > 1.0 else np.array([1.0, 0.0])
-                if aspect.kind == "profile":  # its height stays
+                if aspect.kind == "profile":  # its height is not changed
                     at[last] = np.array([at[first][0] + np.copysign(apart, far[0]), at[last][1]])
                 else:
                     at[last] = at[first] + apart * far / np.linalg.norm(far)
@@ -81,7 +81,7 @@ def positions(scene: DrawnScene, aspect: Aspect, axes, apart: float) -> dict[str
 
 @dataclass
 class DrawnName:
-    """A name and the point that it stands beside [pixels]; `gap` between them [points]."""
+    """Name to draw next to a point `at` [pixels], at a distance `gap` [points]."""
 
     text: str
     at: np.ndarray
@@ -90,44 +90,44 @@ class DrawnName:
 
 
 def _names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[int, int]:
-    """Write the names that find room; how many do, and of how many."""
+    """Write the names that have free space; returns the number of names written and of all names."""
     from matplotlib.patheffects import withStroke
 
     axes, figure = stage.axes, stage.sheet.figure
     pixels = axes.transData.transform(segments.reshape(-1, 2)).reshape(-1, 2, 2)
-    wanted, renderer = _wanted(scene, at, pixels, stage.half), figure.canvas.get_renderer()
+    labels, renderer = _wanted(scene, at, pixels, stage.half), figure.canvas.get_renderer()
     look = {"color": style.INK, "fontsize": 8}
-    wanted += [DrawnName(name, axes.transData.transform(place), 6.0, look) for name, place in stage.labels]
+    labels += [DrawnName(name, axes.transData.transform(place), 6.0, look) for name, place in stage.labels]
     halo = [withStroke(linewidth=HALO, foreground="white")]
     always = {"zorder": 7, "parse_math": False, "va": "bottom", "path_effects": halo}
-    texts = [axes.text(0.0, 0.0, visible(one.text), **always, **one.look) for one in wanted]
+    texts = [axes.text(0.0, 0.0, visible(item.text), **always, **item.look) for item in labels]
     sizes = [text.get_window_extent(renderer).size for text in texts]
     ticks = [text.get_window_extent(renderer).extents for text in stage.texts]
     point = figure.dpi / 72.0
-    found = naming.beside(
-        [one.at for one in wanted], sizes, [point * one.gap for one in wanted],
+    places = naming.beside(
+        [item.at for item in labels], sizes, [point * item.gap for item in labels],
         np.vstack([blocks, np.reshape(ticks, (-1, 4))]),
         np.vstack([naming.dotted(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]),
         (EDGE + axes.bbox.x0 * axes.axison, axes.bbox.y0 - EDGE, figure.bbox.x1 - EDGE, axes.bbox.y1 + EDGE),
     )  # fmt: skip
-    for text, corner in zip(texts, found, strict=True):
+    for text, corner in zip(texts, places, strict=True):
         if corner is None:
             text.remove()
         else:
             text.set_position(axes.transData.inverted().transform(corner))
-    without = sum(one.joint for one in scene.parts) if len(scene.parts) > CROWD else 0
-    return sum(one is not None for one in found), len(wanted) + without
+    without = sum(item.joint for item in scene.parts) if len(scene.parts) > CROWD else 0
+    return sum(item is not None for item in places), len(labels) + without
 
 
 def _wanted(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
-    """Names of parts, then of pipes where these are few, then of joints."""
+    """Names to draw, by priority: parts, pipes if they are few, plain junctions."""
     plain, small = {"color": style.INK, "fontsize": 8}, {"color": style.INK, "fontsize": 7.5}
-    parts = [DrawnName(one.name, at[one.key], half + 3.0, plain) for one in scene.parts if not one.joint]
-    joints = [DrawnName(one.name, at[one.key], 5.0, small) for one in scene.parts if one.joint]
+    parts = [DrawnName(item.name, at[item.key], half + 3.0, plain) for item in scene.parts if not item.joint]
+    joints = [DrawnName(item.name, at[item.key], 5.0, small) for item in scene.parts if item.joint]
     joints = joints if len(scene.parts) <= CROWD else []
     if len(scene.names) > FEW or not scene.pipes or not scene.names:
         return parts + joints
     look = {"color": style.MUTED, "fontsize": 7.5, "fontstyle": "italic"}
     middles = {name: pixels[scene.pipes[0][3] == k].reshape(-1, 2) for k, name in enumerate(scene.names)}
-    pipes = [DrawnName(name, one[len(one) // 2], 4.0, look) for name, one in middles.items() if len(one)]
+    pipes = [DrawnName(name, item[len(item) // 2], 4.0, look) for name, item in middles.items() if len(item)]
     return parts + pipes + joints

@@ -1,4 +1,4 @@
-"""history.png and envelope.png. Knows columns of numbers and matplotlib; knows no run and no files."""
+"""Figures of history.png and envelope.png."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 from fvsolve.draw import style
 from fvsolve.draw.told import told
 
-PANELS = 6  # quantities drawn at most
-LINES = 8  # curves drawn per panel at most
-STILLS = 4  # constant probes named at most
+PANELS = 6  # greatest number of panels
+LINES = 8  # greatest number of curves in a panel
+STILLS = 4  # greatest number of constant probes with names
 BROAD = 26  # letters of a line of a legend
-PIPES = 6  # pipes drawn at most, the longest
-POINTS = 4000  # rows drawn as they are; of longer tables least and greatest per bin
+PIPES = 6  # greatest number of pipes drawn; the longest are chosen
+POINTS = 4000  # greatest number of rows drawn; of longer tables the extremes of bins are drawn
 
 
 @style.as_it_stands
 def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, title=""):
-    """Probes over time, one panel per quantity and unit; none twice, and what stands still is but named.
+    """Figure of probes over time, with a panel for each quantity and unit; constant probes are only named.
 
-    `t : float64[k]` in `time_unit`, `values : float64[k, n]`, `probes` their (name, unit); `measured` maps a
-    probe to (times, values), dotted; from the first of `marks`, (time, cause), on
-    the ground is shaded: not to be trusted.
+    t : float64[k] in `time_unit`; values : float64[k, n]; probes : (name, unit) of each column
+    marks : (time, cause); shaded from the first mark, since later results are not to be trusted
+    measured : probe -> (times, values), drawn dotted
     """
     probes = list(probes)
     panels, still = told(values, probes, measured or {})
@@ -43,9 +43,9 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
 
 @style.as_it_stands
 def envelope_figure(envelope, units, title=""):
-    """Least and greatest head along each of the longest pipes, with elevation and the head at the start.
+    """Figure of least and greatest head along each of the longest pipes, with elevation and initial head.
 
-    `envelope` maps a pipe to float64[cells] arrays named as in envelope.csv, in `units`.
+    envelope : pipe -> quantity of envelope.csv -> float64[cells] in `units`
     """
     longest = sorted(envelope, key=lambda pipe: -envelope[pipe]["distance"][-1])[:PIPES]
     names = [pipe for pipe in envelope if pipe in longest]
@@ -72,12 +72,12 @@ def envelope_figure(envelope, units, title=""):
 
 
 def quantity(probe: str) -> str:
-    """`pressure` of `main.pressure@0.5`."""
+    """Quantity of a probe: `pressure` of `main.pressure@0.5`."""
     return probe.partition("@")[0].rpartition(".")[2]
 
 
 def thinned(t, values, points=POINTS):
-    """Long series as least and greatest per bin of rows, so that no peak is lost and pictures stay small."""
+    """Reduce a long series to the extremes of bins of rows, so that peaks remain and pictures stay small."""
     bins = points // 2
     if len(t) <= points:
         return t, values
@@ -90,11 +90,11 @@ def thinned(t, values, points=POINTS):
 
 def _panel(axes, t, values, probes, lines, measured, still) -> None:
     style.dress(axes)
-    for i, one in enumerate(lines[:LINES]):
-        name, colour = probes[one.column][0], style.COLOURS[i % len(style.COLOURS)]
-        axes.plot(*thinned(t, values[:, one.column]), color=colour, linewidth=1.0, label=_lines(one.label))
+    for i, curve in enumerate(lines[:LINES]):
+        name, colour = probes[curve.column][0], style.COLOURS[i % len(style.COLOURS)]
+        axes.plot(*thinned(t, values[:, curve.column]), color=colour, linewidth=1.0, label=_lines(curve.label))
         if name in measured:
-            axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{one.label}, measured")
+            axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{curve.label}, measured")
     if len(lines) > LINES:
         axes.plot([], [], " ", label=f"... {len(lines) - LINES} more in the table")
     if still:
@@ -102,7 +102,7 @@ def _panel(axes, t, values, probes, lines, measured, still) -> None:
         named += [f"... {len(still) - STILLS} more"] if len(still) > STILLS else []
         axes.plot([], [], " ", label="\n".join(["constant:", *named]))
     low, high = axes.get_ylim()
-    if high - low < 1e-9 * max(abs(low), abs(high)):  # a line at rest, not its round-off magnified
+    if high - low < 1e-9 * max(abs(low), abs(high)):  # constant curves: do not magnify round-off
         middle, half = 0.5 * (low + high), max(abs(low), abs(high)) * 1e-3
         axes.set_ylim(middle - half, middle + half)
     if len(t) > 1:
@@ -111,7 +111,7 @@ def _panel(axes, t, values, probes, lines, measured, still) -> None:
 
 
 def _lines(label: str) -> str:
-    """A label in lines that leave the picture its width."""
+    """Label broken into lines, so that the legend stays narrow."""
     return textwrap.fill(label, BROAD, break_long_words=False)
 
 
@@ -122,13 +122,13 @@ def _shade(axes, t, marks, first: bool) -> None:
     axes.axvspan(begun, t[-1], color=style.DOUBT, alpha=0.08, linewidth=0)
     axes.axvline(begun, color=style.DOUBT, linewidth=0.8)
     late = begun > 0.5 * (t[0] + t[-1])
-    beside = 28 if begun < t[0] + 0.05 * (t[-1] - t[0]) else 4  # the power of ten that the axis stands for
+    offset = 28 if begun < t[0] + 0.05 * (t[-1] - t[0]) else 4  # leaves space for the power of ten of the axis
     if first:
         axes.annotate(
             f"not to be trusted from here: {cause}",
             (begun, 1.0),
             xycoords=("data", "axes fraction"),
-            xytext=(-4 if late else beside, 2),
+            xytext=(-4 if late else offset, 2),
             textcoords="offset points",
             ha="right" if late else "left",
             va="bottom",
@@ -147,6 +147,6 @@ def _profile(axes, arrays, hilly: bool) -> None:
     start = arrays["initial_head"]
     axes.plot(x, start, color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)), label="at the start")
     axes.plot(x, low, color=style.COLOURS[1], linewidth=1.2, label="least head")
-    if hilly:  # elevations that nobody stated would only squeeze the heads
+    if hilly:  # if all elevations are zero, they would only compress the heads
         axes.plot(x, ground, color=style.MUTED, linewidth=1.8, label="pipe")
     axes.set_xlim(0.0, x[-1] + x[0])

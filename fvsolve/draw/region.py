@@ -1,4 +1,4 @@
-"""The stability region of a method in the complex plane. Knows numbers and matplotlib; knows no method."""
+"""Picture of the stability region of a method in the complex plane."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ import numpy as np
 from fvsolve.draw import style
 
 POINTS = 600  # along each side of the grid
-FAR = 60.0  # a region beyond is drawn up to MIDDLE
-MIDDLE = 10.0
-LEVELS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # of |R|: how much a step damps
+FAR = 60.0  # greatest extent of a region that is drawn in full
+MIDDLE = 10.0  # drawn extent of larger or unbounded regions
+LEVELS = (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)  # of the amplification factor |R| of a step
 SHADES = ("#0b6aa8", "#3f8abc", "#74abd0", "#a9cce3", "#d6e7f2")
 
 
 @style.as_it_stands
 def region_figure(r: Callable, title: str = ""):
-    """Where |R(s)| <= 1, darker where a step damps more, s = h lambda; `r` takes an array of complex numbers."""
+    """Figure of the region |R(s)| <= 1 with s = h lambda; darker where a step damps more.
+
+    r : stability function R, for complex arrays
+    """
     left, right, high = _window(r)
     x, y = np.linspace(left, right, POINTS), np.linspace(-high, high, POINTS)
     size = _size(r, x, y)
@@ -41,7 +44,7 @@ def region_figure(r: Callable, title: str = ""):
 
 
 def _window(r: Callable) -> tuple[float, float, float]:
-    """Left, right and upper end of what is drawn: all of the boundary |R| = 1 where it is bounded."""
+    """Left, right and upper end of the drawn window, which contains the boundary |R| = 1 if it is bounded."""
     wide = np.linspace(-FAR, FAR, 2 * POINTS)
     stable = _size(r, wide, wide) <= 1.0
     edge = stable[1:, 1:] != stable[:-1, 1:]

@@ -1,4 +1,4 @@
-"""A frequency response: magnitude, phase and real part over frequency. Knows arrays and matplotlib; knows no case."""
+"""Picture of a frequency response: magnitude, phase and real part over frequency."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from fvsolve.draw import style
 
 @style.as_it_stands
 def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=0.0, title: str = "", said: str = ""):
-    """Bode plot of h over w with Re h below; bands where Re h < 0 shaded, poles on the axis as dotted lines.
+    """Bode plot of h over w with Re h below; bands with Re h < 0 are shaded, poles on the imaginary axis dotted.
 
-    w : float64[k] [rad/s]; h : complex128[k]; labels : what h is and its unit; dips : (low, high) [rad/s]; poles :
-    frequencies [rad/s]; tolerance : of |h|, below which Re h is drawn as zero
+    w : float64[k] [rad/s]; h : complex128[k]; labels : name and unit of h
+    dips : (low, high) of bands with Re h < 0 [rad/s]; poles : frequencies of poles [rad/s]
+    tolerance : fraction of |h| below which Re h is drawn as zero; note : title of the panel of Re h
     """
     name, unit = labels
     figure = style.figure(7.4)
@@ -21,15 +22,15 @@ def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=
     shown = np.isfinite(h)
     values = np.where(shown, h, np.nan)
     phase = np.degrees(np.angle(values))
-    phase = np.where(phase < -179.999, 180.0, phase)  # a minus sign of zero is no jump
+    phase = np.where(phase < -179.999, 180.0, phase)  # rounding at -180 degrees must not draw a jump
     real = np.where(np.abs(values.real) > tolerance * np.abs(values), values.real, 0.0)
-    for one, line in zip(axes, (np.abs(values), phase, real), strict=True):
-        style.dress(one)
+    for ax, line in zip(axes, (np.abs(values), phase, real), strict=True):
+        style.dress(ax)
         for pole in poles:
-            one.axvline(pole / (2.0 * np.pi), color=style.DOUBT, linewidth=0.9, linestyle=(0, (1, 2)))
-        one.plot(frequency, line, color=style.COLOURS[0], linewidth=1.2)
+            ax.axvline(pole / (2.0 * np.pi), color=style.DOUBT, linewidth=0.9, linestyle=(0, (1, 2)))
+        ax.plot(frequency, line, color=style.COLOURS[0], linewidth=1.2)
         for low, high in dips:
-            one.axvspan(max(low / (2.0 * np.pi), frequency[0]), min(high / (2.0 * np.pi), frequency[-1]),
+            ax.axvspan(max(low / (2.0 * np.pi), frequency[0]), min(high / (2.0 * np.pi), frequency[-1]),
                         color=style.DOUBT, alpha=0.25, linewidth=0.8)  # fmt: skip
     axes[0].set_xscale("log")
     _logarithmic(axes[0], np.abs(values))
@@ -44,7 +45,7 @@ def response_figure(w, h, labels: tuple[str, str], dips=(), poles=(), tolerance=
 
 
 def _logarithmic(axes, size) -> None:
-    """Six decades at most."""
+    """Set a logarithmic axis of at most six decades."""
     top, least = np.nanmax(size), np.nanmin(size)
     if not top > 0.0:
         return
@@ -54,7 +55,7 @@ def _logarithmic(axes, size) -> None:
 
 
 def _phase(axes, phase) -> None:
-    """Degrees, with the lines at -90 and 90 between which a passive port stays."""
+    """Set an axis in degrees with lines at -90 and 90, the limits for a passive port."""
     for level in (-90.0, 90.0):
         axes.axhline(level, color=style.MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     least, greatest = np.nanmin(phase), np.nanmax(phase)
@@ -64,7 +65,7 @@ def _phase(axes, phase) -> None:
 
 
 def _real(axes, real) -> None:
-    """Logarithmic, on both sides of zero where it is negative somewhere, six decades at most; linear where it is 0."""
+    """Set the axis of Re h: logarithmic with at most six decades, on both sides of zero if it has negative values."""
     from matplotlib.ticker import NullLocator
 
     size = np.abs(real[np.isfinite(real)])

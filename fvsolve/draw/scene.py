@@ -1,4 +1,4 @@
-"""What is asked to be drawn of a run. Knows numbers and names; draws nothing."""
+"""Scene: data of a run that are drawn as a picture or an animation."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import numpy as np
 
 @dataclass
 class DrawnPart:
-    """A part: its kind and those it is made of, nearest first; where it is [m], and between which parts a link goes.
+    """Part of a network with its position.
 
-    key : "nodes.NAME" or "links.NAME"; joint : it is but a joint of links; held : pipes or positions keep it where
-    it is; own_place : of a link that does not stand between its ends
+    key : "nodes.NAME" or "links.NAME"
+    kinds : its kind and the kinds from which it is derived, nearest first
+    at : position [m]; between : keys of the parts that a link connects
+    joint : True for a plain junction; held : True if pipes or a stated position fix its place
+    own_place : True for a link that is not drawn at the middle of its ends
     """
 
     key: str
@@ -29,7 +32,7 @@ class DrawnPart:
 
 @dataclass
 class DrawnUnit:
-    """A quantity as a reader wants it: shown = factor * SI + shift."""
+    """Quantity with its output unit: shown value = factor * SI value + shift."""
 
     name: str
     unit: str
@@ -43,11 +46,11 @@ class DrawnUnit:
 
 @dataclass
 class DrawnScene:
-    """Frames of a field and what stands about it.
+    """Frames of a field with the parts, names and units of the picture.
 
-    frames : (caption, files) of each time; pipes : the same as (points float64[p, 3] [m], lines int[c, 2],
-    values float64[c] in SI, pipe int[c]), of networks that need no files; plan : "given", "laid out", "own scale" or
-    "schematic"
+    frames : (caption, files) of each time
+    pipes : for networks, (points float64[p, 3] [m], lines int[c, 2], values float64[c] in SI, pipe int[c]) of each time
+    plan : "given", "laid out", "own scale" or "schematic"
     """
 
     title: str
@@ -56,19 +59,19 @@ class DrawnScene:
     height: DrawnUnit
     frames: list[tuple[str, list[Path]]]
     pipes: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)  # of pipes
-    bodies: list[str] = field(default_factory=list)  # by their numbers
+    names: list[str] = field(default_factory=list)  # names of pipes
+    bodies: list[str] = field(default_factory=list)  # names of bodies by index
     parts: list[DrawnPart] = field(default_factory=list)
-    anchors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # patches, that links go to [m]
+    anchors: dict[str, tuple[float, float, float]] = field(default_factory=dict)  # positions of linked patches [m]
     plan: str = "given"
     contours: int = 0
 
     def shown(self, points) -> np.ndarray:
-        """Points float64[n, 3] in the reader's units of lengths and heights."""
+        """Convert points float64[n, 3] [m] to the output units of lengths and heights."""
         plan = self.length.factor
         return np.asarray(points, float).reshape(-1, 3) * (plan, plan, self.height.factor)
 
     @property
     def slant(self) -> float:
-        """What heights in their unit are multiplied by, that one is drawn as long as the same length."""
+        """Factor on heights in their unit that gives equal scales of heights and lengths."""
         return self.length.factor / self.height.factor

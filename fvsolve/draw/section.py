@@ -1,4 +1,4 @@
-"""A long section and phase planes as pictures. Knows columns of numbers and matplotlib; knows no run and no files."""
+"""Pictures of long sections and of phase planes."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ LINES = {"vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle
          "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."}}  # fmt: skip
 LIMITS = {"greatest": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))},
           "least": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2))}}  # fmt: skip
-LONGEST = 22  # letters over a chainage
+LONGEST = 22  # greatest number of letters of a name over a chainage
 
 
 @style.as_it_stands
 def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), posts=(), labels=(), title=""):
-    """Heads along one chainage with the pipe, lines of vapour, classes and limits; shaded where liquid parted.
+    """Figure of heads along a section, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
 
-    chainage, along["greatest_head"] ... : float64[n] in `units`; lines : name -> float64[n]; posts : chainages
-    seen : ends of the axis of heads (low, high), and the limits above and below it by name
-    beyond : (chainage, head, name) where a limit is passed; labels : (chainage, names, whether more than a joint)
+    chainage, along["greatest_head"] ... : float64[n] in `units`; lines : name -> float64[n]
+    seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
+    parted : spans of chainage with cavities; beyond : (chainage, head, name) where a limit is violated
+    posts : chainages of vertical lines; labels : (chainage, names, True if a device is there)
     """
     figure = style.figure(9.2)
     axes = figure.subplots()
@@ -60,7 +61,7 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
 
 @style.as_it_stands
 def phase_figure(pairs, title=""):
-    """One probe over another, a panel for each of `pairs` of (name, unit, float64[k]); a dot is where it begins."""
+    """Figure with a phase plane for each pair of probes (name, unit, float64[k]); a dot marks the start."""
     across = min(len(pairs), 2)
     down = -(-len(pairs) // across)
     figure = style.figure(0.6 + (4.4 if across == 1 else 3.6) * down, width=5.6 if across == 1 else style.WIDTH)
@@ -79,7 +80,7 @@ def phase_figure(pairs, title=""):
 
 
 def _places(axes, posts, labels) -> None:
-    """A thin line at each place, names over some."""
+    """Draw a vertical line at each chainage of `posts`, and the names of `labels`."""
     for x in posts:
         axes.axvline(x, color=style.HAIR, linewidth=0.8, zorder=0)
     for x, names, stands in labels:
@@ -89,7 +90,7 @@ def _places(axes, posts, labels) -> None:
 
 
 def _path(x, y) -> tuple:
-    """A long path with the extremes of both of each bin of rows."""
+    """Reduce a long path to the extremes of both coordinates in bins of rows."""
     rows = np.arange(len(x), dtype=float)
-    kept = np.union1d(thinned(rows, x)[0], thinned(rows, y)[0]).astype(int)
-    return x[kept], y[kept]
+    indices = np.union1d(thinned(rows, x)[0], thinned(rows, y)[0]).astype(int)
+    return x[indices], y[indices]

@@ -1,4 +1,4 @@
-"""The sheet that a field is drawn on: title, axes, bar of colours, symbols and what they mean. Knows matplotlib."""
+"""Sheet of a picture of a field: title, axes, colour bar, symbols and their legend."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from fvsolve.draw.symbols import WATER, strokes, symbol_of
 from fvsolve.errors import visible
 
 SIZE = (10.0, 6.0)  # [inch]
-DPI, SMALL = 150, 100  # of a picture, of an animation
+DPI, SMALL = 150, 100  # resolution of a picture, and of an animation [dots per inch]
 COLOURS = "viridis"
-FOOT = 0.95  # of the sheet, for the bar and the legend [inch]
-HEAD = 0.62
-MARGIN = 0.62  # about a plan
-HALF = 8.0  # of a symbol [points]
-LEAST = 0.05  # of the value about which an even field is shown
-EVEN, NONE = 1e-9, 1e-3
-ROWS = 4  # of the legend
+FOOT = 0.95  # height below the axes for the colour bar and the legend [inch]
+HEAD = 0.62  # height above the axes for the title [inch]
+MARGIN = 0.62  # margin of axes with ticks [inch]
+HALF = 8.0  # half width of a symbol [points]
+LEAST = 0.05  # half width of the colour range of a uniform field, as a fraction of its value
+EVEN, NONE = 1e-9, 1e-3  # relative range of a uniform field; ends of the range shown as zero, as a fraction of it
+ROWS = 4  # rows of the legend
 
 
 class PictureSheet:
-    """A figure with its main axes, `ruled` where ticks stand outside of them."""
+    """Figure with its main axes; ruled : True if the axes have ticks outside."""
 
     def __init__(self, film: bool, ruled: bool = False, high: float = SIZE[1]) -> None:
         self.figure = style.figure(high, SIZE[0])
@@ -41,12 +41,12 @@ class PictureSheet:
             text.set_parse_math(False)
 
     def caption(self, title: str, below: str) -> None:
-        """The title and what stands below it."""
-        for text, said in zip(self._texts, (title, below), strict=True):
-            text.set_text(visible(said if len(said) <= style.LONGEST else said[: style.LONGEST - 3] + "..."))
+        """Set the title and the line below it."""
+        for text, content in zip(self._texts, (title, below), strict=True):
+            text.set_text(visible(content if len(content) <= style.LONGEST else content[: style.LONGEST - 3] + "..."))
 
     def bar(self, limits: tuple[float, float], label: str) -> list[str]:
-        """The bar of colours with the quantity and its unit; what stands at its ticks."""
+        """Draw the colour bar with the quantity and its unit; returns the texts of its ticks."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
         from matplotlib.ticker import MaxNLocator
@@ -65,7 +65,7 @@ class PictureSheet:
         return [text.get_text() for tick, text in shown if low <= tick <= high]
 
     def legend(self, parts) -> None:
-        """The symbols of the kinds that are drawn, each with its word."""
+        """Draw the legend: a symbol for each kind of part, with the name of the kind."""
         kinds = {part.kinds[0]: part for part in parts}
         place = self.figure.add_axes((0.5, 0.08 / self.high, 0.49, 0.8 / self.high))
         place.set_axis_off()
@@ -78,13 +78,13 @@ class PictureSheet:
             place.text(x + 0.03, y, kind.replace("-", " "), fontsize=8, color=style.INK, va="center", parse_math=False)
 
     def picture(self) -> np.ndarray:
-        """The sheet as pixels : uint8[h, w, 3]."""
+        """Pixels of the sheet : uint8[h, w, 3]."""
         self.figure.canvas.draw()
         return np.asarray(self.figure.canvas.buffer_rgba())[:, :, :3].copy()
 
 
 def stamp(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF, shift=(0.0, 0.0)) -> None:
-    """A symbol at a point of the axes, along a direction, moved by `shift` [points]."""
+    """Draw a symbol at a point of the axes, rotated to a direction and moved by `shift` [points]."""
     from matplotlib.patches import Polygon
     from matplotlib.transforms import Affine2D, ScaledTranslation
 
@@ -100,7 +100,7 @@ def stamp(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF, shift=(0.
 
 
 def span(low: float, high: float) -> tuple[float, float]:
-    """Ends of the colours of a field: its own, or some way about an even one."""
+    """Colour range of a field: its own range, or a band around the value of a uniform field."""
     most = max(abs(low), abs(high))
     if most == 0.0:
         return 0.0, 1.0

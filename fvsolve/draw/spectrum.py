@@ -1,4 +1,4 @@
-"""The picture of a spectrum over a stability region. Knows arrays and matplotlib; knows no case and no method."""
+"""Picture of eigenvalues over a stability region."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from fvsolve.draw.region import region_figure
 
 @style.as_it_stands
 def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = None, title: str = ""):
-    """Eigenvalues times the step over |R(s)| <= 1, and the boundary of the field of values times it where given."""
-    made = region_figure(r, title)
-    axes = made.axes[0]
+    """Figure of eigenvalues times the step over the region |R(s)| <= 1.
+
+    values : eigenvalues times the step; field : boundary of the field of values times the step, or None
+    """
+    figure = region_figure(r, title)
+    axes = figure.axes[0]
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     if field is not None:
         axes.plot(*closed(field), color=style.COLOURS[2], linewidth=1.2, label="field of values")
@@ -27,10 +30,10 @@ def spectrum_figure(r: Callable, values: np.ndarray, field: np.ndarray | None = 
         loc="upper left", fontsize=8, framealpha=0.9, edgecolor=style.HAIR, labelcolor=style.INK,
         title=f"{far} of {values.size} eigenvalues lie outside" if far else None, title_fontsize=8,
     )  # fmt: skip
-    return made
+    return figure
 
 
 def closed(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A closed line."""
-    whole = np.append(points, points[:1])
-    return whole.real, whole.imag
+    """Real and imaginary parts of points as a closed line."""
+    line = np.append(points, points[:1])
+    return line.real, line.imag

@@ -1,4 +1,4 @@
-"""Frames of basins and bodies on a sheet, their surfaces drawn by PyVista. Knows .vtu files; knows no run."""
+"""Pictures of basins and bodies from .vtu frames, with surfaces drawn by PyVista."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import COLOURS, HALF, PictureSheet
 from fvsolve.draw.symbols import WATER
 
-FLAT = 0.08  # bodies lower than this part of their width are looked at from above
-LOW = 0.05  # basins lower than this part of their width are drawn higher than they are,
-HIGH = 0.12  # as high as this part
-OVER = 2e-3  # of its diagonal that lines are drawn above a surface
-BESIDE = 0.04  # of parts about a basin, of its size
-ABOVE = 0.25  # of a house, over the highest water, of the height of all
+FLAT = 0.08  # height over width below which bodies are drawn in plan, or depth over width for a profile
+LOW = 0.05  # height over width below which basins are drawn with enlarged heights
+HIGH = 0.12  # drawn height over width of such basins
+OVER = 2e-3  # distance of contour lines above a surface, as a fraction of its diagonal
+BESIDE = 0.04  # margin for parts around a basin, as a fraction of its size
+ABOVE = 0.25  # height of buildings above the scene, as a fraction of the height of the scene
 BED, DEEP, HOUSE, LIMB = "#c9b99a", "#5b87a6", "#a8705a", "#4b5563"
-SHADE = 0.35  # light that reaches all sides
-MARGINS = (62.0, 44.0, 50.0, 14.0)  # about a box [points]
+SHADE = 0.35  # ambient light
+MARGINS = (62.0, 44.0, 50.0, 14.0)  # margins of a box: left, low, right, high [points]
 
 
 class Stage:
-    """What frames have in common: the range of their field, how far they reach and how they are seen."""
+    """Picture of a scene of basins and bodies: range of the field, bounding box and projection of all its frames."""
 
     def __init__(self, scene: DrawnScene, film: bool) -> None:
         import pyvista
@@ -67,18 +67,18 @@ class Stage:
         self.sheet.legend(scene.parts)
 
     def show(self, k: int) -> None:
-        """Put frame `k` on the sheet."""
-        said, files = self.scene.frames[k]
+        """Draw frame `k`."""
+        caption, files = self.scene.frames[k]
         self.plotter.clear_actors()
         for file in files:
             self._add(read(file, self.scene))
         self.image.set_data(self.plotter.screenshot(transparent_background=True, return_img=True))
         rise = self.aspect.rise / self.scene.slant
         notes = [] if abs(rise - 1.0) < 1e-9 else [f"heights drawn {rise:.3g} times"]
-        self.sheet.caption(self.scene.title, "; ".join([said, *notes]))
+        self.sheet.caption(self.scene.title, "; ".join([caption, *notes]))
 
     def _measure(self) -> None:
-        """Range of the field, box, and how it is seen."""
+        """Find the range of the field and the bounding box, and choose the projection."""
         self.limits, self.box, self.wet = measured(self.scene)
         x, y, z = (self.box[1::2] - self.box[::2]).tolist()
         if self.wet:
@@ -93,13 +93,13 @@ class Stage:
             self.aspect = Aspect("aslant", seen=ASLANT)
 
     def _widen(self) -> None:
-        """Room in the box for parts that stand beside basins."""
+        """Widen the box for parts at the edges of basins."""
         for axis in (0, 1) if self.wet else ():
             at = self.scene.shown([part.at for part in self.scene.parts])[:, axis]
             low, high = self.box[2 * axis : 2 * axis + 2]
-            room = BESIDE * float(np.ptp(self.box[:4].reshape(2, 2), axis=1).max())
-            self.box[2 * axis] = min([low, *(one - room for one in at if one <= low)])
-            self.box[2 * axis + 1] = max([high, *(one + room for one in at if one >= high)])
+            margin = BESIDE * float(np.ptp(self.box[:4].reshape(2, 2), axis=1).max())
+            self.box[2 * axis] = min([low, *(x - margin for x in at if x <= low)])
+            self.box[2 * axis + 1] = max([high, *(x + margin for x in at if x >= high)])
 
     def _camera(self) -> None:
         (left, right), (low, high) = self.axes.get_xlim(), self.axes.get_ylim()
@@ -112,8 +112,11 @@ class Stage:
         camera.clipping_range = (0.1 * far, 2.5 * far)
 
     def _lines(self) -> np.ndarray:
-        """Pipes and bodies of the first frame on the sheet : float64[c, 2, 2]; what names stand beside and over."""
-        self.cover, self.labels, found = np.zeros((0, 2)), [], [np.zeros((0, 2, 2))]
+        """Pipes and bodies of the first frame on the sheet : float64[c, 2, 2].
+
+        Sets `cover`, the points that names should not cover, and `labels`, the names of bodies.
+        """
+        self.cover, self.labels, segments = np.zeros((0, 2)), [], [np.zeros((0, 2, 2))]
         for file in self.scene.frames[0][1]:
             mesh = read(file, self.scene)
             points = self.aspect.on_sheet(mesh.points)
@@ -121,21 +124,21 @@ class Stage:
                 self.cover = np.vstack([self.cover, self.aspect.on_sheet(mesh.cell_centers().points)])
                 continue
             lines = mesh.cells_dict[3]
-            found.append(points[lines])
+            segments.append(points[lines])
             if "pipe" in mesh.cell_data:
                 self.scene.pipes = [(np.asarray(mesh.points), lines, np.zeros(0), np.asarray(mesh["pipe"]))]
             elif len(self.scene.frames) == 1:  # bodies move
-                self.labels = self._bodies(found[-1], np.asarray(mesh["body"]))
-        return np.concatenate(found)
+                self.labels = self._bodies(segments[-1], np.asarray(mesh["body"]))
+        return np.concatenate(segments)
 
-    def _bodies(self, lines: np.ndarray, whose: np.ndarray) -> list[tuple[str, np.ndarray]]:
-        """Names of bodies with the middles of their longest lines."""
-        long, found = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), []
+    def _bodies(self, lines: np.ndarray, line_body: np.ndarray) -> list[tuple[str, np.ndarray]]:
+        """(name, midpoint of the longest line) of each body with extent."""
+        long, names = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1), []
         for k, name in enumerate(self.scene.bodies):
-            own = np.flatnonzero(whose == k)
+            own = np.flatnonzero(line_body == k)
             if len(own) and long[own].max() > 0.0:
-                found.append((name, lines[own[long[own].argmax()]].mean(axis=0)))
-        return found
+                names.append((name, lines[own[long[own].argmax()]].mean(axis=0)))
+        return names
 
     def _add(self, mesh: Any) -> None:
         field = self.scene.quantity.name
@@ -144,7 +147,7 @@ class Stage:
         mesh.points[:, 2] *= self.aspect.rise
         if "body" in mesh.cell_data and (field != "speed" or self.wet):
             shape = tubes(mesh, self.box)
-            if shape.n_points:  # there are bodies without extent
+            if shape.n_points:  # bodies without extent have no points
                 self.plotter.add_mesh(shape, color=LIMB, ambient=SHADE)
         elif field in mesh.cell_data:
             plane = 3 not in mesh.celltypes
@@ -154,14 +157,14 @@ class Stage:
                 self.plotter.add_mesh(rim, color=style.INK, line_width=2)
 
     def _basin(self, mesh: Any) -> None:
-        """The bed of a basin, its houses and the water."""
+        """Draw the bed of a basin, its buildings and the water."""
         rise, field = self.aspect.rise, self.scene.quantity.name
         surface = water.water(mesh, rise, (field,), water.WET * self.scene.height.factor) if field != "bed" else None
         block = water.blocks(mesh)
         top = self.box[5] + ABOVE * (self.box[5] - self.box[4])
         mesh.points[:, 2] *= rise
-        for house in water.houses(mesh, rise * top):
-            self.plotter.add_mesh(house, color=HOUSE, ambient=SHADE)
+        for wall in water.houses(mesh, rise * top):
+            self.plotter.add_mesh(wall, color=HOUSE, ambient=SHADE)
         if field == "bed":
             return self._coloured(mesh.cell_data_to_point_data(), True)
         self.plotter.add_mesh(mesh.extract_cells(~block) if block.any() else mesh, color=BED, smooth_shading=False)
@@ -177,21 +180,21 @@ class Stage:
         return None
 
     def _coloured(self, shape: Any, plane: bool) -> None:
-        """A shape in the colours of its field, with lines of equal values where it is plane."""
-        (low, high), field, many = self.limits, self.scene.quantity.name, self.scene.contours
+        """Draw a shape in the colours of its field, with contour lines if it is plane."""
+        (low, high), field, count = self.limits, self.scene.quantity.name, self.scene.contours
         self.plotter.add_mesh(shape, scalars=field, cmap=COLOURS, clim=self.limits, smooth_shading=True,
                               show_scalar_bar=False, lighting=not plane or self.wet,
                               ambient=0.0 if plane else SHADE)  # fmt: skip
-        if plane and many and field in shape.point_data:
-            levels = [low + (high - low) * (k + 1) / (many + 1) for k in range(many)]
+        if plane and count and field in shape.point_data:
+            levels = [low + (high - low) * (k + 1) / (count + 1) for k in range(count)]
             lines = shape.contour(levels, scalars=field)
-            lines.points[:] += OVER * shape.length * self.aspect.back  # or they sink into it here and there
+            lines.points[:] += OVER * shape.length * self.aspect.back  # the surface would hide parts of the lines
             if lines.n_points:
                 self.plotter.add_mesh(lines, color="white", line_width=2)
 
 
 def main() -> None:
-    """Draw what stands on standard input."""
+    """Draw the pickled (scene, path) from standard input."""
     scene, out = pickle.load(sys.stdin.buffer)
     write(Stage(scene, len(scene.frames) > 1), len(scene.frames), Path(out))
 

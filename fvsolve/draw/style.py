@@ -1,4 +1,4 @@
-"""How pictures look: colours, lines, axes. Knows matplotlib; knows no run."""
+"""Style of pictures: colours, figures, axes, legends and titles."""
 
 from __future__ import annotations
 
@@ -9,44 +9,44 @@ from fvsolve.errors import visible
 
 INK, MUTED, HAIR = "#1f2933", "#6b7785", "#d9dee4"
 DOUBT = "#c2410c"  # marks: results are not to be trusted from there on
-# Told apart also by readers who see no red or green (after Wong 2011, Nature Methods 8:441).
+# Distinguishable for colour-blind readers (after Wong 2011, Nature Methods 8:441).
 COLOURS = ("#0b6aa8", "#d1622b", "#12876f", "#8a4fa3", "#b8860b", "#4aa3d8", "#a3324a", "#5a6b2f")
 WIDTH = 9.0  # of a picture [inch]
 DPI = 150
-LONGEST = 200  # letters of a title
+LONGEST = 200  # greatest number of letters of a title
 
 
 def figure(height: float, width: float = WIDTH):
-    """An empty Figure with an Agg canvas; pyplot and its windows are never imported."""
+    """Empty Figure with an Agg canvas; pyplot and its windows are never imported."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    made = Figure(figsize=(width, height), dpi=DPI, facecolor="white", layout="constrained")
-    FigureCanvasAgg(made)
-    return made
+    fig = Figure(figsize=(width, height), dpi=DPI, facecolor="white", layout="constrained")
+    FigureCanvasAgg(fig)
+    return fig
 
 
 def as_it_stands(make: Callable) -> Callable:
-    """A function that makes a figure, none of whose texts is markup: `$` is a dollar, but in powers on log axes."""
+    """Decorator of functions that make a figure: `$` in texts is no markup, except in powers on logarithmic axes."""
 
     @functools.wraps(make)
-    def made(*arguments, **keywords):
+    def draw(*arguments, **keywords):
         from matplotlib.text import Text
         from matplotlib.ticker import LogFormatter
 
         figure = make(*arguments, **keywords)
         powers = [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)
                   if isinstance(axis.get_major_formatter(), LogFormatter)]  # fmt: skip
-        kept = {text for axis in powers for text in axis.findobj(Text) if text is not axis.label}
-        for text in set(figure.findobj(Text)) - kept:
+        markup = {text for axis in powers for text in axis.findobj(Text) if text is not axis.label}
+        for text in set(figure.findobj(Text)) - markup:
             text.set(parse_math=False, usetex=False)
         return figure
 
-    return made
+    return draw
 
 
 def dress(axes) -> None:
-    """Open axes with a light grid behind the lines."""
+    """Style axes: left and bottom lines only, and a light grid behind the curves."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     for side in ("left", "bottom"):
@@ -61,7 +61,7 @@ def dress(axes) -> None:
 
 
 def label_decades(axes) -> None:
-    """On logarithmic axes labels at powers of ten alone, unless an axis spans less than a decade."""
+    """Label logarithmic axes only at powers of ten, unless an axis spans less than a decade."""
     from matplotlib.ticker import NullFormatter
 
     axes.tick_params(which="minor", labelcolor=INK, labelsize=7)
@@ -72,7 +72,7 @@ def label_decades(axes) -> None:
 
 
 def legend(axes) -> None:
-    """The legend beside the axes, where it covers no line."""
+    """Draw the legend to the right of the axes, where it covers no curve."""
     if axes.get_legend_handles_labels()[0]:
         axes.legend(
             loc="upper left",
@@ -85,8 +85,8 @@ def legend(axes) -> None:
         )
 
 
-def title(made, text: str) -> None:
-    """The title over a whole picture."""
+def title(fig, text: str) -> None:
+    """Set the title of a figure."""
     text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
     if text:
-        made.suptitle(visible(text), fontsize=10.5, color=INK, x=0.012, ha="left")
+        fig.suptitle(visible(text), fontsize=10.5, color=INK, x=0.012, ha="left")

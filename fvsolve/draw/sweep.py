@@ -1,4 +1,4 @@
-"""An outcome of many runs over what varied. Knows numbers and matplotlib; runs nothing."""
+"""Pictures of an outcome of many runs over the varied keys."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ from collections.abc import Mapping
 
 from fvsolve.draw import style
 
-PANELS = 6  # keys that are drawn
-WORDS = 12  # values that are named along an axis
-NUMBERS = 100  # squares of a map that say their value
+PANELS = 6  # greatest number of keys that are drawn
+WORDS = 12  # greatest number of named values along an axis
+NUMBERS = 100  # greatest number of squares of a map with their values as text
 BROAD = 26  # letters of a line of a key
 
 
 @style.as_it_stands
 def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
-    """One column of a `Sweep` over each key that varied, under its head, a map over two; runs that are not ok apart."""
+    """Figure of a column of a `Sweep` over each varied key, or a map over two keys; failed runs have another colour.
+
+    heads : key -> label of its axis
+    """
     if len(sweep.keys) == 2:
         return map_figure(sweep, [name], heads)
     keys = list(sweep.keys)[:PANELS]
@@ -28,10 +31,10 @@ def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
         axes.set_axis_off()
     for k, (axes, key) in enumerate(zip(panels, keys, strict=False)):
         x, words = places([row[key] for row in sweep.rows])
-        for colour, which in ((style.COLOURS[0], False), (style.DOUBT, True)):
-            own = [at for at, one in enumerate(wrong) if one is which]
+        for colour, is_wrong in ((style.COLOURS[0], False), (style.DOUBT, True)):
+            own = [at for at, failed in enumerate(wrong) if failed is is_wrong]
             axes.plot([x[at] for at in own], [y[at] for at in own], linestyle="", marker="o", markersize=3.5,
-                      color=colour, label="not ok" if which and own else None)  # fmt: skip
+                      color=colour, label="not ok" if is_wrong and own else None)  # fmt: skip
         style.dress(axes)
         axes.margins(x=0.04)
         if words:
@@ -44,7 +47,10 @@ def outcome_figure(sweep, name: str, heads: Mapping[str, str]):
 
 
 def places(values: list) -> tuple[list[float], list[str]]:
-    """Where values stand on an axis: numbers as they are, others by their first appearance, with their words."""
+    """Positions of values on an axis, and texts of its ticks.
+
+    Numbers keep their value and have no texts; other values are numbered in order of first appearance.
+    """
     if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
         return [float(value) for value in values], []
     texts = [str(value) for value in values]
@@ -54,7 +60,7 @@ def places(values: list) -> tuple[list[float], list[str]]:
 
 @style.as_it_stands
 def map_figure(sweep, names, heads: Mapping[str, str]):
-    """Columns of a `Sweep` over two keys, each a map: squares of a grid, or dots; runs that are not ok are crossed."""
+    """Figure of columns of a `Sweep` over two keys, as maps of squares or as dots; runs that are not ok are crossed."""
     across = min(len(names), 2)
     down = -(-len(names) // across)
     figure = style.figure(0.6 + (4.4 if across == 1 else 3.2) * down)
@@ -72,31 +78,31 @@ def _map(axes, sweep, name: str) -> None:
     import numpy as np
 
     values = [[row[key] for row in sweep.rows] for key in sweep.keys]
-    found = np.array([math.nan if row.get(name) is None else float(row[name]) for row in sweep.rows])
+    numbers = np.array([math.nan if row.get(name) is None else float(row[name]) for row in sweep.rows])
     wrong = np.array([not row["ok"] for row in sweep.rows])
-    steps = [sorted(set(places(one)[0])) for one in values]
-    x, y = (np.array(places(one)[0]) for one in values)
+    steps = [sorted(set(places(column)[0])) for column in values]
+    x, y = (np.array(places(column)[0]) for column in values)
     style.dress(axes)
-    if len(steps[0]) * len(steps[1]) == len(set(zip(x, y, strict=True))) == len(found):
+    if len(steps[0]) * len(steps[1]) == len(set(zip(x, y, strict=True))) == len(numbers):
         x, y = (np.searchsorted(step, at) for step, at in zip(steps, (x, y), strict=True))
         table = np.full((len(steps[1]), len(steps[0])), math.nan)
-        table[y, x] = found
+        table[y, x] = numbers
         seen = axes.pcolormesh(table, cmap="viridis")
         x, y = x + 0.5, y + 0.5
-        for axis, one, step in zip((axes.xaxis, axes.yaxis), values, steps, strict=True):
-            said = places(one)[1] or ["" if isinstance(one[0], str) else f"{at:.4g}" for at in step]
-            every = -(-len(said) // WORDS)
-            axis.set_ticks(np.arange(0, len(said), every) + 0.5, said[::every])
-        if len(found) <= NUMBERS:
-            for a, b, value, shade in zip(x, y, found, seen.norm(found), strict=True):
+        for axis, column, step in zip((axes.xaxis, axes.yaxis), values, steps, strict=True):
+            labels = places(column)[1] or ["" if isinstance(column[0], str) else f"{at:.4g}" for at in step]
+            every = -(-len(labels) // WORDS)
+            axis.set_ticks(np.arange(0, len(labels), every) + 0.5, labels[::every])
+        if len(numbers) <= NUMBERS:
+            for a, b, value, shade in zip(x, y, numbers, seen.norm(numbers), strict=True):
                 if math.isfinite(value):
                     axes.text(a, b, f"{value:.4g}", ha="center", va="center", fontsize=7.5,
                               color="white" if shade < 0.6 else style.INK)  # fmt: skip
     else:
-        seen = axes.scatter(x, y, c=found, s=36, cmap="viridis")
+        seen = axes.scatter(x, y, c=numbers, s=36, cmap="viridis")
         axes.margins(0.05)
-        for axis, one in zip((axes.xaxis, axes.yaxis), values, strict=True):
-            if words := places(one)[1]:
+        for axis, column in zip((axes.xaxis, axes.yaxis), values, strict=True):
+            if words := places(column)[1]:
                 axis.set_ticks(range(len(words)), words)
     axes.plot(x[wrong], y[wrong], linestyle="", marker="x", markersize=9, color=style.DOUBT)
     bar = axes.figure.colorbar(seen, ax=axes)
@@ -105,33 +111,33 @@ def _map(axes, sweep, name: str) -> None:
 
 
 @style.as_it_stands
-def sensitivity_figure(found):
-    """Shares of the variance by key with their intervals, beside sizes and spreads of effects."""
-    figure = style.figure(1.1 + 0.5 * max(len(found.keys), 3))
+def sensitivity_figure(result):
+    """Figure of Sobol shares of the variance by key with their intervals, and of the mean and spread of effects."""
+    figure = style.figure(1.1 + 0.5 * max(len(result.keys), 3))
     panels = figure.subplots(1, 2, sharey=True)
-    unit = found.outcome.rpartition(" ")[2] if found.outcome.endswith("]") else ""
-    effects = f"effect of a move over the whole range {unit}".strip()
-    shown = (("share of the variance", (("S1", "S1, alone"), ("ST", "ST, with others"))),
+    unit = result.outcome.rpartition(" ")[2] if result.outcome.endswith("]") else ""
+    effects = f"elementary effect, per whole range of the key {unit}".strip()
+    shown = (("share of the variance", (("S1", "S1, first order"), ("ST", "ST, total"))),
              (effects, (("mu_star", "mean size"), ("sigma", "spread"))))  # fmt: skip
     for axes, (label, bars) in zip(panels, shown, strict=True):
         style.dress(axes)
-        for shift, (name, said), colour in zip((-0.2, 0.2), bars, style.COLOURS, strict=False):
-            at = [k + shift for k in range(len(found.keys))]
-            axes.barh(at, getattr(found, name), xerr=getattr(found, f"{name}_conf", None), height=0.36, color=colour,
-                      label=said, error_kw={"ecolor": style.MUTED, "elinewidth": 0.8})  # fmt: skip
+        for shift, (name, text), colour in zip((-0.2, 0.2), bars, style.COLOURS, strict=False):
+            at = [k + shift for k in range(len(result.keys))]
+            axes.barh(at, getattr(result, name), xerr=getattr(result, f"{name}_conf", None), height=0.36, color=colour,
+                      label=text, error_kw={"ecolor": style.MUTED, "elinewidth": 0.8})  # fmt: skip
         axes.locator_params(axis="x", nbins=5)
         axes.ticklabel_format(axis="x", scilimits=(-3, 4))
         axes.xaxis.get_offset_text().set(fontsize=8, color=style.MUTED)
         axes.set_xlabel(label, fontsize=8.5, color=style.INK)
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, fontsize=8, borderaxespad=0.2)
-    panels[0].set_yticks(range(len(found.keys)), [parted(key) for key in found.keys], fontsize=8)
+    panels[0].set_yticks(range(len(result.keys)), [parted(key) for key in result.keys], fontsize=8)
     panels[0].invert_yaxis()
-    style.title(figure, found.outcome)
+    style.title(figure, result.outcome)
     return figure
 
 
 def parted(key: str) -> str:
-    """A long key on several lines, each but the last ended by a dot."""
+    """Break a long key into lines after its dots."""
     lines = [""]
     for piece in key.replace(".", ".\n").split("\n"):
         lines = [*lines, piece] if len(lines[-1] + piece) > BROAD and lines[-1] else [*lines[:-1], lines[-1] + piece]

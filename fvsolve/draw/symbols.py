@@ -1,9 +1,9 @@
-"""A symbol for each kind of part, as pipework and fluid power draw them. Knows names of kinds; knows no part.
+"""Symbols of the kinds of parts, as used for pipework and fluid power.
 
-A symbol is strokes in a square from -1 to 1, the way of the flow along x: `M` and `L` go to points, `Z` closes,
-`O x y r` is a circle. What closes is white; after `*` it is ink, after `~` water. A kind that is not here has the
-symbol of the kind that it is made of (an orifice is a valve), else OTHER_NODE or OTHER_LINK: a new part needs no entry,
-and one line gives it its own.
+A symbol is a text of strokes in a square from -1 to 1, with the flow along x. `M x y` and `L x y` move and draw to a
+point, `Z` closes a stroke, `O x y r` is a circle. Closed strokes are filled white; after `*` with ink, after `~` with
+water. A kind without a symbol has that of the kind from which it is derived (an orifice is a valve), else OTHER_NODE or
+OTHER_LINK: a new kind of part needs no entry here.
 """
 
 from __future__ import annotations
@@ -56,32 +56,32 @@ WATER = "#8ab6d6"
 
 
 def symbol_of(kinds: Sequence[str], link: bool) -> str:
-    """The symbol of a part: `kinds` are its own and those it is made of, nearest first."""
+    """Symbol of a part; kinds : its kind and those from which it is derived, nearest first."""
     return next((SYMBOLS[kind] for kind in kinds if kind in SYMBOLS), OTHER_LINK if link else OTHER_NODE)
 
 
 @cache
 def strokes(symbol: str) -> list[tuple[str, tuple[tuple[float, float], ...], bool]]:
-    """(fill, points, whether closed) of each stroke, in the order in which they are drawn."""
-    found: list[tuple[str, list, bool]] = []
+    """(fill, points, True if closed) of each stroke, in the order of drawing."""
+    result: list[tuple[str, list, bool]] = []
     words, at, fill = symbol.split(), 0, "white"
     while at < len(words):
         word = words[at]
         if word in "*~":
             fill, at = {"*": "ink", "~": "water"}[word], at + 1
         elif word == "Z":
-            found[-1] = (*found[-1][:2], True)
+            result[-1] = (*result[-1][:2], True)
             fill, at = "white", at + 1
         elif word == "O":
             x, y, r = map(float, words[at + 1 : at + 4])
-            found.append((fill, _circle(x, y, r), True))
+            result.append((fill, _circle(x, y, r), True))
             fill, at = "white", at + 4
         else:
             if word == "M":
-                found.append((fill, [], False))
-            found[-1][1].append((float(words[at + 1]), float(words[at + 2])))
+                result.append((fill, [], False))
+            result[-1][1].append((float(words[at + 1]), float(words[at + 2])))
             at += 3
-    return [(fill, tuple(points), closed) for fill, points, closed in found]
+    return [(fill, tuple(points), closed) for fill, points, closed in result]
 
 
 def _circle(x: float, y: float, r: float) -> list[tuple[float, float]]:

@@ -1,4 +1,4 @@
-"""The run directory: what a run leaves on disk, and how it is read back. Knows files; knows no physics."""
+"""Files of a run directory: writing and reading."""
 
 from fvsolve.output.directory import RunDirectory
 

@@ -1,4 +1,4 @@
-"""Columns of the tables: a quantity, its unit, and the way to and from SI. Knows units; knows no files."""
+"""Columns of result tables: name, dimension and unit, with conversion from and to SI."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fvsolve import units
 
 @dataclass(frozen=True)
 class UnitColumn:
-    """A named quantity in the unit that the reader asked for; gauge pressures count from `ambient` [Pa]."""
+    """A named quantity in its output unit; gauge pressures are relative to `ambient` [Pa]."""
 
     name: str
     dimension: str
@@ -20,23 +20,23 @@ class UnitColumn:
 
     @property
     def header(self) -> str:
-        """What stands over the column, for example `gate.pressure [Pa]`."""
+        """Header of the column, for example `gate.pressure [Pa]`."""
         return f"{self.name} [{self.unit}]"
 
     def from_si(self, value):
-        """A number or an array, from SI (pressures absolute) to this column's unit."""
+        """Convert a number or an array from SI (absolute pressures) to the unit of the column."""
         return value if self.plain else units.convert(value, self.dimension, self.unit, self.ambient)
 
     def to_si(self, value):
-        """A number or an array, from this column's unit to SI (pressures absolute)."""
+        """Convert a number or an array from the unit of the column to SI (absolute pressures)."""
         if self.plain:
             return value
         unit = units.find(self.unit, self.dimension)
-        counts = unit.gauge and self.dimension == "pressure"
-        return unit.si(value) + (self.ambient if counts else 0.0)
+        is_gauge = unit.gauge and self.dimension == "pressure"
+        return unit.si(value) + (self.ambient if is_gauge else 0.0)
 
     def span_from_si(self, value: float) -> float:
-        """A difference of two values, from SI to this column's unit: the zero point does not matter."""
+        """Convert a difference of two values from SI to the unit of the column, without the zero offset."""
         if self.plain:
             return value
         unit = units.find(self.unit, self.dimension)
@@ -44,38 +44,38 @@ class UnitColumn:
 
     @property
     def span_unit(self) -> str:
-        """What a difference of two values is told in: bar where they are in barg."""
+        """Unit of a difference of two values, for example bar for values in barg."""
         return units.span(self.unit)
 
     @property
     def plain(self) -> bool:
-        """True where the column is in SI itself, so that not one bit is touched."""
+        """True if the unit of the column is the SI unit: values then stay unchanged to the bit."""
         return self.dimension == "number" or self.unit == units.DIMENSIONS[self.dimension].si
 
 
 def column(name: str, dimension: str, case, label: str = "") -> UnitColumn:
-    """The column of a quantity in the unit that `case.output.units` asks for, SI where it is silent; or a number's."""
+    """Column of a quantity in the unit of `case.output.units` (default: SI); `label` is the unit of a plain number."""
     return UnitColumn(name, dimension, label or case.unit_of(dimension), case.ambient_pressure)
 
 
 def time_column(case) -> UnitColumn:
-    """The first column of history.csv."""
+    """Time column, the first column of history.csv."""
     return column("t", "time", case)
 
 
 def probe_columns(model) -> list[UnitColumn]:
-    """One column per probe of a model, in its order."""
+    """Columns of the probes of a model, in the order of the probes."""
     return [column(probe.text, probe.dimension, model.case, probe.unit) for probe in model.probes]
 
 
 def split_header(header: str) -> tuple[str, str]:
-    """`gate.pressure [Pa]` as (`gate.pressure`, `Pa`); the unit is empty where none is stated."""
+    """Split `gate.pressure [Pa]` into (`gate.pressure`, `Pa`); the unit is "" if the header has none."""
     name, bracket, unit = header.strip().rpartition("[")
     return (name.strip(), unit.removesuffix("]").strip()) if bracket else (header.strip(), "")
 
 
 def converted(columns: list[UnitColumn], values: np.ndarray) -> np.ndarray:
-    """`values : float64[k, n]` from SI into the columns' units; the same array where all are SI."""
-    if all(one.plain for one in columns):
+    """Convert `values : float64[k, n]` from SI to the units of the columns; returns `values` itself if all are SI."""
+    if all(column.plain for column in columns):
         return values
-    return np.column_stack([one.from_si(values[:, i]) for i, one in enumerate(columns)])
+    return np.column_stack([column.from_si(values[:, i]) for i, column in enumerate(columns)])

@@ -1,4 +1,4 @@
-"""The sink that writes a run directory. Knows when which file is written; knows no physics."""
+"""Run directory: the sink that writes all files of a run, and functions that read and clear it."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from fvsolve.output.summary import read_summary
 OWN = ("restart.npz", "history.csv", "envelope.csv", "routes.csv", "fields.pvd", "case.toml")
 ENDED = "summary.json"
 PICTURES = ("history.png", "envelope.png")
-# Of `fvsolve report` and `plot`: another run's must not stand beside this one's numbers.
+# Files of `fvsolve report` and `plot`; those of an earlier run are deleted, since they show other numbers.
 REPORTS = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
 DRAWN = ("section-*.png", "view-*.png", "view-*.gif")  # the last two of `fvsolve view`
 
 
 class RunDirectory:
-    """Sink of a run: history.csv and fields are streamed, restart.npz is replaced at every checkpoint.
+    """Sink of a run: streams history.csv and fields, replaces restart.npz at every checkpoint.
 
-    While summary.json is absent the run is unfinished. RunError where the directory holds something that
-    must not be lost, or a restart that does not fit.
+    The run is unfinished while summary.json is absent. Raises RunError if the directory holds another run and
+    neither `force` nor `resume` is set, or if its restart.npz does not fit the case.
     """
 
     def __init__(self, folder: Path, model, force: bool = False, resume: bool = False):
         self.folder = Path(folder)
         self.model = model
         if force and resume:
-            raise RunError("--resume goes on with a run and --force starts it again; state one of them")
+            raise RunError("--resume continues a run and --force starts it again; state only one of them")
         _refuse_names(model.case)
         self.who = identity(model.case)
         self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
@@ -47,7 +47,7 @@ class RunDirectory:
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():
-            raise RunError(f"{self.folder} is a file; state another place with --out DIR")
+            raise RunError(f"{self.folder} is a file. Expected a directory; choose another one with --out DIR")
         self.lock = locked(self.folder, "a run")
         try:
             self.restart = self._checkpoint() if resume else None
@@ -61,14 +61,14 @@ class RunDirectory:
 
     @property
     def ended(self) -> bool:
-        """True where there is nothing to go on with: this very run in the directory came to its end."""
+        """True if the directory holds the finished run of the same case and versions, up to numerics.end."""
         if self.restart is None or not (self.folder / ENDED).is_file():
             return False
-        said = read_summary(self.folder / ENDED)
-        return said["ok"] and said["versions"] == self.who and said["t"] >= self.model.case.numerics.end
+        summary = read_summary(self.folder / ENDED)
+        return summary["ok"] and summary["versions"] == self.who and summary["t"] >= self.model.case.numerics.end
 
     def begin(self, model, state) -> None:
-        """Open the files: empty ones, or those of the checkpoint cut to where it was made."""
+        """Open the files: new empty ones, or those of the checkpoint, truncated to its time."""
         for name in (ENDED, *PICTURES):
             (self.folder / name).unlink(missing_ok=True)
         clear_reports(self.folder)
@@ -90,7 +90,7 @@ class RunDirectory:
             self.history.write(t, values)
 
     def field(self, t: float, frame: dict) -> None:
-        """Write a frame of all pipes and basins at time `t` [s]."""
+        """Write a frame of all pipes, basins and bodies at time `t` [s]."""
         with self.writing():
             if self.lines:
                 self.lines.write(self.fields.frames, frame)
@@ -98,12 +98,12 @@ class RunDirectory:
                 self.fields.write(t, frame)
 
     def among(self, comm, rows: dict) -> None:
-        """Let ranks write frames of basins together, each its rows; see `pieces.Shares`."""
+        """Make all ranks write frames of basins in parallel, each rank its rows; see `ParallelBasinWriter`."""
         if self.fields:
             self.fields.pieces = Shares(comm, rows)
 
     def checkpoint(self, state, extra: dict) -> None:
-        """Replace restart.npz by one that knows this state and all rows and frames so far."""
+        """Replace restart.npz: state, solver arrays and the number of rows and frames written so far."""
         with self.writing():
             size = self.history.flush()
             frames = self.fields.frames if self.fields else 0
@@ -111,7 +111,7 @@ class RunDirectory:
             write_restart(self.folder / "restart.npz", restart, self.who)
 
     def end(self, summary) -> None:
-        """Close the history and write the envelope; summary.json is the caller's last word."""
+        """Close the history and write envelope.csv and routes.csv; the caller writes summary.json last."""
         with self.writing():
             self.history.close()
             if summary.envelope:
@@ -122,7 +122,7 @@ class RunDirectory:
                     write_routes(self.folder / "routes.csv", envelope, case)
 
     def close(self) -> None:
-        """Let go of open files and of the directory, also when a run broke off."""
+        """Close open files and release the lock of the directory, also after a failed run."""
         try:
             with self.writing():
                 self.history.close()
@@ -131,38 +131,38 @@ class RunDirectory:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """What cannot be written is told with its place: RunError."""
+        """Turn an OSError of the body into a RunError with the path."""
         try:
             yield
         except OSError as error:
-            place = error.filename or self.folder
-            raise RunError(f"{place}: cannot be written: {error.strerror or error}; make room and go on with --resume, "
-                           "or state another place with --out DIR") from None  # fmt: skip
+            path = error.filename or self.folder
+            raise RunError(f"{path}: cannot be written: {error.strerror or error}. Free disk space and continue with "
+                           "--resume, or choose another directory with --out DIR") from None  # fmt: skip
 
     def table(self):
-        """`float64[rows, 1 + probes]`: time and probes as history.csv has them."""
+        """Read history.csv : float64[rows, 1 + probes], time and probes in the units of the file."""
         return read_table(self.folder / "history.csv")
 
     def envelope(self) -> dict:
-        """Pipe -> quantity -> float64[cells] as envelope.csv has them, empty where there is none."""
+        """Read envelope.csv: pipe -> quantity -> float64[cells] in the units of the file; {} if there is no file."""
         path = self.folder / "envelope.csv"
         return read_envelope(path) if path.is_file() else {}
 
     def files(self) -> list[str]:
-        """Names of the files that a reader will look for, as far as they are there; pictures come after them."""
+        """Sorted names of the existing files of the run, with summary.json and without pictures."""
         names = [*OWN, *self.model.case.copies]
-        there = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
-        return sorted([*there, ENDED])
+        existing = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
+        return sorted([*existing, ENDED])
 
     def _checkpoint(self) -> Restart | None:
         path = self.folder / "restart.npz"
-        found = read_restart(path, self.who) if path.is_file() else None
-        if found and found.y.size != self.model.y_size:
-            raise RunError(f"{path} holds {found.y.size} states, and the case has {self.model.y_size}; start the run "
+        restart = read_restart(path, self.who) if path.is_file() else None
+        if restart and restart.y.size != self.model.y_size:
+            raise RunError(f"{path} holds {restart.y.size} states, but the case has {self.model.y_size}; start the run "
                            "again with --force")  # fmt: skip
-        if found and found.t > self.model.case.numerics.end:
-            raise RunError(f"{path} is at t = {found.t:.6g} s, after numerics.end; start again with --force")
-        return found
+        if restart and restart.t > self.model.case.numerics.end:
+            raise RunError(f"{path} is at t = {restart.t:.6g} s, after numerics.end; start the run again with --force")
+        return restart
 
     def _start(self) -> None:
         clear(self.folder)
@@ -183,18 +183,21 @@ class RunDirectory:
 
 
 def read_directory(folder: Path) -> tuple:
-    """(summary, table(), envelope(), folder) of a run that ended; RunError where there is none."""
-    said = read_summary(folder / ENDED)
+    """(summary, table(), envelope(), folder) of a finished run; raises RunError if there is none.
+
+    `table` and `envelope` are functions: they read history.csv and envelope.csv when called.
+    """
+    summary = read_summary(folder / ENDED)
     return (
-        said,
+        summary,
         lambda: read_table(folder / "history.csv"),
-        lambda: read_envelope(folder / "envelope.csv") if "envelope.csv" in said["files"] else {},
+        lambda: read_envelope(folder / "envelope.csv") if "envelope.csv" in summary["files"] else {},
         folder,
     )
 
 
 def clear(folder: Path) -> None:
-    """Delete what an earlier run left in `folder`, and nothing else."""
+    """Delete the files of an earlier run in `folder`; other files stay."""
     for name in (ENDED, *OWN, *PICTURES):
         (folder / name).unlink(missing_ok=True)
     for path in (folder / "fields").glob("*.*vtu"):
@@ -203,7 +206,7 @@ def clear(folder: Path) -> None:
 
 
 def clear_reports(folder: Path) -> None:
-    """Delete the page, the workbook and the pictures that were made of earlier results in `folder`."""
+    """Delete the report, the workbook and the pictures of earlier results in `folder`."""
     drawn = [path for name in DRAWN for path in folder.glob(name)]
     for path in [*(folder / name for name in REPORTS), *drawn]:
         path.unlink(missing_ok=True)
@@ -212,26 +215,26 @@ def clear_reports(folder: Path) -> None:
 def _refuse_names(case) -> None:
     for name, path in case.copies.items():
         if name in (ENDED, *OWN, *PICTURES, *REPORTS):
-            raise RunError(f"{path} has the name of a file that every run writes; give it another name")
+            raise RunError(f"{path} has the name of a file of the run directory ({name}); rename it")
 
 
 def _refuse_size(folder: Path, case) -> None:
     least, free = on_disk(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
     if least > free:
-        raise RunError(f"{folder}: history.csv would take {size(least)} at least, and {size(free)} are free; wanted a "
-                       "longer [output] every, or another place with --out DIR")  # fmt: skip
+        raise RunError(f"{folder}: history.csv needs at least {size(least)}, but {size(free)} are free. Expected a "
+                       "longer [output] every, or another directory with --out DIR")  # fmt: skip
 
 
 def pictures_there(folder: Path) -> list[str]:
-    """Names of the pictures that are there."""
+    """Names of the existing pictures of a run directory."""
     return [name for name in PICTURES if (folder / name).is_file()]
 
 
 def _refuse(folder: Path) -> None:
     if (folder / ENDED).exists():
-        raise RunError(f"{folder} holds a run; replace it with --force, or keep it and state --out DIR")
+        raise RunError(f"{folder} holds a run; replace it with --force, or keep it and choose another --out DIR")
     if (folder / "restart.npz").exists():
         raise RunError(
-            f"{folder} holds an unfinished run; go on with --resume, start again with --force, "
-            "or state another place with --out DIR"
+            f"{folder} holds an unfinished run; continue it with --resume, start it again with --force, "
+            "or choose another directory with --out DIR"
         )

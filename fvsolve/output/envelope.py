@@ -1,4 +1,4 @@
-"""envelope.csv: what each cell of each pipe has met, least and greatest. Knows columns; knows no solver."""
+"""envelope.csv: least and greatest pressure and head of each pipe cell, with their times."""
 
 from __future__ import annotations
 
@@ -24,48 +24,50 @@ QUANTITIES = {
 
 
 def envelope_columns(case) -> list[UnitColumn]:
-    """The columns of envelope.csv after `pipe`, in the units that the case asks for."""
+    """Columns of envelope.csv after `pipe`, in the units of the case."""
     return [column(name, dimension, case) for name, dimension in QUANTITIES.items()]
 
 
 def with_start(summary, model) -> dict:
-    """The envelope of a solver, cells and what is watched between them by distance, with the heads that the run began
-    from, `initial_head` [m]."""
-    found = {}
+    """Envelope of each pipe [SI] with the heads at the start, `initial_head` [m].
+
+    Cells and the observed points between cells are sorted by their distance along the pipe.
+    """
+    envelopes = {}
     for k, pipe in enumerate(model.pipes):
-        one = {**summary.envelope[pipe.name], "initial_pressure": model.cell_pressure(k, np.zeros(pipe.cells))}
+        arrays = {**summary.envelope[pipe.name], "initial_pressure": model.cell_pressure(k, np.zeros(pipe.cells))}
         if (points := summary.points.get(pipe.name)) is not None:
-            one = {key: np.concatenate([values, points[key]]) for key, values in one.items()}
-            order = np.argsort(one["distance"], kind="stable")
-            one = {key: values[order] for key, values in one.items()}
-        one["initial_head"] = model.head(one.pop("initial_pressure"), one["elevation"])
-        found[pipe.name] = one
-    return found
+            arrays = {key: np.concatenate([values, points[key]]) for key, values in arrays.items()}
+            order = np.argsort(arrays["distance"], kind="stable")
+            arrays = {key: values[order] for key, values in arrays.items()}
+        arrays["initial_head"] = model.head(arrays.pop("initial_pressure"), arrays["elevation"])
+        envelopes[pipe.name] = arrays
+    return envelopes
 
 
 def in_units(envelope: dict, case) -> dict:
-    """An envelope in SI in the units of envelope.csv."""
+    """Convert an envelope from SI to the units of envelope.csv."""
     columns = envelope_columns(case)
-    return {pipe: {one.name: np.asarray(one.from_si(np.asarray(arrays[one.name], float))) for one in columns}
+    return {pipe: {col.name: np.asarray(col.from_si(np.asarray(arrays[col.name], float))) for col in columns}
             for pipe, arrays in envelope.items()}  # fmt: skip
 
 
 def write_envelope(path: Path, envelope: dict, case) -> None:
-    """One row per cell: pipe, distance from `from`, elevation, extremes and their times.
+    """Write a row for each cell: pipe, distance from its `from` end, elevation, extremes and their times.
 
-    `envelope` maps a pipe to `float64[cells]` arrays named as in `QUANTITIES`, in units of the columns.
+    `envelope` maps a pipe to `float64[cells]` arrays named as in `ENVELOPE_QUANTITIES`, in units of the columns.
     """
     columns = envelope_columns(case)
     with open(path, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow(["pipe", *(one.header for one in columns)])
+        table.writerow(["pipe", *(col.header for col in columns)])
         for pipe, arrays in envelope.items():
-            values = [arrays[one.name].tolist() for one in columns]
+            values = [arrays[col.name].tolist() for col in columns]
             table.writerows([pipe, *map(repr, row)] for row in zip(*values, strict=True))
 
 
 def read_envelope(path: Path) -> dict:
-    """Pipe -> quantity -> float64[cells] as the file has them."""
+    """Read envelope.csv: pipe -> quantity -> float64[cells] in the units of the file; RunError if unreadable."""
     pipes: dict[str, list] = {}
     try:
         with open(path, encoding="utf-8", newline="") as file:

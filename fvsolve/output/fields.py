@@ -1,7 +1,7 @@
-"""fields.pvd and its .vtu frames: what every cell is doing at a time. Knows VTK files; knows no physics.
+"""fields.pvd and its .vtu frames: values of all cells at the output times.
 
-Pipes are chains of line cells along the layout, elevation upwards; cell data are in SI, pressures absolute, and every
-array carries its unit as VTK's own UNITS_LABEL.
+Pipes are chains of line cells along the network layout, with the elevation upwards. Cell data are in SI, pressures are
+absolute, and every array carries its unit as the VTK key UNITS_LABEL.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ TAIL = "</Collection>\n</VTKFile>\n"
 
 
 class FieldSeries:
-    """Writes one .vtu per frame; the .pvd beside them is whole after each.
+    """Series of .vtu frames with their index fields.pvd, which is complete after each frame.
 
-    pieces : None, or `Shares` of the basins that ranks write together
+    pieces : None, or the `ParallelBasinWriter` of basins whose rows are distributed over ranks
     """
 
     def __init__(self, folder: Path, model):
@@ -45,8 +45,8 @@ class FieldSeries:
             self.places = places = layout.positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
             self.points, self.lines = geometry(model, places)
             self.owner = ride(model, self.points)
-        riding = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
-        self.places = places = {**places, **riding}  # in the world, as bodies are
+        moving = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
+        self.places = places = {**places, **moving}  # a basin on a body is drawn in world axes, as bodies are
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | (carried if basin.scalars else {}) for basin in model.basins}
         self.basins = {basin.name: (*shape(basin, places[basin.name]), units[basin.name]) for basin in model.basins}
@@ -57,49 +57,49 @@ class FieldSeries:
         self.pipe = np.repeat(np.arange(len(cells), dtype=np.int32), cells)
 
     def start(self) -> None:
-        """Begin an empty series."""
+        """Start an empty series."""
         (self.folder / "fields").mkdir(exist_ok=True)
         (self.folder / "fields.pvd").write_bytes((HEAD + TAIL).encode())
 
     def continue_from(self, frames: int) -> None:
-        """Keep the first `frames` of a series, drop what came after its checkpoint."""
-        listed = self.folder / "fields.pvd"
-        lines = listed.read_text(encoding="utf-8").splitlines() if listed.is_file() else []
-        many = frames * (len(self.basins) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
-        kept = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:many]
-        named = [FILE.search(line) for line in kept]
-        if len(kept) < many or not all(one and (self.folder / one[1]).is_file() for one in named):
-            raise RunError(f"{listed} lacks frames; start the run again with --force")
+        """Keep the first `frames` frames of a series and delete those after its checkpoint."""
+        index = self.folder / "fields.pvd"
+        lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
+        n = frames * (len(self.basins) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
+        entries = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:n]
+        matches = [FILE.search(line) for line in entries]
+        if len(entries) < n or not all(match and (self.folder / match[1]).is_file() for match in matches):
+            raise RunError(f"{index}: frames are missing; start the run again with --force")
         (self.folder / "fields").mkdir(exist_ok=True)
         for path in (self.folder / "fields").glob("*.*vtu"):
             number = path.stem.rpartition("-")[2]
             if number.isdecimal() and int(number) >= frames:
                 path.unlink()
-        listed.write_bytes((HEAD + "".join(kept) + TAIL).encode())
+        index.write_bytes((HEAD + "".join(entries) + TAIL).encode())
         self.frames = frames
 
     def write(self, t: float, frame: dict) -> None:
-        """Add the frame at time `t` [s]: pipe -> quantity -> float64[cells], SI."""
+        """Write the frame at time `t` [s]; frame : pipe or basin -> quantity -> float64[cells] in SI."""
         name = f"fields/{self.frames:06d}.vtu"
         for part, (basin, (points, cells, units)) in enumerate(self.basins.items(), 1):
-            file, whole = f"fields/{basin}-{self.frames:06d}.vtu", self.model.basins[part - 1]
+            file, owner_basin = f"fields/{basin}-{self.frames:06d}.vtu", self.model.basins[part - 1]
             if self.pieces is not None and basin in self.pieces.rows:
                 file = f"fields/{basin}-{self.frames:06d}.pvtu"
-                self.pieces.write(self.folder / file, whole, self.places[basin], frame[basin], units)
+                self.pieces.write(self.folder / file, owner_basin, self.places[basin], frame[basin], units)
                 self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
                 continue
             values = frame[basin]
-            if whole.part.on is not None:
-                values = values | whole.vectors_at(values, frame["out"], self.model.layout)
-            found = {key: parted(value, cells) for key, value in values.items()}
-            if basin in frame["points"]:  # what moves
+            if owner_basin.part.on is not None:
+                values = values | owner_basin.vectors_at(values, frame["out"], self.model.layout)
+            blocks = {key: parted(value, cells) for key, value in values.items()}
+            if basin in frame["points"]:  # moving basins have points of their own at each time
                 points = np.append(self.places[basin], 0.0) + frame["points"][basin]
-            write_frame(self.folder / file, points, cells, found, units)
+            write_frame(self.folder / file, points, cells, blocks, units)
             self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
         if self.bodies:
             file, (points, speed) = f"fields/bodies-{self.frames:06d}.vtu", self.bodies.at(frame["out"])
-            found = {"body": [self.bodies.whose], "speed": [speed]}
-            write_frame(self.folder / file, points, [("line", self.bodies.lines)], found, {"speed": "m/s"})
+            blocks = {"body": [self.bodies.whose], "speed": [speed]}
+            write_frame(self.folder / file, points, [("line", self.bodies.lines)], blocks, {"speed": "m/s"})
             self._list(f'<DataSet timestep="{float(t)!r}" part="{len(self.basins) + 1}" file="{file}"/>\n')
         if not self.pipes:
             self.frames += 1
@@ -111,7 +111,7 @@ class FieldSeries:
         self.frames += 1
 
     def now(self, frame: dict) -> np.ndarray:
-        """Points of pipes, those that ride where their bodies are."""
+        """Points of pipes at the time of a frame, points on bodies moved with them : float64[n, 3] [m]."""
         if not (self.owner >= 0).any():
             return self.points
         from fvsolve.output.skeleton import moved
@@ -119,14 +119,14 @@ class FieldSeries:
         return moved(self.model, frame["out"], self.owner, self.points)[0]
 
     def _list(self, line: str) -> None:
-        # One write over the closing tags: killed before or after it, the file is whole.
+        # A single write over the closing tags: the file stays valid if the process is killed before or after it.
         with open(self.folder / "fields.pvd", "r+b", buffering=0) as file:
             file.seek(-len(TAIL), 2)
             file.write((line + TAIL).encode())
 
 
 def skeleton_of(model):
-    """What is drawn of bodies, None of none."""
+    """Lines that show the bodies of a model; None if it has no bodies."""
     if not model.body_names:
         return None
     from fvsolve.output.skeleton import Skeleton
@@ -135,7 +135,10 @@ def skeleton_of(model):
 
 
 def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, list], units: dict[str, str]) -> None:
-    """Write a .vtu; `data` are arrays block by block. meshio knows no units, so they are put in behind it."""
+    """Write a .vtu file; `data` holds a list of arrays, one for each cell block.
+
+    meshio has no units, so UNITS_LABEL is inserted into the file afterwards.
+    """
     import meshio
 
     meshio.Mesh(points, cells, cell_data=data).write(path)
@@ -147,14 +150,15 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
 
 
 def unit_of(units: dict[str, str], name: str) -> str:
-    """What an array says of its unit, nothing where it has none."""
+    """XML of the unit of an array; "" if it has no unit."""
     return UNIT.format(html.escape(units[name], quote=False)) if name in units else ""
 
 
 def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Points float64[n, 3] [m] and lines int[cells, 2]; pipes meet in the point of their node, and basins at patches.
+    """Points float64[n, 3] [m] and lines int[cells, 2] of all pipes.
 
-    plan : parts -> float64[2] [m]
+    Pipes share the point of their common node; the point of a basin patch is its mean.
+    plan : part -> float64[2] [m]
     """
     places = {name: plan[layout.place(name)] for name in model.node_names}
     for basin in model.basins:
@@ -182,7 +186,10 @@ def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray
 
 
 def ride(model, points: np.ndarray) -> np.ndarray:
-    """Body of each point of `geometry`, -1 for none : int[n]; what rides is put in axes of its body, straight."""
+    """Body of each point of `pipe_geometry` : int[n], -1 for the world.
+
+    Points on a body are replaced by coordinates in the axes of the body, along a straight pipe.
+    """
     places = model.case.places
     ends = list(dict.fromkeys(end for pipe in model.pipes for end in (pipe.from_, pipe.to)))
     owner, at = np.full(len(points), -1), len(ends)
@@ -205,7 +212,7 @@ def ride(model, points: np.ndarray) -> np.ndarray:
 
 
 def shape(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
-    """Corners float64[p, 3] [m] of a basin's cells, on their bed, and blocks of cells of a kind, in their order."""
+    """Corners float64[p, 3] [m] of the cells of a basin at bed level, and blocks of cells of equal type, in order."""
     mesh = basin.mesh
     points = placed(basin, origin, mesh.points)
     three = mesh.cells[:, 3] < 0
@@ -216,43 +223,43 @@ def shape(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
 
 
 def placed(basin, origin: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points of a mesh where they are drawn : float64[p, 3] [m]."""
+    """Points of a basin mesh, shifted by `origin`, at bed level : float64[p, 3] [m]."""
     x, y = np.ascontiguousarray(points.T)
     return np.column_stack([origin[0] + x, origin[1] + y, basin.ground(x, y)])
 
 
 def parted(values: np.ndarray, blocks: list) -> list[np.ndarray]:
-    """Values of cells, block by block."""
+    """Split values of cells into the blocks of cells."""
     return np.split(values, np.cumsum([len(cells) for _, cells in blocks])[:-1])
 
 
 def read_series(path: Path) -> list[tuple[float, Path]]:
-    """(time [s], file) of every frame of a .pvd."""
+    """(time [s], file) of every frame of a .pvd file; raises RunError if it cannot be read."""
     from xml.etree import ElementTree
 
     try:
         root = ElementTree.parse(path).getroot()
-        return [(float(one.attrib["timestep"]), path.parent / one.attrib["file"]) for one in root.iter("DataSet")]
+        return [(float(entry.attrib["timestep"]), path.parent / entry.attrib["file"]) for entry in root.iter("DataSet")]
     except (OSError, ElementTree.ParseError, KeyError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
 
 
 def read_pipes(path: Path, quantity: str) -> np.ndarray:
-    """A quantity of all cells of pipes in a frame, SI : float64[cells]; RunError where it cannot be read."""
+    """Quantity of all pipe cells in a frame, in SI : float64[cells]; raises RunError if it cannot be read."""
     return read_lines(path, quantity)[2]
 
 
 def read_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(points float64[p, 3] [m], lines int[c, 2], a quantity float64[c] in SI, number of the pipe int[c]) of a frame.
 
-    RunError where it cannot be read.
+    Raises RunError if the file cannot be read.
     """
-    from meshio import vtu  # meshio.read prints and exits where it cannot
+    from meshio import vtu  # meshio.read would print and exit on a damaged file
 
     try:
         mesh = vtu.read(str(path))
         data = mesh.cell_data_dict
         return mesh.points, mesh.cells_dict["line"], data[quantity]["line"], data["pipe"]["line"]
-    except Exception as error:  # whatever it and its parsers make of a damaged file
-        said = f"{type(error).__name__}: {error}"
-        raise RunError(f"{path} cannot be read ({said}); run again with --force") from None
+    except Exception as error:  # meshio and its parsers raise many types on a damaged file
+        text = f"{type(error).__name__}: {error}"
+        raise RunError(f"{path} cannot be read ({text}); run again with --force") from None

@@ -1,4 +1,4 @@
-"""history.csv: the probes over time, written row by row. Knows columns and bytes; keeps nothing in memory."""
+"""history.csv: probe values over time, written row by row."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fvsolve.output.column import UnitColumn, converted, split_header
 
 
 class HistoryFile:
-    """Appends rows to a CSV file whose numbers read back to the last bit."""
+    """CSV file to which rows are appended; numbers are written so that they read back to the last bit."""
 
     def __init__(self, path: Path, time: UnitColumn, columns: list[UnitColumn]):
         self.path = path
@@ -21,15 +21,15 @@ class HistoryFile:
         self._file = None
 
     def start(self) -> None:
-        """Begin an empty file with its header."""
+        """Start an empty file with its header."""
         self._file = open(self.path, "wb")
-        headers = ",".join(quoted(one.header) for one in [self.time, *self.columns])
+        headers = ",".join(quoted(column.header) for column in [self.time, *self.columns])
         self._file.write(f"{headers}\n".encode())
 
     def continue_from(self, rows: int, size: int) -> None:
-        """Open the file that a checkpoint left, cut to `size` bytes; RunError where it is shorter."""
+        """Open the file of a checkpoint, truncated to `size` bytes; raises RunError if it is shorter."""
         if not self.path.is_file() or self.path.stat().st_size < size:
-            raise RunError(f"{self.path} is shorter than its checkpoint says; start the run again with --force")
+            raise RunError(f"{self.path} is shorter than at its checkpoint; start the run again with --force")
         self._file = open(self.path, "r+b")
         self._file.truncate(size)
         self._file.seek(size)
@@ -45,19 +45,19 @@ class HistoryFile:
             self.rows += len(lines)
 
     def flush(self) -> int:
-        """Hand all rows to the operating system; the size of the file [bytes]."""
+        """Flush all rows to the operating system; returns the size of the file [bytes]."""
         self._file.flush()
         return self._file.tell()
 
     def close(self) -> None:
-        """Close the file; closing twice does no harm."""
+        """Close the file; has no effect if it is already closed."""
         if self._file is not None:
             file, self._file = self._file, None
             file.close()
 
 
 def read_headers(path: Path) -> list[tuple[str, str]]:
-    """(name, unit) of every column of a table, `t` first."""
+    """(name, unit) of every column of a table, `t` first; raises RunError if the file cannot be read."""
     import csv
 
     try:
@@ -68,20 +68,20 @@ def read_headers(path: Path) -> list[tuple[str, str]]:
 
 
 def read_table(path: Path) -> np.ndarray:
-    """`float64[k, columns]`: all rows of a table without its header."""
+    """All rows of a table without its header : float64[k, columns]; raises RunError if it cannot be read."""
     names = len(read_headers(path))
     with open(path, encoding="utf-8") as file:
         file.readline()
         try:
             table = np.loadtxt(file, delimiter=",", ndmin=2)
         except ValueError:
-            text = f"a row has not {names} numbers; was it cut off or edited? run again with --force"
+            text = f"a row does not have {names} numbers; the file was truncated or edited, run again with --force"
             raise RunError(f"{path} cannot be read: {text}") from None
     if table.size and table.shape[1] != names:
-        raise RunError(f"{path} cannot be read: {table.shape[1]} numbers in a row under {names} headers")
+        raise RunError(f"{path} cannot be read: rows have {table.shape[1]} numbers, the header has {names} columns")
     return table if table.size else np.empty((0, names))
 
 
 def quoted(text: str) -> str:
-    """A header as CSV writes it."""
+    """Text of a CSV field, in quotes if it contains a comma, a quote or a line break."""
     return '"' + text.replace('"', '""') + '"' if any(sign in text for sign in ',"\n') else text

@@ -1,8 +1,8 @@
-"""Where a network is drawn: plan positions of nodes, paths of links. Knows lengths; knows no physics.
+"""Plan positions of nodes and paths of links in a picture of the network.
 
-Stated positions are used where every node has one, or lies where a pipe between two of them is cut. Otherwise nodes are
-laid out so that their distances in the plan come near the lengths along the network (classical scaling, then stress
-majorization; Gansner, Koren and North 2004). The same network is always laid out alike.
+Positions of the case are used if every node has one, or lies on a pipe that is cut between two nodes that have one.
+Otherwise nodes are laid out so that distances in the plan approximate the lengths along the network (classical scaling,
+then stress majorization; Gansner, Koren and North 2004). The layout of a network is deterministic.
 """
 
 from __future__ import annotations
@@ -13,17 +13,17 @@ import numpy as np
 
 from fvsolve.case.routes import is_cut
 
-ROUNDS = 200  # of majorization
-DENSE = 400  # nodes up to which all pairs are laid out at once
-SHORT = 0.02  # drawn length of links without one, as part of the longest pipe
-BOW = 0.15  # how far parallel links bend aside, as part of their length
+ROUNDS = 200  # iterations of the stress majorization
+DENSE = 400  # greatest number of nodes for the layout by all pairs; larger networks get a radial plan
+SHORT = 0.02  # drawn length of a link without length, as a fraction of the longest pipe
+BOW = 0.15  # sideways bend of parallel links, as a fraction of their length
 
 
 def positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
-    """Plan position float64[2] [m] of every part with places; `lengths` are those of the links that have one [m]."""
+    """Plan position float64[2] [m] of every part that links connect; `lengths` : link -> length [m], if it has one."""
     ports = {name: [place(port) for port in link.ports.values()] for name, link in case.links.items()}
-    named = [one for found in ports.values() for one in found] + [place(one) for one in case.places]
-    owners = dict.fromkeys(one for one in named if one not in case.nodes)
+    named = [part for ends in ports.values() for part in ends] + [place(part) for part in case.places]
+    owners = dict.fromkeys(part for part in named if part not in case.nodes)
     stated = {name: node.position for name, node in case.nodes.items() if node.position is not None}
     stated |= between_ends(case, stated)
     if len(stated) == len(case.nodes):
@@ -34,8 +34,8 @@ def positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
     short = SHORT * max(lengths.values(), default=1.0)
     edges = [
         (index[hub], index[other], max(lengths.get(name, short), short))
-        for name, found in ports.items()
-        for hub, *others in [[name, *found] if name in owners else found]
+        for name, ends in ports.items()
+        for hub, *others in [[name, *ends] if name in owners else ends]
         for other in others
     ]
     plan = _plan(len(names), edges)
@@ -43,8 +43,8 @@ def positions(case, lengths: dict[str, float]) -> dict[str, np.ndarray]:
 
 
 def between_ends(case, stated: dict[str, tuple]) -> dict[str, tuple]:
-    """Positions of nodes at which a pipe is cut: on a straight line between its ends, by their distances along it."""
-    found = {}
+    """Positions of nodes that cut a pipe: on the straight line between its ends, in proportion to the lengths."""
+    result = {}
     for name, route in case.routes.items():
         if not is_cut(name, route.pipes):
             continue
@@ -53,19 +53,19 @@ def between_ends(case, stated: dict[str, tuple]) -> dict[str, tuple]:
         if all(end in stated for end in ends):
             share = np.cumsum([piece.length for piece in pieces]) / sum(piece.length for piece in pieces)
             first, last = (np.array(stated[end], float) for end in ends)
-            found |= {
+            result |= {
                 piece.to: tuple(first + at * (last - first)) for piece, at in zip(pieces[:-1], share, strict=False)
             }
-    return {name: one for name, one in found.items() if name in case.nodes and name not in stated}
+    return {name: position for name, position in result.items() if name in case.nodes and name not in stated}
 
 
 def place(port: str) -> str:
-    """The part that owns a place: `cyl` of `cyl.A`."""
+    """Part that owns a port: `cyl` of `cyl.A`."""
     return port.partition(".")[0]
 
 
 def path(start: np.ndarray, end: np.ndarray, fractions: np.ndarray, aside: float) -> np.ndarray:
-    """Points float64[k, 2] of a link at `fractions` of its length, bent aside by `aside` of its length."""
+    """Points float64[k, 2] of a link at `fractions` of its length; parabolic bend of `aside` times BEND_SIZE."""
     along = end - start
     normal = np.array([-along[1], along[0]])
     straight = start + fractions[:, None] * along
@@ -73,16 +73,16 @@ def path(start: np.ndarray, end: np.ndarray, fractions: np.ndarray, aside: float
 
 
 def bends(links: dict) -> dict[str, float]:
-    """How far each link bends aside, in steps, so that links between the same two nodes stay apart."""
+    """Sideways bend of each link in units of BEND_SIZE, so that links between the same two nodes do not overlap."""
     between: dict[tuple, list[str]] = {}
     for name, link in links.items():
         between.setdefault(tuple(sorted(_ends(link))), []).append(name)
-    found = {}
+    result = {}
     for ends, names in between.items():
         for i, name in enumerate(names):
             step = i - 0.5 * (len(names) - 1)
-            found[name] = step if _ends(links[name])[0] == ends[0] else -step
-    return found
+            result[name] = step if _ends(links[name])[0] == ends[0] else -step
+    return result
 
 
 def _ends(link) -> tuple[str, str]:
@@ -102,7 +102,7 @@ def _plan(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
 
 
 def _distances(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
-    """Lengths of the shortest ways between all nodes (Floyd 1962)."""
+    """Lengths of the shortest paths between all nodes (Floyd 1962)."""
     distance = np.full((count, count), np.inf)
     np.fill_diagonal(distance, 0.0)
     for i, j, length in edges:
@@ -115,7 +115,7 @@ def _distances(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
 
 
 def _scaled(distance: np.ndarray) -> np.ndarray:
-    """Classical scaling: the plan nearest to the distances in the sense of least squares (Torgerson 1952)."""
+    """Classical scaling: least-squares plan for the given distances (Torgerson 1952)."""
     count = len(distance)
     centre = np.eye(count) - 1.0 / count
     values, vectors = np.linalg.eigh(-0.5 * centre @ distance**2 @ centre)
@@ -124,20 +124,20 @@ def _scaled(distance: np.ndarray) -> np.ndarray:
         vector = vectors[:, -1 - column]
         largest = np.argmax(np.abs(vector) > 0.999 * np.abs(vector).max())
         plan[:, column] = vector * np.sign(vector[largest]) * np.sqrt(max(values[-1 - column], 0.0))
-    # Branches of equal length fall on one another in two directions; a fixed nudge parts them.
+    # In two dimensions branches of equal length may coincide; a small fixed displacement separates them.
     angle = 2.399963 * np.arange(count)
     return plan + 1e-3 * distance.max() * np.column_stack([np.cos(angle), np.sin(angle)]) * _bushy(distance)
 
 
 def _bushy(distance: np.ndarray) -> float:
-    """0 for a chain, which stays straight, else 1."""
+    """0 for a chain of nodes, which stays straight, else 1."""
     farthest = np.unravel_index(np.argmax(distance), distance.shape)
     off = distance[farthest[0]] + distance[farthest[1]] - distance[farthest]
     return float(off.max() > 1e-9 * distance.max())
 
 
 def _majorized(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Lower the stress sum((|x_i - x_j| - d_ij)^2 / d_ij^2) by Guttman's transform, weights 1/d^2."""
+    """Reduce the stress sum((|x_i - x_j| - d_ij)^2 / d_ij^2) by the Guttman transform with weights 1/d^2."""
     weight = np.where(distance > 0.0, 1.0 / np.where(distance > 0.0, distance, 1.0) ** 2, 0.0)
     laplacian = np.diag(weight.sum(1)) - weight
     inverse = np.linalg.pinv(laplacian)
@@ -151,7 +151,7 @@ def _majorized(plan: np.ndarray, distance: np.ndarray) -> np.ndarray:
 
 
 def _turned(plan: np.ndarray) -> np.ndarray:
-    """Turned so that the longer side lies along x, the first node to the left, the corner at the origin."""
+    """Rotate and shift a plan: longer side along x, first node to the left, lower left corner at the origin."""
     plan = plan - plan.mean(0)
     _, _, axes = np.linalg.svd(plan, full_matrices=False)
     plan = plan @ axes.T
@@ -160,7 +160,7 @@ def _turned(plan: np.ndarray) -> np.ndarray:
 
 
 def _rings(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
-    """Large networks: as far from the first node as the way is long, each branch in its own sector."""
+    """Plan of a large network: radius = path length from the first node, each branch in its own sector."""
     reach, parent, order = _tree(count, edges)
     leaves = np.zeros(count)
     for i in reversed(order):
@@ -181,7 +181,7 @@ def _rings(count: int, edges: list[tuple[int, int, float]]) -> np.ndarray:
 
 
 def _tree(count: int, edges: list[tuple[int, int, float]]) -> tuple[np.ndarray, list[int], list[int]]:
-    """Shortest ways from the first node (Dijkstra 1959): lengths, parents (-1: none), order of reach."""
+    """Shortest paths from the first node (Dijkstra 1959): lengths, parents (-1: none), nodes in the order reached."""
     near: list[list[tuple[int, float]]] = [[] for _ in range(count)]
     for i, j, length in edges:
         near[i].append((j, length))

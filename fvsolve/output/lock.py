@@ -1,6 +1,6 @@
-"""One writer to a folder at a time. Knows the operating system's locks; knows not what is written.
+"""Lock of a folder, so that a single process writes to it.
 
-The lock is the kernel's own on the file `.lock`, so it goes with the process that holds it, however that ends.
+The operating system holds the lock on the file `.lock` and releases it when the process ends in any way.
 """
 
 from __future__ import annotations
@@ -15,25 +15,29 @@ from fvsolve.errors import RunError
 NAME = ".lock"
 
 
-def locked(folder: Path, what: str) -> FileLock:
-    """The lock of a folder, held, the folder created; RunError where another holds it or nothing can be written."""
+def locked(folder: Path, writer: str) -> FileLock:
+    """Create a folder if needed and lock it; returns the lock.
+
+    writer : the other user of the folder in the message, such as "a run"
+    Raises RunError if another process holds the lock or the folder cannot be written.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
         lock = FileLock(folder / NAME, blocking=False, thread_local=False, fallback_to_soft=False)
         lock.acquire()
     except Timeout:
-        raise RunError(f"{folder} is in use: {what} still writes there; wait until it ends, stop it, or state "
-                       "another place with --out DIR") from None  # fmt: skip
+        raise RunError(f"{folder} is in use: {writer} still writes there. Wait until it ends, stop it, or choose "
+                       "another directory with --out DIR") from None  # fmt: skip
     except NotImplementedError:
-        raise RunError(f"{folder} lies on a file system without locks; state another place with --out DIR") from None
+        raise RunError(f"{folder} is on a file system without locks; choose another directory with --out DIR") from None
     except OSError as error:
-        raise RunError(f"{folder}: cannot be written: {error.strerror or error}; name another with --out") from None
+        raise RunError(f"{folder}: cannot be written: {error.strerror or error}; choose another with --out") from None
     return lock
 
 
 def let_go(lock: FileLock) -> None:
-    """Release a lock that is held and take its file away; whoever waits for that file looks for a new one."""
+    """Release a lock if it is held and delete its file; waiting processes then lock a new file."""
     if lock.is_locked:
-        with contextlib.suppress(OSError):  # Windows deletes no open file
+        with contextlib.suppress(OSError):  # Windows cannot delete an open file
             Path(lock.lock_file).unlink()
         lock.release()

@@ -1,4 +1,4 @@
-"""The sink of a run that writes nothing: rows in memory. Knows arrays; knows no files."""
+"""Sink of a run without a directory: rows are stored in memory."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fvsolve.output.envelope import in_units, with_start
 
 
 class MemorySink:
-    """Keeps the probe rows and the envelope; fields and checkpoints are only for disk."""
+    """Stores the probe rows and the envelope of a run; ignores fields and checkpoints."""
 
     folder = None
     restart = None
@@ -23,7 +23,7 @@ class MemorySink:
         self._summary = None
 
     def begin(self, model, state) -> None:
-        """Nothing to open."""
+        """Do nothing: there is no file to open."""
 
     def rows(self, t, values) -> None:
         """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
@@ -32,29 +32,29 @@ class MemorySink:
         self._blocks.append(block)
 
     def field(self, t: float, frame: dict) -> None:
-        """Not kept."""
+        """Do nothing: fields are not stored."""
 
     def checkpoint(self, state, extra: dict) -> None:
-        """Not kept."""
+        """Do nothing: checkpoints are not stored."""
 
     def end(self, summary) -> None:
-        """Keep the envelope."""
+        """Store the summary, from which `envelope` is made."""
         self._summary = summary
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: there is no file to close."""
 
     def table(self) -> np.ndarray:
-        """`float64[rows, 1 + probes]`: time and probes in the columns' units."""
+        """Time and probes in the units of the columns : float64[rows, 1 + probes]."""
         return np.concatenate([np.empty((0, 1 + len(self.columns))), *self._blocks])
 
     @property
     def last(self) -> np.ndarray:
-        """The last row of the table."""
+        """Last row of the table."""
         return self._blocks[-1][-1]
 
     def envelope(self) -> dict:
-        """Pipe -> quantity -> float64[cells], in the units of envelope.csv."""
-        if not self._summary:  # of a run that never ended
+        """Envelope: pipe -> quantity -> float64[cells] in the units of envelope.csv; {} before the end of the run."""
+        if not self._summary:
             return {}
         return in_units(with_start(self._summary, self.model), self.model.case)

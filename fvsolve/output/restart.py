@@ -1,4 +1,4 @@
-"""restart.npz: all that a run needs to go on, bit for bit. Knows arrays and files; knows no physics."""
+"""restart.npz: state and arrays from which a run continues with identical results, to the bit."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ import numpy as np
 
 from fvsolve.errors import RunError, listing
 
-# Keys of the resolved case that change what is said about a run, not the run.
+# Keys of the resolved case that change the report of a run, not its numbers.
 SILENT = ("title", "expect", "compare")
 
 
 @dataclass(frozen=True)
 class Restart:
-    """A checkpoint: the state, the solver's own arrays, and how far the files had come."""
+    """Checkpoint: state, arrays of the solver, and the numbers of rows, bytes and frames written so far."""
 
     t: float
     y: np.ndarray
@@ -32,28 +32,28 @@ class Restart:
 
 
 def identity(case) -> dict[str, str]:
-    """What has to be the same for a run to go on: the case but for its end time, and the versions."""
-    said = {key: one for key, one in case.table().items() if key not in SILENT}
-    said["numerics"].pop("end")
-    digest = hashlib.sha256(json.dumps(said, sort_keys=True, default=str).encode())
+    """Hash of the case without its end time, and versions; a run can only continue if all are equal."""
+    table = {key: value for key, value in case.table().items() if key not in SILENT}
+    table["numerics"].pop("end")
+    digest = hashlib.sha256(json.dumps(table, sort_keys=True, default=str).encode())
     for path in case.files:
         digest.update(Path(path).read_bytes())
     return {"case": digest.hexdigest()[:16]} | versions(case)
 
 
 def versions(case) -> dict[str, str]:
-    """Versions that the numbers of a run depend on, and the machine that they were compiled for."""
+    """Versions on which the numbers of a run depend: programs, fluid data and target processor."""
     return programs() | {"fluid": case.properties.source}
 
 
 def programs() -> dict[str, str]:
-    """Versions of what computes."""
+    """Versions of the programs that compute: fvsolve, Python, numpy, numba, and the target processor."""
     return dict(_programs())
 
 
 @functools.cache
 def _programs() -> tuple[tuple[str, str], ...]:
-    """They stay the same while a process lasts."""
+    """Versions of the programs; they cannot change within a process, so they are cached."""
     import fvsolve
     from fvsolve import jit
 
@@ -65,7 +65,7 @@ def _programs() -> tuple[tuple[str, str], ...]:
 
 
 def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:
-    """Replace the checkpoint: a kill at any moment leaves the old one or the new one, never half of one."""
+    """Replace the checkpoint atomically: after a kill, either the old or the new file is complete."""
     arrays = {f"extra.{name}": np.asarray(value) for name, value in restart.extra.items()}
     arrays |= {"t": np.float64(restart.t), "y": restart.y, "memory": restart.memory}
     arrays["counts"] = np.array([restart.rows, restart.history_bytes, restart.frames])
@@ -77,37 +77,37 @@ def write_restart(path: Path, restart: Restart, who: dict[str, str]) -> None:
 
 
 def read_restart(path: Path, who: dict[str, str]) -> Restart:
-    """The checkpoint at `path`; RunError where it belongs to another case or to other versions."""
+    """Read a checkpoint; raises RunError if it is damaged or belongs to another case or other versions."""
     try:
         with np.load(path) as file:
             arrays = {name: file[name] for name in file.files}
-        found = json.loads(str(arrays.pop("identity")))
+        stored = json.loads(str(arrays.pop("identity")))
         t, y, memory, counts = (arrays.pop(name) for name in ("t", "y", "memory", "counts"))
-    except Exception as error:  # whatever zip, numpy and json make of a damaged file
-        said = f"{error} is not there" if isinstance(error, KeyError) else error
-        raise RunError(f"{path} cannot be read ({said}); start the run again with --force") from None
-    harmed = [name for name, array, axes in (("t", t, 0), ("y", y, 1), ("memory", memory, 1))
+    except Exception as error:  # zip, numpy and json raise many types on a damaged file
+        reason = f"{error} is missing" if isinstance(error, KeyError) else error
+        raise RunError(f"{path} cannot be read ({reason}); start the run again with --force") from None
+    damaged = [name for name, array, axes in (("t", t, 0), ("y", y, 1), ("memory", memory, 1))
               if array.dtype != np.float64 or array.ndim != axes]  # fmt: skip
-    harmed = harmed or [name for name, array in (("t", t), ("y", y)) if not np.isfinite(array).all()]
-    harmed += ["counts"] if counts.shape != (3,) or counts.dtype.kind != "i" or counts.min() < 0 else []
-    harmed += ["identity"] if not isinstance(found, dict) else []
-    if harmed:
-        raise RunError(f"{path}: {listing(harmed)} is not what a run writes; start the run again with --force")
-    _check(path, found, who)
+    damaged = damaged or [name for name, array in (("t", t), ("y", y)) if not np.isfinite(array).all()]
+    damaged += ["counts"] if counts.shape != (3,) or counts.dtype.kind != "i" or counts.min() < 0 else []
+    damaged += ["identity"] if not isinstance(stored, dict) else []
+    if damaged:
+        raise RunError(f"{path}: damaged or edited data ({listing(damaged)}); start the run again with --force")
+    _check(path, stored, who)
     extra = {name.removeprefix("extra."): value for name, value in arrays.items()}
     return Restart(float(t), y, memory, extra, *counts.tolist())
 
 
-def _check(path: Path, found: dict[str, str], wanted: dict[str, str]) -> None:
-    if found.get("case") != wanted["case"]:
+def _check(path: Path, stored: dict[str, str], expected: dict[str, str]) -> None:
+    if stored.get("case") != expected["case"]:
         raise RunError(
-            f"{path} belongs to another case: more than numerics.end has changed since (an [output] every "
-            "that is not stated changes with it); start again with --force, or keep both with --out DIR"
+            f"{path} belongs to another case: keys other than numerics.end have changed (numerics.end also changes "
+            "the default of [output] every); start again with --force, or keep both runs with --out DIR"
         )
-    other = [name for name in wanted if found.get(name) != wanted[name]]
+    other = [name for name in expected if stored.get(name) != expected[name]]
     if other:
-        listed = ", ".join(f"{name} {found.get(name)} (now {wanted[name]})" for name in other)
+        listed = ", ".join(f"{name} {stored.get(name)} (now {expected[name]})" for name in other)
         raise RunError(
-            f"{path} was written by other versions, so the run would not go on bit for bit: {listed}; "
-            "start again with --force, or go on with the versions of then"
+            f"{path} was written by other versions, so the run would not continue to the bit: {listed}; "
+            "start again with --force, or continue with the earlier versions"
         )

@@ -1,4 +1,4 @@
-"""routes.csv: what the pipes of each route have met, in one running chainage. Knows columns; knows no solver."""
+"""routes.csv: envelopes of the pipes of each route along a continuous chainage."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ from fvsolve.output.envelope import envelope_columns
 
 
 def along_routes(envelope: dict, case) -> dict[str, dict[str, Any]]:
-    """Route -> chainage, pipe, and what the envelope of these has, in its units : arrays of as many places."""
+    """Route -> chainage, pipe and the quantities of the envelope, in its units : arrays along the route."""
     distances = column("distance", "length", case)
     return {name: strung(envelope, legs(route, case.links), distances) for name, route in case.routes.items()}
 
 
 def strung(envelope: dict, route, distances) -> dict[str, Any]:
-    """The envelopes of the pipes of a route, one after the other, those run backwards from their other end."""
-    found: dict[str, list] = {"chainage": [], "pipe": []}
+    """Envelopes of the pipes of a route in order; pipes followed backwards are reversed."""
+    arrays: dict[str, list] = {"chainage": [], "pipe": []}
     for leg in route:
         turn = slice(None, None, -1) if leg.backwards else slice(None)
-        one = {key: np.asarray(values)[turn] for key, values in envelope[leg.pipe].items()}
-        found["chainage"].append(distances.from_si(leg.chainage(distances.to_si(one["distance"]))))
-        found["pipe"].append(np.full(one["distance"].size, leg.pipe))
-        for key, values in one.items():
-            found.setdefault(key, []).append(values)
-    return {key: np.concatenate(parts) for key, parts in found.items()}
+        pipe = {key: np.asarray(values)[turn] for key, values in envelope[leg.pipe].items()}
+        arrays["chainage"].append(distances.from_si(leg.chainage(distances.to_si(pipe["distance"]))))
+        arrays["pipe"].append(np.full(pipe["distance"].size, leg.pipe))
+        for key, values in pipe.items():
+            arrays.setdefault(key, []).append(values)
+    return {key: np.concatenate(parts) for key, parts in arrays.items()}
 
 
 def write_routes(path: Path, envelope: dict, case) -> None:
-    """One row per place along each route, `envelope` as envelope.csv has it."""
+    """Write a row for each place along each route; `envelope` in the units of envelope.csv."""
     columns = envelope_columns(case)
-    headers = ["route", column("chainage", "length", case).header, "pipe", *(one.header for one in columns)]
+    headers = ["route", column("chainage", "length", case).header, "pipe", *(item.header for item in columns)]
     with open(path, "w", encoding="utf-8", newline="") as file:
         table = csv.writer(file, lineterminator="\n")
         table.writerow(headers)
-        for name, one in along_routes(envelope, case).items():
-            values = zip(*(one[key.name].tolist() for key in columns), strict=True)
-            for chainage, pipe, row in zip(one["chainage"].tolist(), one["pipe"].tolist(), values, strict=True):
+        for name, item in along_routes(envelope, case).items():
+            values = zip(*(item[key.name].tolist() for key in columns), strict=True)
+            for chainage, pipe, row in zip(item["chainage"].tolist(), item["pipe"].tolist(), values, strict=True):
                 table.writerow([name, repr(chainage), pipe, *map(repr, row)])

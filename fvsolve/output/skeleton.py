@@ -1,7 +1,6 @@
-"""Bodies as lines between what is known of them: origins, centres of mass, points, and what pushes between points;
-water in modes as lines from where its masses rest to where they are.
+"""Lines that show bodies: from the origin to the centre of mass and the points, and along force elements.
 
-Knows the tables of a model; knows no file.
+A sloshing mass is shown as a line from its rest position to its position.
 """
 
 from __future__ import annotations
@@ -15,21 +14,24 @@ UNITS = {"body": "-", "speed": "m/s"}
 
 
 def ends_of(body) -> list[tuple[float, ...]]:
-    """What is known of a body in its axes, its origin first [m]."""
+    """Points of a body in its axes, without repetition: origin, centre of mass, then its named points [m]."""
     return list(dict.fromkeys([(0.0, 0.0, 0.0), tuple(body.centre_of_mass), *map(tuple, body.points.values())]))
 
 
 class Skeleton:
-    """Points fixed in bodies or in the world, and lines between them; a line belongs to a body, -1 to none.
+    """Points fixed to bodies or to the world, and lines between them.
 
-    owner : int[p]  body of each point, -1 the world; place : float64[p, 3]  in its axes [m]; lines : int[l, 2]
+    owner : int[p]         body of each point, -1 for the world
+    place : float64[p, 3]  its coordinates in the axes of the body [m]
+    lines : int[l, 2]      points of each line
+    line_body : int32[l]   body of each line, -1 for none
     """
 
     def __init__(self, model) -> None:
         self.model, names = model, model.body_names
-        owner, place, lines, whose = [], [], [], []
+        owner, place, lines, line_body = [], [], [], []
         drawn = [ends_of(model.case.nodes[name]) if name in model.case.nodes else [] for name in names]
-        dots = max(map(len, drawn)) < 2  # else a body that is but an origin is no more than a joint of others
+        dots = max(map(len, drawn)) < 2  # if others have extent, a body with only an origin is just a joint of them
         for i, ends in enumerate(drawn):
             first = len(owner)
             if not ends and (row := model.tables.bodies[i])["joint"] == PRISMATIC:  # a mode of water in a tank
@@ -40,29 +42,33 @@ class Skeleton:
                 place += ends
             if len(owner) > first:
                 lines += [(first, first + k) for k in range(1, len(owner) - first)] or [(first, first)]
-                whose += [i] * max(len(owner) - first - 1, 1)
+                line_body += [i] * max(len(owner) - first - 1, 1)
         for row in model.tables.lines:
             if min(row["from_point"], row["to_point"]) >= 0:
-                for end in ("from_point", "to_point"):
-                    point = model.tables.points[row[end]]
+                for key in ("from_point", "to_point"):
+                    point = model.tables.points[row[key]]
                     owner.append(int(point["body"]))
                     place.append(tuple(point["place"]))
                 lines.append((len(owner) - 2, len(owner) - 1))
-                whose.append(-1)
+                line_body.append(-1)
         self.owner, self.place = np.array(owner), np.array(place, dtype=float).reshape(-1, 3)
-        self.lines, self.whose = np.array(lines).reshape(-1, 2), np.array(whose, dtype=np.int32)
+        self.lines, self.whose = np.array(lines).reshape(-1, 2), np.array(line_body, dtype=np.int32)
 
     def at(self, out: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(points float64[p, 3] [m], speeds of middles of lines float64[l] [m/s]) where bodies are as `out` says."""
+        """(points float64[p, 3] [m], speeds of midpoints of lines float64[l] [m/s]) at the body positions in `out`."""
         points, speed = moved(self.model, out, self.owner, self.place)
         return points, np.linalg.norm(speed[self.lines].mean(axis=1), axis=1)
 
 
 def moved(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(points, their velocities : float64[p, 3]) in the world of places in axes of their bodies; -1: of the world."""
-    first, many = int(model.layout["body"]), len(model.body_names)
+    """World coordinates [m] and velocities [m/s] of points fixed to bodies, each float64[p, 3].
+
+    owner : int[p]         body of each point, -1 for the world
+    place : float64[p, 3]  coordinates in the axes of the body [m]
+    """
+    first, n = int(model.layout["body"]), len(model.body_names)
     points, speed = place.copy(), np.zeros_like(place)
-    for i, row in enumerate(out[first : first + BODY_OUT * many].reshape(many, BODY_OUT)):
+    for i, row in enumerate(out[first : first + BODY_OUT * n].reshape(n, BODY_OUT)):
         own = owner == i
         arms = place[own] @ row[ATTITUDE : ATTITUDE + 9].reshape(3, 3).T
         points[own] = row[PLACE : PLACE + 3] + arms

@@ -1,4 +1,4 @@
-"""summary.json: what is to be said about a run, for people and programs. Knows words; knows no solver."""
+"""summary.json: results of a run for people and programs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.errors import RunError, listing
 from fvsolve.output.column import probe_columns, time_column
 from fvsolve.output.envelope import envelope_columns
 
-# What a reader looks for.
+# Keys without which summary.json is rejected.
 NEEDED = (
     "title", "case", "reason", "ok", "t", "invalid_from", "marks",
     "probes", "time_unit", "envelope_units", "ambient_pressure",
@@ -21,7 +21,7 @@ NEEDED = (
 
 
 def described(summary, model) -> dict:
-    """The summary of a solver as plain data: SI but for the extremes, which are in the columns' units."""
+    """Summary of a solver as plain data in SI; only the extremes are in the units of the probes."""
     return {
         "title": model.case.title,
         "case": model.case.name,
@@ -34,10 +34,10 @@ def described(summary, model) -> dict:
             for mark in summary.marks
         ],
         "cavities": [asdict(cavity) for cavity in summary.cavities],
-        "events": [{"time": float(one.time), "name": one.name, "what": one.what} for one in summary.events],
-        "probes": {one.name: {"dimension": one.dimension, "unit": one.unit} for one in probe_columns(model)},
+        "events": [{"time": float(item.time), "name": item.name, "what": item.what} for item in summary.events],
+        "probes": {item.name: {"dimension": item.dimension, "unit": item.unit} for item in probe_columns(model)},
         "time_unit": time_column(model.case).unit,
-        "envelope_units": {one.name: one.unit for one in envelope_columns(model.case)},
+        "envelope_units": {item.name: item.unit for item in envelope_columns(model.case)},
         "ambient_pressure": model.case.ambient_pressure,
         "fluid": model.case.properties.plain(),
         "extremes": _extremes(summary, model),
@@ -49,19 +49,22 @@ def described(summary, model) -> dict:
         "seconds": float(summary.seconds),
         "seconds_setup": float(summary.seconds_setup),
         "cost": plain(summary.cost),
-        "warnings": [one.plain() for one in (*model.warnings, *summary.warnings)],
+        "warnings": [item.plain() for item in (*model.warnings, *summary.warnings)],
     }
 
 
 def plain(value):
-    """`value` with numpy numbers and arrays as Python's own, objects as what they say, complex numbers as [re, im], and
-    what JSON cannot say (NaN) as None."""
+    """Convert a value to plain Python data for JSON.
+
+    Numpy numbers and arrays become Python numbers and lists, dataclasses dicts, complex numbers [re, im], NaN and
+    infinity None, and other objects their text.
+    """
     if is_dataclass(value) and not isinstance(value, type):
         return plain(value.plain() if hasattr(value, "plain") else vars(value))
     if isinstance(value, dict):
-        return {str(key): plain(one) for key, one in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(one) for one in value]
+        return [plain(item) for item in value]
     if hasattr(value, "tolist"):
         return plain(value.tolist())
     if isinstance(value, float):
@@ -72,36 +75,36 @@ def plain(value):
 
 
 def write_summary(path: Path, summary: dict) -> None:
-    """Write summary.json in one move: a directory that has it holds a run that ended."""
+    """Write summary.json atomically: a directory that contains it holds a finished run."""
     fresh = path.with_suffix(".json.tmp")
     fresh.write_text(json.dumps(plain(summary), indent=1) + "\n", encoding="utf-8")
     os.replace(fresh, path)
 
 
 def read_summary(path: Path) -> dict:
-    """summary.json as it was written; RunError where there is none."""
+    """Read summary.json; raises RunError if it is missing, damaged or lacks a required key."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        lacks = [key for key in NEEDED if key not in found] if isinstance(found, dict) else ["a table"]
-        if lacks:
-            raise ValueError(f"it lacks {listing(lacks)}, so no run wrote it; run again with --force")
-        return found
+        summary = json.loads(path.read_text(encoding="utf-8"))
+        missing = [key for key in NEEDED if key not in summary] if isinstance(summary, dict) else ["a table"]
+        if missing:
+            raise ValueError(f"{listing(missing)} missing, so it is not the summary of a run; run again with --force")
+        return summary
     except FileNotFoundError:
-        raise RunError(f"{path.parent} holds no ended run (no {path.name})") from None
+        raise RunError(f"{path.parent} does not hold a finished run (no {path.name})") from None
     except (OSError, ValueError) as error:
         raise RunError(f"{path} cannot be read: {error}") from None
 
 
 def _extremes(summary, model) -> dict:
-    """Extremes in units of the probes; None from when on a run that blew up is not valid."""
-    found = {}
-    for one in probe_columns(model):
-        least, t_least, greatest, t_greatest = (*summary.extremes[one.name],)
+    """Extremes in units of the probes; None if reached after the time from which a diverged run is invalid."""
+    extremes = {}
+    for col in probe_columns(model):
+        least, t_least, greatest, t_greatest = (*summary.extremes[col.name],)
         sides = {"least": (least, t_least), "greatest": (greatest, t_greatest)}
-        made: dict = {"unit": one.unit}
+        row: dict = {"unit": col.unit}
         for side, (value, t) in sides.items():
             valid = not t >= summary.invalid_from
-            made |= {side: plain(float(one.from_si(value))) if valid else None,
-                     f"t_{side}": plain(float(t)) if valid else None}  # fmt: skip
-        found[one.name] = made
-    return found
+            row |= {side: plain(float(col.from_si(value))) if valid else None,
+                    f"t_{side}": plain(float(t)) if valid else None}  # fmt: skip
+        extremes[col.name] = row
+    return extremes

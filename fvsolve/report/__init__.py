@@ -1,1 +1,1 @@
-"""What is handed over: one offline page of a run, and its tables as a workbook. Knows runs; starts none."""
+"""Reports of finished runs: an offline HTML page, a workbook of tables, pictures and pressure cycles."""

@@ -1,8 +1,8 @@
-"""Cycles of pressure that a run puts on its parts, by rainflow counting, and how many a part bears. Starts no run.
+"""Pressure cycles of a run by rainflow counting, and the fatigue damage that they cause.
 
-Counted by ASTM E1049-85 (the package `rainflow`) over all rows of a probe; half cycles count half. A part that bears
-`cycles` of a range R0 bears `cycles (R0 / R)^slope` of a range R (Basquin 1910), and cycles of several ranges use
-shares of it that add up (Palmgren 1924, Miner 1945).
+Cycles are counted by ASTM E1049-85 (package `rainflow`) over all rows of a probe; half cycles count 0.5. A part that
+endures `cycles` of a range R0 endures `cycles (R0 / R)^slope` of a range R (Basquin 1910). The damage of cycles of
+several ranges is the sum of count / endured cycles (Palmgren 1924, Miner 1945).
 """
 
 from __future__ import annotations
@@ -17,26 +17,26 @@ from fvsolve.report.libraries import library
 from fvsolve.units import span
 
 OF = ("pressure", "gauge_pressure", "head")
-SMALL = 1e-3  # of the greatest range: what is less is not counted
+SMALL = 1e-3  # smallest range that is counted, as a fraction of the greatest range
 
 
 @dataclass(frozen=True)
 class Strength:
-    """What a part bears: so many `cycles` of a `range` of pressure [unit of the probe], by a slope."""
+    """Fatigue strength of a part: endured `cycles` at a pressure `range` [unit of the probe], and the Basquin slope."""
 
     range: float
     cycles: float
     slope: float
 
     def allowed(self, range: float) -> float:
-        """Cycles of another range that it bears."""
+        """Cycles of another range that the part endures: cycles (R0 / R)^slope."""
         return self.cycles * (self.range / range) ** self.slope
 
 
 def counted(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]]:
-    """(range, count) of the cycles of a series, the greatest first, in bins named by their upper ends."""
+    """(range, count) of the cycles of a series, greatest range first; each range is the upper end of its bin."""
     cycles = list(library("rainflow").extract_cycles(values.tolist()))
-    greatest = max((found[0] for found in cycles), default=0.0)
+    greatest = max((cycle[0] for cycle in cycles), default=0.0)
     if not greatest > 0.0:
         return []
     width, sums = greatest / bins, np.zeros(bins)
@@ -47,22 +47,23 @@ def counted(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]]:
 
 
 def cycles(result, probes: list[str] | None = None, strength: Strength | None = None) -> list[dict[str, Any]]:
-    """Of every probe of pressure or head: its cycles, and the share of what a part bears that one run uses.
+    """Cycles of every probe of pressure or head, and with `strength` the fatigue damage of one run, `share`.
 
-    A range counts by the upper end of its bin, so the share is on the safe side. Raises FvsolveError for other probes.
+    A range counts with the upper end of its bin, so the damage is on the safe side. Raises FvsolveError for probes of
+    other quantities and for values that are not finite.
     """
     known = [name for name in result.probes if result.column(name).dimension in OF]
     unknown = [name for name in probes or () if name not in known]
     if unknown:
-        raise FvsolveError(f"no probe of pressure or head named {listing(unknown)}{did_you_mean(unknown[0], known)}; "
-                           f"there are {listing(known) or 'none'}")  # fmt: skip
-    made = []
+        raise FvsolveError(f"{listing(unknown)}: unknown probe of pressure or head{did_you_mean(unknown[0], known)}. "
+                           f"The run has {listing(known) or 'none'}")  # fmt: skip
+    rows = []
     for name in probes or known:
         if not np.isfinite(result[name]).all():
-            raise FvsolveError(f"{name} is not finite at all times: its cycles cannot be counted")
-        found = counted(np.asarray(result[name]))
-        row: dict[str, Any] = {"probe": name, "unit": span(result.units[name]), "cycles": found}
+            raise FvsolveError(f"{name} is not finite at all times, so its cycles cannot be counted")
+        counts = counted(np.asarray(result[name]))
+        row: dict[str, Any] = {"probe": name, "unit": span(result.units[name]), "cycles": counts}
         if strength is not None:
-            row["share"] = float(sum(count / strength.allowed(size) for size, count in found))
-        made.append(row)
-    return made
+            row["share"] = float(sum(count / strength.allowed(size) for size, count in counts))
+        rows.append(row)
+    return rows

@@ -1,6 +1,6 @@
-"""Figures of the page as plotly.js takes them, traces and layout as plain data. Knows arrays and colours.
+"""Figures of the report as plain data for plotly.js: traces and layout.
 
-plotly.js reads a little markup in names and titles, so every word of a case goes through `as_it_stands`.
+plotly.js interprets some markup in names and titles, so all texts of a case pass through `escape_markup`.
 """
 
 from __future__ import annotations
@@ -26,66 +26,75 @@ LINES = {VAPOUR_LINE: {"colour": VAPOUR, "width": 1.4, "dash": DOT},
          "class line": {"colour": CLASS, "width": 1.8, "dash": "9px,3px,2px,3px"}}  # fmt: skip
 LIMITS = {"greatest": {"colour": CLASS, "width": 1.3, "dash": LONG},
           "least": {"colour": CLASS, "width": 1.3, "dash": "8px,3px,2px,3px,2px,3px"}}  # fmt: skip
-# Lines stay apart in grey print too.
+# Lines remain distinguishable in grey print.
 DASHES = ("solid", DASH, DOT, "9px,3px,2px,3px", LONG, "14px,3px,2px,3px")
 DARK = {INK: "#dde3ea", MUTED: "#9aa7b5", HAIR: "#37424e", GROUND: "#12171d", DOUBT: "#ff8b5e"} | dict(
     zip(COLOURS, ("#5db4ec", "#f08a4b", "#3cc3a4", "#c08ad8", "#e0b13c", "#8fd0f5", "#e8748c", "#a9bf6a"), strict=True)
-)  # of a screen that is dark; paper is light
+)  # colours for dark screens; printed pages use the light ones
 TALL, LOW = 920, 260  # heights of sections and histories [px]
-TOOLS = 22  # pixels of the bar of tools, below which names stand
-LONGEST = 22  # letters over a chainage
+TOOLS = 22  # height of the tool bar above the names [px]
+LONGEST = 22  # greatest number of letters of a name over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 
 
-def section_figure(one: Section, moving: Motion | None, unit: str, along: str, bins: int) -> dict[str, Any]:
-    """A long section: heads, pipe, vapour and class line, spans where liquid parted, devices; the line that moves."""
-    k = one.picked(bins)
-    x, lines = numbers(one.chainage[k], "f4"), {name: numbers(values[k], "f4") for name, values in one.along.items()}
+def section_figure(section: Section, moving: Motion | None, unit: str, along: str, bins: int) -> dict[str, Any]:
+    """Figure of a long section: heads, pipe, vapour and class lines, cavity spans, devices, and the animated head.
+
+    unit, along : units of head and chainage; bins : of a long line, the number of bins with their extremes
+    """
+    k = section.picked(bins)
+    x, lines = (
+        numbers(section.chainage[k], "f4"),
+        {name: numbers(values[k], "f4") for name, values in section.along.items()},
+    )
     data = [
         _line("greatest head", x, lines["greatest_head"], GREATEST, width=2),
         _line("least head", x, lines["least_head"], LEAST, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
         _line("initial head", x, lines["initial_head"], INK, width=1.2, dash=DASH),
         _line("pipe", x, lines["elevation"], MUTED, width=3.5),
     ]
-    data += _limits(one, x, k)
-    if one.parted:
+    data += _limits(section, x, k)
+    if section.parted:
         data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
                      "marker": {"symbol": "square", "size": 11, "color": VAPOUR, "opacity": 0.35}})  # fmt: skip
-    if one.beyond:
-        at, heads, names = zip(*one.beyond, strict=True)
+    if section.beyond:
+        at, heads, names = zip(*section.beyond, strict=True)
         data.append({"type": "scatter", "mode": "markers", "name": "limit passed", "x": at, "y": heads,
                      "cliponaxis": False, "text": [as_it_stands(name) for name in names],
                      "marker": {"symbol": "x-thin", "size": 10, "line": {"color": DOUBT, "width": 2.5}}})  # fmt: skip
-    shapes = [_span(a, b, VAPOUR, 0.18) for a, b in one.parted]
+    shapes = [_span(a, b, VAPOUR, 0.18) for a, b in section.parted]
     if moving is not None:
         data.append(_line("head now", numbers(moving.chainage, "f4"), numbers(moving.heads[0], "f4"), NOW, width=2.6))
-    layout = _along([one], unit, along)
+    layout = _along([section], unit, along)
     layout["shapes"] = [*shapes, *layout["shapes"]]
-    made: dict[str, Any] = {"data": data, "layout": layout}
+    figure: dict[str, Any] = {"data": data, "layout": layout}
     if moving is not None:
-        made["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
+        figure["moving"] = {"trace": len(data) - 1, "times": moving.times.tolist(),
                           "heads": [[float(f"{v:.6g}") for v in row] for row in moving.heads.tolist()]}  # fmt: skip
-    return made
+    return figure
 
 
 def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> dict[str, Any]:
-    """The same section of several runs: pipe, vapour line and limits once, heads of each by its colour."""
-    first = max((one for _, one in several), key=lambda one: len(one.devices))
+    """Figure of a section of several (name, section): pipe, vapour line and limits once, heads in a colour per run."""
+    first = max((section for _, section in several), key=lambda section: len(section.devices))
     k = first.picked()
     x = numbers(first.chainage[k], "f4")
     data = [_line("pipe", x, numbers(first.along["elevation"][k], "f4"), MUTED, width=3.5)]
     data += _limits(first, x, k)
-    for n, (name, one) in enumerate(several):
-        colour, k = COLOURS[n % len(COLOURS)], one.picked()
-        x, group = numbers(one.chainage[k], "f4"), {"legendgroup": f"run {n}"}
-        high, low = (numbers(one.along[key][k], "f4") for key in ("greatest_head", "least_head"))
+    for n, (name, section) in enumerate(several):
+        colour, k = COLOURS[n % len(COLOURS)], section.picked()
+        x, group = numbers(section.chainage[k], "f4"), {"legendgroup": f"run {n}"}
+        high, low = (numbers(section.along[key][k], "f4") for key in ("greatest_head", "least_head"))
         data.append(_line(name or "the case", x, high, colour, width=2, **group))
         data.append(_line("", x, low, colour, width=2, dash=DASH, showlegend=False, **group))
-    return {"data": data, "layout": _along([first, *(one for _, one in several if one is not first)], unit, along)}
+    return {
+        "data": data,
+        "layout": _along([first, *(section for _, section in several if section is not first)], unit, along),
+    }
 
 
 def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> dict[str, Any]:
-    """Series of one quantity; from `doubt` on the ground is shaded."""
+    """Figure of the series of a quantity; shaded from the time `doubt`, from which results are not reliable."""
     data, names = [], [line.name for line in panel.lines if not line.measured]
     for line in panel.lines:
         place = names.index(line.name)
@@ -107,12 +116,12 @@ def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> 
 
 
 def as_it_stands(text: str) -> str:
-    """Words of a case for plotly.js, none of them markup, and no dollar the begin of a formula."""
+    """Escape a text for plotly.js: no markup, and `$` does not begin a formula."""
     return html.escape(visible(str(text)), quote=False).replace("$", "&#36;")
 
 
 def numbers(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict[str, str]:
-    """Numbers as plotly.js reads arrays: f8 to the last bit, f4 to seven digits."""
+    """Array as plotly.js reads it, in base64; kind : "f8" (exact) or "f4" (seven digits)."""
     packed = np.ascontiguousarray(values, f"<{kind}").tobytes()
     return {"dtype": kind, "bdata": base64.b64encode(packed).decode()}
 
@@ -148,14 +157,14 @@ def _post(x: float) -> dict[str, Any]:
             "line": {"color": HAIR, "width": 1}, "layer": "below"}  # fmt: skip
 
 
-def _limits(one: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
-    """The vapour line and those of limits, upper and lower ones with dashes of their own."""
+def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
+    """Traces of the vapour line and of limits; upper and lower limits have different dashes."""
     return [_line(name, x, numbers(line[k], "f4"), **(LINES.get(name) or LIMITS[name.rpartition(", ")[2]]))
-            for name, line in one.lines.items()]  # fmt: skip
+            for name, line in section.lines.items()]  # fmt: skip
 
 
 def _along(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
-    """The layout of sections along the chainage of the first."""
+    """Layout of a figure of sections, with the chainage and devices of the first."""
     first, seen = sections[0], window(sections, unit)
     layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", TALL), _names(first)
     layout["margin"]["t"] = TOOLS + 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
@@ -167,7 +176,7 @@ def _along(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
 
 
 def _beyond(limits: list[str], edge: int) -> list[dict[str, Any]]:
-    """An arrow to the upper (1) or lower (0) edge with the limits beyond it; a double click shows them."""
+    """Arrow to the upper (1) or lower (0) edge with the limits outside the axis; a double click shows them."""
     text, away = "<br>".join(map(as_it_stands, limits)), 7 * len(limits) + 6  # pixels from the edge
     arrow = {"xref": "paper", "yref": "paper", "x": 0.97, "y": edge, "ax": 0, "ay": away if edge else -away,
              "showarrow": True, "arrowhead": 2, "arrowwidth": 1.2, "arrowcolor": CLASS, "xanchor": "right",
@@ -176,13 +185,14 @@ def _beyond(limits: list[str], edge: int) -> list[dict[str, Any]]:
     return [arrow] if limits else []
 
 
-def _names(one: Section) -> list[dict[str, Any]]:
-    """What stands over the chainages of a section."""
-    late = one.ends[0] + 0.9 * (one.ends[1] - one.ends[0])
+def _names(section: Section) -> list[dict[str, Any]]:
+    """Names of devices and nodes above the chainages of a section."""
+    late = section.ends[0] + 0.9 * (section.ends[1] - section.ends[0])
     return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
              "xanchor": "right" if x > late else "left", "yanchor": "bottom",
              "text": as_it_stands(_cut(names)), "hovertext": as_it_stands(names),
-             "font": {"size": 11, "color": INK if stands else MUTED}} for x, names, stands in one.labels()]  # fmt: skip
+             "font": {"size": 11, "color": INK if stands else MUTED}}
+            for x, names, stands in section.labels()]  # fmt: skip
 
 
 def _cut(text: str) -> str:
@@ -190,7 +200,7 @@ def _cut(text: str) -> str:
 
 
 def _still(panel: HistoryPanel) -> dict[str, Any]:
-    """A range for series at rest, whose round-off would else be magnified."""
+    """Axis range for constant series, so that round-off is not magnified; {} for series that vary."""
     values = np.concatenate([line.values for line in panel.lines if line.seen] or [np.zeros(0)])
     values = values[np.isfinite(values)]
     if not values.size or np.ptp(values) >= 1e-9 * np.abs(values).max():

@@ -1,4 +1,4 @@
-"""Columns of the envelope, and pressures as heads in their unit. Knows units and a case's law; knows no section."""
+"""Units of the envelope of a result, and conversion of pressures to heads."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from fvsolve.output.envelope import QUANTITIES
 
 
 def in_units(result, name: str) -> UnitColumn:
-    """The column of a quantity of the envelope."""
+    """Unit column of a quantity of the envelope."""
     unit, ambient = result.summary["envelope_units"][name], result.summary["ambient_pressure"]
     return UnitColumn(name, QUANTITIES[name], unit, ambient)
 
 
 def head_of(result, pressure: float | np.ndarray, elevation: np.ndarray) -> np.ndarray:
-    """The head of a pressure [Pa] at elevations, both in the unit of heads."""
+    """Head of an absolute pressure [Pa] at elevations; head and elevations in the units of the envelope."""
     height = in_units(result, "elevation")
     law: Callable[..., Any] = result.case.law.head
     return in_units(result, "greatest_head").from_si(law(pressure, height.to_si(elevation)))

@@ -1,7 +1,7 @@
-"""Which pipes make a long section, and which way round. Knows the network of a case; draws nothing.
+"""Pipes of each long section of a run, in order and direction.
 
-The one place that chooses: the routes of the case, then the longest ways through pipes on none of them that meet end to
-end, or at the two junctions of a link without length, each pipe in one.
+Sections are the routes of the case, then the longest paths through the remaining pipes, without common pipes. A path
+continues through common nodes and through links without length between two junctions.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from fvsolve.case.routes import Leg, alone, is_cut, joined
 from fvsolve.case.routes import legs as legs_of
 from fvsolve.run.result import not_valid
 
-MOST = 6  # sections of a run, unless it has more routes
+MOST = 6  # greatest number of sections of a run, unless it has more routes
 
 
 class SectionWay(NamedTuple):
-    """A section: its name, its legs in order, and the places where they meet with their chainages [m]."""
+    """Path of a section: name, legs in order, and (node, chainage [m]) of the ends of its legs."""
 
     name: str
     legs: list[Leg]
@@ -25,57 +25,57 @@ class SectionWay(NamedTuple):
 
     @property
     def begin(self) -> float:
-        """Chainage where it begins [m]."""
+        """Chainage of its start [m]."""
         return self.legs[0].begin
 
     @property
     def end(self) -> float:
-        """Chainage where it ends [m]."""
+        """Chainage of its end [m]."""
         return self.legs[-1].end
 
     @property
     def length(self) -> float:
-        """From end to end [m]."""
+        """Length from end to end [m]."""
         return self.end - self.begin
 
 
 def ways(result) -> list[SectionWay]:
-    """The sections of a run, its routes first, then the longest; none without pipes, or where a run blew up."""
+    """Section paths of a run, its routes first, then the longest; [] without pipes or if the run diverged."""
     if not_valid(result.summary):
         return []
     links = result.case.links
-    found = [_way(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
-    found = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(found)}.values())[::-1]  # each but once
-    found = [way for way in found if not _within(way, found)]
-    strung = {leg.pipe for way in found for leg in way.legs}
-    one = joined({name: link for name, link in links.items() if _in_line(link, result.case)})
+    paths = [_way(name, legs_of(route, links), links) for name, route in result.case.routes.items()]
+    paths = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(paths)}.values())[::-1]  # no duplicates
+    paths = [way for way in paths if not _within(way, paths)]
+    strung = {leg.pipe for way in paths for leg in way.legs}
+    merged = joined({name: link for name, link in links.items() if _in_line(link, result.case)})
     free = [name for name in result.envelope if name in links and name not in strung]
-    pipes = {name: (*(one.get(end, end) for end in (links[name].from_, links[name].to)), links[name].length)
+    pipes = {name: (*(merged.get(end, end) for end in (links[name].from_, links[name].to)), links[name].length)
              for name in free}  # fmt: skip
     others = []
-    while pipes and len(found) + len(others) < MOST:
+    while pipes and len(paths) + len(others) < MOST:
         chain = _longest(pipes)
         for pipe, _, _ in chain:
             del pipes[pipe]
         others.append(_chained(chain, result))
-    return [*found, *sorted(others, key=lambda one: -one.length)]
+    return [*paths, *sorted(others, key=lambda path: -path.length)]
 
 
 def _within(way: SectionWay, ways: list[SectionWay]) -> bool:
-    """Whether it is a cut pipe, a route by itself, whose pieces all lie on another route."""
+    """True if a path is only a pipe cut into pieces, and all pieces are on another path."""
     pipes = [leg.pipe for leg in way.legs]
     return is_cut(way.name, pipes) and any(
-        set(pipes) <= {leg.pipe for leg in one.legs} for one in ways if one is not way
+        set(pipes) <= {leg.pipe for leg in other.legs} for other in ways if other is not way
     )
 
 
 def _in_line(link, case) -> bool:
-    """Whether a section may run through a link: it has no length, and joins two junctions."""
+    """True if a section may continue through a link: all its ends are junctions."""
     return all(getattr(case.nodes.get(place), "kind", "") == "junction" for place in link.ports.values())
 
 
 def _chained(chain: list[tuple[str, bool, float]], result) -> SectionWay:
-    """A chain with its chainages, turned so that the head falls along it at the start; one pipe as it was drawn."""
+    """Section path of a chain, directed so that the initial head falls along it; a single pipe keeps its direction."""
     if len(chain) == 1:
         pipe = chain[0][0]
         return _way(pipe, [alone(pipe, result.case.links)], result.case.links)
@@ -97,7 +97,7 @@ def _chained(chain: list[tuple[str, bool, float]], result) -> SectionWay:
 
 
 def _way(name: str, legs: list[Leg], links: dict) -> SectionWay:
-    """A section with the places where its pipes begin and end; what stands between two of them has both."""
+    """Section path with the end nodes of its pipes; a device between two pipes thus has both its nodes."""
     places = []
     for leg in legs:
         ends = (links[leg.pipe].from_, leg.chainage(0.0)), (links[leg.pipe].to, leg.chainage(links[leg.pipe].length))
@@ -110,16 +110,16 @@ def _start_head(result, pipe: str, last: bool) -> float:
 
 
 def _longest(pipes: dict) -> list[tuple[str, bool, float]]:
-    """The way between two places that are farthest apart along pipes: (pipe, turned, length) in order.
+    """Longest shortest path between two nodes along pipes: (pipe, turned, length) in order.
 
-    Found by going twice to the farthest place, from an end of the longest pipe; exact where there are no loops.
+    Two searches for the farthest node, the first from an end of the longest pipe; exact for networks without loops.
     """
     around: dict[str, list] = {}
     for name, (a, b, length) in pipes.items():
         around.setdefault(a, []).append((b, name, False, length))
         around.setdefault(b, []).append((a, name, True, length))
     longest = max(pipes, key=lambda name: pipes[name][2])
-    if pipes[longest][0] == pipes[longest][1]:  # its ends are joined by a link without length
+    if pipes[longest][0] == pipes[longest][1]:  # a link without length connects its ends
         return [(longest, False, pipes[longest][2])]
     far = _farthest(around, pipes[longest][0])[0]
     end, came = _farthest(around, far)
@@ -131,7 +131,7 @@ def _longest(pipes: dict) -> list[tuple[str, bool, float]]:
 
 
 def _farthest(around: dict, start: str) -> tuple[str, dict]:
-    """The place farthest from `start`, and by which pipe each place was reached (Dijkstra 1959)."""
+    """Node farthest from `start`, and for each node the pipe by which it was reached (Dijkstra 1959)."""
     distance, came, queue, end = {start: 0.0}, {}, [(0.0, start)], start
     done = set()
     while queue:

@@ -1,4 +1,4 @@
-"""The only door to Jinja2, Plotly, XlsxWriter and rainflow, the extra `report`; says what to install."""
+"""Imports of Jinja2, Plotly, XlsxWriter and rainflow (extra `report`), with a message on how to install them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fvsolve.errors import FvsolveError
 
 
 def library(name: str) -> Any:
-    """A module of the extra; FvsolveError that says what to install where it is not there."""
+    """Import a module of the extra `report`; raises FvsolveError with the install command if it is missing."""
     try:
         return import_module(name)
     except ImportError:
@@ -17,18 +17,18 @@ def library(name: str) -> Any:
 
 
 def template(text: str) -> Any:
-    """A page to be filled in: whatever is put into it stands there as text, never as markup."""
+    """Jinja template that escapes all values, so that they never become markup."""
     jinja = library("jinja2")
     return jinja.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja.StrictUndefined,
                              ).from_string(text)  # fmt: skip
 
 
 def charts() -> str:
-    """The source of plotly.js as Plotly's wheel ships it, so that nothing is fetched."""
+    """Source of plotly.js from the Plotly wheel, so that the page needs no network."""
     return library("plotly.offline").get_plotlyjs()
 
 
 def workbook(path: str) -> Any:
-    """An empty workbook in which text is text: no formula, no link."""
+    """New workbook at `path` that stores text as text, never as a formula, link or number."""
     plain = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
     return library("xlsxwriter").Workbook(path, {**plain, "nan_inf_to_errors": True})

@@ -1,76 +1,76 @@
-"""How the numbers were made and what was kept: scheme, step, ledgers, versions. Knows a summary; knows no solver."""
+"""Report tables of numerics: scheme, method, step, ledgers, events, cavities, comparisons and versions."""
 
 from __future__ import annotations
 
 from fvsolve.output.column import column
 from fvsolve.report.tables import ReportTable, worded
 
-UNITS = {"mass": "kg", "energy": "J"}  # of ledgers; others are in the unit of their scalar
+UNITS = {"mass": "kg", "energy": "J"}  # units of ledgers; ledgers of scalars have the unit of the scalar
 TERMS = ("initial", "inflow", "outflow", "spilled", "made_up", "final")
 
 
 def settings(result) -> ReportTable:
-    """Scheme, method, step and what the run took."""
-    said, numerics = result.summary, result.case.numerics
+    """Scheme, method and step, with the numbers of steps and the time of the run."""
+    summary, numerics = result.summary, result.case.numerics
     steps = {"courant": "Courant number", "step": "given, s", "rtol": "by error, rtol"}
     given = [
         f"{words} {worded(getattr(numerics, key))}" for key, words in steps.items() if getattr(numerics, key, None)
     ]
     time = column("", "time", result.case)
-    span = [worded(float(time.from_si(one))) for one in (numerics.start, said["t"])]
+    span = [worded(float(time.from_si(item))) for item in (numerics.start, summary["t"])]
     rows = [["time", f"{span[0]} to {span[1]} {time.unit}"]]
-    if said["cells"]:
-        rows += [["scheme", _scheme(numerics)], ["cells", said["cells"]]]
-    rows += [["method", "; ".join(_method(one, result.case) for one in said["methods"])],
+    if summary["cells"]:
+        rows += [["scheme", _scheme(numerics)], ["cells", summary["cells"]]]
+    rows += [["method", "; ".join(_method(item, result.case) for item in summary["methods"])],
              ["step", "; ".join(given) or "by default"],
-             ["steps", said["steps"]], ["steps taken again", said["rejections"]], ["calls of rates", said["rhs"]],
-             ["seconds of stepping", said["seconds"]]]  # fmt: skip
-    if "resolution" in said:
+             ["steps", summary["steps"]], ["repeated steps", summary["rejections"]],
+             ["evaluations of rates", summary["rhs"]], ["seconds of stepping", summary["seconds"]]]  # fmt: skip
+    if "resolution" in summary:
         rows.append(
-            ["errors of peaks (\u00b1)", "; ".join([said["resolution"]["words"], *said["resolution"]["reasons"]])]
+            ["errors of peaks (\u00b1)", "; ".join([summary["resolution"]["words"], *summary["resolution"]["reasons"]])]
         )
     return ReportTable("Method", ("", ""), [[key, worded(value)] for key, value in rows])
 
 
 def ledgers(result) -> ReportTable | None:
-    """What came in, went out and is stored, and what does not add up."""
-    found = {name: one for name, one in result.summary["ledgers"].items() if "remainder" in one}
-    if not found:
+    """Balances of mass, energy and scalars: inflow, outflow, content and remainder; None without ledgers."""
+    balances = {name: row for name, row in result.summary["ledgers"].items() if "remainder" in row}
+    if not balances:
         return None
-    terms = [term for term in TERMS if any(isinstance(one.get(term), float) for one in found.values())]
-    rows = [[name, UNITS.get(name, ""), *(one.get(term) for term in terms), f"{one['remainder']:.2e}",
-             f"{one['relative']:.1e}" if "relative" in one else None] for name, one in found.items()]  # fmt: skip
+    terms = [term for term in TERMS if any(isinstance(row.get(term), float) for row in balances.values())]
+    rows = [[name, UNITS.get(name, ""), *(row.get(term) for term in terms), f"{row['remainder']:.2e}",
+             f"{row['relative']:.1e}" if "relative" in row else None] for name, row in balances.items()]  # fmt: skip
     heads = ("ledger", "unit", *(term.replace("_", " ") for term in terms), "remainder", "of the largest term")
     return ReportTable("Ledgers", heads, rows)
 
 
 def versions(result) -> ReportTable:
-    """What made the numbers: versions, the case's hash, when."""
+    """Versions of programs and data, hash of the case, and time of the run."""
     rows = [["run ended", result.summary.get("ended", "not recorded")]]
     words = {"case": "hash of the case", "sources": "hash of compiled sources", "fluid": "fluid properties",
              "target": "machine"}  # fmt: skip
-    rows += [[words.get(key, key), one] for key, one in result.summary["versions"].items()]
+    rows += [[words.get(key, key), version] for key, version in result.summary["versions"].items()]
     return ReportTable("", ("", ""), rows)
 
 
 def events(result) -> ReportTable | None:
-    """What parts did by themselves."""
-    rows = [[one["time"], one["name"], one["what"]] for one in result.summary["events"]]
-    return ReportTable("Events", ("time", "part", "what"), rows, ("s",), more="in summary.json") if rows else None
+    """Events of self-acting parts with their times; None without events."""
+    rows = [[event["time"], event["name"], event["what"]] for event in result.summary["events"]]
+    return ReportTable("Events", ("time", "part", "event"), rows, ("s",), more="in summary.json") if rows else None
 
 
 def cavities(result) -> ReportTable | None:
-    """Where liquid parted, and how much of it."""
-    rows = [[one["place"].removeprefix("links."), one["distance"], one["time"], one["volume"], one["t_volume"]]
-            for one in result.summary["cavities"]]  # fmt: skip
+    """Cavities in pipes: first place and time, greatest volume and its time; None without cavities."""
+    rows = [[row["place"].removeprefix("links."), row["distance"], row["time"], row["volume"], row["t_volume"]]
+            for row in result.summary["cavities"]]  # fmt: skip
     heads = ("pipe", "first at", "time", "greatest volume", "time")
     return ReportTable("Cavities", heads, rows, ("", "m", "s", "m3", "s")) if rows else None
 
 
 def comparisons(result) -> ReportTable | None:
-    """Measured series beside their probes."""
-    rows = [[one.probe, one.file, one.unit, one.rms, one.greatest_difference, one.measured_peak, one.computed_peak]
-            for one in result.comparisons]  # fmt: skip
+    """Comparison of probes with measured series; None without measurements."""
+    rows = [[row.probe, row.file, row.unit, row.rms, row.greatest_difference, row.measured_peak, row.computed_peak]
+            for row in result.comparisons]  # fmt: skip
     heads = ("probe", "measured", "unit", "rms", "greatest difference", "peak measured", "computed")
     return ReportTable("Against measurements", heads, rows, loose=frozenset({3, 4, 5, 6})) if rows else None
 
@@ -80,5 +80,5 @@ def _scheme(numerics) -> str:
     return f"{numerics.scheme}, limiter {limiter}" if limiter and numerics.scheme == "muscl" else numerics.scheme
 
 
-def _method(one: dict, case) -> str:
-    return one["method"] if not one["time"] else f"{one['method']} from {case.amount(one['time'], 'time', 6)} on"
+def _method(row: dict, case) -> str:
+    return row["method"] if not row["time"] else f"{row['method']} from {case.amount(row['time'], 'time', 6)} on"

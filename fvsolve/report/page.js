@@ -4,9 +4,9 @@
   const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
   const ids = Object.keys(figures), histories = ids.filter((id) => id.startsWith("history-"));
   const chart = (id) => document.getElementById(id);
-  const WIDE = 680;  // pixels of paper
+  const WIDE = 680;  // width of a printed page [px]
 
-  // Where fingers scroll, a chart is zoomed by its buttons; on a narrow page names that would cover each other give way.
+  // On touch screens a chart is zoomed by its buttons; on a narrow page names that would overlap are left out.
   const touched = matchMedia("(pointer: coarse)").matches;
   if (touched) config.displayModeBar = true;
   for (const [id, { layout }] of Object.entries(figures)) {
@@ -20,7 +20,7 @@
     layout.annotations = kept;
   }
 
-  // The legend stands over its chart, where it covers no line however wide the page is.
+  // The legend is above its chart, where it covers no line at any width of the page.
   const swatch = ({ mode, line, marker }) => mode === "markers"
     ? `<b style="color:${marker.line?.color ?? marker.color}">${{ square: "\u25a0", "x-thin": "\u00d7" }[marker.symbol] ?? "\u2022"}</b>`
     : `<svg width="30" height="8"><line x2="30" y1="4" y2="4" stroke="${line.color}" stroke-width="${line.width}"`
@@ -32,7 +32,7 @@
       const button = document.createElement("button"), seen = trace.visible !== "legendonly";
       button.type = "button";
       button.setAttribute("aria-pressed", seen);
-      button.innerHTML = swatch(trace) + trace.name;  // no markup: text of the case was escaped for Plotly
+      button.innerHTML = swatch(trace) + trace.name;  // texts of the case were escaped for Plotly
       button.onclick = () => {
         const own = (one) => one === trace || (trace.legendgroup && one.legendgroup === trace.legendgroup);
         Plotly.restyle(chart(id), { visible: seen ? "legendonly" : true }, [...traces.keys()].filter((k) => own(traces[k])));
@@ -66,7 +66,7 @@
   ids.forEach(legend);
   screen.addEventListener("change", () => repaint(screen.matches));
 
-  // One time axis for all histories: what is zoomed in one is zoomed in all.
+  // All histories have the same time axis: a zoom in a chart applies to all.
   let following = false;
   for (const id of histories) {
     chart(id).on("plotly_relayout", (change) => {
@@ -109,8 +109,8 @@
     show(0);
   }
 
-  // Paper is light and has its own sizes [px]; the moving line stays on the screen, and what can follow the figures does.
-  // A section fills what is left of its page, or begins the next one where that is too little: no page stays half empty.
+  // Printed pages have light colours and their own sizes [px], without the animated line; other content follows the figures.
+  // A section fills the rest of its page, or starts on the next page if the rest is too small.
   const PAGE = 985, LEAST = 250, GOOD = 420, WELL = 0.6, MOST = 720, HISTORY = 200, TOOLS = 22;
   const main = document.querySelector("main"), box = (node) => node.getBoundingClientRect();
   const paper = [...document.styleSheets].flatMap((one) => [...one.cssRules]).find((rule) => rule.conditionText === "print");
@@ -127,7 +127,7 @@
       const figure = id.closest("figure"), before = figure.previousElementSibling;
       const first = before?.matches("figure") ? figure : figure.closest("section").querySelector("h2");
       id.style.height = "0";
-      if (box(first).top - page > PAGE) {  // tables before it went over the end of a page, where rows are not cut
+      if (box(first).top - page > PAGE) {  // earlier tables crossed the end of a page, where rows are not cut
         page += PAGE * Math.floor((box(first).top - page) / PAGE);
         spare = 60;
       }

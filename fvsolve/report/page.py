@@ -1,4 +1,4 @@
-"""The page: one HTML file that asks nothing of any network. Knows what stands where on it; computes nothing."""
+"""HTML report of a run: one file with all data, scripts and styles, which needs no network."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from fvsolve.report.tables import ReportTable, worded
 from fvsolve.run.result import not_valid
 
 HERE = Path(__file__).parent
-SHARED = 900  # bins of all sections together
-PAPER_TITLE = 100  # letters over each page of paper
-WARNINGS = 40  # on the page; all are in summary.json
+SHARED = 900  # greatest number of bins of all sections together
+PAPER_TITLE = 100  # greatest number of letters of the title on each printed page
+WARNINGS = 40  # greatest number on the page; summary.json has all
 
 
 def page(result, ways: list[SectionWay]) -> str:
-    """The report of a run as HTML."""
+    """HTML report of a run."""
     sections = [section(result, way) for way in ways]
     figures: dict[str, Any] = {}
     probes = worst.of_probes(result)
@@ -41,15 +41,18 @@ def page(result, ways: list[SectionWay]) -> str:
         "model": _there(described.model(result)),
         "numbers": _there([numerics.settings(result), numerics.ledgers(result), trust.claims(result),
                            numerics.comparisons(result)]),
-        "told": _cut([one.text for one in result.warnings if one.ok]), "happened": _there([numerics.cavities(result),
-                                                                                     numerics.events(result)]),
+        "told": _cut([notice.text for notice in result.warnings if notice.ok]),
+        "happened": _there([numerics.cavities(result), numerics.events(result)]),
         "versions": numerics.versions(result),
     }  # fmt: skip
     return rendered("page", filled, figures)
 
 
 def rendered(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> str:
-    """A page filled in, with its style, its script, the charting library and the figures within it."""
+    """Render a template with its data, style, script, figures and the charting library embedded.
+
+    name : "page" or "study"; filled : values of the template; figures : id -> data for plotly.js
+    """
     files = {"table": "table.html.j2", "page": f"{name}.html.j2", "css": "page.css", "js": "page.js"}
     texts = {key: (HERE / file).read_text(encoding="utf-8") for key, file in files.items()}
     return template(texts["table"] + texts["page"]).render(
@@ -64,54 +67,58 @@ def rendered(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> str:
 
 
 def quoted(text: str) -> str:
-    """Text as a string of CSS, which nothing within can end."""
+    """Text as a CSS string; all but ASCII letters and digits are escaped, so that nothing can end it early."""
     text = text if len(text) <= PAPER_TITLE else f"{text[: PAPER_TITLE - 1]}\u2026"
-    return '"' + "".join(one if one.isascii() and one.isalnum() else f"\\{ord(one):x} " for one in text) + '"'
+    return (
+        '"'
+        + "".join(letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in text)
+        + '"'
+    )
 
 
 def embedded(data: Any) -> str:
-    """JSON that no text within can end or escape: it stands in a <script> of the page. What is no number is null."""
+    """JSON for a <script> element of the page, escaped so that no text can end it; NaN and infinity become null."""
     try:
         text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
-    except ValueError:  # of a run that stopped on one
+    except ValueError:  # a run that stopped at a value that is not finite
         data = json.loads(json.dumps(data), parse_constant=lambda _: None)
         text = json.dumps(data, separators=(",", ":"), ensure_ascii=False)
-    for sign in "<>&\u2028\u2029":
-        text = text.replace(sign, f"\\u{ord(sign):04x}")
+    for letter in "<>&\u2028\u2029":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
     return text
 
 
 def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """What the page says of each section; its figure goes into `figures`."""
-    moving = motions(result, [one.way for one in sections])
+    """Template data of each section; adds its figure to `figures`."""
+    moving = motions(result, [item.way for item in sections])
     height, along = in_units(result, "greatest_head").unit, in_units(result, "distance").unit
-    told, bins = [], min(BINS, SHARED // max(len(sections), 1))
-    for k, one in enumerate(sections):
+    entries, bins = [], min(BINS, SHARED // max(len(sections), 1))
+    for k, item in enumerate(sections):
         line = moving[k] if moving else None
-        figures[f"section-{k}"] = section_figure(one, line, height, along, bins)
-        told.append({"id": f"section-{k}", "name": visible(one.way.name),
-                     "length": f"{worded(in_units(result, 'distance').from_si(one.way.length))} {along}",
-                     "frames": 0 if line is None else len(line.times), "pipes": len(one.way.legs),
-                     "parted": bool(one.parted)})  # fmt: skip
-    return told
+        figures[f"section-{k}"] = section_figure(item, line, height, along, bins)
+        entries.append({"id": f"section-{k}", "name": visible(item.way.name),
+                     "length": f"{worded(in_units(result, 'distance').from_si(item.way.length))} {along}",
+                     "frames": 0 if line is None else len(line.times), "pipes": len(item.way.legs),
+                     "parted": bool(item.parted)})  # fmt: skip
+    return entries
 
 
 def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
-    """What the page says of each panel of histories; its figure goes into `figures`."""
+    """Template data of each panel of histories; adds its figure to `figures`."""
     drawn = result.history_drawn()
     doubt = min((time for time, _ in drawn.get("marks", ())), default=None)
-    told = []
+    entries = []
     for k, panel in enumerate(panels(result)):
         figures[f"history-{k}"] = history_figure(panel, drawn["time_unit"], doubt)
         hidden = sum(not line.seen for line in panel.lines)
-        told.append({"id": f"history-{k}", "name": panel.quantity.replace("_", " "), "hidden": hidden})
-    return told
+        entries.append({"id": f"history-{k}", "name": panel.quantity.replace("_", " "), "hidden": hidden})
+    return entries
 
 
 def _there(tables: list[ReportTable | None]) -> list[ReportTable]:
-    return [one for one in tables if one is not None and one.rows]
+    return [table for table in tables if table is not None and table.rows]
 
 
 def _cut(texts: list[str]) -> list[str]:
     more = len(texts) - WARNINGS
-    return [visible(one) for one in texts[:WARNINGS]] + ([f"{more} more in summary.json"] if more > 0 else [])
+    return [visible(text) for text in texts[:WARNINGS]] + ([f"{more} more in summary.json"] if more > 0 else [])

@@ -1,4 +1,4 @@
-"""Pictures of a run without a browser: long sections, histories by choice, phase planes. Knows runs; draws nothing."""
+"""Picture files of a run: long sections, histories of chosen probes, and phase planes."""
 
 from __future__ import annotations
 
@@ -20,32 +20,34 @@ from fvsolve.units import show
 def write_pictures(
     directory: str | Path, probes: str = "", route: str = "", phases: Sequence[str] = (), out: str | Path | None = None
 ) -> list[Path]:
-    """Draw what is asked for into `out`, the run directory by default; their paths.
+    """Write pictures of a run into the folder `out` (default: the run directory); returns their paths.
 
-    probes : names with commas between them, of probes.png; route : a section, all where nothing is asked for;
-    phases : "X:Y", two probes, of phase.png. Raises RunError, FvsolveError with all names that are none.
+    probes : names separated by commas, drawn in probes.png
+    route : name of a section; all sections are drawn if probes, route and phases are empty
+    phases : pairs of probes "X:Y", drawn in phase.png
+    Raises RunError if the directory holds no finished run, FvsolveError with all unknown names.
     """
     result, folder = opened(Path(directory)), Path(out) if out is not None else Path(directory)
     faults: list[str] = []
     picked = chosen(result, probes, faults)
     pairs = [_pair(result, text, faults) for text in phases]
-    found = _sections(ways(result), route, bool(picked or phases), faults)
+    sections = _sections(ways(result), route, bool(picked or phases), faults)
     if faults:
         raise FvsolveError("\n".join(faults))
     title, drawn = result.summary["title"], {}
-    for k, way in enumerate(found, 1):
-        drawn["section.png" if len(found) == 1 else f"section-{k}.png"] = _section_figure(result, way)
+    for k, way in enumerate(sections, 1):
+        drawn["section.png" if len(sections) == 1 else f"section-{k}.png"] = _section_figure(result, way)
     if picked:
-        told = result.history_drawn()
+        data = result.history_drawn()
         columns = [result.probes.index(name) for name in picked]
-        measured = {name: one for name, one in told["measured"].items() if name in picked}
-        drawn["probes.png"] = history_figure(**{**told, "values": told["values"][:, columns], "measured": measured,
-                                                "probes": [told["probes"][k] for k in columns]})  # fmt: skip
+        measured = {name: series for name, series in data["measured"].items() if name in picked}
+        drawn["probes.png"] = history_figure(**{**data, "values": data["values"][:, columns], "measured": measured,
+                                                "probes": [data["probes"][k] for k in columns]})  # fmt: skip
     if pairs:
         drawn["phase.png"] = phase_figure([[(n, result.units[n], result[n]) for n in pair] for pair in pairs], title)
     if not drawn:
-        why = f"run is {text}" if (text := not_valid(result.summary)) else "case has no pipes"
-        raise FvsolveError(f"{directory}: the {why}, so no long section; name --probes or --phase X:Y")
+        reason = f"run is {text}" if (text := not_valid(result.summary)) else "case has no pipes"
+        raise FvsolveError(f"{directory}: the {reason}, so it has no long section. Choose --probes or --phase X:Y")
     folder.mkdir(parents=True, exist_ok=True)
     for name, figure in drawn.items():
         kept(figure, folder / name)
@@ -53,49 +55,49 @@ def write_pictures(
 
 
 def chosen(result, text: str, faults: list[str]) -> list[str]:
-    """`a.head,tank.depth@1,2` as names of probes, which may have commas themselves; what is none is a fault."""
-    found, pieces = [], [piece.strip() for piece in text.split(",")] if text else []
+    """Split `a.head,tank.depth@1,2` into names of probes, which may contain commas; adds a fault for unknown names."""
+    names, pieces = [], [piece.strip() for piece in text.split(",")] if text else []
     while pieces:
         ends = [k for k in range(1, len(pieces) + 1) if ",".join(pieces[:k]) in result.units]
-        many = ends[-1] if ends else 1
-        name, pieces = ",".join(pieces[:many]), pieces[many:]
+        n = ends[-1] if ends else 1
+        name, pieces = ",".join(pieces[:n]), pieces[n:]
         if ends:
-            found.append(name)
+            names.append(name)
         else:
             faults.append(_none(result, name))
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(names))
 
 
 def _pair(result, text: str, faults: list[str]) -> list[str]:
     names = [name.strip() for name in text.split(":")]
     if len(names) != 2:
-        faults.append(f"--phase {show(text)}: wanted two probes, X:Y")
+        faults.append(f"--phase {show(text)}: expected two probes, X:Y")
     faults += [_none(result, name) for name in names if len(names) == 2 and name not in result.units]
     return names
 
 
 def _none(result, name: str) -> str:
-    near = did_you_mean(name, result.units) or f"; they are {listing(result.units) or 'none'}"
-    return f"no probe {show(name)} was recorded{near}"
+    hint = did_you_mean(name, result.units) or f"; the run has {listing(result.units) or 'none'}"
+    return f"{show(name)}: unknown probe{hint}"
 
 
-def _sections(found: list[SectionWay], route: str, others: bool, faults: list[str]) -> list[SectionWay]:
-    """The sections that are to be drawn."""
+def _sections(sections: list[SectionWay], route: str, others: bool, faults: list[str]) -> list[SectionWay]:
+    """Sections to draw; adds a fault for an unknown route. others : True if probes or phase planes are drawn."""
     if not route:
-        return [] if others else found
-    named = [way for way in found if way.name == route]
+        return [] if others else sections
+    named = [way for way in sections if way.name == route]
     if not named:
-        names = [way.name for way in found]
-        near = did_you_mean(route, names) or f"; they are {listing(names) or 'none'}"
-        faults.append(f"no route {show(route)}{near}")
+        names = [way.name for way in sections]
+        hint = did_you_mean(route, names) or f"; the run has {listing(names) or 'none'}"
+        faults.append(f"{show(route)}: unknown route{hint}")
     return named
 
 
 def _section_figure(result, way: SectionWay):
-    one = section(result, way)
-    k, title = one.picked(), "\n".join(filter(None, [result.summary["title"], way.name]))
+    sec = section(result, way)
+    k, title = sec.picked(), "\n".join(filter(None, [result.summary["title"], way.name]))
     return section_figure(
-        one.chainage[k], {name: values[k] for name, values in one.along.items()}, result.summary["envelope_units"],
-        {name: line[k] for name, line in one.lines.items()}, window([one], in_units(result, "greatest_head").unit),
-        one.parted, one.beyond, [device.chainage for device in one.devices], one.labels(), title,
+        sec.chainage[k], {name: values[k] for name, values in sec.along.items()}, result.summary["envelope_units"],
+        {name: line[k] for name, line in sec.lines.items()}, window([sec], in_units(result, "greatest_head").unit),
+        sec.parted, sec.beyond, [device.chainage for device in sec.devices], sec.labels(), title,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""A long section as an engineer draws it: arrays along one chainage, in the units of [output]. Draws nothing."""
+"""Data of a long section: elevation, heads, limits and devices along the chainage, in the units of [output]."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pres
          "t_least", "t_greatest")  # fmt: skip
 HEADS = ("initial_head", "least_head", "greatest_head")
 VAPOUR = "vapour line"
-APART = 0.035  # of the length: names nearer to each other than this would cover each other
-NEAREST = 0.5  # of the range of heads: limits further away than this are named at the edge of a picture
-EDGE, NAME = 0.05, 0.07  # of the axis of heads: free at its ends, and for each limit that is named there
-BINS = 150  # of a long line at most: of each the greatest and the least head and elevation stand, and where
+APART = 0.035  # least distance of names, as a fraction of the length; closer names would overlap
+NEAREST = 0.5  # limits farther away than this fraction of the range of heads are only named at the edge of the picture
+EDGE, NAME = 0.05, 0.07  # fractions of the head axis: free at each end, and for each limit that is named there
+BINS = 150  # greatest number of bins of a long line; the extremes of head and elevation of each bin are drawn
 
 
 class Standing(NamedTuple):
-    """What stands at a place of a section."""
+    """Node of a section with the devices at it."""
 
     chainage: float
     place: str
@@ -36,12 +36,14 @@ class Standing(NamedTuple):
 
 @dataclass(frozen=True)
 class Section:
-    """One way with what was met along it.
+    """Long section: a path through the network with the results along it.
 
-    chainage : float64[n]; pipe : str[n]; along : quantity -> float64[n]; lines : name -> float64[n], heads at which
-    liquid boils, that a class allows, that limits state, nan where there is none; ends : chainages of both ends;
-    parted : spans of chainage where the vapour pressure was reached; beyond : (chainage, head, name) of what passes a
-    limit
+    chainage : float64[n]; pipe : str[n]  pipe of each point
+    along : quantity -> float64[n]
+    lines : name -> float64[n]  heads of vapour pressure, pressure class and limits, NaN where there is none
+    ends : chainages of both ends
+    parted : spans of chainage where the vapour pressure was reached
+    beyond : (chainage, head, name of the limit) of places where a limit is violated
     """
 
     way: SectionWay
@@ -55,7 +57,7 @@ class Section:
     devices: list[Standing]
 
     def picked(self, bins: int = BINS) -> np.ndarray:
-        """Numbers of the points to be drawn: all, or of a long line the extremes of each bin."""
+        """Indices of the points to draw: all, or for a long section the extremes of each bin."""
         n = len(self.chainage)
         if n <= 4 * bins:
             return np.arange(n)
@@ -67,20 +69,20 @@ class Section:
             ("elevation", np.argmin),
         ]
         lines = [(self.along[name], end) for name, end in most]
-        kept = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
-        return np.unique([0, *kept, n - 1])
+        rows = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return np.unique([0, *rows, n - 1])
 
     def labels(self) -> list[tuple[float, str, bool]]:
-        """Chainages with names, and whether more than a joint stands there; none would cover another.
+        """(chainage, names, True if a device is there) of labels that do not overlap.
 
-        Devices and ends go before joints; devices that are near share a label.
+        Devices and ends have priority over plain junctions; devices close to each other share a label.
         """
         length = self.ends[1] - self.ends[0]
         order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in self.ends))
         shown: list[tuple[float, list[str], bool]] = []
         for device in order:
             names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
-            near = [one for one in shown if abs(device.chainage - one[0]) < APART * length]
+            near = [label for label in shown if abs(device.chainage - label[0]) < APART * length]
             if not near:
                 shown.append((device.chainage, names, bool(device.parts)))
             elif device.parts:
@@ -89,7 +91,7 @@ class Section:
 
 
 class Window(NamedTuple):
-    """Ends of the axis of heads, and the limits that lie beyond each, with where they begin."""
+    """Ends of the head axis, and texts of the limits above and below it."""
 
     low: float
     high: float
@@ -98,62 +100,64 @@ class Window(NamedTuple):
 
 
 def window(sections: Sequence[Section], unit: str) -> Window:
-    """What a picture of sections shows: heads, profile and vapour line, and limits that are near, so that a class far
-    away flattens nothing."""
-    heads = ends_of([one.along[name] for one in sections for name in HEADS]) or (0.0, 1.0)
-    shown = [one.along["elevation"] for one in sections]
-    shown += [line for one in sections for name, line in one.lines.items() if name == VAPOUR]
+    """Head axis of a picture of sections: heads, profile, vapour line and limits close to them.
+
+    Limits far away are only named, so that they do not compress the heads.
+    """
+    heads = ends_of([section.along[name] for section in sections for name in HEADS]) or (0.0, 1.0)
+    shown = [section.along["elevation"] for section in sections]
+    shown += [limit for section in sections for name, limit in section.lines.items() if name == VAPOUR]
     followed = ends_of([*map(np.array, heads), *shown]) or heads
     reach, (low, high), above, below = NEAREST * (heads[1] - heads[0]), followed, [], []
-    for name in dict.fromkeys(name for one in sections for name in one.lines if name != VAPOUR):
-        line = ends_of([one.lines[name] for one in sections if name in one.lines])
-        if line and line[0] > followed[1] + reach:
-            above.append(f"{name}: from {line[0]:.4g} {unit}")
-        elif line and line[1] < followed[0] - reach:
-            below.append(f"{name}: from {line[1]:.4g} {unit}")
-        elif line:
-            low = min(low, max(line[0], followed[0] - reach))
-            high = max(high, min(line[1], followed[1] + reach))
+    for name in dict.fromkeys(name for section in sections for name in section.lines if name != VAPOUR):
+        limit = ends_of([section.lines[name] for section in sections if name in section.lines])
+        if limit and limit[0] > followed[1] + reach:
+            above.append(f"{name}: from {limit[0]:.4g} {unit}")
+        elif limit and limit[1] < followed[0] - reach:
+            below.append(f"{name}: from {limit[1]:.4g} {unit}")
+        elif limit:
+            low = min(low, max(limit[0], followed[0] - reach))
+            high = max(high, min(limit[1], followed[1] + reach))
     span = high - low or 1.0
     return Window(low - (EDGE + NAME * len(below)) * span, high + (EDGE + NAME * len(above)) * span, above, below)
 
 
 def ends_of(lines: list[np.ndarray]) -> tuple[float, float] | None:
-    """Least and greatest of all values; None of lines that are nowhere."""
+    """Least and greatest of all finite values; None if there is none."""
     values = np.concatenate([np.ravel(line) for line in lines] or [np.empty(0)])
     values = values[np.isfinite(values)]
     return (float(values.min()), float(values.max())) if values.size else None
 
 
 def section(result, way: SectionWay) -> Section:
-    """The section of a way through a run."""
+    """Long section of a run along a path."""
     distances = in_units(result, "distance")
     strung_up = strung(result.envelope, way.legs, distances)
     chainage, pipe = distances.to_si(strung_up["chainage"]), strung_up["pipe"]
     along = {name: strung_up[name] for name in ALONG}
     lines, boils = {}, result.summary["fluid"]["vapor_pressure"]
-    if boils is not None:  # at that pressure itself a gas would fill all, so a law with cavities has no head there
+    if boils is not None:  # a law with cavities has no head at the vapour pressure itself, where vapour fills all
         left = 1.0 + NEAR * result.case.law.cavitates
         lines[VAPOUR] = head_of(result, boils * left, along["elevation"])
     lines |= limit_lines(result, pipe, along["elevation"])
     parted = _parted(result, along["least_pressure"], chainage, way)
     beyond = _beyond(result, way, chainage, along)
-    told = distances.from_si
+    to_unit = distances.from_si
     return Section(
-        way, strung_up["chainage"], pipe, along, lines, (float(told(way.begin)), float(told(way.end))),
-        [(float(told(a)), float(told(b))) for a, b in parted],
-        [(float(told(at)), head, name) for at, head, name in beyond],
-        [one._replace(chainage=float(told(one.chainage))) for one in _devices(result, way)],
+        way, strung_up["chainage"], pipe, along, lines, (float(to_unit(way.begin)), float(to_unit(way.end))),
+        [(float(to_unit(a)), float(to_unit(b))) for a, b in parted],
+        [(float(to_unit(at)), head, name) for at, head, name in beyond],
+        [device._replace(chainage=float(to_unit(device.chainage))) for device in _devices(result, way)],
     )  # fmt: skip
 
 
 def boiling(result) -> float | None:
-    """The pressure [Pa] at which a pipe counts as parted: the vapour pressure, twice it where cavities are followed."""
+    """Pressure [Pa] below which a pipe has a cavity: vapour pressure, or twice it for laws with cavities; or None."""
     return None if result.summary["fluid"]["vapor_pressure"] is None else result.case.law.cavity_pressure
 
 
 def _parted(result, least: np.ndarray, chainage: np.ndarray, way: SectionWay) -> list[tuple[float, float]]:
-    """Spans of chainage [m] about places whose pressure fell to that of vapour."""
+    """Spans of chainage [m] around points where the pressure fell to the vapour pressure."""
     limit = boiling(result)
     if limit is None:
         return []
@@ -164,30 +168,30 @@ def _parted(result, least: np.ndarray, chainage: np.ndarray, way: SectionWay) ->
 
 
 def _beyond(result, way: SectionWay, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
-    """Places of a way where a limit on pressure or head is passed: chainage [m], head there, name of the limit."""
-    found, told = [], Chainages(result.case)
-    for one in result.summary["verdicts"]:
-        limit = result.case.limits.get(one["name"])
+    """(chainage [m], head, name of the limit) of places of a path where a limit on pressure or head is violated."""
+    violations, chainages = [], Chainages(result.case)
+    for verdict in result.summary["verdicts"]:
+        limit = result.case.limits.get(verdict["name"])
         on = limit.extent.on if limit is not None else ()
-        for worst in one["worst"] if one["quantity"] in OF_PRESSURE else []:
+        for worst in verdict["worst"] if verdict["quantity"] in OF_PRESSURE else []:
             leg = next((leg for leg in way.legs if leg.pipe == worst["place"]), None)
             if leg is None or worst["state"] != FAILS:
                 continue
-            at = float(leg.chainage(told.leg(leg.pipe, on).distance(worst["chainage"])))
+            at = float(leg.chainage(chainages.leg(leg.pipe, on).distance(worst["chainage"])))
             if leg.begin <= at <= leg.end:
                 line = along["least_head" if worst["bound"] == "least" else "greatest_head"]
-                found.append((at, float(line[np.argmin(np.abs(chainage - at))]), one["name"]))
-    return found
+                violations.append((at, float(line[np.argmin(np.abs(chainage - at))]), verdict["name"]))
+    return violations
 
 
 def _devices(result, way: SectionWay) -> list[Standing]:
-    """What stands at the places of a way, chainages in m: nodes that are more than joints, and links but pipes."""
-    case, found = result.case, []
+    """Nodes of a path with their devices, chainages in m: nodes other than junctions, and links other than pipes."""
+    case, devices = result.case, []
     for place, chainage in way.places:
         owner = place.partition(".")[0]
         kind = case.nodes[place].kind if place in case.nodes else case.nodes[owner].kind if owner in case.nodes else ""
         parts = [] if kind in ("junction", "") else [f"{place} ({kind})"]
         parts += [f"{name} ({link.kind})" for name, link in case.links.items()
                   if link.kind != "pipe" and place in link.ports.values()]  # fmt: skip
-        found.append(Standing(chainage, place, tuple(parts)))
-    return found
+        devices.append(Standing(chainage, place, tuple(parts)))
+    return devices

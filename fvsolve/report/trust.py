@@ -1,4 +1,4 @@
-"""What a reader must know before any number: why a run stopped, what is not to be trusted, whether limits hold."""
+"""Sentences and tables at the top of a report: early stop, unreliable results, verdicts of limits and claims."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
 from fvsolve.units import span
 
 BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
-LATER = 6  # marks named behind the first
+LATER = 6  # greatest number of marks named after the first
 
 
 class Word(NamedTuple):
-    """A sentence at the top of the page; level : "bad", "doubt" or "good"; links : (name, place) of pages."""
+    """Sentence at the top of the page; level : "bad", "doubt", "good" or "none"; links : (name, address) of pages."""
 
     level: str
     head: str
@@ -23,30 +23,30 @@ class Word(NamedTuple):
 
 
 def words(result) -> list[Word]:
-    """The sentences at the top: a stop first, then what is wrong, what is in doubt, and the verdict."""
-    said = result.summary
-    found = []
+    """Sentences at the top: early stop, errors, doubts, verdict of the limits, then failed or open claims."""
+    summary = result.summary
+    rows = []
     if result.reason != "finished":
-        reached, end = (result.case.amount(one, "time", 6) for one in (said["t"], result.case.numerics.end))
+        reached, end = (result.case.amount(item, "time", 6) for item in (summary["t"], result.case.numerics.end))
         reached = f"It reached t = {reached} of {end}"
-        found.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; the rest is not known."))
-    found += [Word("bad", "Not to be trusted.", one.text) for one in result.warnings if not one.ok]
-    found += [*_doubt(result), verdict(result)]
-    for state, level, head in ((FAILS, "bad", "The case claims what this run does not show."),
-                               (OPEN, "doubt", "Whether the case's claims hold is open.")):  # fmt: skip
-        if those := [one for one in result.expectations if one.state == state]:
-            more = f"; and {len(those) - 1} more, under Numerics" if len(those) > 1 else ""
-            found.append(Word(level, head, claim(those[0]) + more))
-    return found
+        rows.append(Word("bad", "This run stopped early.", f"{result.reason}. {reached}; later values are unknown."))
+    rows += [Word("bad", "Not to be trusted.", item.text) for item in result.warnings if not item.ok]
+    rows += [*_doubt(result), verdict(result)]
+    for state, level, head in ((FAILS, "bad", "The run does not meet an expected value of the case."),
+                               (OPEN, "doubt", "The verdict of an expected value is open.")):  # fmt: skip
+        if claims := [item for item in result.expectations if item.state == state]:
+            more = f"; and {len(claims) - 1} more, under Numerics" if len(claims) > 1 else ""
+            rows.append(Word(level, head, claim(claims[0]) + more))
+    return rows
 
 
 def _doubt(result) -> list[Word]:
-    """From when on results are not to be trusted: the first mark, and where others follow."""
-    marks = sorted(result.marks, key=lambda one: one.time)
+    """Sentence on the time from which results are not reliable: the first mark, and the places of later ones."""
+    marks = sorted(result.marks, key=lambda mark: mark.time)
     if not marks:
         return []
-    when = [result.case.amount(one.time, "time", 6) for one in marks]
-    places = [f"{one.place.partition('.')[2]} at {t}" for one, t in zip(marks, when, strict=True)]
+    when = [result.case.amount(mark.time, "time", 6) for mark in marks]
+    places = [f"{mark.place.partition('.')[2]} at {t}" for mark, t in zip(marks, when, strict=True)]
     later = ", ".join(places[1 : 1 + LATER])
     more = f", and {len(marks) - 1 - LATER} more places" if len(marks) > 1 + LATER else ""
     text = marks[0].text + (f". Later also {later}{more}" if later else "")
@@ -54,93 +54,101 @@ def _doubt(result) -> list[Word]:
 
 
 def sound(result) -> bool:
-    """Whether the run came to its end and nothing casts doubt on its numbers."""
+    """True if the run finished, is ok and has no marks."""
     return result.reason == "finished" and result.ok and not result.marks
 
 
 def verdict(result) -> Word:
-    """Whether the limits of the case hold."""
+    """Sentence on the limits of the case: violated, open, all hold, or none stated."""
     verdicts = result.verdicts
     if not verdicts:
-        return Word("none", "No limits were stated.", "The case does not say what its parts may bear: this report says "
-                    "what happens, not whether it is allowed.")  # fmt: skip
-    states = [one.state for one in verdicts]
-    failed = [one.name for one, how in zip(verdicts, states, strict=True) if how == FAILS]
+        return Word("none", "No limits were stated.", "The case has no [limits], so this report shows what happens, "
+                    "but not if it is allowed.")  # fmt: skip
+    states = [item.state for item in verdicts]
+    failed = [item.name for item, state in zip(verdicts, states, strict=True) if state == FAILS]
     if failed:
-        many = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
-        return Word("bad", f"{many} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed))
-    unsure = [one.name for one, how in zip(verdicts, states, strict=True) if how == OPEN]
+        text = f"{len(failed)} of {len(verdicts)} limits" if len(verdicts) > 1 else "The limit"
+        return Word("bad", f"{text} {'do' if len(failed) > 1 else 'does'} not hold.", ", ".join(failed))
+    unsure = [item.name for item, state in zip(verdicts, states, strict=True) if state == OPEN]
     if unsure:
-        return Word("doubt", f"Whether {'limits hold' if len(unsure) > 1 else 'a limit holds'} is open.",
+        return Word("doubt", f"The verdict of {'limits' if len(unsure) > 1 else 'a limit'} is open.",
                     f"{', '.join(unsure)}: {open_for(result)}.")  # fmt: skip
-    every = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
-    return Word("good", f"{every}.", "") if sound(result) else Word("doubt", f"{every}, as far as to be trusted.", "")
+    summary = f"All {len(verdicts)} limits hold" if len(verdicts) > 1 else "The limit holds"
+    return (
+        Word("good", f"{summary}.", "")
+        if sound(result)
+        else Word("doubt", f"{summary}, as far as results are reliable.", "")
+    )
 
 
 def open_for(result) -> str:
-    """Why limits of a run are open."""
+    """Reason why limits of a run are open."""
     if text := not_valid(result.summary):
         return f"the run is {text}"
     if not result.ok:
         return "the run is not sound"
     if result.marks:
-        return "from a time on the numbers are not to be trusted"
-    if any(one.kind == "end" for one in result.warnings):
-        return "what is scheduled goes on after the end of the run"
-    return "their margins are smaller than the error of the numbers"
+        return "from some time on the results are not to be trusted"
+    if any(notice.kind == "end" for notice in result.warnings):
+        return "a schedule continues after the end of the run"
+    return "their margins are smaller than the numerical errors"
 
 
 def verdicts(result) -> ReportTable | None:
-    """The table of verdicts, those that fail first; None where no limits were stated."""
+    """Table of the verdicts of limits, failed ones first; None without limits."""
     order = (FAILS, OPEN, HOLDS)
-    found = sorted(result.verdicts, key=lambda one: order.index(one.state))
-    length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
-    asked = any(one.error is not None for one in found)
+    ordered = sorted(result.verdicts, key=lambda check: order.index(check.state))
+    length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
+    errors = any(check.error is not None for check in ordered)
     rows = []
-    for one in found:
-        asks = f"{one.quantity.replace('_', ' ')} {BOUNDS[one.bound]} {worded(one.limit)} {one.unit}"
-        apart = span(one.unit)
-        said = one.unit if apart == one.unit else f"{one.unit}, margin {apart}"
-        where = in_unit(length, one.chainage), in_unit(height, one.elevation), in_unit(time, one.time)
-        margin = not_valid(result.summary) or None if one.margin is None else one.margin
+    for check in ordered:
+        requirement = f"{check.quantity.replace('_', ' ')} {BOUNDS[check.bound]} {worded(check.limit)} {check.unit}"
+        margin_unit = span(check.unit)
+        unit_text = check.unit if margin_unit == check.unit else f"{check.unit}, margin {margin_unit}"
+        place = in_unit(length, check.chainage), in_unit(height, check.elevation), in_unit(time, check.time)
+        margin = not_valid(result.summary) or None if check.margin is None else check.margin
         rows.append(
-            [one.name, asks, IN_WORDS[one.state], one.value, *[one.error] * asked, margin, said, one.place, *where]
-        )
-    heads = ("limit", "asks for", "verdict", "value", *[ERROR] * asked, "margin", "unit", "worst at")
+            [check.name, requirement, IN_WORDS[check.state], check.value, *[check.error] * errors, margin,
+             unit_text, check.place, *place]
+        )  # fmt: skip
+    heads = ("limit", "requirement", "verdict", "value", *[ERROR] * errors, "margin", "unit", "worst place")
     heads += ("chainage", "elevation", "time")
-    bad = frozenset(k for k, one in enumerate(found) if one.state == FAILS)
-    units = ("",) * (7 + asked) + (length.unit, height.unit, time.unit)
-    return ReportTable("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * asked})) if rows else None
+    bad = frozenset(k for k, check in enumerate(ordered) if check.state == FAILS)
+    units = ("",) * (7 + errors) + (length.unit, height.unit, time.unit)
+    return ReportTable("Limits", heads, rows, units, bad, frozenset({3, 4, *[5] * errors})) if rows else None
 
 
 def worst(result) -> list[ReportTable]:
-    """Of each limit that more than one part has, its worst places."""
-    length, height, time = (column("", what, result.case) for what in ("length", "head", "time"))
-    made = []
-    for one in result.verdicts:
-        told = ((length, "chainage"), (height, "elevation"), (time, "time"))
-        asked = any(row["error"] is not None for row in one.worst)
-        rows = [[row["place"], *(in_unit(shown, row[key]) for shown, key in told), row["value"],
-                 *[row["error"]] * asked, BOUNDS[row["bound"]], row["limit"], row["margin"], IN_WORDS[row["state"]]]
-                for row in one.worst]  # fmt: skip
-        bad = frozenset(k for k, row in enumerate(one.worst) if row["state"] == FAILS)
-        apart = span(one.unit)
-        units = ("", length.unit, height.unit, time.unit, one.unit, *[apart] * asked, "", one.unit, apart, "")
-        heads = ("place", "chainage", "elevation", "time", one.quantity.replace("_", " "), *[ERROR] * asked)
+    """Tables of the worst places of each limit that applies to more than one part."""
+    length, height, time = (column("", dimension, result.case) for dimension in ("length", "head", "time"))
+    tables = []
+    for check in result.verdicts:
+        keys = ((length, "chainage"), (height, "elevation"), (time, "time"))
+        errors = any(row["error"] is not None for row in check.worst)
+        rows = [[row["place"], *(in_unit(shown, row[key]) for shown, key in keys), row["value"],
+                 *[row["error"]] * errors, BOUNDS[row["bound"]], row["limit"], row["margin"], IN_WORDS[row["state"]]]
+                for row in check.worst]  # fmt: skip
+        bad = frozenset(k for k, row in enumerate(check.worst) if row["state"] == FAILS)
+        margin_unit = span(check.unit)
+        units = ("", length.unit, height.unit, time.unit, check.unit, *[margin_unit] * errors, "", check.unit,
+                 margin_unit, "")  # fmt: skip
+        heads = ("place", "chainage", "elevation", "time", check.quantity.replace("_", " "), *[ERROR] * errors)
         heads += ("", "limit", "margin", "verdict")
-        made += [ReportTable(f"Limit {one.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
-    return made
+        tables += [ReportTable(f"Limit {check.name}: worst places", heads, rows, units, bad)] if len(rows) > 1 else []
+    return tables
 
 
 def claims(result) -> ReportTable | None:
-    """What the case claims of its own results."""
-    rows = [[one.text, one.claimed, one.found, one.tolerance, one.unit, IN_WORDS[one.state]]
-            for one in result.expectations]  # fmt: skip
-    bad = frozenset(k for k, one in enumerate(result.expectations) if one.state == FAILS)
-    heads = ("claim", "claimed", "found", "tolerance", "unit", "verdict")
-    return ReportTable("What the case claims", heads, rows, bad=bad, loose=frozenset({1, 2, 3})) if rows else None
+    """Table of the expected values that the case states; None without any."""
+    rows = [[item.text, item.claimed, item.found, item.tolerance, item.unit, IN_WORDS[item.state]]
+            for item in result.expectations]  # fmt: skip
+    bad = frozenset(k for k, item in enumerate(result.expectations) if item.state == FAILS)
+    heads = ("expectation", "expected", "computed", "tolerance", "unit", "verdict")
+    return (
+        ReportTable("Expected values of the case", heads, rows, bad=bad, loose=frozenset({1, 2, 3})) if rows else None
+    )
 
 
-def claim(one) -> str:
-    """A claim in words."""
-    return f"{one.text}: claimed {one.claimed:.6g}, found {worded(one.found)} {one.unit}"
+def claim(item) -> str:
+    """Text of an expected value of the case."""
+    return f"{item.text}: expected {item.claimed:.6g}, computed {worded(item.found)} {item.unit}"

@@ -1,4 +1,4 @@
-"""The tables of a report as a workbook: every row, numbers as numbers, words as words. Knows no page."""
+"""Workbook (.xlsx) of the tables of a report, with all rows; numbers are stored as numbers, words as text."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from fvsolve.report.libraries import workbook
 from fvsolve.report.section import Section, section
 from fvsolve.report.tables import ReportTable, is_number
 
-WIDEST = 60  # letters of a column as it opens
-NAME = 31  # letters of a sheet's name, and these not among them:
+WIDEST = 60  # greatest initial width of a column [letters]
+NAME = 31  # greatest length of the name of a sheet [letters]; it must not contain these signs:
 SIGNS = "[]:*?/\\'"
 ALONG = {"elevation": "elevation", "initial_head": "initial head", "least_head": "least head",
          "greatest_head": "greatest head", "least_pressure": "least pressure",
@@ -23,33 +23,33 @@ ALONG = {"elevation": "elevation", "initial_head": "initial head", "least_head":
          "t_greatest": "time of the greatest"}  # fmt: skip
 
 
-def write_workbook(result, found: list[SectionWay], path: Path) -> Path:
-    """Write the tables of a run, one sheet each; its path. FvsolveError where it cannot be written."""
-    return write_tables(tables(result, found), path)
+def write_workbook(result, sections: list[SectionWay], path: Path) -> Path:
+    """Write the tables of a run, one sheet each; returns the path. Raises FvsolveError if it cannot be written."""
+    return write_tables(tables(result, sections), path)
 
 
-def write_tables(found: list[ReportTable], path: Path) -> Path:
-    """Write tables, one sheet each; the path. FvsolveError where it cannot be written."""
+def write_tables(report_tables: list[ReportTable], path: Path) -> Path:
+    """Write tables, one sheet each; returns the path. Raises FvsolveError if it cannot be written."""
     book = workbook(str(path))
     bold = book.add_format({"bold": True, "text_wrap": True, "valign": "bottom"})
     taken: set[str] = set()
-    for table in found:
+    for table in report_tables:
         _sheet(book, table, _named(table.title, taken), bold)
     try:
         book.close()
-    except Exception as error:  # XlsxWriter wraps what the system says
-        raise FvsolveError(f"{path}: cannot be written: {error}; name another with --out") from None
+    except Exception as error:  # XlsxWriter wraps errors of the operating system
+        raise FvsolveError(f"{path}: cannot be written: {error}; choose another with --out") from None
     return path
 
 
 def tables(result, sections: list[SectionWay]) -> list[ReportTable]:
-    """All tables of a run, sections with every cell."""
-    words = ReportTable("Summary", ("", ""), [[one.head, one.text] for one in trust.words(result)])
+    """All tables of a run; sections have a row for each point."""
+    words = ReportTable("Summary", ("", ""), [[item.head, item.text] for item in trust.words(result)])
     notes = ReportTable(
-        "Warnings", ("kind", "place", "text"), [[one.kind, one.place, one.text] for one in result.warnings]
+        "Warnings", ("kind", "place", "text"), [[item.kind, item.place, item.text] for item in result.warnings]
     )
     versions = numerics.versions(result)
-    found = [
+    contents = [
         words, trust.verdicts(result), *trust.worst(result),
         worst.of_all(result, sections), *worst.by_pipe(result), worst.of_probes(result),
         *(_along(result, section(result, way)) for way in sections), numerics.cavities(result), numerics.events(result),
@@ -57,31 +57,36 @@ def tables(result, sections: list[SectionWay]) -> list[ReportTable]:
         numerics.ledgers(result), trust.claims(result), numerics.comparisons(result), notes,
         ReportTable("Versions", versions.headers, versions.rows),
     ]  # fmt: skip
-    return [one for one in found if one is not None and one.rows]
+    return [item for item in contents if item is not None and item.rows]
 
 
 def study_tables(runs: list) -> list[ReportTable]:
-    """The tables of a study, the long sections of all its runs among them; runs : (row, `Result`) of each."""
-    found = [study.matrix(runs), study.failing(runs)]
+    """Tables of a study with the long sections of all runs; runs : (row, `Result`) of each."""
+    contents = [study.matrix(runs), study.failing(runs)]
     for row, result in runs:
         for way in ways(result):
             along = _along(result, section(result, way))
             title = f"{Path(row['directory']).name} {way.name}"
             rows = [[study.name_of(row), *cells] for cells in along.rows]
-            found.append(
+            contents.append(
                 replace(along, title=title, headers=["run", *along.headers], units=["", *along.units], rows=rows)
             )
-    return [one for one in found if one is not None]
+    return [table for table in contents if table is not None]
 
 
-def _along(result, one: Section) -> ReportTable:
-    """A long section, a row a cell."""
+def _along(result, sec: Section) -> ReportTable:
+    """Table of a long section, with a row for each point."""
     head = in_units(result, "least_head").unit
-    columns = [one.chainage, one.pipe, *(one.along[name] for name in ALONG), *one.lines.values()]
-    heads = ["chainage", "pipe", *ALONG.values(), *one.lines]
+    columns = [
+        sec.chainage,
+        sec.pipe,
+        *(sec.along[name] for name in ALONG),
+        *sec.lines.values(),
+    ]
+    heads = ["chainage", "pipe", *ALONG.values(), *sec.lines]
     units = [in_units(result, "distance").unit, "", *(in_units(result, name).unit for name in ALONG)]
     rows = [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]
-    return ReportTable(f"Section {one.way.name}", heads, rows, [*units, *[head] * len(one.lines)])
+    return ReportTable(f"Section {sec.way.name}", heads, rows, [*units, *[head] * len(sec.lines)])
 
 
 def _sheet(book, table: ReportTable, name: str, bold) -> None:
@@ -103,7 +108,7 @@ def _sheet(book, table: ReportTable, name: str, bold) -> None:
 
 
 def _named(title: str, taken: set[str]) -> str:
-    """A name that a sheet may have, and none had before."""
+    """Valid name of a sheet from a title, different from all in `taken`; adds it to `taken`."""
     plain = "".join("-" if sign in SIGNS else sign for sign in visible(title)).strip() or "table"
     name, k = plain[:NAME], 1
     while name.casefold() in taken:

@@ -1,4 +1,4 @@
-"""Where and when it is worst: along pipes from the envelope, elsewhere from the probes. Knows no limits."""
+"""Extremes of a run with place and time: of pipes from the envelope, elsewhere from the probes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from fvsolve.report.legs import SectionWay
 from fvsolve.report.tables import ERROR, ReportTable, in_unit
 from fvsolve.run.result import not_valid
 
-FIRST = 10  # rows of a ranking on the page
-EXTREMES = (  # quantity, its words, which end of it, when
+FIRST = 10  # greatest number of rows of a ranking on the page
+EXTREMES = (  # quantity, its text, function of the index of the extreme, quantity of its time
     ("greatest_pressure", "greatest pressure", np.argmax, "t_greatest"),
     ("least_pressure", "least pressure", np.argmin, "t_least"),
     ("greatest_head", "greatest head", np.argmax, "t_greatest"),
@@ -21,29 +21,32 @@ EXTREMES = (  # quantity, its words, which end of it, when
 
 
 def of_all(result, ways: list[SectionWay]) -> ReportTable | None:
-    """The worst of all pipes: each extreme, its pipe, where along it, chainage of the one section, elevation, time."""
+    """Table of the extremes over all pipes: value, pipe, distance, elevation and time; None without envelope.
+
+    The chainage is added if the run has a single section whose chainage differs from the distance along the pipe.
+    """
     envelope = result.envelope
     if not envelope or not_valid(result.summary):
         return None
     legs = {leg.pipe: leg for way in ways for leg in way.legs}
     if len(ways) > 1 or all(leg.begin == 0.0 and not leg.backwards for leg in legs.values()):
-        legs = {}  # the chainage says nothing more, or not of which section
+        legs = {}  # the chainage equals the distance, or the section would be ambiguous
     rows = []
     for name, words, most, when in EXTREMES:
         ends = {pipe: int(most(arrays[name])) for pipe, arrays in envelope.items()}
         pipes = list(ends)
-        pipe = pipes[int(most([envelope[one][name][ends[one]] for one in pipes]))]
+        pipe = pipes[int(most([envelope[key][name][ends[key]] for key in pipes]))]
         arrays, k = envelope[pipe], ends[pipe]
         chainage = [_chainage(result, legs.get(pipe), arrays["distance"][k])] if legs else []
         rows.append([words, float(arrays[name][k]), in_units(result, name).unit, pipe, float(arrays["distance"][k]),
                      *chainage, float(arrays["elevation"][k]), float(arrays[when][k])])  # fmt: skip
-    units = [in_units(result, one).unit for one in ("distance", *["distance"] * bool(legs), "elevation", "t_greatest")]
+    units = [in_units(result, key).unit for key in ("distance", *["distance"] * bool(legs), "elevation", "t_greatest")]
     heads = ("", "value", "unit", "pipe", "from its start", *["chainage"] * bool(legs), "elevation", "time")
     return ReportTable("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), loose=frozenset({1}))
 
 
 def by_pipe(result) -> list[ReportTable]:
-    """Pipes by their greatest and by their least pressure, the worst first; none where there is but one pipe."""
+    """Tables of pipes ranked by greatest and by least pressure, worst first; [] for a single pipe."""
     if len(result.envelope) < 2 or not_valid(result.summary):
         return []
     return [_ranked(result, name, words, most, when) for name, words, most, when in EXTREMES[:2]]
@@ -53,23 +56,23 @@ def _ranked(result, name: str, words: str, most, when: str) -> ReportTable:
     rows = []
     for pipe, arrays in result.envelope.items():
         k = int(most(arrays[name]))
-        rows.append([pipe, *(float(arrays[one][k]) for one in (name, "distance", "elevation", when))])
+        rows.append([pipe, *(float(arrays[key][k]) for key in (name, "distance", "elevation", when))])
     rows.sort(key=lambda row: row[1], reverse=most is np.argmax)
-    units = ["", *(in_units(result, one).unit for one in (name, "distance", "elevation", when))]
+    units = ["", *(in_units(result, key).unit for key in (name, "distance", "elevation", when))]
     heads = ("pipe", words, "from its start", "elevation", "time")
     return ReportTable(f"{words.capitalize()} by pipe", heads, rows, units, most=FIRST,
                  more="in envelope.csv and in the workbook (--xlsx)")  # fmt: skip
 
 
 def of_probes(result) -> ReportTable | None:
-    """Least and greatest of each probe over all accepted steps, and when; how far off where it was asked for."""
-    peaks, rows, none = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
+    """Least and greatest of each probe over all accepted steps with their times, and their errors if estimated."""
+    peaks, rows, invalid = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
     clock = UnitColumn("t", "time", result.summary["time_unit"])
-    for name, one in result.extremes.items():
-        off = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("least", "greatest")}
-        first, last = (in_unit(clock, t) for t in (one.t_least, one.t_greatest))
-        low, high = (none if value is None else value for value in (one.least, one.greatest))
-        rows.append([name, result.units[name], low, *off["least"], first, high, *off["greatest"], last])
+    for name, extremes in result.extremes.items():
+        errors = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("least", "greatest")}
+        first, last = (in_unit(clock, t) for t in (extremes.t_least, extremes.t_greatest))
+        low, high = (invalid if value is None else value for value in (extremes.least, extremes.greatest))
+        rows.append([name, result.units[name], low, *errors["least"], first, high, *errors["greatest"], last])
     heads = [column for side in ("least", "greatest") for column in (side, *[ERROR] * bool(peaks), "time")]
     units = [clock.unit if column == "time" else "" for column in heads]
     loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
@@ -78,6 +81,6 @@ def of_probes(result) -> ReportTable | None:
 
 
 def _chainage(result, leg: Leg | None, distance: float) -> float | None:
-    """Chainage of a distance from the start of a pipe; None of a pipe that is on no section."""
+    """Chainage of a distance from the start of a pipe; None without a leg, for a pipe on no section."""
     shown = in_units(result, "distance")
     return None if leg is None else float(shown.from_si(leg.chainage(shown.to_si(distance))))

@@ -387,7 +387,9 @@ def test_view_draws_contours_and_magnitudes(dam, fvs):
     assert plain != lines and plain.startswith(b"\x89PNG")
     assert drawn(fvs, dam, "--field", "velocity").endswith("velocity.png")
     code, _, err = fvs("view", dam, "--field", "dept")
-    assert code == 2 and "no field 'dept'; did you mean \"depth\"" in err and "bed, depth, surface, velocity" in err
+    assert (
+        code == 2 and "unknown field 'dept'; did you mean \"depth\"" in err and "bed, depth, surface, velocity" in err
+    )
 
 
 def test_view_animates_all_frames(dam, fvs):
@@ -402,7 +404,7 @@ def test_view_animates_all_frames(dam, fvs):
     bar = [frame[-60:, 30:430].std() for frame in frames]  # the bar of colours stands in every one
     assert min(bar) > 20.0 and np.abs(frames[1] - frames[0])[:400].max() > 50
     code, _, err = fvs("view", dam, "--animate", "dam.avi")
-    assert code == 2 and "wanted a name that ends in .gif or .mp4" in err
+    assert code == 2 and "Expected a file name that ends in .gif or .mp4" in err
     code, _, err = fvs("view", dam, "--animate", "dam.gif", "--time", "0 s")
     assert code == 2 and "--animate draws all times" in err
 

@@ -59,7 +59,7 @@ def test_the_command_says_which_and_why(fvs, tmp_path, monkeypatch) -> None:
     said = json.loads((tmp_path / "runs" / "scene" / "summary.json").read_text())["expectations"]
     assert [(one["state"], one["ok"]) for one in said] == [("open", False)]
     assert fvs("report", "runs/scene")[0] == 0
-    assert "claims hold is open" in (tmp_path / "runs" / "scene" / "report.html").read_text()
+    assert "verdict of an expected value is open" in (tmp_path / "runs" / "scene" / "report.html").read_text()
 
 
 def test_a_tank_that_spills_opens_nothing() -> None:

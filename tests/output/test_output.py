@@ -154,7 +154,7 @@ def test_a_bad_case_leaves_the_run_before_it_alone(folder):
 
 
 def test_an_unended_directory_is_no_result(tmp_path):
-    with pytest.raises(fvsolve.RunError, match="no ended run"):
+    with pytest.raises(fvsolve.RunError, match="not hold a finished run"):
         fvsolve.open_run(tmp_path)
 
 

@@ -195,12 +195,12 @@ def test_verdicts_stand_first_those_that_fail_before_others(closure):
     assert "1 of 2 limits does not hold. class" in text and "class gauge pressure at most 10 bar FAILS 13.5" in text
     assert text.index("FAILS") < text.index("vacuum") < text.index("Worst of all pipes")
     early = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "state": "open"}], ok=False)).text
-    assert "Whether a limit holds is open. vacuum: the run is not sound." in early and "FAILS" not in early
+    assert "The verdict of a limit is open. vacuum: the run is not sound." in early and "FAILS" not in early
     mark = {"what": "below vapor pressure", "place": "links.main", "time": 1.0, "text": "main: below"}
     later = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "state": "open"}], marks=[mark])).text
-    assert "vacuum: from a time on the numbers are not to be trusted." in later
+    assert "vacuum: from some time on the results are not to be trusted." in later
     unsure = read(changed(closure, verdicts=[VERDICT | holds | {"ok": False, "state": "open", "error": 0.4}])).text
-    assert "open. vacuum: their margins are smaller than the error" in unsure and "open 0.5 0.4" in unsure
+    assert "open. vacuum: their margins are smaller than the numerical errors" in unsure and "open 0.5 0.4" in unsure
     passed = read(changed(closure, verdicts=[VERDICT | {"error": 4.0}])).text
     assert "The limit does not hold. class" in passed and "FAILS 13.5 4" in passed
 
@@ -215,12 +215,12 @@ def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):
 
 
 def test_a_report_of_what_is_no_run_says_what_is_there(closure, tmp_path, monkeypatch):
-    with pytest.raises(fvsolve.RunError, match="nowhere does not exist; wanted a run directory"):
+    with pytest.raises(fvsolve.RunError, match=r"nowhere does not exist\. Expected a run directory"):
         write_report(tmp_path / "nowhere")
-    with pytest.raises(fvsolve.RunError, match="holds no ended run"):
+    with pytest.raises(fvsolve.RunError, match="does not hold a finished run"):
         write_report(tmp_path)
     (tmp_path / "restart.npz").touch()
-    with pytest.raises(fvsolve.RunError, match="holds an unfinished run: go on with it, .* --resume"):
+    with pytest.raises(fvsolve.RunError, match="holds an unfinished run: continue it with .* --resume"):
         write_report(tmp_path)
     for name in ("summary.json", "history.csv", "envelope.csv", "fields/000003.vtu"):
         path = closure.directory / name

@@ -34,8 +34,8 @@ def test_names_that_are_none_are_told_at_once_with_what_was_meant(closure, fvs):
         "plot", closure.directory, "--probes", "gate.had,valve.flow", "--phase", "valve.flow", "--route", "mian"
     )
     assert code == 2 and said.splitlines() == [
-        'no probe "gate.had" was recorded; did you mean "gate.head"?', '--phase "valve.flow": wanted two probes, X:Y',
-        'no route "mian"; did you mean "main"?',
+        '"gate.had": unknown probe; did you mean "gate.head"?', '--phase "valve.flow": expected two probes, X:Y',
+        '"mian": unknown route; did you mean "main"?',
     ]  # fmt: skip
 
 

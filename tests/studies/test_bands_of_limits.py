@@ -85,7 +85,7 @@ def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> 
     said = json.loads((tmp_path / "run" / "summary.json").read_text())["verdicts"][0]
     assert (said["state"], said["ok"], said["bound"]) == ("open", False, "greatest")
     page = write_report(tmp_path / "run", tmp_path / "run.html", False)[0].read_text()
-    assert "Whether a limit holds is open" in page
+    assert "The verdict of a limit is open" in page
     (tmp_path / "two.toml").write_text('case = "short.toml"\nerror = true\n[events.close]\n')
     found = design.study(tmp_path / "two.toml", tmp_path / "out")
     row = json.loads((tmp_path / "out" / "study.json").read_text())["runs"][0]["verdicts"][0]
