@@ -121,7 +121,7 @@ def bent(table, step):
 
 def reference(table):
     """Heads by fine cells, from the temporary folder where they have been found before."""
-    numerics = {"scheme": "upwind5", "method": "rk4", "line": "cells", "cell_time": FINE}
+    numerics = {"scheme": "upwind5", "method": "rk4", "pipe_model": "finite-volume", "cell_time": FINE}
     said = json.dumps([table, numerics, fvsolve.__version__], sort_keys=True, default=str)
     kept = Path(tempfile.gettempdir()) / f"fvsolve-reference-{hashlib.sha256(said.encode()).hexdigest()[:16]}.npy"
     if not kept.exists():
@@ -159,20 +159,22 @@ def event(name, scene, title):
     print(f"  {'':40} {'CPU/s [s]':>10} {'whole':>10} {'greatest':>10} {'rms':>10}")
     for time in TODAY:
         coarse = scene(name, shortest=0.25 * SPEED * time)[0]
-        cells = solved(coarse, 2, scheme="upwind5", method="rk4", line="cells", cell_time=time)
+        cells = solved(coarse, 2, scheme="upwind5", method="rk4", pipe_model="finite-volume", cell_time=time)
         row(today(time), *cells)
     for step in STEPS:
         row(delay(step), *delayed(table, step, FEW))
     row("the same by 10 ms, envelopes each 0.1 s", *delayed(table, 0.01, MORE))
     for step in PEER if rthym_moc else ():
-        cut = solved(bent(table, step), 0, scheme="upwind", method="euler", line="cells", courant=1.0)[2]
+        cut = solved(bent(table, step), 0, scheme="upwind", method="euler", pipe_model="finite-volume", courant=1.0)[2]
         row(f"rthym-moc, steps of {1e3 * step:g} ms", peer(name, step, table["numerics"]["end"]), np.nan, cut)
     verdict(found)
 
 
 def delayed(table, step, places, repeats=None):
     """The case as delay lines, by steps that are given; envelopes at places a travel time of `places` [s] apart."""
-    return solved(table, repeats, line="delay", method="euler", step=step, cell_time=places, accuracy=ACCURACY)
+    return solved(
+        table, repeats, pipe_model="delay-line", method="euler", step=step, cell_time=places, delay_tolerance=ACCURACY
+    )
 
 
 def verdict(found):
@@ -215,7 +217,7 @@ def net6():
         print(f"  rthym-moc            {20.0 * peer('Net6', 0.01, 20.0):8.2f} s")
 
 
-def lattice(side, lakes=16, line="delay"):
+def lattice(side, lakes=16, pipe_model="delay-line"):
     """Streets: side x side junctions with a demand each, pipes between neighbours and to lakes, 2 000 in all."""
     rng, nodes, links = np.random.default_rng(1), {}, {}
 
@@ -238,7 +240,7 @@ def lattice(side, lakes=16, line="delay"):
         join(f"lake{k}", f"n{rng.integers(side)}-{rng.integers(side)}")
     middle = f"n{side // 2}-{side // 2}"
     nodes[middle]["demand"] = {"start": 0.5, "duration": STOP, "value": [0.02, 0.0]}
-    numerics = {"end": 10.0, "cell_time": 0.01, "line": line}
+    numerics = {"end": 10.0, "cell_time": 0.01, "pipe_model": pipe_model}
     output = {"every": EVERY, "fields": 0, "probes": [f"nodes.{middle}.head"]}
     fluid = {"name": "Water", "law": "linear", "temperature": "20 degC"}
     return {"schema": 1, "title": "streets", "fluid": fluid, "nodes": nodes, "links": links, "numerics": numerics,
@@ -250,7 +252,7 @@ def grid():
     print(f"\na grid of {len(lattice(SIDE)['links'])} pipes, 10 s")
     with tempfile.TemporaryDirectory() as folder:
         for line in LINES:
-            case, file = load(lattice(SIDE, line=line)), Path(folder) / f"{line}.toml"
+            case, file = load(lattice(SIDE, pipe_model=line)), Path(folder) / f"{line}.toml"
             file.write_text(case.resolved(), encoding="utf-8")
             spent = []
             for _ in range(min(4, REPEATS)):

@@ -1,4 +1,4 @@
-"""Bands of `fvsolve run --error` of random networks of delay lines, held against eight times their resolution.
+"""Bands of `fvsolve run --estimate-error` of random networks of delay lines, held against eight times their resolution.
 
 python benchmarks/line_bands.py [--quick] [--seed 1] [--random 22]
 
@@ -48,7 +48,7 @@ def network(random: np.random.Generator) -> dict:
     links["v"] = {"type": "valve", "from": before, "to": "out", "area": float(random.uniform(5e-4, 4e-3)),
                   "opening": opening}  # fmt: skip
     control = [{"courant": 0.9}, {"step": float(10.0 ** random.uniform(-2.5, -1.3))}, {"rtol": 1e-5}]
-    numerics = {"end": 4.0, "line": "delay", **control[int(random.integers(3))]}
+    numerics = {"end": 4.0, "pipe_model": "delay-line", **control[int(random.integers(3))]}
     numerics["method"] = "bogacki-shampine" if "rtol" in numerics else str(random.choice(["euler", "rk4"]))
     probes = [f"{name}.head" for name, node in nodes.items() if node["type"] == "junction"] + ["p0.flow", "v.flow"]
     output = {"every": 0.02, "fields": 0, "probes": [*probes, "p0.pressure@0.37"]}

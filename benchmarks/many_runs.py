@@ -17,7 +17,7 @@ from fvsolve.studies.row import RowMaker
 
 CASE, KEY, GOAL, SHARE = "valve-closure", "links.valve.area", 500.0, 0.9
 CELLS = {"links.main.cells": 20, "numerics.scheme": "upwind5", "numerics.method": "rk4", "output.fields": 0}
-LINE = {"links.main.cells": 20, "numerics.line": "delay", "numerics.method": "euler", "output.fields": 0}
+LINE = {"links.main.cells": 20, "numerics.pipe_model": "delay-line", "numerics.method": "euler", "output.fields": 0}
 DELAYS = (0.01, 0.05)  # steps of delay lines [s]: of the second errors are those of 20 cells
 FINE, PROBE = 2000, "gate.pressure"  # cells of the run that errors are taken from
 TIMES, RUNS, REPEATS = 200, 2000, 20

@@ -47,7 +47,7 @@ def network(random, kind):
     if kind == "chamber":
         nodes["vessel"] = {"type": "chamber", "volume": float(random.uniform(0.5, 5.0))}
         links["neck"] = pipe(f"n{random.integers(many)}", "vessel")
-    numerics = {"line": "delay", "end": END, "step": float(random.choice([0.004, 0.01, 0.025]))}
+    numerics = {"pipe_model": "delay-line", "end": END, "step": float(random.choice([0.004, 0.01, 0.025]))}
     numerics["method"] = str(random.choice(METHODS))
     return {
         "schema": 1, "title": kind, "fluid": {"name": "Water", "law": "linear", "temperature": "20 degC"},

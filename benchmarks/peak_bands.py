@@ -1,4 +1,4 @@
-"""Bands of `fvsolve run --error` held against finer runs of all shipped cases, or of random mains.
+"""Bands of `fvsolve run --estimate-error` held against finer runs of all shipped cases, or of random mains.
 
 python benchmarks/peak_bands.py [--quick] [CASE]...
 python benchmarks/peak_bands.py --random 160 [--seed 0]
@@ -75,9 +75,9 @@ def whole(result, name: str) -> tuple[float, float]:
     """Least and greatest pressure of a part."""
     if name in result.envelope:
         one = result.envelope[name]
-        return float(one["least_pressure"].min()), float(one["greatest_pressure"].max())
+        return float(one["min_pressure"].min()), float(one["max_pressure"].max())
     peak = result.extremes[f"{name}.pressure"]
-    return peak.least, peak.greatest
+    return peak.minimum, peak.maximum
 
 
 def tell(rows: list[Row], what: str) -> int:

@@ -75,11 +75,14 @@ def main():
     print(f"{'':36} {'step [ms]':>9} {'CPU [s]':>8} {'us/step':>9} {'drift [m]':>10} {'median':>10} cells")
     for cell_time in (0.02,) if quick else (0.01, 0.02):
         for scheme, method in SETTINGS:
-            found = ours(SHORTEST, line="cells", cell_time=cell_time, scheme=scheme, method=method)
+            found = ours(SHORTEST, pipe_model="finite-volume", cell_time=cell_time, scheme=scheme, method=method)
             row(f"fvsolve {scheme} {method}, {1e3 * cell_time:g} ms cells", *found)
         if rthym_moc:
             row("rthym-moc at that step", *rthym(END / found[3]))
-        row(f"fvsolve delay lines, {1e3 * cell_time:g} ms steps", *ours(0.0, line="delay", step=cell_time)[:4])
+        row(
+            f"fvsolve delay lines, {1e3 * cell_time:g} ms steps",
+            *ours(0.0, pipe_model="delay-line", step=cell_time)[:4],
+        )
         if rthym_moc:
             row("rthym-moc at that length of cells", *rthym(cell_time))
 

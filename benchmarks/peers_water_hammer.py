@@ -33,7 +33,9 @@ PEER_STEPS = {"three": 8e-3 / 2.0 ** np.arange(8), "nine": 8e-3 / 2.0 ** np.aran
 UPWIND5 = dict(scheme="upwind5", method="rk4", courant=0.9)
 UPWIND = dict(scheme="upwind", method="euler", courant=1.0)
 MUSCL = dict(scheme="muscl", limiter="van-leer", method="ssp-rk3", courant=0.9)
-DELAY = [dict(line="delay", method="euler", courant=1.0, accuracy=share) for share in (1e-2, 2e-2, 5e-2)]
+DELAY = [
+    dict(pipe_model="delay-line", method="euler", courant=1.0, delay_tolerance=share) for share in (1e-2, 2e-2, 5e-2)
+]
 SCHEMES = {  # closure: (numerics, cell times [s], of delay lines steps), those that do best and one to compare
     "smooth": ((UPWIND5, 0.04 / 2 ** (0.5 * np.arange(8))), (UPWIND, 0.01 / 2.0 ** np.arange(5))),
     "ramp": ((UPWIND, 0.01 / 2.0 ** np.arange(6)), (UPWIND5, 0.02 / 2.0 ** np.arange(5))),

@@ -77,7 +77,7 @@ def limits_near(peaks: dict[str, tuple[float, float]], seed: int) -> dict[str, A
     """An upper and a lower limit on pressure for each part, at 0.9 to 1.1 of what it met [Pa]."""
     rng, made = np.random.default_rng([seed, 1]), {}
     for part, (least, greatest) in peaks.items():
-        for bound, value in (("least", least), ("greatest", greatest)):
+        for bound, value in (("minimum", least), ("maximum", greatest)):
             limit = value * rng.uniform(0.9, 1.1)
             if limit > VACUUM:
                 made[f"{part}-{bound}"] = {"on": part, "quantity": "pressure", bound: limit}

@@ -3,8 +3,8 @@
     python benchmarks/start_up.py [--quick] [--times 5] [--beside CHECKOUT] [CASE]
 
 Cold is a new cache folder: kernels are compiled and CoolProp is asked. With a store is the first run from a copy of
-what `fvsolve warm` leaves, code and fluid properties, without numba's own cache; `without fluids` of its code alone, so
-that CoolProp is asked. Warm is every run after that. `--beside` takes turns with another
+what `fvsolve precompile` leaves, code and fluid properties, without numba's own cache; `without fluids`
+of its code alone, so that CoolProp is asked. Warm is every run after that. `--beside` takes turns with another
 checkout, of an earlier version, and prints ratios. The answer is there when the terminal says how the run ended, the
 pictures when the process has. With `--quick` two-tanks is run, and the user's own cache stands for the new one, so that
 nothing is compiled if it has been before.

@@ -26,7 +26,7 @@ _HOMES = {
     "integrate": "steppers.ode",
     "load": "case",
     "open_run": "run",
-    "register": "parts.outside",
+    "register_part": "parts.outside",
     "run": "run",
     "solve": "solve",
     "tableau": "steppers.tableau",

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.extent import Extent, read_extent
+from fvsolve.case.extent import ALL, Extent, read_extent
 from fvsolve.case.probe import Kinds, Probe, read_probe
 from fvsolve.errors import did_you_mean
 from fvsolve.parts.series import copy_name, find_file, read_columns
@@ -18,8 +18,7 @@ from fvsolve.parts.table import read_keys
 from fvsolve.parts.value import NEEDED, VALUE, Anything, Misfit, Number, Quantity, Setting, Text, nonnegative
 from fvsolve.units import show
 
-FUNCTIONS = ("max", "min", "mean", "final", "at", "greatest", "least")
-WHOLE = ("greatest", "least")
+FUNCTIONS = ("max", "min", "mean", "final", "at")
 _CLAIM = re.compile(r"\s*(\w+)\s*\(\s*([^()]+?)\s*\)\s*")
 _BARE = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 
@@ -98,7 +97,7 @@ def read_claim(
     match = _CLAIM.fullmatch(claim)
     if match is None or match[1] not in FUNCTIONS:
         hint = did_you_mean(match[1], FUNCTIONS) if match else ""
-        forms = "max, min, mean or final(PROBE), at(PROBE, TIME), or greatest or least(PART.QUANTITY)"
+        forms = "max, min, mean or final(PROBE), at(PROBE, TIME), or max or min(PART.QUANTITY)"
         raise ValueError(f"is not a claim; expected {forms}{hint}")
     function, probe_text = match.groups()
     when = None
@@ -112,12 +111,18 @@ def read_claim(
     if when is not None:
         given_time = float(when) if _BARE.fullmatch(when) else when.strip("\"'")
         time = Quantity("time").read(given_time, setting)
-    if function in WHOLE and "@" not in probe_text:
+    try:
+        return function, read_probe(probe_text, kinds), None, time
+    except ValueError:
         on, dot, quantity = probe_text.rpartition(".")
-        if not dot:
-            raise ValueError(f"the quantity is missing; expected {function}(PART.QUANTITY)")
-        return function, None, read_extent(on, quantity, kinds, routes), time
-    return function, read_probe(probe_text, kinds), None, time
+        if not dot or "@" in probe_text or function not in ("max", "min"):
+            raise
+        try:
+            return function, None, read_extent(on, quantity, kinds, routes), time
+        except ValueError:
+            if on in routes or on in ALL:
+                raise
+        raise  # the fault of the probe
 
 
 def expect_keys(dimension: str) -> dict[str, tuple[Any, Any]]:

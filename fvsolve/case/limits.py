@@ -16,7 +16,7 @@ from fvsolve.units import show
 
 VACUUM, VAPOR = "vacuum", "vapor"
 NAMED = {"vacuum": VACUUM, "vapor": VAPOR, "vapour": VAPOR}
-BOUNDS = ("least", "greatest", "share_of_class")
+BOUNDS = ("minimum", "maximum", "class_fraction")
 
 
 class Bound(Value):
@@ -58,15 +58,15 @@ class On(Value):
 class DesignLimit:
     """Lower and upper bound of a quantity on an extent, checked after every step [SI].
 
-    least, greatest : a number, "vacuum" (ambient pressure) or "vapor" (vapour pressure)
-    share_of_class : greatest gauge pressure over the allowable pressure of the class of each pipe [-]
+    minimum, maximum : a number, "vacuum" (ambient pressure) or "vapor" (vapour pressure)
+    class_fraction : greatest gauge pressure over the allowable pressure of the class of each pipe [-]
     """
 
     name: str
     extent: Extent
-    least: float | str | None
-    greatest: float | str | None
-    share_of_class: float | None
+    minimum: float | str | None
+    maximum: float | str | None
+    class_fraction: float | None
 
     def table(self) -> dict[str, Any]:
         """Keys of the limit as in a file."""
@@ -81,9 +81,9 @@ def limit_keys(quantity: str, dimension: str) -> dict[str, tuple[Value, Any]]:
     return {
         "on": (On(), NEEDED),
         "quantity": (Text(changes=VALUE), "pressure"),
-        "least": (bound, None),
-        "greatest": (bound, None),
-        "share_of_class": (Number(positive, changes=VALUE), None),
+        "minimum": (bound, None),
+        "maximum": (bound, None),
+        "class_fraction": (Number(positive, changes=VALUE), None),
     }
 
 
@@ -92,8 +92,8 @@ def read_limit(
 ) -> DesignLimit | None:
     """Read one table of `[limits]`; None if its parts are faulty. Raises ValueError, ValueFault."""
     if not isinstance(given, dict):
-        raise ValueError(f'{show(given)} is not a table; expected for example {{ on = "pipes", greatest = "16 barg" }}')
-    quantity = given.get("quantity", "gauge_pressure" if "share_of_class" in given else "pressure")
+        raise ValueError(f'{show(given)} is not a table; expected for example {{ on = "pipes", maximum = "16 barg" }}')
+    quantity = given.get("quantity", "gauge_pressure" if "class_fraction" in given else "pressure")
     faults, extent = [], None
     if not isinstance(quantity, str):
         faults.append((("quantity",), f"{show(quantity)} is not text"))
@@ -108,7 +108,7 @@ def read_limit(
     )
     keys = limit_keys(quantity if isinstance(quantity, str) else "", dimension or "number")
     if dimension is None:
-        keys |= dict.fromkeys(("least", "greatest"), (Anything(), None))
+        keys |= dict.fromkeys(("minimum", "maximum"), (Anything(), None))
     bounds = dict.fromkeys(BOUNDS)
     try:
         read_keys(given, keys, setting)
@@ -119,12 +119,12 @@ def read_limit(
             bounds[key] = keys[key][0].read(given[key], setting)
     if not any(key in given for key in BOUNDS):
         faults.append(((), f"bound is missing; expected one of {', '.join(BOUNDS)}"))
-    if bounds["greatest"] is not None and bounds["share_of_class"] is not None:
-        faults.append((("share_of_class",), "greatest and share_of_class are given; keep one"))
-    least, greatest = bounds["least"], bounds["greatest"]
-    if dimension is not None and isinstance(least, float) and isinstance(greatest, float) and not least < greatest:
-        faults.append((("least",), f"{show(given['least'])} is not below greatest, {show(given['greatest'])}"))
-    if extent is not None and bounds["share_of_class"] is not None:
+    if bounds["maximum"] is not None and bounds["class_fraction"] is not None:
+        faults.append((("class_fraction",), "maximum and class_fraction are given; keep one"))
+    minimum, maximum = bounds["minimum"], bounds["maximum"]
+    if dimension is not None and isinstance(minimum, float) and isinstance(maximum, float) and not minimum < maximum:
+        faults.append((("minimum",), f"{show(given['minimum'])} is not below maximum, {show(given['maximum'])}"))
+    if extent is not None and bounds["class_fraction"] is not None:
         faults += list(unclassed(extent, links))
     if faults:
         raise Misfit(faults)
@@ -140,18 +140,18 @@ def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Itera
             ("quantity",),
             f"{limit.extent.quantity} does not exist where gravity is 0; expected pressure",
         )
-    for key in ("least", "greatest"):
+    for key in ("minimum", "maximum"):
         if getattr(limit, key) == VAPOR and fluid is not None and not fluid.vapor_pressure:
             yield (key,), 'the fluid has no vapour pressure; expected vapor_pressure above 0 under [fluid], or "vacuum"'
 
 
 def unclassed(extent: Extent, links: Mapping[str, Any]):
-    """Faults of `share_of_class` on quantities or parts without a pressure class."""
+    """Faults of `class_fraction` on quantities or parts without a pressure class."""
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
-        yield ("share_of_class",), f"a class limits pressure, not {extent.quantity}; leave quantity out"
+        yield ("class_fraction",), f"a class limits pressure, not {extent.quantity}; leave quantity out"
         return
     bare = {name for name, link in links.items() if getattr(link, "allowable_pressure", None) is None}
     parts = [name for group, name in extent.parts if group != "links" or name in bare]
     if parts:
         more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
-        yield ("share_of_class",), f"{parts[0]}{more} has no pressure class; give it class or allowable_pressure"
+        yield ("class_fraction",), f"{parts[0]}{more} has no pressure class; give it class or allowable_pressure"

@@ -34,9 +34,9 @@ def notices(case: Any) -> list[Notice]:
              if (odd := _beyond(value, getattr(case, key), case.raw.get(key)))]  # fmt: skip
     result += [_notice(place, *odd[:1], case, *odd[1:]) for place, part in parts.items()
               for odd in _of_part(part, _said(case.raw, place))]  # fmt: skip
-    result += [_notice(("limits", name), ("share_of_class",), case, limit.share_of_class, SHARES,
-                      f"{limit.share_of_class:g} times the pressure class; 1 is the class itself")
-              for name, limit in case.limits.items() if (limit.share_of_class or 0.0) > SHARES]  # fmt: skip
+    result += [_notice(("limits", name), ("class_fraction",), case, limit.class_fraction, SHARES,
+                      f"{limit.class_fraction:g} times the pressure class; 1 is the class itself")
+              for name, limit in case.limits.items() if (limit.class_fraction or 0.0) > SHARES]  # fmt: skip
     result += [_notice(("links", defaults.whole(case.raw, name)), ("wave_speed",), case, *odd)
               for name, link in case.links.items() if (odd := _wave_speed(case, name, link))]  # fmt: skip
     return list({(notice.place, notice.text): notice for notice in result}.values())

@@ -78,7 +78,7 @@ def read_raw(source: Any) -> Raw:
         raise CaseError([Fault("", "tables or lists nested too deep")], path.name) from None
     except ValueError as error:
         if re.search(r"^\s*\[(JUNCTIONS|RESERVOIRS|PIPES)\]", text, re.MULTILINE | re.IGNORECASE):
-            message = f"is an EPANET network, not a case; fvsolve new {path.stem} --from {path} translates it"
+            message = f"is an EPANET network, not a case; fvsolve import {path} translates it"
             raise CaseError([Fault("", message)], path.name) from None
         raise CaseError([syntax_fault(error, text)], path.name) from None
     return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)

@@ -15,7 +15,7 @@ from fvsolve.units import show
 
 Found = Iterator[tuple[tuple, str]]
 
-TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "least_pressure", "greatest_pressure"}
+TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "min_pressure", "max_pressure"}
 
 
 def taken() -> set[str]:

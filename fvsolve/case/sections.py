@@ -239,11 +239,11 @@ class Numerics(Table):
             changes=SHAPE,
         ),
     ] = None
-    line: Annotated[
+    pipe_model: Annotated[
         str,
-        Choice("line", LINES, "model of pipes that state no line", changes=SHAPE),
-    ] = "cells"
-    accuracy: Annotated[
+        Choice("pipe model", LINES, "model of pipes that state no pipe_model", changes=SHAPE),
+    ] = "finite-volume"
+    delay_tolerance: Annotated[
         float,
         Number(
             between(0, 1, open=True),

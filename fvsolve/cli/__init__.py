@@ -19,6 +19,7 @@ COMMANDS = (
     "energy",
     "failure_map",
     "handed",
+    "imported",
     "linearise",
     "order",
     "response",

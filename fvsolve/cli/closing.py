@@ -14,9 +14,9 @@ from fvsolve.errors import CaseError, gathered
 @app.command()
 def optimise(
     case: One,
-    law: Annotated[str, typer.Option("--law", metavar="KEY", help="key of the schedule that is optimised")],
+    schedule: Annotated[str, typer.Option(metavar="KEY", help="key of the schedule that is optimised")],
     minimise: Annotated[
-        str, typer.Option(metavar="CLAIM", help='peak that is minimised: "max(gate.pressure)", "greatest(main.head)"')
+        str, typer.Option(metavar="CLAIM", help='peak that is minimised: "max(gate.pressure)", "max(main.head)"')
     ],
     knots: Annotated[int, typer.Option(metavar="N", help="number of inner knots of the schedule")] = 3,
     runs: Annotated[int, typer.Option(metavar="N", help="greatest number of runs")] = 60,
@@ -29,12 +29,12 @@ def optimise(
     faults, loaded = [], None
     with gathered(faults):
         loaded = load_case(case, set)
-    faults += closing.asked(loaded, law, minimise, knots, runs)
+    faults += closing.asked(loaded, schedule, minimise, knots, runs)
     if faults:
         raise CaseError(faults, case)
     with told(kept=False) as progress:
         result = closing.optimise(
-            loaded, law, minimise, knots, runs, None, lambda done, text: progress(done, runs, text)
+            loaded, schedule, minimise, knots, runs, None, lambda done, text: progress(done, runs, text)
         )
     if as_json:
         print_json(result.plain())

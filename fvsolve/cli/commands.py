@@ -25,8 +25,9 @@ def run(
         int, typer.Option(metavar="N", help="number of threads; rows of basin cells are distributed over them")
     ] = 1,
     no_pictures: Annotated[bool, typer.Option("--no-pictures", help="write no pictures")] = False,
-    error: Annotated[
-        bool, typer.Option("--error", help="estimate the error of peaks, by runs of half and twice the resolution")
+    estimate_error: Annotated[
+        bool,
+        typer.Option("--estimate-error", help="estimate the error of peaks, by runs of half and twice the resolution"),
     ] = False,
     as_json: Json = False,
 ) -> None:
@@ -48,7 +49,9 @@ def run(
         for name, place in places.items():
             with ranks.leading(ranks.world()):
                 model = model_of(load_case(name, set))
-            results.append(_run(model, place, force, resume, threads, None if no_pictures else painter, as_json, error))
+            results.append(
+                _run(model, place, force, resume, threads, None if no_pictures else painter, as_json, estimate_error)
+            )
             if results[-1].reason.startswith("interrupted"):
                 break
     if as_json:
@@ -128,32 +131,12 @@ def list_cases(as_json: Json = False) -> None:
 
 @app.command()
 def new(
-    name: Annotated[str | None, typer.Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")] = None,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="a shipped case, see `fvsolve list`")],
     file: Annotated[Path | None, typer.Argument(metavar="FILE", help="file to write (default NAME.toml)")] = None,
-    source: Annotated[Path | None, typer.Option("--from", metavar="NET.inp", help="EPANET network to import")] = None,
-    hour: Annotated[
-        float | None, typer.Option(metavar="H", help="hour of the EPANET run that gives the initial state (default 0)")
-    ] = None,
-    wave_speed: Annotated[
-        str | None, typer.Option(metavar="A", help='wave speed of all pipes (default "1200 m/s")')
-    ] = None,
-    shortest: Annotated[
-        str | None,
-        typer.Option(metavar="L", help="least pipe length, to which shorter pipes are lengthened (default 0)"),
-    ] = None,
 ) -> None:
-    """Copy a shipped case and the files it uses; or import an EPANET network with --from as the case NAME."""
+    """Copy a shipped case and the files it uses."""
     from fvsolve.case import copying
-    from fvsolve.cli import imported
 
-    if source is not None:
-        imported.write(source, name, file, hour, wave_speed, shortest)
-        return
-    if name is None or hour is not None or wave_speed is not None or shortest is not None:
-        raise FvsolveError(
-            "expected fvsolve new NAME, which copies a shipped case, or fvsolve new --from NET.inp [--hour H] "
-            "[--wave-speed A] [--shortest L], which imports an EPANET network"
-        )
     for path in copying.copy(name, file or Path(f"{name}.toml")):
         print(path)
 

@@ -1,4 +1,4 @@
-"""`fvsolve map`: map of the failures of methods on a case."""
+"""`fvsolve failure-map`: map of the failures of methods on a case."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.units import parse
 
 
-@app.command("map")
-def map_(
+@app.command("failure-map")
+def failure_map(
     case: One,
     scheme: Annotated[
         str | None,
@@ -43,14 +43,14 @@ def map_(
     as_json: Json = False,
 ) -> None:
     """Map failures: methods against steps or a key, each square by a run: stable, ringing, wrong, blown up ..."""
-    from fvsolve.studies.failure.failure_map import failures
+    from fvsolve.studies.failure.failure_map import failure_map as study
     from fvsolve.studies.plans import headed
     from fvsolve.studies.points import Points
 
     read_case = load_case(case, set, scheme, method)
     folder = folder_of(read_case, "map", out)
     with told() as progress, Points(folder) as points:
-        result = failures(
+        result = study(
             read_case, listed(scheme, "--scheme"), methods_of(method), _numbers("--courant", courant),
             _steps(step), _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
         )  # fmt: skip

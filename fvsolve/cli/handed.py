@@ -1,4 +1,4 @@
-"""`fvsolve report`, `fvsolve plot` and `fvsolve cycles`: HTML report, pictures and pressure cycles of a run."""
+"""`fvsolve report`, `fvsolve plot` and `fvsolve fatigue`: HTML report, pictures and pressure cycles of a run."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def plot(
 
 
 @app.command()
-def cycles(
+def fatigue(
     directory: Annotated[Path, typer.Argument(metavar="RUN", help="a run directory")],
     probes: Annotated[
         str, typer.Option(metavar="A,B", help="probes of pressure or head (default all such probes)")
@@ -54,7 +54,9 @@ def cycles(
     range: Annotated[
         float | None, typer.Option(metavar="R", help="pressure range of the fatigue strength, in the unit of the probe")
     ] = None,
-    bears: Annotated[float | None, typer.Option(metavar="N", help="number of cycles of --range to failure")] = None,
+    allowable_range: Annotated[
+        float | None, typer.Option(metavar="N", help="number of cycles of --range to failure")
+    ] = None,
     slope: Annotated[
         float | None, typer.Option(metavar="M", help="exponent of the strength: N (R / r)^M cycles of a range r")
     ] = None,
@@ -68,9 +70,11 @@ def cycles(
     from fvsolve.report import cycles as counting
     from fvsolve.run import open_run
 
-    given = [entry for entry in (range, bears, slope) if entry is not None]
+    given = [entry for entry in (range, allowable_range, slope) if entry is not None]
     if len(given) not in (0, 3) or any(not entry > 0.0 for entry in given) or not per_day > 0.0:
-        raise FvsolveError("expected --range, --bears and --slope together (fatigue strength), and all values above 0")
+        raise FvsolveError(
+            "expected --range, --allowable-range and --slope together (fatigue strength), and all values above 0"
+        )
     strength = counting.Strength(*given) if given else None
     names = [name.strip() for name in probes.split(",") if name.strip()]
     results = counting.cycles(open_run(directory), names or None, strength)

@@ -1,38 +1,47 @@
-"""Import of an EPANET network as a case file."""
+"""`fvsolve import`: an EPANET network as a case file."""
 
 from __future__ import annotations
 
 import shutil
 import sys
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from fvsolve.case import shipped
-from fvsolve.cli.app import value_of
+from fvsolve.cli.app import app, value_of
 from fvsolve.errors import FvsolveError, listing
 
-WAVE_SPEED = "1200 m/s"
-SHORT = 'shorter than a cell: with line = "cells" use --shortest'
+SHORT = 'shorter than a cell: with pipe_model = "finite-volume" use --min-pipe-length'
 
 
-def write(
-    source: Path,
-    name: str | None,
-    file: Path | None,
-    hour: float | None,
-    wave_speed: str | None,
-    shortest: str | None,
+@app.command("import")
+def import_(
+    source: Annotated[Path, typer.Argument(metavar="FILE", help="EPANET network to import, for example town.inp")],
+    case: Annotated[
+        Path | None, typer.Argument(metavar="CASE", help="case file to write, or its folder (default FILE as .toml)")
+    ] = None,
+    hour: Annotated[float, typer.Option(metavar="H", help="hour of the EPANET run that gives the initial state")] = 0.0,
+    wave_speed: Annotated[str, typer.Option(metavar="A", help="wave speed of all pipes")] = "1200 m/s",
+    min_pipe_length: Annotated[
+        str | None,
+        typer.Option(metavar="L", help="minimum pipe length, to which shorter pipes are lengthened (default 0)"),
+    ] = None,
 ) -> None:
-    """Write the case of an EPANET network and its schema, and print all differences from EPANET."""
+    """Import an EPANET network: write its case file and print all differences from EPANET."""
     from fvsolve.epanet import import_network
 
-    to = file or Path(f"{name or source.stem}.toml")
+    to = case or Path(f"{source.stem}.toml")
     if to.is_dir():
-        to = to / f"{name or source.stem}.toml"
+        to = to / f"{source.stem}.toml"
+    if not to.suffix:
+        to = to.with_suffix(".toml")
     if to.exists():
-        raise FvsolveError(f"{to} exists. Give another file: fvsolve new NAME FILE --from {source}")
-    speed = _positive("--wave-speed", wave_speed or WAVE_SPEED, "velocity")
-    least = _positive("--shortest", shortest, "length") if shortest else 0.0
-    network = import_network(source, hour or 0.0, speed, least)
+        raise FvsolveError(f"{to} exists. Give another file: fvsolve import {source} CASE")
+    speed = _positive("--wave-speed", wave_speed, "velocity")
+    shortest = _positive("--min-pipe-length", min_pipe_length, "length") if min_pipe_length else 0.0
+    network = import_network(source, hour, speed, shortest)
     to.parent.mkdir(parents=True, exist_ok=True)
     to.write_text(network.text, encoding="utf-8")
     written = [to]

@@ -15,7 +15,7 @@ from fvsolve.studies.sheet import Sheet, write
 SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 
 At = Annotated[str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms` (default start)")]
-Before = Annotated[bool, typer.Option("--before", help="use the state just before a kink or jump of a schedule")]
+Before = Annotated[bool, typer.Option("--left-limit", help="use the state just before a kink or jump of a schedule")]
 
 
 def time_of(text: str | None) -> float | None:

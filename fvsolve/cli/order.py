@@ -52,7 +52,7 @@ def order(
     method: Annotated[
         str | None, typer.Option(metavar="A,B", help="methods to study (default method of the case)")
     ] = None,
-    against: Annotated[str, typer.Option(help="reference solution: auto, exact, finer or richardson")] = "auto",
+    reference: Annotated[str, typer.Option(help="reference solution: auto, exact, finer or richardson")] = "auto",
     jobs: Jobs = 1,
     dask: Dask = None,
     out: Out = None,
@@ -66,7 +66,7 @@ def order(
     folder = folder_of(loaded, "order", out)
     with told() as progress, Points(folder) as points:
         studies = study(loaded, refine=refine, key=key, levels=levels, cells=cells, schemes=listed(scheme, "--scheme"),
-                      methods=methods_of(method), against=against, out=points, progress=progress,
+                      methods=methods_of(method), against=reference, out=points, progress=progress,
                       jobs=jobs, dask=dask)  # fmt: skip
     studies = studies if isinstance(studies, list) else [studies]
     files = [

@@ -135,7 +135,7 @@ def checks(case, facts: dict, every: bool = False) -> None:
     notes = [f"unsteady friction of {name}: {_memory(part['unsteady'])}"
             for name, part in facts["pipes"].items() if "unsteady" in part]  # fmt: skip
     notes += _walls(case, facts["pipes"])
-    lines = {name: part for name, part in facts["pipes"].items() if part["line"] == "delay"}
+    lines = {name: part for name, part in facts["pipes"].items() if part["line"] == "delay-line"}
     notes += [f"{name} is a delay line, error at most {part['line_bound']:.2g} of the greatest jump: {part['line_why']}"
              for name, part in lines.items()]  # fmt: skip
     if lines:
@@ -296,15 +296,15 @@ def _extremes(console, run) -> None:
 
     clock = UnitColumn("at", "time", run.summary["time_unit"])
     missing = not_valid(run.summary) or "-"
-    rows = [[name, run.units[name], missing if extreme.least is None else _number(extreme.least),
-             _number(_in(clock, extreme.t_least)), missing if extreme.greatest is None else _number(extreme.greatest),
-             _number(_in(clock, extreme.t_greatest))] for name, extreme in run.extremes.items()]  # fmt: skip
-    heads = ["probe", "unit", "least", clock.header, "greatest", clock.header]
+    rows = [[name, run.units[name], missing if extreme.minimum is None else _number(extreme.minimum),
+             _number(_in(clock, extreme.t_min)), missing if extreme.maximum is None else _number(extreme.maximum),
+             _number(_in(clock, extreme.t_max))] for name, extreme in run.extremes.items()]  # fmt: skip
+    heads = ["probe", "unit", "minimum", clock.header, "maximum", clock.header]
     if "peaks" in run.summary:
-        heads = ["probe", "unit", "least", "+-", clock.header, "greatest", "+-", clock.header]
+        heads = ["probe", "unit", "minimum", "+-", clock.header, "maximum", "+-", clock.header]
         for row, peak in zip(rows, run.summary["peaks"].values(), strict=True):
-            row[3:3] = [_off(peak["least"])]
-            row[6:6] = [_off(peak["greatest"])]
+            row[3:3] = [_off(peak["minimum"])]
+            row[6:6] = [_off(peak["maximum"])]
     if rows:
         _table(heads, rows[:ROWS], console)
     if len(rows) > ROWS:
@@ -356,7 +356,7 @@ def _verdict(verdict: dict, summary: dict) -> str:
     from fvsolve.run.result import IN_WORDS, OPEN, LimitVerdict, not_valid
 
     this = LimitVerdict(**verdict)
-    relation = "at least" if verdict["bound"] == "least" else "at most"
+    relation = "at least" if verdict["bound"] == "minimum" else "at most"
     value_text = (
         f"{verdict['quantity'].replace('_', ' ')} {_number(verdict['value'])} {verdict['unit']} "
         f"({where_and_when(verdict, summary)})"

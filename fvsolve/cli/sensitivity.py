@@ -1,4 +1,4 @@
-"""`fvsolve sensitivity` and `fvsolve fit`: sensitivity indices and calibration of keys."""
+"""`fvsolve sensitivity` and `fvsolve calibrate`: sensitivity indices and calibration of keys."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ def sensitivity(
 
 
 @app.command()
-def fit(
+def calibrate(
     case: One,
-    free: Annotated[list[str], typer.Option("--free", metavar="KEY=LOW,HIGH", help="key to fit and its range")],
+    parameter: Annotated[list[str], typer.Option(metavar="KEY=LOW,HIGH", help="key to calibrate and its range")],
     seed: Seed = 0,
     jobs: Jobs = 1,
     dask: Dask = None,
@@ -63,7 +63,7 @@ def fit(
 
     loaded = load_case(case, set)
     with told(kept=False) as progress:
-        result = studies.calibrate(loaded, ranges(free, "--free"), None, seed, jobs, dask, progress)
+        result = studies.calibrate(loaded, ranges(parameter, "--parameter"), None, seed, jobs, dask, progress)
     if as_json:
         print_json(result.plain())
         return

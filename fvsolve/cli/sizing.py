@@ -19,9 +19,9 @@ def size(
     vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range")],
     goal: Annotated[
         str,
-        typer.Option(metavar="least|greatest", help="goal: least or greatest value that satisfies all limits"),
-    ] = "least",
-    tie: Annotated[
+        typer.Option(metavar="minimum|maximum", help="goal: minimum or maximum value that satisfies all limits"),
+    ] = "minimum",
+    dependent: Annotated[
         list[str],
         typer.Option(
             metavar='"KEY = formula"', help="dependent key as a formula of x, the value of the sized key in SI"
@@ -35,7 +35,7 @@ def size(
     set: Set = [],  # noqa: B006
     as_json: Json = False,
 ) -> None:
-    """Find by bracketing the least or greatest value of a key at which all limits of a case hold."""
+    """Find by bracketing the minimum or maximum value of a key at which all limits of a case hold."""
     from fvsolve.studies import sizing
 
     faults, key, values, ties, loaded = [], "", [], {}, None
@@ -45,7 +45,7 @@ def size(
             values = []
             raise FvsolveError(f"--vary {vary}: expected {RANGE}")
     with gathered(faults):
-        ties = sizing.tied(tie)
+        ties = sizing.tied(dependent)
     with gathered(faults):
         loaded = load_case(case, set)
     faults += sizing.asked(loaded, key, values, goal, ties, rtol)

@@ -52,7 +52,13 @@ def stability(
     as_json: Json = False,
 ) -> None:
     """Compute the greatest stable step of a case, predicted and measured, and bounds on it."""
-    of_a_case = {"--set": set, "--at": at, "--before": before, "--jobs": jobs if jobs != 1 else None, "--dask": dask}
+    of_a_case = {
+        "--set": set,
+        "--at": at,
+        "--left-limit": before,
+        "--jobs": jobs if jobs != 1 else None,
+        "--dask": dask,
+    }
     refuse(case, of_a_case, {"--cells": cells, "--courant": courant})
     if case is None:
         from fvsolve.cli.grid import without_case

@@ -21,7 +21,7 @@ Values = Annotated[
 ]
 Ranges = Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="range of a key, for --sample")]
 Outcomes = Annotated[
-    list[str], typer.Option("--outcome", metavar="max(PROBE)", help="outcome to chart (default all extremes)")
+    list[str], typer.Option("--quantity", metavar="max(PROBE)", help="quantity to chart (default all extremes)")
 ]
 WANTED = "KEY=a,b,c, for example links.main.cells=100,200,400"
 RANGE = "KEY=LOW,HIGH, for example links.main.length=900,1000"

@@ -1,4 +1,4 @@
-"""`fvsolve warm`: compilation ahead of runs."""
+"""`fvsolve precompile`: compilation ahead of runs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fvsolve.cli.app import Json, app, print_json
 
 
 @app.command()
-def warm(
+def precompile(
     cases: Annotated[
         list[str], typer.Option("--for", metavar="CASE", help="case to compile for (default all shipped cases)")
     ] = [],  # noqa: B006

@@ -43,7 +43,7 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
 
 @style.as_it_stands
 def envelope_figure(envelope, units, title=""):
-    """Figure of least and greatest head along each of the longest pipes, with elevation and initial head.
+    """Figure of least and maximum head along each of the longest pipes, with elevation and initial head.
 
     envelope : pipe -> quantity of envelope.csv -> float64[cells] in `units`
     """
@@ -60,7 +60,7 @@ def envelope_figure(envelope, units, title=""):
     for axes in list(grid.flat)[len(names) :]:
         axes.set_visible(False)
     for axes in grid[:, 0]:
-        axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)
+        axes.set_ylabel(f"head [{units['max_head']}]", fontsize=8.5, color=style.INK)
     figure.supxlabel(f"distance from its start [{units['distance']}]", fontsize=8.5, color=style.INK)
     handles = {
         label: handle for axes in grid.flat for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
@@ -140,13 +140,13 @@ def _shade(axes, t, marks, first: bool) -> None:
 def _profile(axes, arrays, hilly: bool) -> None:
     style.dress(axes)
     x, ground = arrays["distance"], arrays["elevation"]
-    low, high = arrays["least_head"], arrays["greatest_head"]
+    low, high = arrays["min_head"], arrays["max_head"]
     blue = style.COLOURS[0]
     axes.fill_between(x, low, high, color=blue, alpha=0.10, linewidth=0)
-    axes.plot(x, high, color=blue, linewidth=1.2, label="greatest head")
+    axes.plot(x, high, color=blue, linewidth=1.2, label="maximum head")
     start = arrays["initial_head"]
     axes.plot(x, start, color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)), label="at the start")
-    axes.plot(x, low, color=style.COLOURS[1], linewidth=1.2, label="least head")
+    axes.plot(x, low, color=style.COLOURS[1], linewidth=1.2, label="minimum head")
     if hilly:  # if all elevations are zero, they would only compress the heads
         axes.plot(x, ground, color=style.MUTED, linewidth=1.8, label="pipe")
     axes.set_xlim(0.0, x[-1] + x[0])

@@ -9,8 +9,9 @@ from fvsolve.draw.plot import thinned
 
 LINES = {"vapour line": {"color": style.COLOURS[3], "linewidth": 1.2, "linestyle": ":"},
          "class line": {"color": style.COLOURS[6], "linewidth": 1.4, "linestyle": "-."}}  # fmt: skip
-LIMITS = {"greatest": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))},
-          "least": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2))}}  # fmt: skip
+LIMITS = {"maximum": {"color": style.COLOURS[6], "linewidth": 1.1, "linestyle": (0, (9, 3))},
+          "minimum": {"color": style.COLOURS[6], "linewidth": 1.1,
+                      "linestyle": (0, (6, 2, 1.5, 2, 1.5, 2))}}  # fmt: skip
 LONGEST = 22  # greatest number of letters of a name over a chainage
 
 
@@ -18,7 +19,7 @@ LONGEST = 22  # greatest number of letters of a name over a chainage
 def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), posts=(), labels=(), title=""):
     """Figure of heads along a section, with pipe, vapour line, pressure class and limits; shaded where cavities formed.
 
-    chainage, along["greatest_head"] ... : float64[n] in `units`; lines : name -> float64[n]
+    chainage, along["max_head"] ... : float64[n] in `units`; lines : name -> float64[n]
     seen : `HeadWindow`, ends of the head axis and texts of the limits above and below it
     parted : spans of chainage with cavities; beyond : (chainage, head, name) where a limit is violated
     posts : chainages of vertical lines; labels : (chainage, names, True if a device is there)
@@ -28,10 +29,10 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
     style.dress(axes)
     for a, b in parted:
         axes.axvspan(a, b, color=style.COLOURS[3], alpha=0.15, linewidth=0)
-    high, low = along["greatest_head"], along["least_head"]
+    high, low = along["max_head"], along["min_head"]
     axes.fill_between(chainage, low, high, color=style.COLOURS[0], alpha=0.08, linewidth=0)
-    axes.plot(chainage, high, color=style.COLOURS[0], linewidth=1.4, label="greatest head")
-    axes.plot(chainage, low, color=style.COLOURS[1], linewidth=1.4, label="least head")
+    axes.plot(chainage, high, color=style.COLOURS[0], linewidth=1.4, label="maximum head")
+    axes.plot(chainage, low, color=style.COLOURS[1], linewidth=1.4, label="minimum head")
     axes.plot(chainage, along["initial_head"], color=style.INK, linewidth=0.9, linestyle=(0, (5, 3)),
               label="initial head")  # fmt: skip
     axes.plot(chainage, along["elevation"], color=style.MUTED, linewidth=2.4, label="pipe")
@@ -53,7 +54,7 @@ def section_figure(chainage, along, units, lines, seen, parted=(), beyond=(), po
                           color=red, arrowprops={"arrowstyle": "->", "color": red, "relpos": (1, edge)})  # fmt: skip
     _places(axes, posts, labels)
     axes.set_xlabel(f"chainage [{units['distance']}]", fontsize=8.5, color=style.INK)
-    axes.set_ylabel(f"head [{units['greatest_head']}]", fontsize=8.5, color=style.INK)
+    axes.set_ylabel(f"head [{units['max_head']}]", fontsize=8.5, color=style.INK)
     figure.legend(loc="outside lower center", ncols=4, handlelength=3, frameon=False, fontsize=8, labelcolor=style.INK)
     style.title(figure, title)
     return figure

@@ -68,7 +68,7 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
     description = " ".join(line.strip() for line in network.title if line.strip())
     if description:
         lines.append(f"description = {text.inline(description)}")
-    lines += [f"source = {text.inline(f'{path.name}, by fvsolve new --from')}"]
+    lines += [f"source = {text.inline(f'{path.name}, by fvsolve import')}"]
     lines += ["", "# Differences from EPANET:"] if translation.notes else []
     lines += [f"# - {note}: {listing(names, 60)}" for note, names in translation.notes]
     density = DENSITY * network.options.hydraulic.specific_gravity
@@ -84,7 +84,7 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
         "[numerics]",
         f'end = "{END}"',
         f'cell_time = "{1e3 * time:.10g} ms"  # pipes that are shorter get one cell',
-        'line = "auto"' + (f"  # {_short(translation, short)}" if short else ""),
+        'pipe_model = "auto"' + (f"  # {_short(translation, short)}" if short else ""),
     ]
     lines += [
         "",

@@ -182,7 +182,7 @@ def settings_of(draft: Draft) -> np.ndarray:
     s["vapor"] = case.law.cavity_pressure
     s["stop_below"] = case.numerics.below_vapor == "stop"
     case.law.lower(draft.fluid, s, draft.floats)
-    s["jumps"] = 0.25 * case.numerics.accuracy
+    s["jumps"] = 0.25 * case.numerics.delay_tolerance
     if len(draft.delay_table):
         method = method_named(automatic.first_method(case.numerics.method))
         s["weights"], s["stages"] = len(draft.floats), method.stages

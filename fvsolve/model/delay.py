@@ -32,28 +32,28 @@ ROUGH = 0.5  # greatest attenuation of a wave by friction in a line shorter than
 
 @dataclass(frozen=True)
 class Followed:
-    """Method for a pipe, "cells" or "delay", the reason, and the steps it implies.
+    """Method for a pipe, "finite-volume" or "delay-line", the reason, and the steps it implies.
 
     rate : of lines that limit steps [1/s]; longest : step for which lines are divided [s]
     """
 
-    line: str
+    pipe_model: str
     why: str
     rate: float = 0.0
     longest: float = math.inf
 
 
 def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
-    """Pipe -> method; unfit : pipes whose error `auto` has estimated to exceed `numerics.accuracy`."""
+    """Pipe -> method; unfit : pipes whose error `auto` has estimated to exceed `numerics.delay_tolerance`."""
     pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
     methods, lines = {}, []
     for name, link in pipes.items():
-        line = link.line or case.numerics.line
-        need = "" if line == "cells" else what_needs_cells(case, name, link)
-        if line == "cells" or need:
-            methods[name] = Followed("cells", need or f'line = "{line}"')
+        line = link.pipe_model or case.numerics.pipe_model
+        need = "" if line == "finite-volume" else what_needs_cells(case, name, link)
+        if line == "finite-volume" or need:
+            methods[name] = Followed("finite-volume", need or f'pipe_model = "{line}"')
         elif name in unfit:
-            methods[name] = Followed("cells", "its bound as a delay line is above numerics.accuracy")
+            methods[name] = Followed("finite-volume", "its bound as a delay line is above numerics.delay_tolerance")
         else:
             lines.append(name)
     if not lines:
@@ -73,7 +73,7 @@ def followed(case, unfit: Collection[str] = ()) -> dict[str, Followed]:
         reason = "waves travel along it unchanged except for friction"
         if travel[name] < longest:
             reason += f", and faster than a step of {case.step_amount(longest, 4)}"
-        methods[name] = Followed("delay", reason, rate, longest)
+        methods[name] = Followed("delay-line", reason, rate, longest)
     return {name: methods[name] for name in pipes}
 
 
@@ -102,11 +102,13 @@ def lower_delays(draft) -> None:
     case, rows = draft.case, []
     for k, name in enumerate(draft.pipe_names):
         link, chosen = case.links[name], draft.followed[name]
-        stated = link.line or case.numerics.line
-        if stated == "delay" and chosen.line == "cells":
-            key = f"links.{name}.line" if link.line else "numerics.line"
-            draft.fault(key, f'"delay" is not possible for links.{name}: {chosen.why}; expected "cells" or "auto"')
-        if chosen.line == "cells":
+        stated = link.pipe_model or case.numerics.pipe_model
+        if stated == "delay-line" and chosen.pipe_model == "finite-volume":
+            key = f"links.{name}.pipe_model" if link.pipe_model else "numerics.pipe_model"
+            draft.fault(
+                key, f'"delay-line" is not possible for links.{name}: {chosen.why}; expected "finite-volume" or "auto"'
+            )
+        if chosen.pipe_model == "finite-volume":
             continue
         row = np.zeros((), rec.DELAY)
         pipe = draft.pipe_table[k]
@@ -169,7 +171,7 @@ def cut_lines(draft) -> list[str]:
     case, at, unfit = draft.case, 0, []
     facts = draft.steady["lines"] = {}
     for name, chosen in draft.followed.items():
-        facts[name] = {"line": chosen.line, "line_bound": None, "line_why": chosen.why}
+        facts[name] = {"line": chosen.pipe_model, "line_bound": None, "line_why": chosen.why}
     scale, ramp = time_scales(draft) if len(draft.delay_table) else (0.0, 0.0)
     for row in draft.delay_table:
         name = draft.pipe_names[row["pipe"]]
@@ -178,7 +180,7 @@ def cut_lines(draft) -> list[str]:
         flow = abs(float(pipe["flow"])) + float(pipe["admittance"]) * FELT
         attenuation = travel * float(drag_and_slope(pipe, flow)[1])
         limit = max(1, math.floor(travel / chosen.longest * (1.0 + 1e-9)))
-        count = min(limit, max(1, math.ceil(0.5 * attenuation / case.numerics.accuracy)))
+        count = min(limit, max(1, math.ceil(0.5 * attenuation / case.numerics.delay_tolerance)))
         if row["now"] > 0.0:
             count = 1
         row["stretches"], row["stretch"], row["tau"] = count, at, travel / count
@@ -192,23 +194,23 @@ def cut_lines(draft) -> list[str]:
         if abs(float(pipe["drag"]) - force) > DRIVEN * float(pipe["admittance"]) * 1e5 / travel:
             bound = math.inf
             unfit.append(name)
-            if (case.links[name].line or case.numerics.line) == "delay":
-                draft.fault(f"links.{name}.line", '"delay" is not possible: at the start friction does not balance the '
-                            'drop of pressure along it; expected "cells"')  # fmt: skip
+            if (case.links[name].pipe_model or case.numerics.pipe_model) == "delay-line":
+                draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: at the start friction does not '
+                            'balance the drop of pressure along it; expected "finite-volume"')  # fmt: skip
             continue
         if row["now"] > 0.0 and attenuation > ROUGH:
             bound = math.inf
             facts[name]["line_why"] += ", where friction attenuates a wave too much"
-        stated = case.links[name].line or case.numerics.line
-        if stated == "auto" and bound > case.numerics.accuracy:
+        stated = case.links[name].pipe_model or case.numerics.pipe_model
+        if stated == "auto" and bound > case.numerics.delay_tolerance:
             unfit.append(name)
-        elif smoothed > case.numerics.accuracy and bound < math.inf:
+        elif smoothed > case.numerics.delay_tolerance and bound < math.inf:
             draft.warnings.append(too_quick(case, name, chosen.longest, min(scale, ramp or scale), smoothed))
         elif bound == math.inf:
             longest = draft.case.step_amount(chosen.longest, 4)
-            draft.fault(f"links.{name}.line", f'"delay" is not possible: friction attenuates a wave by a fraction of '
-                        f"{attenuation:.3g} in a line shorter than a step of {longest}; expected shorter steps, "
-                        'or "cells"')  # fmt: skip
+            draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: friction attenuates a wave by a '
+                        f"fraction of {attenuation:.3g} in a line shorter than a step of {longest}; expected shorter "
+                        'steps, or "finite-volume"')  # fmt: skip
     shape_past(draft)
     return unfit
 
@@ -218,9 +220,9 @@ def too_quick(case, name: str, step: float, scale: float, bound: float) -> Notic
     text = (
         f"{name}: a schedule changes something within {case.step_amount(scale, 3)}, and steps of "
         f"{case.step_amount(step, 3)} may cause an error of its waves of {bound:.2g} of the change; "
-        f'expected shorter steps, or line = "cells"'
+        f'expected shorter steps, or pipe_model = "finite-volume"'
     )
-    return Notice("lines", f"links.{name}", text, "line", bound, case.numerics.accuracy)
+    return Notice("lines", f"links.{name}", text, "pipe_model", bound, case.numerics.delay_tolerance)
 
 
 def by_interpolation(tau: float, step: float, scale: float, ramp: float) -> float:
@@ -267,4 +269,6 @@ def shape_past(draft) -> None:
 
 def longest_of(draft) -> float:
     """Step for which lines are divided [s]."""
-    return min((method.longest for method in draft.followed.values() if method.line == "delay"), default=math.inf)
+    return min(
+        (method.longest for method in draft.followed.values() if method.pipe_model == "delay-line"), default=math.inf
+    )

@@ -306,7 +306,7 @@ class Model(Shown):
         """Raise FvsolveError if the model has delay lines: their history is not part of y."""
         if len(self.tables.delays):
             raise FvsolveError(f"{function}(t, y) is not defined for a model with delay lines: waves sent into them "
-                               'are needed too. Expected rhs(State), or line = "cells" in the case')  # fmt: skip
+                               'are needed too. Expected rhs(State), or pipe_model = "finite-volume"')  # fmt: skip
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
         """Right-hand side and `out` at t : (dydt, out), as `rhs`.
@@ -405,7 +405,7 @@ class Model(Shown):
             fields[pipe.name] = {
                 "pressure": pressure, "head": self.head(pressure, pipe.elevation),
                 "velocity": flow / law.area(row, pressure), "flow": flow,
-                "least_pressure": pressure, "greatest_pressure": pressure, **pipe_values(self, k, y),
+                "min_pressure": pressure, "max_pressure": pressure, **pipe_values(self, k, y),
             }  # fmt: skip
         nodes = self.tables.nodes
         at = int(self.layout["pressure"])

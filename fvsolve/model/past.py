@@ -131,6 +131,7 @@ def crowded(past: np.ndarray) -> list[Notice]:
     share = past[at.CROWDED] / past[at.GREATEST]
     text = (
         f"more than {int(past[at.QUEUE])} jumps were travelling in one pipe: some of them, up to {share:.3g} of the "
-        'greatest, were smoothed over a step; raise numerics.accuracy, so that fewer are stored, or set line = "cells"'
+        "greatest, were smoothed over a step; raise numerics.delay_tolerance, so that fewer are stored, or set "
+        'pipe_model = "finite-volume"'
     )
-    return [Notice("jumps", "numerics", text, "accuracy", float(share), None)]
+    return [Notice("jumps", "numerics", text, "delay_tolerance", float(share), None)]

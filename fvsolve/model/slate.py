@@ -155,8 +155,8 @@ class Slate:
         for k, (pipe, row) in enumerate(zip(self.model.pipes, self.model.tables.pipes, strict=True)):
             own, cells = fields[pipe.name], row["cell"] + np.arange(pipe.cells)
             least, greatest = (self.model.cell_pressure(k, self.envelope[i, cells]) for i in (0, 2))
-            own["least_pressure"] = np.minimum(least, own["pressure"])
-            own["greatest_pressure"] = np.maximum(greatest, own["pressure"])
+            own["min_pressure"] = np.minimum(least, own["pressure"])
+            own["max_pressure"] = np.maximum(greatest, own["pressure"])
         return fields
 
     def observe(self, t: float, y: np.ndarray, out: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""envelope.csv: least and greatest pressure and head of each pipe cell, with their times."""
+"""envelope.csv: least and maximum pressure and head of each pipe cell, with their times."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ QUANTITIES = {
     "distance": "length",
     "elevation": "head",
     "initial_head": "head",
-    "least_pressure": "pressure",
-    "t_least": "time",
-    "greatest_pressure": "pressure",
-    "t_greatest": "time",
-    "least_head": "head",
-    "greatest_head": "head",
+    "min_pressure": "pressure",
+    "t_min": "time",
+    "max_pressure": "pressure",
+    "t_max": "time",
+    "min_head": "head",
+    "max_head": "head",
 }
 
 

@@ -17,7 +17,7 @@ from fvsolve.errors import RunError
 from fvsolve.output import layout
 
 UNITS = {
-    "pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s", "least_pressure": "Pa", "greatest_pressure": "Pa",
+    "pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s", "min_pressure": "Pa", "max_pressure": "Pa",
 }  # fmt: skip
 UNIT = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
 ARRAY = b"</DataArray>"

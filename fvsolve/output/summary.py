@@ -99,8 +99,8 @@ def _extremes(summary, model) -> dict:
     """Extremes in units of the probes; None if reached after the time from which a diverged run is invalid."""
     extremes = {}
     for col in probe_columns(model):
-        least, t_least, greatest, t_greatest = (*summary.extremes[col.name],)
-        sides = {"least": (least, t_least), "greatest": (greatest, t_greatest)}
+        least, t_min, greatest, t_max = (*summary.extremes[col.name],)
+        sides = {"minimum": (least, t_min), "maximum": (greatest, t_max)}
         row: dict = {"unit": col.unit}
         for side, (value, t) in sides.items():
             valid = not t >= summary.invalid_from

@@ -22,7 +22,7 @@ HOME = "fvsolve_parts"  # package in which registered folders appear
 
 
 @door(folder=PATH)
-def register(folder: str | os.PathLike) -> None:
+def register_part(folder: str | os.PathLike) -> None:
     """Register the part in a folder: `part.py`, and `lower.py` and `law.py` if the part has a law.
 
     Modules of the folder use relative imports. Their sources belong to the key of the compilation cache: an edit
@@ -31,7 +31,7 @@ def register(folder: str | os.PathLike) -> None:
     """
     path = Path(folder).resolve()
     if not (path / "part.py").is_file():
-        raise FvsolveError(f"register: {show(str(folder))} has no part.py; expected the folder of a part")
+        raise FvsolveError(f"register_part: {show(str(folder))} has no part.py; expected the folder of a part")
     package = f"{HOME}.{path.name}"
     for name, places in ((HOME, []), (package, [str(path)])):
         if name not in sys.modules:
@@ -39,7 +39,7 @@ def register(folder: str | os.PathLike) -> None:
             spec.submodule_search_locations = places
             sys.modules[name] = module_from_spec(spec)
     if sys.modules[package].__path__ != [str(path)]:
-        raise FvsolveError(f"register: a part in a folder {show(path.name)} exists already; expected another name")
+        raise FvsolveError(f"register_part: a part in a folder {show(path.name)} exists already; expected another name")
     declare(package)
     os.environ[NAMED] = os.pathsep.join(dict.fromkeys([*named(), str(path)]))
 
@@ -61,7 +61,7 @@ def declare_offered() -> None:
     offered = [
         (f"{entry.name} of the entry points {GROUP}", declare, entry.value) for entry in entry_points(group=GROUP)
     ]
-    for source, read, place in [*offered, *((NAMED, register, folder) for folder in named())]:
+    for source, read, place in [*offered, *((NAMED, register_part, folder) for folder in named())]:
         try:
             read(place)
         except Exception as error:

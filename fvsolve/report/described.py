@@ -77,7 +77,7 @@ def walls(result) -> ReportTable | None:
     modulus = _pressed(column("", "modulus", case), case)
     for name, link in case.links.items():
         wall, allowed = getattr(link, "wall", None), getattr(link, "allowable_pressure", None)
-        wall = None if wall == "stiff" else wall
+        wall = None if wall == "rigid" else wall
         if wall is None and allowed is None:
             continue
         row = [name, None if allowed is None else float(allowable.span_from_si(allowed)), None, None, link.source or ""]

@@ -24,8 +24,8 @@ GROUND = "#ffffff"
 DASH, DOT, LONG = "9px,5px", "2px,3px", "14px,5px"
 LINES = {VAPOUR_LINE: {"colour": VAPOUR, "width": 1.4, "dash": DOT},
          "class line": {"colour": CLASS, "width": 1.8, "dash": "9px,3px,2px,3px"}}  # fmt: skip
-LIMITS = {"greatest": {"colour": CLASS, "width": 1.3, "dash": LONG},
-          "least": {"colour": CLASS, "width": 1.3, "dash": "8px,3px,2px,3px,2px,3px"}}  # fmt: skip
+LIMITS = {"maximum": {"colour": CLASS, "width": 1.3, "dash": LONG},
+          "minimum": {"colour": CLASS, "width": 1.3, "dash": "8px,3px,2px,3px,2px,3px"}}  # fmt: skip
 # Lines remain distinguishable in grey print.
 DASHES = ("solid", DASH, DOT, "9px,3px,2px,3px", LONG, "14px,3px,2px,3px")
 DARK = {INK: "#dde3ea", MUTED: "#9aa7b5", HAIR: "#37424e", GROUND: "#12171d", DOUBT: "#ff8b5e"} | dict(
@@ -48,8 +48,8 @@ def section_figure(section: Section, moving: Motion | None, unit: str, along: st
         {name: numbers(values[k], "f4") for name, values in section.along.items()},
     )
     data = [
-        _line("greatest head", x, lines["greatest_head"], GREATEST, width=2),
-        _line("least head", x, lines["least_head"], LEAST, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
+        _line("maximum head", x, lines["max_head"], GREATEST, width=2),
+        _line("minimum head", x, lines["min_head"], LEAST, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
         _line("initial head", x, lines["initial_head"], INK, width=1.2, dash=DASH),
         _line("pipe", x, lines["elevation"], MUTED, width=3.5),
     ]
@@ -84,7 +84,7 @@ def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> 
     for n, (name, section) in enumerate(several):
         colour, k = COLOURS[n % len(COLOURS)], section.picked()
         x, group = numbers(section.chainage[k], "f4"), {"legendgroup": f"run {n}"}
-        high, low = (numbers(section.along[key][k], "f4") for key in ("greatest_head", "least_head"))
+        high, low = (numbers(section.along[key][k], "f4") for key in ("max_head", "min_head"))
         data.append(_line(name or "the case", x, high, colour, width=2, **group))
         data.append(_line("", x, low, colour, width=2, dash=DASH, showlegend=False, **group))
     return {

@@ -21,4 +21,4 @@ def head_of(result, pressure: float | np.ndarray, elevation: np.ndarray) -> np.n
     """Head of an absolute pressure [Pa] at elevations; head and elevations in the units of the envelope."""
     height = in_units(result, "elevation")
     law: Callable[..., Any] = result.case.law.head
-    return in_units(result, "greatest_head").from_si(law(pressure, height.to_si(elevation)))
+    return in_units(result, "max_head").from_si(law(pressure, height.to_si(elevation)))

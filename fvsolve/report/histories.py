@@ -62,5 +62,5 @@ def chosen(result) -> list[str]:
 
 def _liveliest(result, names: list[str], count: int = LINES) -> set[str]:
     extremes = result.extremes
-    swing = {name: (extremes[name].greatest or 0.0) - (extremes[name].least or 0.0) for name in names}
+    swing = {name: (extremes[name].maximum or 0.0) - (extremes[name].minimum or 0.0) for name in names}
     return set(sorted(names, key=lambda name: -swing[name])[:count])

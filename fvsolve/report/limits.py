@@ -25,22 +25,22 @@ def limit_lines(result, pipe: np.ndarray, elevation: np.ndarray) -> dict[str, np
         applies = np.isin(pipe, parts)
         if quantity not in OF_PRESSURE or not applies.any():
             continue
-        for bound in ("least", "greatest"):
+        for bound in ("minimum", "maximum"):
             value = getattr(limit, bound)
             if value is None or isinstance(value, str):
                 continue  # "vacuum" is the line of the pipe itself, and the vapour line is drawn anyway
             line = _head(result, quantity, value, elevation)
             lines[f"{limit.name}, {bound}"] = np.where(applies, line, np.nan)
-        if limit.share_of_class is not None and limit.share_of_class != 1.0:
-            gauge = np.array([limit.share_of_class * (classes[name] or np.nan) for name in pipe.tolist()])
+        if limit.class_fraction is not None and limit.class_fraction != 1.0:
+            gauge = np.array([limit.class_fraction * (classes[name] or np.nan) for name in pipe.tolist()])
             line = _head(result, "gauge_pressure", gauge, elevation)
-            lines[f"{limit.name}, greatest"] = np.where(applies, line, np.nan)
+            lines[f"{limit.name}, maximum"] = np.where(applies, line, np.nan)
     return dict(list(lines.items())[:MOST])
 
 
 def _head(result, quantity: str, value, elevation: np.ndarray) -> np.ndarray:
     """Convert a value [SI] of a pressure quantity to a head in the unit of heads."""
-    shown = in_units(result, "greatest_head")
+    shown = in_units(result, "max_head")
     if quantity == "head":
         return shown.from_si(value + 0.0 * elevation)
     if quantity == "pressure_head":

@@ -38,7 +38,7 @@ def motions(result, ways: Iterable[SectionWay]) -> list[Motion]:
     step = -(-len(frames) * n // NUMBERS)
     frames = [*frames[:-1:step], frames[-1]]
     heads = np.array([_heads(path, sum(counts.values())) for _, path in frames])
-    shown = in_units(result, "greatest_head").from_si(heads)
+    shown = in_units(result, "max_head").from_si(heads)
     times = np.array([t for t, _ in frames])
     return [Motion(chainage, times, shown[:, indices]) for chainage, indices in spots]
 

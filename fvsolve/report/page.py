@@ -91,7 +91,7 @@ def embedded(data: Any) -> str:
 def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[dict[str, Any]]:
     """Template data of each section; adds its figure to `figures`."""
     moving = motions(result, [item.way for item in sections])
-    height, along = in_units(result, "greatest_head").unit, in_units(result, "distance").unit
+    height, along = in_units(result, "max_head").unit, in_units(result, "distance").unit
     entries, bins = [], min(BINS, SHARED // max(len(sections), 1))
     for k, item in enumerate(sections):
         line = moving[k] if moving else None

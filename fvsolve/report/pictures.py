@@ -98,6 +98,6 @@ def _section_figure(result, way: SectionWay):
     k, title = sec.picked(), "\n".join(filter(None, [result.summary["title"], way.name]))
     return section_figure(
         sec.chainage[k], {name: values[k] for name, values in sec.along.items()}, result.summary["envelope_units"],
-        {name: line[k] for name, line in sec.lines.items()}, window([sec], in_units(result, "greatest_head").unit),
+        {name: line[k] for name, line in sec.lines.items()}, window([sec], in_units(result, "max_head").unit),
         sec.parted, sec.beyond, [device.chainage for device in sec.devices], sec.labels(), title,
     )  # fmt: skip

@@ -16,9 +16,9 @@ from fvsolve.report.limits import limit_lines
 from fvsolve.run.result import FAILS
 from fvsolve.run.verdicts import NEAR, Chainages
 
-ALONG = ("elevation", "initial_head", "least_head", "greatest_head", "least_pressure", "greatest_pressure",
-         "t_least", "t_greatest")  # fmt: skip
-HEADS = ("initial_head", "least_head", "greatest_head")
+ALONG = ("elevation", "initial_head", "min_head", "max_head", "min_pressure", "max_pressure",
+         "t_min", "t_max")  # fmt: skip
+HEADS = ("initial_head", "min_head", "max_head")
 VAPOUR = "vapour line"
 APART = 0.035  # least distance of names, as a fraction of the length; closer names would overlap
 NEAREST = 0.5  # limits farther away than this fraction of the range of heads are only named at the edge of the picture
@@ -63,8 +63,8 @@ class Section:
             return np.arange(n)
         edges = np.linspace(0, n, bins + 1).astype(int)
         most = [
-            ("greatest_head", np.argmax),
-            ("least_head", np.argmin),
+            ("max_head", np.argmax),
+            ("min_head", np.argmin),
             ("elevation", np.argmax),
             ("elevation", np.argmin),
         ]
@@ -140,7 +140,7 @@ def section(result, way: SectionWay) -> Section:
         left = 1.0 + NEAR * result.case.law.cavitates
         lines[VAPOUR] = head_of(result, boils * left, along["elevation"])
     lines |= limit_lines(result, pipe, along["elevation"])
-    parted = _parted(result, along["least_pressure"], chainage, way)
+    parted = _parted(result, along["min_pressure"], chainage, way)
     beyond = _beyond(result, way, chainage, along)
     to_unit = distances.from_si
     return Section(
@@ -161,7 +161,7 @@ def _parted(result, least: np.ndarray, chainage: np.ndarray, way: SectionWay) ->
     limit = boiling(result)
     if limit is None:
         return []
-    low = in_units(result, "least_pressure").to_si(least) <= limit * (1.0 + 1e-9)
+    low = in_units(result, "min_pressure").to_si(least) <= limit * (1.0 + 1e-9)
     middles = np.concatenate([[way.begin], 0.5 * (chainage[1:] + chainage[:-1]), [way.end]])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], low.astype(int), [0]])))
     return [(float(middles[a]), float(middles[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -179,7 +179,7 @@ def _beyond(result, way: SectionWay, chainage: np.ndarray, along: dict) -> list[
                 continue
             at = float(leg.chainage(chainages.leg(leg.pipe, on).distance(worst["chainage"])))
             if leg.begin <= at <= leg.end:
-                line = along["least_head" if worst["bound"] == "least" else "greatest_head"]
+                line = along["min_head" if worst["bound"] == "minimum" else "max_head"]
                 violations.append((at, float(line[np.argmin(np.abs(chainage - at))]), verdict["name"]))
     return violations
 

@@ -23,7 +23,7 @@ from fvsolve.units import span
 POINTS = 400  # greatest number of points of a series
 PROBES, SECTIONS = 6, 2  # greatest numbers of probes and sections of an event, from its first run
 FAILED = 200  # greatest number of rows of limits that fail or are open
-CAPTION = "Greatest (solid) and least (dashed) head over all accepted steps, by protection."
+CAPTION = "Maximum (solid) and minimum (dashed) head over all accepted steps, by protection."
 
 
 def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
@@ -138,7 +138,7 @@ def drawn(event: str | None, number: int, runs: list, figures: dict[str, Any]) -
     for k, first in enumerate(next((paths for *_, paths in runs_drawn if paths), [])[:SECTIONS]):
         several = [(name, section(result, path)) for name, result, paths in runs_drawn
                    for path in paths if path.name == first.name]  # fmt: skip
-        height, along = in_units(own[0][1], "greatest_head").unit, in_units(own[0][1], "distance").unit
+        height, along = in_units(own[0][1], "max_head").unit, in_units(own[0][1], "distance").unit
         figures[f"section-{number}-{k}"] = study_section(several, height, along)
         entries.append({"id": f"section-{number}-{k}", "name": visible(first.name), "caption": CAPTION})
     shared = [name for name in own[0][1].probes if all(name in result.units for _, result in own)]

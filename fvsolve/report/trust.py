@@ -9,7 +9,7 @@ from fvsolve.report.tables import ERROR, ReportTable, in_unit, worded
 from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
 from fvsolve.units import span
 
-BOUNDS = {"least": "at\u00a0least", "greatest": "at\u00a0most"}
+BOUNDS = {"minimum": "at\u00a0least", "maximum": "at\u00a0most"}
 LATER = 6  # greatest number of marks named after the first
 
 

@@ -17,10 +17,10 @@ from fvsolve.report.tables import ReportTable, is_number
 WIDEST = 60  # greatest initial width of a column [letters]
 NAME = 31  # greatest length of the name of a sheet [letters]; it must not contain these signs:
 SIGNS = "[]:*?/\\'"
-ALONG = {"elevation": "elevation", "initial_head": "initial head", "least_head": "least head",
-         "greatest_head": "greatest head", "least_pressure": "least pressure",
-         "greatest_pressure": "greatest pressure", "t_least": "time of the least",
-         "t_greatest": "time of the greatest"}  # fmt: skip
+ALONG = {"elevation": "elevation", "initial_head": "initial head", "min_head": "minimum head",
+         "max_head": "maximum head", "min_pressure": "minimum pressure",
+         "max_pressure": "maximum pressure", "t_min": "time of the minimum",
+         "t_max": "time of the maximum"}  # fmt: skip
 
 
 def write_workbook(result, sections: list[SectionWay], path: Path) -> Path:
@@ -76,7 +76,7 @@ def study_tables(runs: list) -> list[ReportTable]:
 
 def _along(result, sec: Section) -> ReportTable:
     """Table of a long section, with a row for each point."""
-    head = in_units(result, "least_head").unit
+    head = in_units(result, "min_head").unit
     columns = [
         sec.chainage,
         sec.pipe,

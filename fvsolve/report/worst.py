@@ -13,10 +13,10 @@ from fvsolve.run.result import not_valid
 
 FIRST = 10  # greatest number of rows of a ranking on the page
 EXTREMES = (  # quantity, its text, function of the index of the extreme, quantity of its time
-    ("greatest_pressure", "greatest pressure", np.argmax, "t_greatest"),
-    ("least_pressure", "least pressure", np.argmin, "t_least"),
-    ("greatest_head", "greatest head", np.argmax, "t_greatest"),
-    ("least_head", "least head", np.argmin, "t_least"),
+    ("max_pressure", "maximum pressure", np.argmax, "t_max"),
+    ("min_pressure", "minimum pressure", np.argmin, "t_min"),
+    ("max_head", "maximum head", np.argmax, "t_max"),
+    ("min_head", "minimum head", np.argmin, "t_min"),
 )
 
 
@@ -40,13 +40,13 @@ def of_all(result, ways: list[SectionWay]) -> ReportTable | None:
         chainage = [_chainage(result, legs.get(pipe), arrays["distance"][k])] if legs else []
         rows.append([words, float(arrays[name][k]), in_units(result, name).unit, pipe, float(arrays["distance"][k]),
                      *chainage, float(arrays["elevation"][k]), float(arrays[when][k])])  # fmt: skip
-    units = [in_units(result, key).unit for key in ("distance", *["distance"] * bool(legs), "elevation", "t_greatest")]
+    units = [in_units(result, key).unit for key in ("distance", *["distance"] * bool(legs), "elevation", "t_max")]
     heads = ("", "value", "unit", "pipe", "from its start", *["chainage"] * bool(legs), "elevation", "time")
     return ReportTable("Worst of all pipes", heads, rows, ("",) * 4 + tuple(units), loose=frozenset({1}))
 
 
 def by_pipe(result) -> list[ReportTable]:
-    """Tables of pipes ranked by greatest and by least pressure, worst first; [] for a single pipe."""
+    """Tables of pipes ranked by greatest and by minimum pressure, worst first; [] for a single pipe."""
     if len(result.envelope) < 2 or not_valid(result.summary):
         return []
     return [_ranked(result, name, words, most, when) for name, words, most, when in EXTREMES[:2]]
@@ -69,11 +69,11 @@ def of_probes(result) -> ReportTable | None:
     peaks, rows, invalid = result.summary.get("peaks", {}), [], not_valid(result.summary) or None
     clock = UnitColumn("t", "time", result.summary["time_unit"])
     for name, extremes in result.extremes.items():
-        errors = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("least", "greatest")}
-        first, last = (in_unit(clock, t) for t in (extremes.t_least, extremes.t_greatest))
-        low, high = (invalid if value is None else value for value in (extremes.least, extremes.greatest))
-        rows.append([name, result.units[name], low, *errors["least"], first, high, *errors["greatest"], last])
-    heads = [column for side in ("least", "greatest") for column in (side, *[ERROR] * bool(peaks), "time")]
+        errors = {side: [peaks[name][side]["error"]] if peaks else [] for side in ("minimum", "maximum")}
+        first, last = (in_unit(clock, t) for t in (extremes.t_min, extremes.t_max))
+        low, high = (invalid if value is None else value for value in (extremes.minimum, extremes.maximum))
+        rows.append([name, result.units[name], low, *errors["minimum"], first, high, *errors["maximum"], last])
+    heads = [column for side in ("minimum", "maximum") for column in (side, *[ERROR] * bool(peaks), "time")]
     units = [clock.unit if column == "time" else "" for column in heads]
     loose = frozenset(2 + k for k, column in enumerate(heads) if column != "time")
     return ReportTable("Probes", ("probe", "unit", *heads), rows, ("", "", *units), loose=loose,

@@ -66,11 +66,11 @@ def expectation(text: str, expect, column: UnitColumn, value: float, complete: b
 
 def _whole(model, summary, expect) -> tuple[float, float]:
     """Greatest or least value of all places of an extent, and its time."""
-    extent, low = expect.extent, expect.function == "least"
+    extent, low = expect.extent, expect.function == "min"
     values, times = [], []
     for part in met(model, summary, extent):
-        extreme = part.least if low else part.greatest
-        times.append(part.t_least if low else part.t_greatest)
+        extreme = part.minimum if low else part.maximum
+        times.append(part.t_min if low else part.t_max)
         values.append(
             in_quantity(model, extent.quantity, extreme, part.elevation) if extent.quantity in OF_PRESSURE else extreme
         )
@@ -80,9 +80,9 @@ def _whole(model, summary, expect) -> tuple[float, float]:
 
 def _found(expect, probe: str, summary, result) -> tuple[float, float]:
     """Value of a probe for a claim, and its time; for a mean the end of the run."""
-    if expect.function in ("min", "least"):
+    if expect.function == "min":
         return summary.extremes[probe][:2]
-    if expect.function in ("max", "greatest"):
+    if expect.function == "max":
         return summary.extremes[probe][2:]
     t, values = result.seconds, result.si(probe)
     if not len(t):

@@ -17,12 +17,12 @@ WHOLE = {  # rows with exactly these fields
 ROWS = WHOLE | {
     "extremes": Extremes._fields, "probes": ("dimension", "unit"), "methods": ("time", "method"),
     "events": ("time", "name", "what"), "cavities": ("place", "distance", "time", "volume", "t_volume"),
-    "peaks": ("least", "greatest"),
+    "peaks": ("minimum", "maximum"),
 }  # fmt: skip
 WITHIN = {  # rows within rows
     ("verdicts", "worst"): ("place", "chainage", "elevation", "time", "bound", "value", "limit", "margin",
                             "error", "state"),
-    ("peaks", "least"): ("error",), ("peaks", "greatest"): ("error",),
+    ("peaks", "minimum"): ("error",), ("peaks", "maximum"): ("error",),
 }  # fmt: skip
 
 

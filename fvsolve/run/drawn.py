@@ -15,7 +15,7 @@ from fvsolve.output.column import column
 from fvsolve.output.fields import UNITS, read_lines
 
 DIMENSIONS = {
-    "pressure": "pressure", "least_pressure": "pressure", "greatest_pressure": "pressure", "head": "head",
+    "pressure": "pressure", "min_pressure": "pressure", "max_pressure": "pressure", "head": "head",
     "velocity": "velocity", "speed": "velocity", "flow": "flow",
 }  # fmt: skip
 SILENT = {"pressure": "bar"}  # units of pictures if `[output]` sets none: pressures in Pa are hard to read

@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.output.envelope import with_start
 
-ALONG = ("distance", "elevation", "least_pressure", "t_least", "greatest_pressure", "t_greatest")
+ALONG = ("distance", "elevation", "min_pressure", "t_min", "max_pressure", "t_max")
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,10 @@ class Met:
     part: str
     distance: np.ndarray
     elevation: np.ndarray
-    least: np.ndarray
-    t_least: np.ndarray
-    greatest: np.ndarray
-    t_greatest: np.ndarray
+    minimum: np.ndarray
+    t_min: np.ndarray
+    maximum: np.ndarray
+    t_max: np.ndarray
 
 
 def met(model, summary, extent) -> list[Met]:
@@ -55,7 +55,7 @@ def met(model, summary, extent) -> list[Met]:
 def valid(part: Met, until: float) -> Met:
     """Places of a part, with nan for extremes from a time on."""
     sides = {side: np.where(getattr(part, f"t_{side}") < until, getattr(part, side), np.nan)
-             for side in ("least", "greatest")}  # fmt: skip
+             for side in ("minimum", "maximum")}  # fmt: skip
     return replace(part, **sides)
 
 
@@ -77,7 +77,7 @@ def in_quantity(model, quantity: str, pressure, elevation):
 
 
 def pressure_of(model, quantity: str, value: float, elevation):
-    """Absolute pressure [Pa] for a quantity of pressure [SI]; nan below the least pressure of the fluid."""
+    """Absolute pressure [Pa] for a quantity of pressure [SI]; nan below the minimum pressure of the fluid."""
     if quantity == "pressure":
         return value
     if quantity == "gauge_pressure":

@@ -45,10 +45,10 @@ class Extremes(NamedTuple):
     Values of a diverged run from the time at which it is not valid are left out.
     """
 
-    least: float
-    t_least: float
-    greatest: float
-    t_greatest: float
+    minimum: float
+    t_min: float
+    maximum: float
+    t_max: float
 
 
 class Expectation(NamedTuple):
@@ -73,7 +73,7 @@ class LimitVerdict(NamedTuple):
 
     state : `holds`; `fails` if it is exceeded; `open` if the run cannot decide, or if the error at a place exceeds its
     margin; ok : True if it holds; margin : distance from the limit, negative beyond it
-    bound : "least" or "greatest"; until : end time of the run
+    bound : "minimum" or "maximum"; until : end time of the run
     error : bound of the error of `value`, None without an error estimate; reason : cause of a large or unknown error
     worst : entries of the worst places, a row for each bound of each part
     """
@@ -198,7 +198,7 @@ class Result(Shown):
 
     @cached_property
     def envelope(self) -> dict:
-        """Pipe -> distance, elevation, least and greatest pressure and head, times: float64[cells]."""
+        """Pipe -> distance, elevation, least and maximum pressure and head, times: float64[cells]."""
         tables = self._read_envelope()
         for arrays in tables.values():
             for array in arrays.values():
@@ -207,7 +207,7 @@ class Result(Shown):
 
     @cached_property
     def routes(self) -> dict:
-        """Route -> chainage, pipe, distance, elevation, least and greatest pressure and head, times, along it."""
+        """Route -> chainage, pipe, distance, elevation, least and maximum pressure and head, times, along it."""
         from fvsolve.output.routes import along_routes
 
         return along_routes(self.envelope, self.case)
@@ -277,7 +277,7 @@ class Result(Shown):
 
     @door(path=PATH)
     def plot_envelope(self, path=None):
-        """Figure (matplotlib) of least and greatest head along the pipes, also written to `path` if given."""
+        """Figure (matplotlib) of least and maximum head along the pipes, also written to `path` if given."""
         from fvsolve.draw.plot import envelope_figure
 
         return kept(envelope_figure(**self.envelope_drawn()), path)

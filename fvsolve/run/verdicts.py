@@ -96,7 +96,7 @@ def nearest(model, summary, limit, part: Met, complete: bool):
     """For every bound of a limit, the place of a part nearest to it, or most beyond it."""
     quantity = limit.extent.quantity
     for bound, (values, times), sign in zip(
-        ("least", "greatest"), extremes(model, quantity, part), (1.0, -1.0), strict=True
+        ("minimum", "maximum"), extremes(model, quantity, part), (1.0, -1.0), strict=True
     ):
         bounds = allowed(model, limit, bound, part)
         if bounds is None:
@@ -106,7 +106,7 @@ def nearest(model, summary, limit, part: Met, complete: bool):
         unknown = np.isnan(margin) | (margin == np.inf)
         at = int(np.argmin(np.where(unknown, -tolerance, margin)))
         state = FAILS if margin[at] < -tolerance[at] else HOLDS if complete and not unknown[at] else OPEN
-        if state == FAILS and bound == "least" and bounds[at] == cavity_of(model, quantity, part.elevation[at]):
+        if state == FAILS and bound == "minimum" and bounds[at] == cavity_of(model, quantity, part.elevation[at]):
             at = opened(summary, part, margin, at)
         yield Nearest(float(margin[at]), float(values[at]), float(bounds[at]), bound, float(times[at]), part, at, state,
                       margin, bounds)  # fmt: skip
@@ -129,13 +129,13 @@ def allowed(model, limit, bound: str, part: Met):
     which a place counts as a cavity.
     """
     case, quantity, value = model.case, limit.extent.quantity, getattr(limit, bound)
-    if bound == "greatest" and limit.share_of_class is not None:
-        value = limit.share_of_class * case.links[part.part].allowable_pressure
+    if bound == "maximum" and limit.class_fraction is not None:
+        value = limit.class_fraction * case.links[part.part].allowable_pressure
         return in_quantity(model, quantity, value + case.ambient_pressure, part.elevation)
     if isinstance(value, str):
         pressure = case.ambient_pressure if value == VACUUM else case.law.cavity_pressure
         return in_quantity(model, quantity, pressure, part.elevation)
-    if value is None or bound == "greatest" or quantity not in OF_PRESSURE or not case.law.cavitates:
+    if value is None or bound == "maximum" or quantity not in OF_PRESSURE or not case.law.cavitates:
         return value
     above = pressure_of(model, quantity, value, part.elevation) > (1.0 + NEAR) * case.properties.vapor_pressure
     return np.where(above, value, cavity_of(model, quantity, part.elevation))
@@ -161,15 +161,15 @@ def extremes(model, quantity: str, part: Met):
     """Least and greatest of a quantity, or of its magnitude, at the places of a part, each with its times."""
     if quantity in OF_PRESSURE:
         low, high = (
-            in_quantity(model, quantity, pressures, part.elevation) for pressures in (part.least, part.greatest)
+            in_quantity(model, quantity, pressures, part.elevation) for pressures in (part.minimum, part.maximum)
         )
-        return (low, part.t_least), (high, part.t_greatest)
+        return (low, part.t_min), (high, part.t_max)
     if quantity not in MAGNITUDES:
-        return (part.least, part.t_least), (part.greatest, part.t_greatest)
-    changes_sign, reversed = (part.least <= 0.0) & (part.greatest >= 0.0), -part.least > part.greatest
-    low = np.where(changes_sign, 0.0, np.minimum(abs(part.least), abs(part.greatest)))
-    t_low = np.where(changes_sign, np.nan, np.where(reversed, part.t_greatest, part.t_least))
-    high, t_high = np.where(reversed, -part.least, part.greatest), np.where(reversed, part.t_least, part.t_greatest)
+        return (part.minimum, part.t_min), (part.maximum, part.t_max)
+    changes_sign, reversed = (part.minimum <= 0.0) & (part.maximum >= 0.0), -part.minimum > part.maximum
+    low = np.where(changes_sign, 0.0, np.minimum(abs(part.minimum), abs(part.maximum)))
+    t_low = np.where(changes_sign, np.nan, np.where(reversed, part.t_max, part.t_min))
+    high, t_high = np.where(reversed, -part.minimum, part.maximum), np.where(reversed, part.t_min, part.t_max)
     return (low, t_low), (high, t_high)
 
 

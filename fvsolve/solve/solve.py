@@ -201,16 +201,16 @@ class Run:
 
     def widen(self, rows: np.ndarray) -> None:
         """Update the extremes by rows between steps, which are as accurate as steps; so no row exceeds the extremes."""
-        least, t_least, greatest, t_greatest = self.slate.extremes
+        least, t_min, greatest, t_max = self.slate.extremes
         t, values = rows[:, 0], rows[:, 1:]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
         lower = (extreme := values[at, each]) < least
         if lower.any():
-            least[lower], t_least[lower] = extreme[lower], t[at][lower]
+            least[lower], t_min[lower] = extreme[lower], t[at][lower]
         at = values.argmax(axis=0)
         higher = (extreme := values[at, each]) > greatest
         if higher.any():
-            greatest[higher], t_greatest[higher] = extreme[higher], t[at][higher]
+            greatest[higher], t_max[higher] = extreme[higher], t[at][higher]
 
     def look(self, t: float, y: np.ndarray) -> None:
         """Pass a state to the checks of basins."""

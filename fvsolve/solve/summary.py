@@ -221,11 +221,11 @@ def find_envelope(run_data: Slate) -> dict[str, dict[str, np.ndarray]]:
 
 def described(model: Model, pipe, distance, elevation, extremes) -> dict[str, np.ndarray]:
     """Envelope of a pipe from (least, times, greatest, times) of its pressures."""
-    least, t_least, greatest, t_greatest = extremes
+    least, t_min, greatest, t_max = extremes
     return {
-        "distance": distance, "elevation": elevation, "least_pressure": least, "t_least": t_least,
-        "greatest_pressure": greatest, "t_greatest": t_greatest,
-        "least_head": model.head(least, elevation), "greatest_head": model.head(greatest, elevation),
+        "distance": distance, "elevation": elevation, "min_pressure": least, "t_min": t_min,
+        "max_pressure": greatest, "t_max": t_max,
+        "min_head": model.head(least, elevation), "max_head": model.head(greatest, elevation),
     }  # fmt: skip
 
 

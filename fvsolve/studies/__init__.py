@@ -12,7 +12,7 @@ _HOMES = {  # public name -> module of this package
     "chart": "accuracy.chart",
     "optimise": "closing",
     "energy": "energy.energy",
-    "failures": "failure.failure_map",
+    "failure_map": "failure.failure_map",
     "fit": "accuracy.fit",
     "ladder": "accuracy.models",
     "limit_of": ".limits.grid",

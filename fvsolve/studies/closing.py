@@ -98,7 +98,7 @@ def optimise(
     """Find the piecewise-linear schedule with inner knots that gives the least peak.
 
     key : key of a schedule between two values, such as a ramp; minimise : a quantity as in `[expect]`, such as
-    "max(gate.pressure)" or "greatest(main.head)". The result is monotonic, with the end values and the duration of the
+    "max(gate.pressure)" or "max(main.head)". The result is monotonic, with the end values and the duration of the
     original schedule. Simplex searches (Nelder and Mead 1965) start from schedules that are linear, fast first and
     slow first. Raises CaseError for an invalid case or an unsuitable key, FvsolveError if no run has a finite peak.
     """
@@ -137,7 +137,7 @@ def asked(case: Case | None, key: str, minimise: str, knots: int, runs: int) -> 
             Fault("runs", f"{runs} are too few. Expected {fewest} or more for {fewest // len(STARTS) - 2} knots")
         )
     if case is not None:
-        with gathered(faults, f"--law {key}"):
+        with gathered(faults, f"--schedule {key}"):
             span_of(case, key)
         load_faults: list[Fault] = []
         with gathered(load_faults):

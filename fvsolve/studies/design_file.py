@@ -15,7 +15,7 @@ from fvsolve.case.raw import dotted, syntax_fault
 from fvsolve.errors import CaseError, Fault, did_you_mean
 from fvsolve.units import show
 
-KEYS = ("case", "title", "error", "events", "protections")
+KEYS = ("case", "title", "estimate_error", "events", "protections")
 DEEP = ("nodes", "links", "limits", "routes", "scalars", "defaults")  # tables of named parts: keys are set one by one
 Say = Callable[[tuple, str], None]
 
@@ -59,7 +59,7 @@ def read_design(path: str | Path) -> Design:
     for key in data:
         if key not in KEYS:
             fault((key,), f"unknown key{did_you_mean(key, KEYS) or '. Expected ' + ', '.join(KEYS)}")
-    for key, kind, kind_text in (("title", str, "text"), ("error", bool, "true or false")):
+    for key, kind, kind_text in (("title", str, "text"), ("estimate_error", bool, "true or false")):
         if not isinstance(data.get(key, kind()), kind):
             fault((key,), f"{show(data[key])} is not {kind_text}")
     sets = {group: read_sets(data.get(group, {}), group, fault) for group in ("events", "protections")}
@@ -69,7 +69,7 @@ def read_design(path: str | Path) -> Design:
         text = f"{key} is set here, and {other} in protections.{protection}; the two are in conflict"
         fault(("events", event, key), text)
     place = studied(data.get("case"), path.parent, fault)
-    design = Design(path.stem, path, data.get("title", ""), place, data.get("error", False), **sets)
+    design = Design(path.stem, path, data.get("title", ""), place, data.get("estimate_error", False), **sets)
     if place is not None:
         run_faults(design, fault)
     if faults:

@@ -205,9 +205,7 @@ def ranges(values: np.ndarray) -> np.ndarray:
 
 def spans_of(envelope: Mapping[str, Mapping]) -> dict[str, float]:
     """Pipe -> range of its pressure over a run [Pa], from the envelope."""
-    pressures = {
-        name: np.append(entry["least_pressure"], entry["greatest_pressure"]) for name, entry in envelope.items()
-    }
+    pressures = {name: np.append(entry["min_pressure"], entry["max_pressure"]) for name, entry in envelope.items()}
     return {name: float(ranges(entry)) for name, entry in pressures.items()}
 
 

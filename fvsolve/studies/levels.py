@@ -24,7 +24,7 @@ def finer(case, times: float) -> dict[str, Any]:
     if numerics.rtol is not None:
         keys["numerics.rtol"] = min(numerics.rtol / times**2, 0.5)
     if lines(case):
-        keys["numerics.accuracy"] = min(numerics.accuracy / times, 0.5)
+        keys["numerics.delay_tolerance"] = min(numerics.delay_tolerance / times, 0.5)
         keys |= finer_steps(case, times)
     return keys | settled(case)
 

@@ -22,7 +22,7 @@ EXACT = "delay lines are exact here, at any step and stretch: rows are exact to 
 
 def lines(case) -> list[str]:
     """Names of pipes that are delay lines. With `fixed_choices` in the case, no pipe is left to `auto`."""
-    return [name for name, pipe in followed(case).items() if pipe.line == "delay"]
+    return [name for name, pipe in followed(case).items() if pipe.pipe_model == "delay-line"]
 
 
 def slowest(case) -> str:
@@ -34,17 +34,19 @@ def settled(case) -> dict[str, str]:
     """Overrides that fix the present choice of `auto` for each pipe, independent of the changes of a study."""
     from fvsolve.run import model_of
 
-    undecided = [name for name in lines(case) if (case.links[name].line or case.numerics.line) == "auto"]
+    undecided = [name for name in lines(case) if (case.links[name].pipe_model or case.numerics.pipe_model) == "auto"]
     if not undecided:
         return {}
     model = model_of(case)
     pairs = zip(model.pipes, model.tables.pipes["delay"] >= 0, strict=True)
-    return as_lines({pipe.name: "delay" if delayed else "cells" for pipe, delayed in pairs if pipe.name in undecided})
+    return as_lines(
+        {pipe.name: "delay-line" if delayed else "finite-volume" for pipe, delayed in pairs if pipe.name in undecided}
+    )
 
 
 def in_cells(names: Iterable[str]) -> dict[str, str]:
     """Overrides that replace these delay lines, all lines of the case, by cells."""
-    return {"numerics.line": "cells"} | as_lines(dict.fromkeys(names, "cells"))
+    return {"numerics.pipe_model": "finite-volume"} | as_lines(dict.fromkeys(names, "finite-volume"))
 
 
 def cells_for_lines(case, step: float) -> dict:
@@ -60,8 +62,8 @@ def cells_for_lines(case, step: float) -> dict:
 
 
 def as_lines(chosen: dict[str, str]) -> dict[str, str]:
-    """Overrides of the pipe models; chosen : pipe -> "cells" or "delay"."""
-    return {f"links.{name}.line": line for name, line in chosen.items()}
+    """Overrides of the pipe models; chosen : pipe -> "finite-volume" or "delay-line"."""
+    return {f"links.{name}.pipe_model": line for name, line in chosen.items()}
 
 
 def averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:

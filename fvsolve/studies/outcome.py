@@ -27,7 +27,7 @@ class Outcome:
     """Outcome of a run, in SI; that of a refused case has only its reason.
 
     y : float64[n]  last state; rows : float64[k, 1 + probes]  time [s], then the probes named in `probes`
-    envelope : pipe -> "least_pressure", "greatest_pressure" [Pa], ... of its cells over the run
+    envelope : pipe -> "min_pressure", "max_pressure" [Pa], ... of its cells over the run
     counts : steps, rejections, rhs, ...; seconds : time of stepping alone [s]; processor : its CPU time [s]
     slate : `RunData` of the run; lines : wave sums of delay lines at the end, see `delay_line_keys.line_averages`
     """

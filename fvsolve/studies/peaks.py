@@ -26,7 +26,7 @@ from fvsolve.studies.unresolved import NAMED, WIDE, Unresolved, parted
 LEVELS = (0.5, 1.0, 2.0)
 LEAST = 5e-6  # least relative error, from iterations, interpolated rows and nearly decayed oscillations
 ROUNDING = 1e-12  # rounding error relative to the greatest value in that unit (for angles at least 1 rad)
-SIGNS = {"least": -1.0, "greatest": 1.0}
+SIGNS = {"minimum": -1.0, "maximum": 1.0}
 SIDES = tuple(SIGNS)
 QUIET = {"output.fields": 0, "output.lines": {}}
 FEWEST_ROWS, MOST_ROWS = 500, 4000  # limits of the number of rows of signals, at the resolution of the run itself
@@ -125,7 +125,7 @@ def peaks(result: Result, runs: dict[float, Result], unresolved: Unresolved) -> 
             triple = values(runs, lambda run, n=name, s=side: run.summary["extremes"][n][s], sign)
             unknown = parts[name] in unresolved.unknown
             error = None if unknown else bounded(runs, triple, [signals(runs, name, lambda v, sign=sign: sign * v)])
-            span = (extreme["greatest"] or 0.0) - (extreme["least"] or 0.0)
+            span = (extreme["maximum"] or 0.0) - (extreme["minimum"] or 0.0)
             if error is not None:
                 least = 2.0 * (missed + ROUNDING * largest[extreme["unit"]]) + LEAST * abs(extreme[side])
                 error += least + abs(sign * extreme[side] - triple[1]) + unresolved.tolerance * span
@@ -180,7 +180,7 @@ def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], u
 
 def of_claim(runs: dict[float, Result], expect: Any, k: int, peak_rows: dict[str, Any]) -> float | None:
     """Error of the value of an expectation: that of a peak, or from three values alone."""
-    side = {"min": "least", "least": "least", "max": "greatest", "greatest": "greatest"}.get(expect.function)
+    side = {"min": "minimum", "max": "maximum"}.get(expect.function)
     if side is not None and expect.probe is not None and expect.probe.text in peak_rows:
         return peak_rows[expect.probe.text][side]["error"]
     triple = values(runs, lambda run: run.summary["expectations"][k]["found"])
@@ -207,7 +207,7 @@ def order(triple: Sequence[float | None], separated: bool) -> float | None:
 def between_rows(result: Result, probe: str, side: str) -> float:
     """Height of a smooth peak above the highest row, an eighth of the second difference of rows."""
     t, v = result.t, result[probe]
-    position = int(np.argmin(v) if side == "least" else np.argmax(v))
+    position = int(np.argmin(v) if side == "minimum" else np.argmax(v))
     if not 0 < position < len(v) - 1 or t[position - 1] == t[position] or t[position] == t[position + 1]:
         return 0.0
     return abs(float(v[position - 1] - 2.0 * v[position] + v[position + 1])) / 8.0

@@ -78,10 +78,10 @@ def row_of(model, summary, sink) -> dict[str, Any]:
     row["fluid"] = plain(model.case.properties.plain())
     blown, last = grown(summary.reason), sink.last  # values of a diverged run are meaningless
     for k, column in enumerate(sink.columns):
-        least, t_least, greatest, t_greatest = summary.extremes[column.name]
+        least, t_min, greatest, t_max = summary.extremes[column.name]
         name, unit = column.name, f"[{column.unit}]"
-        entries = {f"min({name}) {unit}": column.from_si(least), f"t_min({name}) [s]": t_least}
-        entries |= {f"max({name}) {unit}": column.from_si(greatest), f"t_max({name}) [s]": t_greatest}
+        entries = {f"min({name}) {unit}": column.from_si(least), f"t_min({name}) [s]": t_min}
+        entries |= {f"max({name}) {unit}": column.from_si(greatest), f"t_max({name}) [s]": t_max}
         entries[f"final({name}) {unit}"] = last[1 + k]
         row |= {key: None if blown else plain(float(x)) for key, x in entries.items()}
     expectations = claimed_of(model, summary, sink)

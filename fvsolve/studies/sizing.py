@@ -20,7 +20,7 @@ from fvsolve.studies.peaks import peak_errors
 from fvsolve.studies.plans import bare_unit, is_known, quantity_of
 from fvsolve.units import UNITS, show
 
-GOALS = ("least", "greatest")
+GOALS = ("minimum", "maximum")
 LOOKS = 8  # greatest number of trials between two ends if limits fail at both
 MOST_RUNS = 60
 EDGE = 0.1  # least distance of the next value from the ends of the bracket, as a fraction of its width
@@ -118,7 +118,7 @@ class Sizing:
             try:
                 overrides[tied] = float(np.asarray(rule(np.array([x]), np.array([0.0])))[0])
             except ValueError as error:
-                raise CaseError([Fault(f"--tie {tied}", str(error))], self.case.name) from None
+                raise CaseError([Fault(f"--dependent {tied}", str(error))], self.case.name) from None
         return overrides
 
     def __call__(self, value: float) -> SizeRun:
@@ -145,7 +145,7 @@ class Sizing:
 
     def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
         """(value, bracket) with the least or greatest value that holds; (None, None) if no value holds."""
-        best, opposite = (low, high) if goal == "least" else (high, low)
+        best, opposite = (low, high) if goal == "minimum" else (high, low)
         if self(best).ok:
             return best, None
         good = opposite if self(opposite).ok else self.between()
@@ -212,7 +212,7 @@ def relative(row: Mapping[str, Any], quantity: str) -> float:
 
 
 def size(
-    case, key: str, low: Any, high: Any, goal: str = "least", ties: Mapping[str, str] | None = None,
+    case, key: str, low: Any, high: Any, goal: str = "minimum", ties: Mapping[str, str] | None = None,
     set: Mapping[str, Any] | None = None, rtol: float = 0.01, progress: Callable | None = None, error: bool = False,
 ) -> Size:  # fmt: skip
     """Find the least (or greatest) value of a key between `low` and `high` at which all limits of a case hold.
@@ -254,18 +254,18 @@ def asked(
         if case is not None and is_known(case.raw, key) and quantity_of(case.raw, key) is None:
             raise ValueError("has words or whole numbers as values, so it has no range. Use a sweep")
     for name, text in ties.items():
-        with gathered(faults, f"--tie {name}"):
+        with gathered(faults, f"--dependent {name}"):
             Arithmetic(text)
             if name == key:
                 raise ValueError("is the key that is sized. Expected another key")
     if case is not None and not case.limits:
-        text = 'states no [limits] to satisfy. Expected for example { on = "pipes", greatest = "10 barg" }'
+        text = 'states no [limits] to satisfy. Expected for example { on = "pipes", maximum = "10 barg" }'
         faults.append(Fault("", f"{case.name} {text}"))
     if case is not None and span and len(faults) == count + (not case.limits):
         run_faults: list[Fault] = []
         with gathered(run_faults):
-            load(case, Sizing(case, key, unit, ties, None).keys(high if goal == "greatest" else low))
-        options = {key: "--vary", **dict.fromkeys(ties, "--tie")}
+            load(case, Sizing(case, key, unit, ties, None).keys(high if goal == "maximum" else low))
+        options = {key: "--vary", **dict.fromkeys(ties, "--dependent")}
         faults += [Fault(f"{options[run_fault.place]} {run_fault.place}", run_fault.message)
                    if run_fault.place in options else run_fault
                    for run_fault in run_faults]  # fmt: skip
@@ -280,9 +280,9 @@ def tied(texts: Sequence[str]) -> dict[str, str]:
         key, equals, rule = (part.strip() for part in text.partition("="))
         if not (equals and key and rule):
             example = '"nodes.vessel.gas_volume = x / 2"'
-            faults.append(Fault(f"--tie {text}", f'expected "KEY = formula of x", for example {example}'))
+            faults.append(Fault(f"--dependent {text}", f'expected "KEY = formula of x", for example {example}'))
         elif key in ties:
-            faults.append(Fault(f"--tie {text}", f"{key} is given before as {ties[key]}. Give it once"))
+            faults.append(Fault(f"--dependent {text}", f"{key} is given before as {ties[key]}. Give it once"))
         ties.setdefault(key, rule)
     if faults:
         raise CaseError(faults)

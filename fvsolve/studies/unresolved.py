@@ -17,7 +17,9 @@ from fvsolve.studies.lines import lines
 
 Part = tuple[str, str]  # group and name
 MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in tolerances of a step
-SMOOTHED = 0.05  # effect of jumps below a quarter of numerics.accuracy, smoothed over a step, relative to that key
+SMOOTHED = (
+    0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, relative to that key
+)
 FEW = 4  # least number of cells for which half the resolution differs
 NAMED = 3  # greatest number of names in a text
 WIDE = 0.05  # error relative to the span of a signal above which a reason is given
@@ -75,7 +77,7 @@ class Unresolved:
         self.unknown = unknown_parts(case)
         self.tolerance = 0.0
         if case.numerics.rtol is not None and lines(case):
-            self.tolerance = max(MANY_STEPS * case.numerics.rtol, SMOOTHED * case.numerics.accuracy)
+            self.tolerance = max(MANY_STEPS * case.numerics.rtol, SMOOTHED * case.numerics.delay_tolerance)
         liquid = ["column separation, so no order is assumed; use more cells"] if parted(runs) else []
         self.shared = [*liquid, *differing(runs), *few_beside_answers(case)]
 

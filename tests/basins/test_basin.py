@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies.accuracy.models import ladder
-from fvsolve.studies.failure.failure_map import failures
+from fvsolve.studies.failure.failure_map import failure_map
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 
@@ -245,7 +245,7 @@ def test_what_basins_do_not_go_with_yet_is_said():
     case = alone(basin((4.0, 2.0), (8, 4), 0.2), 1.0)
     with pytest.raises(CaseError, match="one density"):
         fvsolve.load(case | {"fluid": {**case["fluid"], "law": "log"}})
-    for study in (ladder, lambda case: failures(fvsolve.load(case))):
+    for study in (ladder, lambda case: failure_map(fvsolve.load(case))):
         with pytest.raises(FvsolveError, match="basins"):
             study(case)
 

@@ -127,7 +127,7 @@ def faults(**more):
 
 basin = case["nodes"]["belt"]
 said = {"unknown": faults()}
-fvsolve.register(sys.argv[1])
+fvsolve.register_part(sys.argv[1])
 slowly = {**case["numerics"], "method": "radau-iia-5", "courant": 0.5}
 for name, numerics in {"exact": case["numerics"], "implicit": slowly}.items():
     run = fvsolve.run({**case, "numerics": numerics})

@@ -31,7 +31,7 @@ ODD: dict[tuple, Any] = {  # path of a key -> what cannot stand there
     ("defaults", "pipe", "colour"): "red",
     ("routes", "way", "pipes"): ["main", "tial"],
     ("limits", "high", "on"): "wya",
-    ("limits", "quick", "greatest"): "9 bar",
+    ("limits", "quick", "maximum"): "9 bar",
     ("numerics", "method"): "rk44",
     ("output", "every"): "3 m",
     ("output", "units", "pressure"): "m3/h",
@@ -62,8 +62,8 @@ def whole() -> dict:
         "scalars": {"dye": {"unit": "g"}},
         "defaults": {"pipe": {"minor_loss": 1.0}},
         "routes": {"way": {"pipes": ["main", "tail"]}},
-        "limits": {"high": {"on": "way", "greatest": "30 bar"},
-                   "quick": {"on": ["main", "tail"], "quantity": "velocity", "greatest": "9 m/s"}},
+        "limits": {"high": {"on": "way", "maximum": "30 bar"},
+                   "quick": {"on": ["main", "tail"], "quantity": "velocity", "maximum": "9 m/s"}},
         "expect": {"max(gate.pressure)": {"value": 1e6, "rtol": 10.0}},
     }  # fmt: skip
 
@@ -110,7 +110,7 @@ def test_faults_that_follow_from_another_are_not_told() -> None:
 def test_a_basin_without_a_mesh_hides_nothing(cells: Any) -> None:
     with pytest.raises(fvsolve.CaseError) as error:
         fvsolve.load("basin-draining", {"nodes.pool.cells": cells, "output.units": {"pressure": "m3/h"},
-                                        "limits.high": {"on": "outsied", "greatest": 1.0}})  # fmt: skip
+                                        "limits.high": {"on": "outsied", "maximum": 1.0}})  # fmt: skip
     assert sorted(one.place for one in error.value.faults) == [
         "limits.high.on", "nodes.pool.cells", "output.units.pressure"]  # fmt: skip
 

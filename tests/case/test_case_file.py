@@ -168,7 +168,7 @@ def dressed(tmp_path, **changes):
                 "friction": {"model": "hazen-williams", "coefficient": 120},
             },
             "stiff": {
-                "type": "pipe", "from": "well", "to": "gate", "length": 10, "diameter": 0.1, "wall": "stiff",
+                "type": "pipe", "from": "well", "to": "gate", "length": 10, "diameter": 0.1, "wall": "rigid",
             },
             "riser": {"type": "rigid-column", "from": "gate", "to": "tower", "length": 10, "diameter": 0.1},
             "gate": {
@@ -308,7 +308,7 @@ def test_a_case_goes_through_pickle_and_back(scene):
         ),
         # a key takes the place of the one it stands for
         ("numerics.step", "1 ms", lambda case: case.numerics.step == 1e-3 and case.numerics.courant is None),
-        ("links.main.wall", "stiff", lambda case: case.links["main"].wave_speed is None),
+        ("links.main.wall", "rigid", lambda case: case.links["main"].wave_speed is None),
         ("nodes.lake.pressure", "4 barg", lambda case: case.nodes["lake"].head is None),
         ("links.main.friction.factor", "0.02", lambda case: case.links["main"].friction.roughness is None),
         # a new part may come in whole

@@ -249,7 +249,7 @@ BAD = {
         "line 32: links.valve: size is missing; expected area, diameter, Kv or Cv",
     ),
     "wall and wave speed": (
-        add("links.main", 'wall = "stiff"'),
+        add("links.main", 'wall = "rigid"'),
         "links.main.wall: wave_speed and wall are given",
     ),
     "roughness and factor": (
@@ -310,7 +310,7 @@ BAD = {
     ),
     "wall of a word": (
         swap('wave_speed = "1219.2 m/s"', 'wall = "soft"'),
-        'links.main.wall: "soft" is not a wall; expected "stiff"',
+        'links.main.wall: "soft" is not a wall; expected "rigid"',
     ),
     "gauge modulus": (swap('"2.2 GPa"', '"2.2 barg"'), 'fluid.bulk_modulus: "2.2 barg" is a gauge pressure'),
     "position": (add("nodes.gate", "position = [1]"), "nodes.gate.position: [1] has 1 values; expected 2"),

@@ -38,11 +38,11 @@ def judged(case: dict) -> dict:
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_planted_exceedance_is_found_at_its_chainage_and_time(turned: bool) -> None:
     routes = {"line": {"pipes": ["low", "high"], "start": "5 km"}}
-    limits = {"top": {"on": "line", "greatest": "14 bar"}, "vacuum": {"on": "pipes", "least": "vacuum"}}
+    limits = {"top": {"on": "line", "maximum": "14 bar"}, "vacuum": {"on": "pipes", "minimum": "vacuum"}}
     found = judged(shut(turned, routes=routes, limits=limits))
     top = found["top"]
     highest = AMBIENT + RHO * GRAVITY * HEAD + JUMP  # at the bottom, but behind the lake's own end, which knows no rise
-    assert not top.ok and top.place == "low" and top.unit == "Pa" and top.bound == "greatest"
+    assert not top.ok and top.place == "low" and top.unit == "Pa" and top.bound == "maximum"
     assert top.chainage == pytest.approx(5025.0)  # the first cell
     z = 20.0 * 25.0 / LENGTH
     assert top.value == pytest.approx(highest - RHO * GRAVITY * z, rel=1e-12)
@@ -60,7 +60,7 @@ def test_a_picture_has_it_where_it_stands_whatever_the_unit_and_however_the_pipe
     """Lengths in feet, the pipe cut by a device, the limit on pipes and not on the route: one chainage everywhere."""
     found = []
     for more in ({}, {"tap": {"type": "junction", "on": "low", "at": "250 m"}}):
-        case = shut(turned, limits={"top": {"on": ["low", "high"], "greatest": "14 bar"}},
+        case = shut(turned, limits={"top": {"on": ["low", "high"], "maximum": "14 bar"}},
                     routes={"line": {"pipes": ["low", "high"], "start": "5 km"}})  # fmt: skip
         case["nodes"] |= more
         case["output"]["units"] = {"length": "ft"}
@@ -76,7 +76,7 @@ def test_a_picture_has_it_where_it_stands_whatever_the_unit_and_however_the_pipe
 
 def test_among_the_nodes_a_reservoir_is_not_judged() -> None:
     """Its pressure is given, perhaps at no elevation of its own: here it stands at its head, under no pressure."""
-    case = shut(limits={"low": {"on": "nodes", "quantity": "pressure_head", "least": "5 m"}})
+    case = shut(limits={"low": {"on": "nodes", "quantity": "pressure_head", "minimum": "5 m"}})
     case["nodes"]["lake"] = lake(HEAD, elevation=HEAD)
     assert {one["place"] for one in judged(case)["low"].worst} == {"middle", "gate"}
     case["limits"]["low"]["on"] = "lake"
@@ -87,13 +87,13 @@ def test_the_same_limit_said_in_other_words_has_the_same_verdict() -> None:
     level = HEAD + JUMP / (RHO * GRAVITY) - 20.0 - 1.0  # a metre below what the gate meets
     gauge = RHO * GRAVITY * level
     limits = {
-        "absolute": {"on": "gate", "greatest": gauge + AMBIENT},
-        "gauge": {"on": ["gate"], "quantity": "gauge_pressure", "greatest": f"{gauge / 1e5!r} bar"},
-        "barg": {"on": "nodes.gate", "quantity": "pressure", "greatest": f"{gauge / 1e5!r} barg"},
-        "above the pipe": {"on": "gate", "quantity": "pressure_head", "greatest": f"{level / 0.3048!r} ft"},
-        "head": {"on": "gate", "quantity": "head", "greatest": level + 20.0},
-        "nodes": {"on": ["middle", "gate", "gate"], "quantity": "head", "greatest": level + 20.0},
-        "pipe": {"on": "high", "quantity": "pressure_head", "greatest": level},
+        "absolute": {"on": "gate", "maximum": gauge + AMBIENT},
+        "gauge": {"on": ["gate"], "quantity": "gauge_pressure", "maximum": f"{gauge / 1e5!r} bar"},
+        "barg": {"on": "nodes.gate", "quantity": "pressure", "maximum": f"{gauge / 1e5!r} barg"},
+        "above the pipe": {"on": "gate", "quantity": "pressure_head", "maximum": f"{level / 0.3048!r} ft"},
+        "head": {"on": "gate", "quantity": "head", "maximum": level + 20.0},
+        "nodes": {"on": ["middle", "gate", "gate"], "quantity": "head", "maximum": level + 20.0},
+        "pipe": {"on": "high", "quantity": "pressure_head", "maximum": level},
     }
     named = {name.replace(" ", "-"): one for name, one in limits.items()}
     found = judged(shut(limits=named))
@@ -109,9 +109,9 @@ def test_the_same_limit_said_in_other_words_has_the_same_verdict() -> None:
 
 
 def test_velocity_is_limited_in_both_directions_and_flow_in_one() -> None:
-    limits = {"fast": {"on": "pipes", "quantity": "velocity", "greatest": 0.49},
-              "slow": {"on": "pipes", "quantity": "velocity", "greatest": 0.51},
-              "back": {"on": "low", "quantity": "flow", "least": -0.3 * area(DIAMETER)}}  # fmt: skip
+    limits = {"fast": {"on": "pipes", "quantity": "velocity", "maximum": 0.49},
+              "slow": {"on": "pipes", "quantity": "velocity", "maximum": 0.51},
+              "back": {"on": "low", "quantity": "flow", "minimum": -0.3 * area(DIAMETER)}}  # fmt: skip
     ahead, back = judged(shut(limits=limits)), judged(shut(turned=True, limits=limits))
     for found in (ahead, back):
         assert (found["fast"].ok, found["slow"].ok) == (False, True)
@@ -123,10 +123,10 @@ def test_velocity_is_limited_in_both_directions_and_flow_in_one() -> None:
 def test_a_limit_that_is_just_met_holds_and_every_one_of_two_bounds_counts() -> None:
     top = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) + JUMP
     low = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) - JUMP
-    for least, greatest, ok, bound in ((low, top, True, None), (low + 1.0, top + 9.0, False, "least"),
-                                       (low - 9.0, top - 1.0, False, "greatest"),
-                                       (low + 1.0, top - 2.0, False, "greatest")):  # fmt: skip
-        one = judged(shut(limits={"gate": {"on": "gate", "least": least, "greatest": greatest}}))["gate"]
+    for least, greatest, ok, bound in ((low, top, True, None), (low + 1.0, top + 9.0, False, "minimum"),
+                                       (low - 9.0, top - 1.0, False, "maximum"),
+                                       (low + 1.0, top - 2.0, False, "maximum")):  # fmt: skip
+        one = judged(shut(limits={"gate": {"on": "gate", "minimum": least, "maximum": greatest}}))["gate"]
         assert one.ok == ok
         assert bound in (None, one.bound)
 
@@ -135,7 +135,7 @@ def test_a_limit_that_is_just_met_holds_and_every_one_of_two_bounds_counts() -> 
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_no_row_is_needed_to_find_it(method: str, law: str) -> None:
     """A limit looks at every step: one row at the end has the verdict of a thousand, which tell little more."""
-    limits = {"top": {"on": "high", "greatest": 1.0e6}, "valve": {"on": "gate", "quantity": "head", "least": 30.0}}
+    limits = {"top": {"on": "high", "maximum": 1.0e6}, "valve": {"on": "gate", "quantity": "head", "minimum": 30.0}}
     verdicts = []
     for every in (4.0, 0.004):
         case = shut(limits=limits)
@@ -156,26 +156,28 @@ def test_what_lies_between_long_steps_is_judged_by_rows(method: str) -> None:
     found = fvsolve.run({
         "fluid": {"name": "Water"}, "nodes": tanks, "links": {"c": column}, "output": {"probes": ["b.level"]},
         "numerics": {"end": 60.0, "rtol": 1e-3, "method": method},
-        "limits": {"b": {"on": "b", "quantity": "level", "greatest": 2.99}},
+        "limits": {"b": {"on": "b", "quantity": "level", "maximum": 2.99}},
     })  # fmt: skip
     (verdict,) = found.verdicts
-    assert not verdict.ok and verdict.value == found.extremes["b.level"].greatest == pytest.approx(3.0, abs=2e-4)
+    assert not verdict.ok and verdict.value == found.extremes["b.level"].maximum == pytest.approx(3.0, abs=2e-4)
 
 
 def test_delay_lines_are_limited_at_the_same_places() -> None:
     limits = {
-        "top": {"on": "pipes", "greatest": 14e5},
-        "fast": {"on": "pipes", "quantity": "velocity", "greatest": 0.49},
+        "top": {"on": "pipes", "maximum": 14e5},
+        "fast": {"on": "pipes", "quantity": "velocity", "maximum": 0.49},
     }
     exact = {"scheme": "upwind", "method": "euler", "step": 0.05}
-    cells, lines = (judged(shut(limits=limits, numerics={"line": one, **exact})) for one in ("cells", "delay"))
+    cells, lines = (
+        judged(shut(limits=limits, numerics={"pipe_model": one, **exact})) for one in ("finite-volume", "delay-line")
+    )
     for name in limits:
         assert cells[name].value == pytest.approx(lines[name].value, rel=1e-9)
         assert cells[name].ok == lines[name].ok is False
 
 
 def test_a_run_that_stops_passes_no_limit(fvs, tmp_path) -> None:
-    case = shut(limits={"top": {"on": "pipes", "greatest": "100 bar"}})
+    case = shut(limits={"top": {"on": "pipes", "maximum": "100 bar"}})
     case["numerics"]["below_vapor"] = "stop"
     case["nodes"]["lake"] = lake(30.0, elevation=0.0)
     found = fvsolve.run(case)
@@ -186,7 +188,7 @@ def test_a_run_that_stops_passes_no_limit(fvs, tmp_path) -> None:
 def test_where_numbers_are_not_to_be_trusted_no_limit_holds(fvs, tmp_path, monkeypatch) -> None:
     """Below the vapour pressure at every place: one line, the first place first, and a limit is open or fails."""
     monkeypatch.chdir(tmp_path)
-    limits = {"top": {"on": "pipes", "greatest": "100 bar"}, "low": {"on": "pipes", "greatest": "5 bar"}}
+    limits = {"top": {"on": "pipes", "maximum": "100 bar"}, "low": {"on": "pipes", "maximum": "5 bar"}}
     case = shut(limits=limits)
     case["nodes"]["lake"] = lake(30.0, elevation=0.0)
     (tmp_path / "scene.toml").write_text(fvsolve.load(case).resolved())
@@ -200,7 +202,7 @@ def test_where_numbers_are_not_to_be_trusted_no_limit_holds(fvs, tmp_path, monke
 
 def test_what_goes_on_after_the_end_is_noted_and_nothing_is_sized_by_it(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    case = shut(limits={"top": {"on": "pipes", "greatest": "14 bar"}})
+    case = shut(limits={"top": {"on": "pipes", "maximum": "14 bar"}})
     flow = VELOCITY * area(DIAMETER)
     case["nodes"]["gate"]["demand"] = {"start": SHUT, "duration": 1.0, "value": [flow, 0.0]}
     (tmp_path / "scene.toml").write_text(fvsolve.load(case).resolved())
@@ -215,7 +217,7 @@ def test_what_goes_on_after_the_end_is_noted_and_nothing_is_sized_by_it(fvs, tmp
     )
     held = {"nodes.gate.demand": {"time": [0.0, 30.0], "value": [flow, flow]}}  # goes on, but changes nothing
     assert [one for one in fvsolve.run(case, set=held).warnings if one.kind == "end"] == []
-    status, text, _ = fvs("size", "scene.toml", "--vary", "nodes.gate.demand.duration=0.1 s,30 s", "--goal", "least")
+    status, text, _ = fvs("size", "scene.toml", "--vary", "nodes.gate.demand.duration=0.1 s,30 s", "--goal", "minimum")
     assert status == 0 and "open: nodes.gate.demand: continues to 30.1 s" in text
     value = float(text.split("holds all limits: ")[1].split(" s;")[0])
     assert 1.0 < value < 4.0 - SHUT and "open" in text
@@ -223,7 +225,7 @@ def test_what_goes_on_after_the_end_is_noted_and_nothing_is_sized_by_it(fvs, tmp
 
 def test_the_command_line_fails_where_a_limit_does(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    case = fvsolve.load(shut(limits={"top": {"on": "pipes", "greatest": "14 bar"}}))
+    case = fvsolve.load(shut(limits={"top": {"on": "pipes", "maximum": "14 bar"}}))
     (tmp_path / "scene.toml").write_text(case.resolved())
     status, text, _ = fvs("run", "scene.toml", "--out", "out")
     assert status == 1 and "FAILS: top" in text
@@ -231,7 +233,7 @@ def test_the_command_line_fails_where_a_limit_does(fvs, tmp_path, monkeypatch) -
     keys = {"name", "ok", "place", "chainage", "elevation", "time", "value", "limit", "margin", "unit"}
     assert keys <= set(said["verdicts"][0])
     assert said["ok"] and not said["verdicts"][0]["ok"]
-    assert fvs("run", "scene.toml", "--out", "out2", "--set", "limits.top.greatest='16 bar'")[0] == 0
+    assert fvs("run", "scene.toml", "--out", "out2", "--set", "limits.top.maximum='16 bar'")[0] == 0
     assert fvsolve.open_run("out2").verdicts[0].ok
 
 
@@ -239,10 +241,10 @@ def test_expect_reaches_whole_pipes_and_routes() -> None:
     top = AMBIENT + RHO * GRAVITY * HEAD + JUMP
     low = AMBIENT + RHO * GRAVITY * (HEAD - 20.0) - JUMP
     tight = {"rtol": 1e-9}
-    expect = {"greatest(low.pressure)": {"value": top, "rtol": 1e-2}, "least(pipes.pressure)": {"value": low, **tight},
-              "least(line.pressure)": {"value": low, **tight}, "greatest(gate.pressure)": {"value": 1.5e6, "rtol": 1.0},
-              "greatest(high.velocity)": {"value": 0.5, "rtol": 1e-9},
-              "greatest(high.pressure@0.5)": {"value": top, "rtol": 0.1}}  # fmt: skip
+    expect = {"max(low.pressure)": {"value": top, "rtol": 1e-2}, "min(pipes.pressure)": {"value": low, **tight},
+              "min(line.pressure)": {"value": low, **tight}, "max(gate.pressure)": {"value": 1.5e6, "rtol": 1.0},
+              "max(high.velocity)": {"value": 0.5, "rtol": 1e-9},
+              "max(high.pressure@0.5)": {"value": top, "rtol": 0.1}}  # fmt: skip
     found = fvsolve.run(shut(expect=expect, routes={"line": {"pipes": ["low", "high"]}}))
     assert all(one.ok for one in found.expectations), found.expectations
 
@@ -250,18 +252,18 @@ def test_expect_reaches_whole_pipes_and_routes() -> None:
 @pytest.mark.parametrize(
     ("limit", "place", "told"),
     [
-        ({"on": "hihg", "greatest": 1e6}, "on", 'did you mean "high"'),
-        ({"on": "high"}, "", "bound is missing; expected one of least, greatest, share_of_class"),
-        ({"greatest": 1e6}, "", "on is missing"),
-        ({"on": "high", "greatest": "3 m/s"}, "greatest", "is a velocity; expected a pressure"),
-        ({"on": "high", "quantity": "gas_volume", "greatest": 1.0}, "quantity", "high has no"),
-        ({"on": "high", "least": 2e6, "greatest": 1e6}, "least", "is not below greatest"),
-        ({"on": "high", "quantity": "velocity", "least": "vacuum"}, "least", "is a pressure; expected a velocity"),
-        ({"on": "high", "least": "vaccum"}, "least", 'did you mean "vacuum"'),
-        ({"on": "high", "share_of_class": 1.0}, "share_of_class", "has no pressure class"),
-        ({"on": [], "greatest": 1e6}, "on", "is not a name"),
-        ({"on": "nodes", "quantity": "level", "greatest": 2.0}, "quantity", "no node has"),
-        ({"on": "high", "top": 2.0, "greatest": 1e6}, "top", "unknown key"),
+        ({"on": "hihg", "maximum": 1e6}, "on", 'did you mean "high"'),
+        ({"on": "high"}, "", "bound is missing; expected one of least, greatest, class_fraction"),
+        ({"maximum": 1e6}, "", "on is missing"),
+        ({"on": "high", "maximum": "3 m/s"}, "maximum", "is a velocity; expected a pressure"),
+        ({"on": "high", "quantity": "gas_volume", "maximum": 1.0}, "quantity", "high has no"),
+        ({"on": "high", "minimum": 2e6, "maximum": 1e6}, "minimum", "is not below greatest"),
+        ({"on": "high", "quantity": "velocity", "minimum": "vacuum"}, "minimum", "is a pressure; expected a velocity"),
+        ({"on": "high", "minimum": "vaccum"}, "minimum", 'did you mean "vacuum"'),
+        ({"on": "high", "class_fraction": 1.0}, "class_fraction", "has no pressure class"),
+        ({"on": [], "maximum": 1e6}, "on", "is not a name"),
+        ({"on": "nodes", "quantity": "level", "maximum": 2.0}, "quantity", "no node has"),
+        ({"on": "high", "top": 2.0, "maximum": 1e6}, "top", "unknown key"),
         (3.0, "", "is not a table"),
     ],
 )  # fmt: skip
@@ -272,13 +274,13 @@ def test_what_is_wrong_is_named(limit, place: str, told: str) -> None:
     assert f"limits.one{'.' if place else ''}{place}" in str(error.value)
 
 
-DEEP = {"on": "high", "quantity": "pressure_head", "least": 1}
+DEEP = {"on": "high", "quantity": "pressure_head", "minimum": 1}
 
 
 def test_a_fluid_that_does_not_boil_limits_nothing_at_its_vapour() -> None:
-    case = shut(limits={"dry": {"on": "high", "least": "vapour"}})
+    case = shut(limits={"dry": {"on": "high", "minimum": "vapour"}})
     case["fluid"] = case["fluid"] | {"vapor_pressure": 0.0}
-    with pytest.raises(fvsolve.CaseError, match="limits.dry.least: the fluid has no vapour pressure"):
+    with pytest.raises(fvsolve.CaseError, match="limits.dry.minimum: the fluid has no vapour pressure"):
         fvsolve.load(case)
 
 
@@ -320,7 +322,7 @@ def test_a_route_runs_through_pumps_and_valves_and_against_its_pipes() -> None:
     case["nodes"] |= {"far": junction(elevation=20.0), "end": junction(elevation=25.0)}
     case["links"] |= {"tap": valve("gate", "far", 1.0), "last": pipe("end", "far", 40.0, DIAMETER, SPEED, 2)}
     case["routes"] = {"line": {"pipes": ["low", "high", "last"]}, "home": {"pipes": ["last", "high", "low"]}}
-    case["limits"] = {"end": {"on": "line", "quantity": "head", "greatest": 0.0}}
+    case["limits"] = {"end": {"on": "line", "quantity": "head", "maximum": 0.0}}
     from fvsolve.case.routes import legs
 
     found = fvsolve.load(case)
@@ -339,10 +341,10 @@ def test_a_route_is_one_table_with_a_running_chainage(tmp_path) -> None:
     one = found.routes["line"]
     assert np.array_equal(one["chainage"], 5000.0 + 25.0 + 50.0 * np.arange(20))
     assert list(one["pipe"]) == ["low"] * 10 + ["high"] * 10
-    assert np.array_equal(one["least_head"][:10], found.envelope["low"]["least_head"][::-1])
+    assert np.array_equal(one["min_head"][:10], found.envelope["low"]["min_head"][::-1])
     with open(tmp_path / "out" / "routes.csv", encoding="utf-8") as file:
         header, *rows = [line.strip().split(",") for line in file]
-    assert header[:4] == ["route", "chainage [m]", "pipe", "distance [m]"] and "least_head [ft]" in header
+    assert header[:4] == ["route", "chainage [m]", "pipe", "distance [m]"] and "min_head [ft]" in header
     assert [float(row[1]) for row in rows] == one["chainage"].tolist() and rows[0][:1] == ["line"]
     assert "routes.csv" in found.summary["files"]
     assert np.array_equal(fvsolve.open_run(tmp_path / "out").routes["line"]["chainage"], one["chainage"])

@@ -50,7 +50,7 @@ def parting(limits: dict, turned: bool = False, opening: float = 0.1, **more) ->
 @pytest.mark.parametrize("turned", [False, True])
 @pytest.mark.parametrize("quantity", [*LEAST])
 def test_a_limit_at_vapour_pressure_fails_where_a_cavity_opens(quantity: str, turned: bool) -> None:
-    limits = {f"{on} {k}": {"on": on, "quantity": quantity, "least": least}
+    limits = {f"{on} {k}": {"on": on, "quantity": quantity, "minimum": least}
               for on in ("main", "gate") for k, least in enumerate(("vapor", LEAST[quantity]))}  # fmt: skip
     result = fvsolve.run(parting(limits, turned))
     (cavity,) = result.summary["cavities"]
@@ -63,12 +63,12 @@ def test_a_limit_at_vapour_pressure_fails_where_a_cavity_opens(quantity: str, tu
 
 @pytest.mark.parametrize("quantity", [*LEAST])
 def test_it_holds_where_none_opens(quantity: str) -> None:
-    quiet = fvsolve.run(parting({"a": {"on": "main", "quantity": quantity, "least": "vapor"}}, opening=1e-3))
+    quiet = fvsolve.run(parting({"a": {"on": "main", "quantity": quantity, "minimum": "vapor"}}, opening=1e-3))
     assert not quiet.summary["cavities"] and quiet.verdicts[0].state == "holds"
     above = {
         "on": "gate",
         "quantity": "pressure",
-        "least": 1.5 * BOILS,
+        "minimum": 1.5 * BOILS,
     }  # a bound above vapour is compared by its number
     (found,) = fvsolve.run(parting({"a": above})).verdicts
     assert found.limit == 1.5 * BOILS and found.state == "fails"
@@ -98,7 +98,7 @@ def weightless(**more) -> dict:
 
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("bounds", [{"least": 1e4}, {"greatest": 1e6}, {"least": 1e4, "greatest": 1e6}])
+@pytest.mark.parametrize("bounds", [{"minimum": 1e4}, {"maximum": 1e6}, {"minimum": 1e4, "maximum": 1e6}])
 def test_a_value_that_is_no_number_never_holds(wrong: float, bounds: dict) -> None:
     """In one place of many, in both extremes; the others hold."""
     model = model_of(weightless(limits={"a": {"on": "main", **bounds}}))
@@ -106,7 +106,7 @@ def test_a_value_that_is_no_number_never_holds(wrong: float, bounds: dict) -> No
     limit = model.case.limits["a"]
     (part,) = met(model, summary, limit.extent)
     spoilt = {
-        side: np.where(np.arange(part.least.size) == 2, wrong, getattr(part, side)) for side in ("least", "greatest")
+        side: np.where(np.arange(part.minimum.size) == 2, wrong, getattr(part, side)) for side in ("minimum", "maximum")
     }
     states = {one.state for one in nearest(model, summary, limit, replace(part, **spoilt), True)}
     assert "holds" not in states and {one.state for one in nearest(model, summary, limit, part, True)} == {"holds"}
@@ -114,13 +114,13 @@ def test_a_value_that_is_no_number_never_holds(wrong: float, bounds: dict) -> No
 
 
 def test_a_place_that_is_passed_fails_beside_one_that_is_not_known() -> None:
-    rows = [{"name": "a", "quantity": "head", "until": 1.0, "state": state, "margin": margin, "bound": "least"}
+    rows = [{"name": "a", "quantity": "head", "until": 1.0, "state": state, "margin": margin, "bound": "minimum"}
             for state, margin in (("holds", 1.0), ("open", None), ("fails", -2.0))]  # fmt: skip
     assert verdict(rows)["state"] == "fails" and verdict(rows[:2])["state"] == "open"
 
 
 def test_a_claim_of_no_number_fails() -> None:
-    claims = {text: {"value": 30.0, "atol": 1e9} for text in ("max(gate.head)", "greatest(main.head)",
+    claims = {text: {"value": 30.0, "atol": 1e9} for text in ("max(gate.head)", "max(main.head)",
               "final(gate.head)", "mean(gate.head)", "at(gate.head, 0.5 s)")}  # fmt: skip
     result = fvsolve.run(weightless(expect=claims))
     assert [one.ok for one in result.expectations] == [False] * 5
@@ -145,7 +145,7 @@ def test_cycles_of_no_numbers_last_no_time() -> None:
 
 def test_a_size_counts_a_cavity_as_a_failure() -> None:
     """The quicker the tap shuts, the deeper the trough: the least time is one without a cavity."""
-    case = parting({"a": {"on": "main", "least": "vapor"}})
+    case = parting({"a": {"on": "main", "minimum": "vapor"}})
     found = size(case, "links.tap.opening.duration", "0.1 s", "20 s", rtol=0.2, set={"numerics.end": 3.0})
     assert found.value is not None and found.value > 0.1
     assert not found.runs[0].ok and not found.runs[0].open and found.runs[0].margin < 0.0

@@ -89,7 +89,7 @@ def test_drawn_the_other_way_it_is_the_same() -> None:
 
 
 def test_the_resolved_case_is_the_same_case(tmp_path) -> None:
-    case = fvsolve.load(placed(limits={"top": {"on": "main", "greatest": "20 bar"}}))
+    case = fvsolve.load(placed(limits={"top": {"on": "main", "maximum": "20 bar"}}))
     again = fvsolve.load(case.table())
     assert again == case
     one, other = fvsolve.run(case), fvsolve.run(again)
@@ -117,7 +117,7 @@ RESTATED = {
     "as it is": {},
     "by cell_time": {"cells": None},
     "no profile": {"profile": None},
-    "a delay line": {"line": "delay"},
+    "a delay line": {"pipe_model": "delay-line"},
     "a few cells": {"cells": 3},
 }
 

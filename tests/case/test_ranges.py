@@ -28,8 +28,8 @@ EXAMPLES = {  # what the docs print of cases
 
 SLIPS = {  # settings -> (place, key, value, limit, what the text says)
     "per cent of a class": (
-        {"links.main.allowable_pressure": 1e6, "limits.top": {"on": "main", "share_of_class": 100}},
-        "limits.top", "share_of_class", 100.0, 3.0, "1 is the class itself",
+        {"links.main.allowable_pressure": 1e6, "limits.top": {"on": "main", "class_fraction": 100}},
+        "limits.top", "class_fraction", 100.0, 3.0, "1 is the class itself",
     ),
     "diameter in mm": ({"links.main.diameter": 304.8}, "links.main", "diameter", 304.8, 14.0, '"304.8 mm"'),
     "diameter with its unit": ({"links.main.diameter": "300 m"}, "links.main", "diameter", 300.0, 14.0, '"300 mm"'),

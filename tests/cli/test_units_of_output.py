@@ -29,7 +29,7 @@ def cases(tmp_path_factory):
              "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 2.0, 1.0, 0.0))}  # fmt: skip
     nodes = {"top": lake(45.0), "gate": junction(), "outfall": reservoir("0 barg")}
     numerics = {"scheme": "upwind", "method": "ssp-rk2", "courant": 0.9}
-    high = {"high": {"on": "main", "quantity": "pressure", "greatest": "9 bar"}}
+    high = {"high": {"on": "main", "quantity": "pressure", "maximum": "9 bar"}}
     made, folder = scene(nodes, links, 4.0, numerics, ["gate.pressure", "valve.flow"], 0.05, limits=high), []
     for name, units in (("si", {}), ("own", UNITS)):
         folder.append(tmp_path_factory.mktemp(name) / "main.toml")
@@ -39,8 +39,9 @@ def cases(tmp_path_factory):
 
 ASKED = {
     "energy": ("--port", "gate"), "order": ("--levels", "3", "--cells", "5"), "response": ("--port", "top"),
-    "optimise": ("--law", "links.valve.opening", "--minimise", "max(gate.pressure)", "--knots", "1", "--runs", "9"),
-    "size": ("--vary", "links.valve.area=0.0009,0.001", "--goal", "greatest"),
+    "optimise": ("--schedule", "links.valve.opening", "--minimise", "max(gate.pressure)", "--knots", "1",
+                 "--runs", "9"),
+    "size": ("--vary", "links.valve.area=0.0009,0.001", "--goal", "maximum"),
     "sweep": ("--set", "links.main.length=900,950"), "check": ("--set", "numerics.end=2"),
 }  # fmt: skip
 TOLD = [  # command, a number and its unit as both print them, and how many of the one the other is
@@ -87,5 +88,5 @@ def test_a_response_is_drawn_in_the_unit_that_stands_at_it(cases):
 
 
 def test_a_number_without_a_unit_is_sized_without_one(fvs, cases):
-    code, out, _ = fvs("size", cases[0], "--vary", "links.valve.discharge_coefficient=0.5,0.6", "--goal", "greatest")
+    code, out, _ = fvs("size", cases[0], "--vary", "links.valve.discharge_coefficient=0.5,0.6", "--goal", "maximum")
     assert code == 0 and out.startswith("links.valve.discharge_coefficient  ") and "[" not in out

@@ -1,4 +1,4 @@
-"""`fvsolve warm` leaves nothing to compile, and says where it cannot."""
+"""`fvsolve precompile` leaves nothing to compile, and says where it cannot."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fvsolve import jit
 
 def warm(*words: str, **environment: str):
     """A process that warms."""
-    command = [sys.executable, "-m", "fvsolve", "warm", *words]
+    command = [sys.executable, "-m", "fvsolve", "precompile", *words]
     return subprocess.run(command, env=os.environ | environment, capture_output=True, text=True)
 
 
@@ -50,7 +50,7 @@ def test_where_nothing_can_be_kept_is_said_and_nothing_compiled(environment, nam
 
 def test_all_cases_are_read_before_any_is_compiled(tmp_path, fvs):
     (tmp_path / "bad.toml").write_text("schema = 1\nnonsense = 2\n")
-    code, _, err = fvs("warm", "--for", "two-tanks", "--for", str(tmp_path / "bad.toml"))
+    code, _, err = fvs("precompile", "--for", "two-tanks", "--for", str(tmp_path / "bad.toml"))
     assert code == 2 and "nonsense" in err
-    code, _, err = fvs("warm", "--for", "two-tankz")
+    code, _, err = fvs("precompile", "--for", "two-tankz")
     assert code == 2 and "two-tanks" in err

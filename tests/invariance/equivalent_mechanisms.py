@@ -54,7 +54,7 @@ TEXT = {
     "velocity": (3.6, "km/h"), "axis": None, "attitude": (180.0 / math.pi, "deg"), "closed_length": (1e3, "mm"),
     "stroke": (100.0, "cm"), "area_A": (1e4, "cm2"), "area_B": (1e6, "mm2"), "dead_volume_A": (1e3, "l"),
     "dead_volume_B": (1e6, "ml"), "stiffness": (1e-3, "kN/m"), "free_length": (1e3, "mm"), "preload": (1e-3, "kN"),
-    "greatest": (1e3, "mm"), "force": (1e-3, "kN"), "torque": (1e-3, "kN m"), "level": (1e3, "mm"),
+    "maximum": (1e3, "mm"), "force": (1e-3, "kN"), "torque": (1e-3, "kN m"), "level": (1e3, "mm"),
         "zone": (100.0, "cm"),
     "length": (1e3, "mm"), "diameter": (100.0, "cm"), "initial_position": (1e3, "mm"),
         "initial_velocity": (3.6, "km/h"),

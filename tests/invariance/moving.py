@@ -61,7 +61,7 @@ def machine(method: str = "rk4", law: str = "linear", **more) -> dict:
         "string": {"type": "spring", "from": "world.hook", "to": "kite.nose", "stiffness": 30.0, "free_length": 1.0},
         "strap": {"type": "spring", "from": "plate.edge", "to": "kite.tail", "stiffness": 20.0, "preload": -2.0},
         "brake": {"type": "damper", "from": "base.side", "to": "slider.tip", "damping": 2.0},
-        "rope": {"type": "end-stop", "from": "base.side", "to": "kite.tail", "greatest": 0.9, "stiffness": 40.0,
+        "rope": {"type": "end-stop", "from": "base.side", "to": "kite.tail", "maximum": 0.9, "stiffness": 40.0,
                  "damping": 0.5},
         "wind": {"type": "force", "to": "kite.nose", "force": {"mean": 1.0, "amplitude": 3.0, "period": 0.7},
                  "direction": [1, 2, 0.5]},

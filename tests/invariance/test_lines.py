@@ -1,7 +1,7 @@
 """Networks of delay lines said in another way tell the same, as those of cells do (`test_networks`).
 
 Where what is rounded decides whether a jump is kept as one, or smoothed over a step, the two are answers that differ by
-such a jump, a quarter of `numerics.accuracy` of the greatest: it is asked to be small.
+such a jump, a quarter of `numerics.delay_tolerance` of the greatest: it is asked to be small.
 """
 
 from __future__ import annotations
@@ -31,17 +31,19 @@ def nearly(case: dict) -> float:
 
 def followed(case: dict, line: str) -> dict:
     """All pipes as lines, or as `auto` finds them."""
-    return equivalent.changed(case, "numerics", line=line, accuracy=SMALL if line == "delay" else 1e-2)
+    return equivalent.changed(
+        case, "numerics", pipe_model=line, delay_tolerance=SMALL if line == "delay-line" else 1e-2
+    )
 
 
 def lines(*ways: str) -> st.SearchStrategy[dict]:
     """Networks under the law that lines know, some of whose pipes are shorter than a step."""
-    return st.builds(followed, networks(laws=("linear",)), st.sampled_from(ways or ("delay", "auto")))
+    return st.builds(followed, networks(laws=("linear",)), st.sampled_from(ways or ("delay-line", "auto")))
 
 
 def given_steps() -> st.SearchStrategy[dict]:
     """Without error control: it sees nothing of what is read between steps, and rounding decides which these are."""
-    return lines("delay").filter(lambda case: "rtol" not in case["numerics"])
+    return lines("delay-line").filter(lambda case: "rtol" not in case["numerics"])
 
 
 def told_lines(case: dict):

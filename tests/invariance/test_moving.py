@@ -219,7 +219,7 @@ def test_a_mass_on_a_cylinder_is_a_body_on_a_prismatic_joint(law, method):
                 "viscous_friction": 30.0, "closed_length": 0.1, "initial_pressure_A": 3e6,
                     "initial_pressure_B": 3.2e6}  # fmt: skip
     rest = {"spring": {"type": "spring", "stiffness": 5e3, "free_length": 0.2}, "stop": {"type": "end-stop",
-        "greatest": 0.31,
+        "maximum": 0.31,
             "stiffness": 1e6, "damping": 1e3}, "brake": {"type": "damper", "damping": 40.0}}  # fmt: skip
     push = {"type": "force", "force": {"mean": 100.0, "amplitude": 500.0, "period": 0.05}}
     probes = [

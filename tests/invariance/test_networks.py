@@ -137,9 +137,9 @@ def test_without_profiles(case):
 @given(case=networks())
 def test_limits_and_points_that_are_watched_change_nothing(case):
     """What is followed for its extremes alone is read off states, never written into them."""
-    limits = {"any": {"on": "pipes", "greatest": "1 GPa"},
-              "quick": {"on": "pipes", "quantity": "velocity", "greatest": 1e3},
-              "push": {"on": "pipes", "quantity": "force", "greatest": "1 GN"}}  # fmt: skip
+    limits = {"any": {"on": "pipes", "maximum": "1 GPa"},
+              "quick": {"on": "pipes", "quantity": "velocity", "maximum": 1e3},
+              "push": {"on": "pipes", "quantity": "force", "maximum": "1 GN"}}  # fmt: skip
     watched = told(case | {"limits": limits})
     alike(told(case), watched)
     if watched.result and watched.result.ok:

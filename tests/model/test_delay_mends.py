@@ -21,7 +21,7 @@ def ran(behind: dict, gap: dict, method: str, h: float) -> fvsolve.Result:
     """A demand stops at a dead end 0.3 s from a junction, which has a lake 0.6 s away and something behind a gap."""
     nodes = {"lake": lake(HEAD), "j": junction(), "gate": junction(step(0.1, FLOW, 0.0)), "behind": behind}
     links = {"far": pipe("lake", "j", 2 * LENGTH, BORE, SPEED, 4), "near": pipe("j", "gate", LENGTH, BORE, SPEED, 4)}
-    numerics, end = {"line": "delay", "method": method, "step": h}, 0.1 + LENGTH / SPEED + AFTER
+    numerics, end = {"pipe_model": "delay-line", "method": method, "step": h}, 0.1 + LENGTH / SPEED + AFTER
     found = fvsolve.run(scene(nodes, {**links, "gap": gap}, end, numerics, ["behind.pressure", "gap.flow"], end))
     assert found.reason == "finished"
     assert abs(found.ledger["mass"]["relative"]) < 1e-14
@@ -59,7 +59,7 @@ def test_a_store_that_fills_in_less_than_a_step_takes_no_more_than_there_is(h):
     flow, long, volume = 0.03, 317.0, 0.15
     nodes = {"lake": lake(600.0), "a": junction(step(0.0503, flow, 0.0)), "v": chamber(volume)}
     links = {"up": pipe("lake", "a", long, BORE, 1200.0, 2), "neck": pipe("a", "v", 123.0, 0.1, 1200.0, 2)}
-    numerics = {"line": "delay", "method": "trapezoid", "step": h}
+    numerics = {"pipe_model": "delay-line", "method": "trapezoid", "step": h}
     found = fvsolve.run(scene(nodes, links, 30.0, numerics, ["v.pressure"], 0.05))
     risen = np.max(np.abs(found["v.pressure"] - found["v.pressure"][0]))
     assert volume * risen**2 / (2.0 * WATER["bulk_modulus"]) < RHO * flow**2 * long / (2.0 * area(BORE))

@@ -509,7 +509,7 @@ def test_a_mass_on_an_axis_goes_to_where_its_spring_holds_what_pushes_it():
 def test_a_body_comes_to_rest_on_a_stop():
     nodes = {"floor": {"type": "frame", "points": {"a": [0, 0, 0]}},
              "box": body(5.0, [1, 1, 1], {"kind": "prismatic", "axis": [0, 0, 1], "travel": 1.0})}  # fmt: skip
-    links = {"stop": {"type": "end-stop", "from": "floor.a", "to": "box", "stiffness": 1e5, "least": 0.5},
+    links = {"stop": {"type": "end-stop", "from": "floor.a", "to": "box", "stiffness": 1e5, "minimum": 0.5},
              "soft": spring("floor.a", "box", 10.0, 1.0)}  # fmt: skip
     model = built(balanced(nodes, links))
     truth = (1e5 * 0.5 + 10.0 - 5.0 * GRAVITY) / (1e5 + 10.0)

@@ -23,7 +23,7 @@ def ladder(rungs: int, line: str) -> dict:
             before = f"{side}{k - 1}" if k else f"lake-{side}"
             links[f"{side}{k}"] = pipe(before, f"{side}{k}", 60.0, 0.3, 1200.0, 4, friction=HAZEN)
         links[f"r{k}"] = pipe(f"a{k}", f"b{k}", 60.0, 0.2, 1200.0, 4, friction=HAZEN)
-    return scene(nodes, links, 1.0, {"line": line}, ["a0.head"])
+    return scene(nodes, links, 1.0, {"pipe_model": line}, ["a0.head"])
 
 
 def effort(rungs: int, line: str) -> int:
@@ -47,7 +47,7 @@ def effort(rungs: int, line: str) -> int:
     return count
 
 
-@pytest.mark.parametrize("line", ["cells", "delay"])
+@pytest.mark.parametrize("line", ["finite-volume", "delay-line"])
 def test_four_times_the_pipes_take_less_than_four_times_the_work(line):
     effort(5, line)  # what is done once
     few, many = effort(12, line), effort(48, line)
@@ -56,7 +56,7 @@ def test_four_times_the_pipes_take_less_than_four_times_the_work(line):
 
 def test_a_ladder_of_like_halves_flows_alike_in_both():
     """A system so large that it is solved as a sparse one."""
-    model = fvsolve.build(fvsolve.load(ladder(120, "cells")))
+    model = fvsolve.build(fvsolve.load(ladder(120, "finite-volume")))
     flow = dict(zip([p.name for p in model.pipes], model.tables.pipes["flow"], strict=True))
     rho = model.case.properties.density
     drawn = rho * 1e-4 * np.arange(120, 0, -1)

@@ -28,7 +28,7 @@ def told(case, settings: dict | None = None) -> list:
 
 def peaks(settings: dict) -> list[float]:
     found = fvsolve.run("valve-closure", set=CLOSURE | settings, pictures=False).summary["extremes"]["gate.pressure"]
-    return [found["least"], found["greatest"]]
+    return [found["minimum"], found["maximum"]]
 
 
 @pytest.mark.parametrize("duration", [0.0, 0.05, 1.5, 4.0])
@@ -56,7 +56,7 @@ def test_what_is_slow_or_is_exact_needs_no_cells() -> None:
     sharp = {"numerics.scheme": "upwind", "numerics.method": "euler", "numerics.courant": 1.0}
     assert not told("valve-closure", sharp | {"links.main.cells": 4})
     assert told("valve-closure", sharp | {"links.main.cells": 4, "numerics.courant": 0.5})
-    assert not told("valve-closure", {"numerics.line": "delay", "links.main.cells": 4})
+    assert not told("valve-closure", {"numerics.pipe_model": "delay-line", "links.main.cells": 4})
 
 
 def behind_a_stub(closure: dict | float, length: float = 8.0, cells: int = 1) -> dict:
@@ -66,7 +66,7 @@ def behind_a_stub(closure: dict | float, length: float = 8.0, cells: int = 1) ->
         "short": pipe("j", "gate", length, 0.15, 1000.0, cells),
         "tap": valve("gate", "out", 1e-3, closure),
     }
-    return scene(nodes, links, 2.0, {"scheme": "muscl", "line": "cells"}, ["gate.head"])
+    return scene(nodes, links, 2.0, {"scheme": "muscl", "pipe_model": "finite-volume"}, ["gate.head"])
 
 
 def test_a_short_pipe_counts_beside_what_is_quicker_than_its_waves() -> None:

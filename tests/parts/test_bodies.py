@@ -366,7 +366,7 @@ def test_a_boom_lifted_through_valves_follows_scipy():
 def test_an_end_stop_between_points_throws_back_without_loss():
     """A bob that falls onto an elastic stop: it comes back to where it was let go."""
     drop = body(2.0, [0, 0, 0], {"kind": "prismatic", "axis": [0, 0, 1], "travel": 1.0})
-    links = {"stop": {"type": "end-stop", "from": "ground.low", "to": "drop", "stiffness": 1e5, "least": 0.75}}
+    links = {"stop": {"type": "end-stop", "from": "ground.low", "to": "drop", "stiffness": 1e5, "minimum": 0.75}}
     result = run(held(links, {"drop": drop}, 1.0, ["drop.travel", "stop.force"], every=1e-3))
     assert result["drop.travel"].min() < 0.5 and result["stop.force"].max() > 1000.0
     fall = math.sqrt(2 * 0.5 / GRAVITY)
@@ -425,7 +425,7 @@ def test_a_loop_converges_at_the_order_of_its_method():
 @pytest.mark.parametrize("share, fails", [(0.95, False), (1.03, True)])
 def test_the_pull_of_a_pin_is_a_rate_that_steps_must_bear(share, fails):
     """RK4 ends at pull h = 2.785, a double real root: predicted, then run."""
-    nodes, links = parallelogram(0.3, pull=share * 2.785 / 2e-3)
+    nodes, links = parallelogram(0.3, stabilisation=share * 2.785 / 2e-3)
     model = fvsolve.build(fvsolve.load(bodies(nodes, 2.0, ["loop.gap"], links, method="rk4", step=2e-3)))
     result = fvsolve.run(model)
     assert (not result.ok or result["loop.gap"].max() > 1e-3) == fails

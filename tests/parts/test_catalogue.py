@@ -147,6 +147,6 @@ def test_what_was_not_read_is_refused_and_asked_for():
 
 
 def test_a_limit_takes_its_share_of_what_the_class_bears():
-    settings = {"limits.class": {"on": "pipes", "share_of_class": 0.5}, "numerics.end": 5.0, "expect": {}}
+    settings = {"limits.class": {"on": "pipes", "class_fraction": 0.5}, "numerics.end": 5.0, "expect": {}}
     [found] = fvsolve.run("plastic-main", settings).verdicts
     assert found.limit == approx(8.0) and not found.ok and found.place == "lower"  # bar, half of PN16

@@ -209,8 +209,8 @@ def test_a_wall_of_no_elements_has_no_state_and_elements_that_give_nothing_chang
 
 @pytest.mark.parametrize(("change", "words"), [
     (lambda case: case.update(scalars={"salt": {}}), "takes up liquid, into which scalars are not followed"),
-    (lambda case: case["links"]["main"].update(line="delay"),
-     '"delay" is not possible .* its wall creeps in every cell'),
+    (lambda case: case["links"]["main"].update(pipe_model="delay-line"),
+     '"delay-line" is not possible .* its wall creeps in every cell'),
     (lambda case: case["links"]["main"].update(lining={"youngs_modulus": 2e10, "thickness": 0.004}),
      "for a lined wall"),
     (lambda case: case["links"]["main"]["wall"].update(creep={"compliance": [1e-10], "time": [1, 2]}),

@@ -69,7 +69,7 @@ def test_a_closed_cylinder_keeps_the_exact_period_of_its_log_law():
     result = run(jack, 6 * period, rows=6000, rtol=1e-12)
     found = crossings(result.t, result["load.velocity"])
     assert np.diff(found) == approx(period, rel=1e-8)
-    assert [result.extremes["load.position"].least, result.extremes["load.position"].greatest] == approx(
+    assert [result.extremes["load.position"].minimum, result.extremes["load.position"].maximum] == approx(
         [low, high], abs=1e-4 * (high - low)
     )
 
@@ -322,11 +322,11 @@ def test_a_damper_brakes_by_its_exponential_and_a_force_speeds_up():
     assert result["damper.force"] == approx(-10.0 * v, abs=1e-7) and np.all(result["push.force"] == 30.0)
 
 
-@pytest.mark.parametrize("side", [1.0, -1.0], ids=["greatest", "least"])
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["maximum", "minimum"])
 @pytest.mark.parametrize("damping", [0.0, 400.0], ids=["elastic", "damped"])
 def test_an_end_stop_throws_a_mass_back_and_never_holds_it(damping, side):
     """Half a swing in touch, from x = 0.1 at v0; with damping until the contact would pull."""
-    key, m, k, v0 = ("greatest" if side > 0 else "least"), 2.0, 5e5, 3.0
+    key, m, k, v0 = ("maximum" if side > 0 else "minimum"), 2.0, 5e5, 3.0
     stop = {"type": "end-stop", "from": "wall", "to": "load", "stiffness": k, "damping": damping, key: 0.1 * side}
     result = bodies({"stop": stop}, 0.1, ["load.velocity", "load.position", "stop.force"], 20000,
                     load={"initial_velocity": v0 * side}, rtol=1e-11)  # fmt: skip
@@ -343,7 +343,8 @@ def test_an_end_stop_throws_a_mass_back_and_never_holds_it(damping, side):
 
 def test_a_mass_that_rests_on_a_stop_stays():
     """Pressed onto a stop by a force: it sinks in until the stop carries it, and that is a start at rest."""
-    links = {"stop": {"type": "end-stop", "from": "wall", "to": "load", "stiffness": 1e6, "damping": 1e3, "least": 0.1},
+    links = {"stop": {"type": "end-stop", "from": "wall", "to": "load", "stiffness": 1e6, "damping": 1e3,
+                      "minimum": 0.1},
              "push": {"type": "force", "to": "load", "force": -250.0}}  # fmt: skip
     result = bodies(links, 0.5, ["load.position", "stop.force"], load={"initial_position": 0.1 - 250e-6},
                     initial="equilibrium")  # fmt: skip

@@ -64,8 +64,8 @@ damping = "0.1 N s/mm"
 type = "end-stop"
 from = "ground"
 to = "load"
-least = "1 mm"
-greatest = "199 mm"
+minimum = "1 mm"
+maximum = "199 mm"
 stiffness = "50 kN/mm"
 damping = 1e4
 
@@ -188,10 +188,10 @@ BAD = {
         "links.spring.to: ground is behind load at the start; exchange from and to",
     ),
     "a stop without a side": (
-        swap('least = "1 mm"\ngreatest = "199 mm"', ""),
+        swap('minimum = "1 mm"\nmaximum = "199 mm"', ""),
         "links.stop: expected one of least, greatest",
     ),
-    "a stop without room": (swap('"199 mm"', '"1 mm"'), "links.stop.greatest: 0.001 m is not above least, 0.001 m"),
+    "a stop without room": (swap('"199 mm"', '"1 mm"'), "links.stop.maximum: 0.001 m is not above minimum, 0.001 m"),
     "a force on nothing": (swap('to = "load"\nforce', "force"), "links.push: to is missing"),
     "a loose mass": (
         swap("[nodes.ground]", '[nodes.m]\ntype = "mass"\nmass = 1\n[nodes.ground]'),

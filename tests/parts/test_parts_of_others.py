@@ -150,7 +150,7 @@ def test_drawn_from_the_other_end_it_carries_as_much_the_other_way(home):
 def test_an_edit_of_its_law_counts_and_a_second_start_compiles_nothing(home):
     def least() -> float:
         told = json.loads(command(home, "run", "mill.toml", "--json", "--force"))
-        return told["extremes"]["upper.level"]["least"]
+        return told["extremes"]["upper.level"]["minimum"]
 
     def compiled() -> int:
         return command(home, "run", "mill.toml", "--force", NUMBA_DEBUG_CACHE="1").count("saved to")
@@ -173,7 +173,7 @@ def test_a_folder_can_be_named(home):
     (bare / "mill.toml").write_text(BLOCKS["mill.toml"], encoding="utf-8")
     folder = bare / "runner"
     shutil.copytree(home / "mill" / "runner", folder)
-    named = 'import fvsolve; fvsolve.register("runner"); print(fvsolve.run("mill.toml").ok)'
+    named = 'import fvsolve; fvsolve.register_part("runner"); print(fvsolve.run("mill.toml").ok)'
     paths = {"PYTHONPATH": str(Path(fvsolve.__file__).parents[1])}
     for words, more in ((["-c", named], {}), (["-m", "fvsolve", "check", "mill.toml"], {"FVSOLVE_PARTS": str(folder)})):
         done = subprocess.run(

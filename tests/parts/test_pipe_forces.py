@@ -40,7 +40,7 @@ def test_joukowskys_force_on_a_bend_is_exact(turned: bool) -> None:
     assert np.allclose(high[on_high & ~near], FORCE, rtol=1e-12)
     assert np.allclose(low[on_low & ~near], FORCE, rtol=1e-12)
     assert np.max(np.abs(high[~on_high & ~near & (t < SHUT + 0.7)])) <= 1e-9 * FORCE
-    assert found.extremes["main-1.force"].greatest <= FORCE * (1.0 + 1e-12)
+    assert found.extremes["main-1.force"].maximum <= FORCE * (1.0 + 1e-12)
 
 
 def throttled(law: str, friction: dict, **numerics) -> dict:
@@ -93,18 +93,18 @@ def test_ends_and_wall_bear_what_the_momentum_loses() -> None:
 
 
 def test_a_limit_on_force_is_held_against_every_step_and_leg() -> None:
-    case = shut(limits={"anchor": {"on": "main", "quantity": "force", "greatest": "50 kN"}})
+    case = shut(limits={"anchor": {"on": "main", "quantity": "force", "maximum": "50 kN"}})
     one = fvsolve.run(case).verdicts[0]
     assert not one.ok and one.value == pytest.approx(FORCE) and one.unit == "N" and one.place in ("main-1", "main-2")
-    back = fvsolve.run(
-        shut(True, limits={"anchor": {"on": "main", "quantity": "force", "greatest": "90 kN"}})
-    ).verdicts[0]
+    back = fvsolve.run(shut(True, limits={"anchor": {"on": "main", "quantity": "force", "maximum": "90 kN"}})).verdicts[
+        0
+    ]
     assert back.ok == (FORCE < 9e4) and back.value == pytest.approx(FORCE)
 
 
 def test_what_has_no_force_is_named() -> None:
     with pytest.raises(fvsolve.CaseError, match="its force is requested"):
-        fvsolve.run(shut(), set={"numerics.line": "delay", "numerics.method": "rk4"})
+        fvsolve.run(shut(), set={"numerics.pipe_model": "delay-line", "numerics.method": "rk4"})
     case = shut()
     case["links"]["main"]["bends"] = [600.0, 900.0]
     with pytest.raises(fvsolve.CaseError, match="links.main.bends.1.*is outside"):

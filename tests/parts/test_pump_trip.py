@@ -19,7 +19,7 @@ from fvsolve.studies.linear.linearise import linearise
 ONE = {"flow": [0.1], "head": [50.0]}
 OMEGA, INERTIA, EFFICIENCY = 150.0, 2.0, 0.8
 SHAFT = {
-    "curve": ONE, "outside": "parabola", "rated_speed": OMEGA, "inertia": INERTIA, "efficiency": EFFICIENCY,
+    "curve": ONE, "curve_extrapolation": "parabola", "rated_speed": OMEGA, "inertia": INERTIA, "efficiency": EFFICIENCY,
 }  # fmt: skip
 TORQUE = RHO * GRAVITY * 0.1 * 50.0 / EFFICIENCY / OMEGA  # at the rated point
 BORE, LENGTH, FACTOR = 0.3, 500.0, 0.02

@@ -264,8 +264,8 @@ def test_its_norm_is_what_its_energy_is_bent_by():
 
 
 def test_limits_and_claims_look_at_its_level():
-    limits = {"full": {"on": "a", "quantity": "level", "greatest": 0.35},
-              "empty": {"on": "a", "quantity": "level", "least": 0.1}}  # fmt: skip
+    limits = {"full": {"on": "a", "quantity": "level", "maximum": 0.35},
+              "empty": {"on": "a", "quantity": "level", "minimum": 0.1}}  # fmt: skip
     case = swing(0.04, 1.0, limits=limits)
     case |= {"limits": limits, "expect": {"max(a.level)": {"value": 0.43, "atol": 0.05}}}
     del case["nodes"]["a"]["limits"]

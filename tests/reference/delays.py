@@ -26,7 +26,7 @@ def main(end: float = 8.0, numerics: dict | None = None, demand=STOP, every: flo
     """A lake, a pipe and a demand that stops."""
     nodes = {"lake": {"type": "reservoir", "pressure": 6e6}, "gate": {"type": "junction", "demand": demand}}
     probes = ["gate.pressure", "main.flow@0", "main.pressure@0.5", "main.pressure@0.3", *probes]
-    numerics = {"method": "euler", "line": "delay", **(STEPS if numerics is None else numerics)}
+    numerics = {"method": "euler", "pipe_model": "delay-line", **(STEPS if numerics is None else numerics)}
     return scene(nodes, {"main": pipe("lake", "gate", **keys)}, end, numerics, probes, every)
 
 

@@ -93,7 +93,7 @@ def pipe(start: str, end: str, length: float, diameter: float, wave_speed: float
 
 def stiff_pipe(start: str, end: str, length: float, diameter: float, cells: int, **more: Any) -> dict:
     """A pipe whose wave speed is the fluid's sound speed."""
-    found = pipe(start, end, length, diameter, 0.0, cells, wall="stiff", **more)
+    found = pipe(start, end, length, diameter, 0.0, cells, wall="rigid", **more)
     del found["wave_speed"]
     return found
 

@@ -24,8 +24,8 @@ def report(tmp_path_factory):
     links = {"main": pipe("top", "gate", 900.0, 0.3, 1200.0, 40),
              "valve": valve("gate", "outfall", 1e-3, ramp(0.5, 0.05, 1.0, 0.0))}  # fmt: skip
     probes = ["gate.head", *(f"main.head@{k / 10}" for k in range(1, 10)), "valve.flow"]
-    limits = {HIGH: {"on": "main", "quantity": "head", "greatest": 5e3},
-              "low": {"on": "main", "quantity": "head", "least": -20.0}}  # fmt: skip
+    limits = {HIGH: {"on": "main", "quantity": "head", "maximum": 5e3},
+              "low": {"on": "main", "quantity": "head", "minimum": -20.0}}  # fmt: skip
     case = scene(nodes, links, 3.0, {}, probes, title=TITLE, limits=limits)
     case["output"] |= {"fields": 6, "units": {"flow": "l/s"}}
     fvsolve.run(case, out=folder, pictures=False)
@@ -57,7 +57,7 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     for id in PARTS:
         assert page.locator(f"{id} .scatterlayer path.js-line").count() >= 1
     names = legend(page, "#section-0").all_text_contents()
-    assert {"greatest head", "least head", "initial head", "pipe", "vapour line", "head now"} <= set(names)
+    assert {"maximum head", "minimum head", "initial head", "pipe", "vapour line", "head now"} <= set(names)
     assert f"{HIGH}, greatest" in names
     beyond = f"{HIGH}, greatest: from 5000 m"
     assert set(page.locator("#section-0 .annotation-text").all_text_contents()) == {"top", "valve", beyond}

@@ -45,12 +45,23 @@ def test_the_command_says_how_long_it_lasts(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "swung.toml").write_text(write(swung()))
     fvs("run", "swung.toml", "--no-pictures")
-    ask = ("cycles", "runs/swung", "--probes", "swung.pressure", "--range", "4e5", "--bears", "1e6", "--slope", "3")
+    ask = (
+        "fatigue",
+        "runs/swung",
+        "--probes",
+        "swung.pressure",
+        "--range",
+        "4e5",
+        "--allowable-range",
+        "1e6",
+        "--slope",
+        "3",
+    )
     status, text, _ = fvs(*ask, "--per-day", "100")
     assert status == 0 and "years" in text and "range up to" in text
     assert json.loads(fvs(*ask, "--json")[1])["probes"][0]["share"] == pytest.approx(20.0 / 8e6, rel=0.05)
-    assert fvs("cycles", "runs/swung", "--range", "4e5")[0] == 2
-    assert fvs("cycles", "runs/nowhere")[0] == 2
+    assert fvs("fatigue", "runs/swung", "--range", "4e5")[0] == 2
+    assert fvs("fatigue", "runs/nowhere")[0] == 2
 
 
 def test_what_has_no_cycles_is_named() -> None:

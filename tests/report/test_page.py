@@ -24,7 +24,7 @@ from fvsolve.run.result import Result
 WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"
 
 VERDICT = {"name": "class", "ok": False, "place": "main", "chainage": 480.0, "elevation": 0.0, "time": 1.25,
-           "bound": "greatest", "state": "fails", "value": 13.5, "limit": 10.0, "margin": -3.5, "unit": "bar",
+           "bound": "maximum", "state": "fails", "value": 13.5, "limit": 10.0, "margin": -3.5, "unit": "bar",
            "quantity": "gauge_pressure", "until": 3.0, "error": None, "reason": None, "worst": []}  # fmt: skip
 
 
@@ -140,7 +140,7 @@ def test_lines_of_a_section_are_those_of_the_envelope(closure):
     figure = read(closure).figures["section-0"]
     lines = {one["name"]: values(one["y"]) for one in figure["data"] if isinstance(one["y"], dict)}
     envelope, fluid = closure.envelope["main"], closure.summary["fluid"]
-    for name in ("greatest_head", "least_head", "initial_head"):
+    for name in ("max_head", "min_head", "initial_head"):
         assert lines[name.replace("_", " ")] == pytest.approx(envelope[name], rel=1e-6)
     below = (fluid["vapor_pressure"] - closure.summary["ambient_pressure"]) / (fluid["density"] * closure.case.gravity)
     assert lines["vapour line"] == pytest.approx(envelope["elevation"] + below, rel=1e-6)
@@ -188,7 +188,7 @@ def test_verdicts_stand_first_those_that_fail_before_others(closure):
         "value": 0.5,
         "limit": 0.2,
         "margin": 0.3,
-        "bound": "least",
+        "bound": "minimum",
     }
     verdicts = [VERDICT | holds, VERDICT]
     text = read(changed(closure, verdicts=verdicts)).text

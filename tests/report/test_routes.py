@@ -32,8 +32,8 @@ def over_a_hill(**more) -> dict:
 
 @pytest.fixture(scope="module")
 def main(tmp_path_factory):
-    limits = {"class": {"on": "line", "quantity": "gauge_pressure", "greatest": "10 bar"},
-              "surge": {"on": "last", "quantity": "pressure_head", "greatest": 400.0}}  # fmt: skip
+    limits = {"class": {"on": "line", "quantity": "gauge_pressure", "maximum": "10 bar"},
+              "surge": {"on": "last", "quantity": "pressure_head", "maximum": 400.0}}  # fmt: skip
     case = over_a_hill(routes={"line": {"pipes": ["hill", "last"], "start": "2 km"}}, limits=limits)
     return fvsolve.run(case, out=tmp_path_factory.mktemp("runs") / "main", pictures=False)
 
@@ -80,7 +80,7 @@ def test_limits_are_lines_and_what_passes_one_is_marked_where_it_is_worst(main):
 def test_the_axis_follows_heads_profile_and_vapour_line_and_names_limits_far_from_them(main):
     """Limits within half the range of heads are shown; others are named with an arrow and flatten nothing."""
     one = section(main, ways(main)[0])
-    heads = np.concatenate([one.along[name] for name in ("initial_head", "least_head", "greatest_head")])
+    heads = np.concatenate([one.along[name] for name in ("initial_head", "min_head", "max_head")])
     followed = np.concatenate([heads, one.along["elevation"], one.lines["vapour line"]])
     top, bottom, reach = followed.max(), followed.min(), 0.5 * np.ptp(heads)
     flat = {name: np.full_like(one.chainage, at) for name, at in (

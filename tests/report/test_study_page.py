@@ -32,9 +32,9 @@ def test_a_study_is_reported_with_all_its_runs(tmp_path, fvs) -> None:
     assert {"section-0-0", "history-0-0", "section-1-0", "history-1-0"} <= set(figures)
     lines = [one["name"] for one in figures["history-0-0"]["data"]]
     assert lines == ["none", "vessel"]
-    top = max(row["extremes"]["gate.pressure"]["greatest"] for row in found.rows)
+    top = max(row["extremes"]["gate.pressure"]["maximum"] for row in found.rows)
     result = fvsolve.open_run(tmp_path / "out" / "fast.none")
-    assert top == result.extremes["gate.pressure"].greatest >= np.max(result["gate.pressure"])
+    assert top == result.extremes["gate.pressure"].maximum >= np.max(result["gate.pressure"])
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def taps(tmp_path_factory):
     """A study with its page and workbook: a quick closure fails some limits and leaves others open, a slow one goes on
     after the end."""
     folder, case = tmp_path_factory.mktemp("study"), throttled()
-    case["limits"]["deep"] = {"on": "main", "quantity": "head", "least": -1e3}
+    case["limits"]["deep"] = {"on": "main", "quantity": "head", "minimum": -1e3}
     (folder / "main.toml").write_text(write(case))
     (folder / "taps.toml").write_text(STUDY.replace('duration = "3 s"', 'duration = "30 s"'))
     design.study(folder / "taps.toml", folder / "out")
@@ -92,7 +92,7 @@ def test_the_workbook_of_a_study_has_the_envelope_of_each_run(taps) -> None:
         sheet = book.read(f"xl/worksheets/sheet{1 + names.index('fast.none main')}.xml").decode()
     values = [float(one) for one in re.findall("<v>([^<]+)</v>", sheet)]
     envelope = fvsolve.open_run(taps / "fast.none").envelope["main"]
-    assert min(abs(one - envelope["greatest_pressure"].max()) for one in values) < 1e-6
+    assert min(abs(one - envelope["max_pressure"].max()) for one in values) < 1e-6
     assert sheet.count("<row ") == 1 + len(envelope["distance"])
 
 

@@ -75,4 +75,4 @@ def test_the_workbook_holds_every_row_and_no_formula(fork, tmp_path):
     along = sheets[f"xl/worksheets/sheet{which}.xml"]
     assert along.count("<row ") == 1 + 24
     values = [float(text) for text in re.findall("<v>([^<]+)</v>", along)]
-    assert float(fork.envelope["first"]["greatest_pressure"].max()) == pytest.approx(max(values), rel=1e-14)
+    assert float(fork.envelope["first"]["max_pressure"].max()) == pytest.approx(max(values), rel=1e-14)

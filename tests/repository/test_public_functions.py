@@ -253,7 +253,7 @@ def test_a_picture_that_cannot_be_written_is_named(there, tmp_path):
 def test_a_study_says_what_is_wrong_with_what_it_is_given():
     for study, given, words in (
         (studies.sweep, {"vary": {"nodes.pond.level": 3}}, "expected a table of lists"),
-        (studies.failures, {"key": ["links.main.cells"]}, "expected a key and its values"),
+        (studies.failure_map, {"key": ["links.main.cells"]}, "expected a key and its values"),
         (studies.order, {"cells": 3, "refine": "time"}, "cells = 3: only steps are refined here"),
     ):
         with pytest.raises(FvsolveError, match=words):

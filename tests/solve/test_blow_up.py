@@ -20,10 +20,10 @@ def blown(step: float = 0.02, scheme: str = "muscl", **more) -> dict:
              "air": reservoir(1e5, elevation=0.0)}  # fmt: skip
     links = {"main": pipe("lake", "gate", 300.0, 0.2, 1000.0, 60),
              "tap": valve("gate", "air", 0.02 * area(0.2), ramp(0.5, 0.1, 1.0, 0.0))}  # fmt: skip
-    limits = {"top": {"on": "main", "greatest": "200 bar"}, "low": {"on": "main", "quantity": "head", "least": -1e3},
-              "start": {"on": "main", "quantity": "head", "greatest": 40.0}}  # fmt: skip
+    limits = {"top": {"on": "main", "maximum": "200 bar"}, "low": {"on": "main", "quantity": "head", "minimum": -1e3},
+              "start": {"on": "main", "quantity": "head", "maximum": 40.0}}  # fmt: skip
     claims = {text: {"value": 0.0, "atol": 1e60}
-              for text in ("max(gate.head)", "final(gate.head)", "greatest(main.head)", "mean(gate.head)")}  # fmt: skip
+              for text in ("max(gate.head)", "final(gate.head)", "max(main.head)", "mean(gate.head)")}  # fmt: skip
     numerics = {"scheme": scheme, "method": "ssp-rk2", "step": step}
     return scene(nodes, links, 5.0, numerics, ["gate.head", "lake.pressure"], limits=limits, expect=claims, **more)
 
@@ -50,7 +50,7 @@ def test_extremes_margins_and_claims_are_no_numbers(step: float, scheme: str) ->
     states = {one.name: one.state for one in result.verdicts}
     assert states["top"] == states["low"] == "open"
     assert all(one.margin is None for one in result.verdicts if one.state == "open")
-    assert result.extremes["lake.pressure"].greatest is not None  # which does not move
+    assert result.extremes["lake.pressure"].maximum is not None  # which does not move
 
 
 def test_all_that_is_printed_says_from_when(fvs, tmp_path, monkeypatch) -> None:
@@ -71,4 +71,4 @@ def test_all_that_is_printed_says_from_when(fvs, tmp_path, monkeypatch) -> None:
 
 def test_a_sound_run_is_valid_to_its_end() -> None:
     result = fvsolve.run(blown(0.004))
-    assert result.ok and result.summary["invalid_from"] is None and result.extremes["gate.head"].greatest < LARGEST
+    assert result.ok and result.summary["invalid_from"] is None and result.extremes["gate.head"].maximum < LARGEST

@@ -231,7 +231,7 @@ def test_a_ball_on_a_damped_stop_bounces_as_solve_ivp_says(rtol, method):
     nodes = {"ground": {"type": "frame"}, "ball": {"type": "mass", "mass": 2.0, "initial_position": 0.1}}
     nodes["ball"]["initial_velocity"] = -1.0
     links = {
-        "stop": {"type": "end-stop", "from": "ground", "to": "ball", "least": 0.0, "stiffness": 1e5, "damping": 60.0},
+        "stop": {"type": "end-stop", "from": "ground", "to": "ball", "minimum": 0.0, "stiffness": 1e5, "damping": 60.0},
         "weight": {"type": "force", "to": "ball", "force": -20.0},
     }
     case = scene(nodes, links, 0.5, {"method": method, "rtol": rtol}, ["ball.position", "ball.velocity"], 0.01)

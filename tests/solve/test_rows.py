@@ -68,7 +68,7 @@ def with_rows(case: dict, every: float):
 
 def excess(result) -> float:
     """By how much the worst row leaves the printed extremes."""
-    found = [(result[p].max() - e.greatest, e.least - result[p].min()) for p, e in result.extremes.items()]
+    found = [(result[p].max() - e.maximum, e.minimum - result[p].min()) for p, e in result.extremes.items()]
     return float(np.max(found))
 
 
@@ -82,7 +82,9 @@ def test_steps_do_not_hang_on_rows_and_no_row_lies_beyond_the_extremes(how, scen
         result = with_rows(case, every)
         for probe, extremes in result.extremes.items():
             assert result[probe][-1] == alone[probe][-1], (probe, every)
-            assert extremes.least <= alone.extremes[probe].least and extremes.greatest >= alone.extremes[probe].greatest
+            assert (
+                extremes.minimum <= alone.extremes[probe].minimum and extremes.maximum >= alone.extremes[probe].maximum
+            )
         assert result.ledger["mass"]["remainder"] == alone.ledger["mass"]["remainder"]
         assert excess(result) <= 0.0
 

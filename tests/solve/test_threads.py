@@ -71,13 +71,15 @@ def carried(scheme="muscl", diffusivity=0.0):
 
 def lined(**numerics):
     """Delay lines between a pool, a chamber and a demand that stops: jumps reach all of them within steps."""
-    case = water(PIPE | {"line": "delay", "to": "air"}, end=0.6, probes=["pool.near.head", "air.pressure"], **numerics)
+    case = water(
+        PIPE | {"pipe_model": "delay-line", "to": "air"}, end=0.6, probes=["pool.near.head", "air.pressure"], **numerics
+    )
     del case["nodes"]["river"]
     case["nodes"] |= {
         "air": {"type": "chamber", "volume": 50.0},
         "gate": {"type": "junction", "demand": {"time": [0.0, 0.0503], "value": [0.02, 0.0], "kind": "step"}},
     }
-    case["links"]["far"] = PIPE | {"from": "air", "to": "gate", "length": 7.0, "line": "delay"}
+    case["links"]["far"] = PIPE | {"from": "air", "to": "gate", "length": 7.0, "pipe_model": "delay-line"}
     return case
 
 

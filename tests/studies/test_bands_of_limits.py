@@ -26,7 +26,7 @@ def short_pipe(on: object = "gate", **bounds: float) -> dict:
     links = {"main": pipe("lake", "j", 1000.0, 0.3, 1000.0, 100), "short": pipe("j", "gate", 25.0, 0.15, 1000.0, 2),
              "tap": valve("gate", "out", 0.61e-3, ramp(0.5, 0.03, 1.0, 0.0))}  # fmt: skip
     limits = {"heads": {"on": on, "quantity": "head", **bounds}}
-    return scene(nodes, links, 0.56, {"line": "cells"}, ["gate.head"], limits=limits)
+    return scene(nodes, links, 0.56, {"pipe_model": "finite-volume"}, ["gate.head"], limits=limits)
 
 
 def judged(case: dict) -> dict:
@@ -35,14 +35,14 @@ def judged(case: dict) -> dict:
 
 
 def test_a_sure_bound_that_is_nearer_hides_none_that_is_open() -> None:
-    alone, both = judged(short_pipe(greatest=NEAR)), judged(short_pipe(greatest=NEAR, least=SURE))
+    alone, both = judged(short_pipe(maximum=NEAR)), judged(short_pipe(maximum=NEAR, minimum=SURE))
     assert alone["state"] == both["state"] == "open" and not both["ok"]
     rows = {row["bound"]: row for row in both["worst"]}
-    assert rows["least"]["margin"] < rows["greatest"]["margin"] < rows["greatest"]["error"]
-    assert rows["least"]["state"] == "holds" and rows["least"]["error"] < rows["least"]["margin"]
-    assert both["bound"] == "greatest" and both["error"] == alone["error"] == rows["greatest"]["error"]
-    sure = judged(short_pipe(least=SURE))
-    assert sure["state"] == "holds" and sure["error"] == rows["least"]["error"]
+    assert rows["minimum"]["margin"] < rows["maximum"]["margin"] < rows["maximum"]["error"]
+    assert rows["minimum"]["state"] == "holds" and rows["minimum"]["error"] < rows["minimum"]["margin"]
+    assert both["bound"] == "maximum" and both["error"] == alone["error"] == rows["maximum"]["error"]
+    sure = judged(short_pipe(minimum=SURE))
+    assert sure["state"] == "holds" and sure["error"] == rows["minimum"]["error"]
 
 
 def with_still_water(case: dict, many: int = 1) -> dict:
@@ -51,7 +51,7 @@ def with_still_water(case: dict, many: int = 1) -> dict:
         case["nodes"][f"deep{k}"] = junction(elevation=-115.9)
         case["links"][f"still{k}"] = pipe("lake", f"deep{k}", 200.0, 0.3, 1000.0, 20)
     case["limits"]["heads"] = {"on": ["gate", *(f"deep{k}" for k in range(many))], "quantity": "pressure_head",
-                               "greatest": NEAR}  # fmt: skip
+                               "maximum": NEAR}  # fmt: skip
     return case
 
 
@@ -63,8 +63,8 @@ def test_still_water_hides_no_place_whose_cells_miss_the_peak() -> None:
 
 
 def test_a_limit_passed_fails_whatever_another_place_may_do() -> None:
-    found = judged(short_pipe(greatest=NEAR, least=50.5))
-    assert (found["state"], found["bound"]) == ("fails", "least")
+    found = judged(short_pipe(maximum=NEAR, minimum=50.5))
+    assert (found["state"], found["bound"]) == ("fails", "minimum")
 
 
 def test_a_run_read_back_is_judged_as_one_in_memory(tmp_path) -> None:
@@ -79,11 +79,11 @@ def test_a_run_read_back_is_judged_as_one_in_memory(tmp_path) -> None:
 
 def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "short.toml").write_text(write(short_pipe(greatest=NEAR, least=SURE)))
-    status, text, _ = fvs("run", "short.toml", "--error", "--no-pictures", "--out", "run")
+    (tmp_path / "short.toml").write_text(write(short_pipe(maximum=NEAR, minimum=SURE)))
+    status, text, _ = fvs("run", "short.toml", "--estimate-error", "--no-pictures", "--out", "run")
     assert status == 1 and "OPEN, because its margin is smaller than its error: heads" in text
     said = json.loads((tmp_path / "run" / "summary.json").read_text())["verdicts"][0]
-    assert (said["state"], said["ok"], said["bound"]) == ("open", False, "greatest")
+    assert (said["state"], said["ok"], said["bound"]) == ("open", False, "maximum")
     page = write_report(tmp_path / "run", tmp_path / "run.html", False)[0].read_text()
     assert "The verdict of a limit is open" in page
     (tmp_path / "two.toml").write_text('case = "short.toml"\nerror = true\n[events.close]\n')
@@ -96,7 +96,7 @@ def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> 
 
 def test_a_study_says_why_errors_are_not_known_and_what_helps(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    case = short_pipe(greatest=NEAR)
+    case = short_pipe(maximum=NEAR)
     case["links"]["short"]["cells"] = 1
     (tmp_path / "short.toml").write_text(write(case))
     (tmp_path / "two.toml").write_text('case = "short.toml"\nerror = true\n[events.close]\n')
@@ -104,14 +104,14 @@ def test_a_study_says_why_errors_are_not_known_and_what_helps(fvs, tmp_path, mon
     assert "close: error of gate.head, heads at gate: " in text and "links.short.cells = 4" in text
     row = json.loads((tmp_path / "out" / "study.json").read_text())["runs"][0]
     assert "links.short.cells = 4" in row["verdicts"][0]["reason"] and row["verdicts"][0]["state"] == "open"
-    assert row["peaks"]["gate.head"]["greatest"]["reason"] in row["resolution"]["reasons"][0]
+    assert row["peaks"]["gate.head"]["maximum"]["reason"] in row["resolution"]["reasons"][0]
     page = write_report(tmp_path / "out" / "close", tmp_path / "close.html", False)[0].read_text()
     assert "links.short.cells = 4" in page
 
 
 def test_a_size_holds_its_limits_by_more_than_their_errors() -> None:
     """A slow closure: the greatest head is that of the steady start, and a quick one is in doubt before it fails."""
-    case = short_pipe(greatest=NEAR, least=SURE)
+    case = short_pipe(maximum=NEAR, minimum=SURE)
     case["nodes"]["lake"]["head"] = 50.0
     span = "links.tap.opening.duration", "0.02 s", "0.3 s"
     case["numerics"]["end"] = 0.9
@@ -127,7 +127,7 @@ def test_a_place_without_a_known_error_is_open(monkeypatch) -> None:
     """The run of twice the resolution stops early: nothing bounds the error."""
     from fvsolve.studies import peaks
 
-    case, real = short_pipe(least=SURE), peaks.run
+    case, real = short_pipe(minimum=SURE), peaks.run
 
     def stopped(case, set=None, **more):
         made = real(case, set=set, **more)
@@ -148,11 +148,11 @@ def test_a_band_of_each_part_is_that_of_its_own_cells(factor: float) -> None:
     for k, share in ((1, 1.0), (2, factor)):
         links[f"main{k}"] = pipe("lake", f"gate{k}", 900.0, 0.4, 1000.0, 30)
         links[f"tap{k}"] = valve(f"gate{k}", "air", 0.02 * share * area(0.4), ramp(0.5, 0.2, 1.0, 0.0))
-    limits = {"top": {"on": ["gate1", "gate2"], "quantity": "head", "greatest": 400.0}}
+    limits = {"top": {"on": ["gate1", "gate2"], "quantity": "head", "maximum": 400.0}}
     case = scene(nodes, links, 4.0, {"scheme": "muscl", "courant": 0.8}, ["gate1.head", "gate2.head"], limits=limits)
     result = fvsolve.run(case)
     said = peak_errors(result, fvsolve.load(case))
     rows = {row["place"]: row for row in said["verdicts"][0]["worst"]}
     for k in (1, 2):
-        peak = said["peaks"][f"gate{k}.head"]["greatest"]
+        peak = said["peaks"][f"gate{k}.head"]["maximum"]
         assert rows[f"gate{k}"]["error"] == pytest.approx(peak["error"], rel=0.2)

@@ -25,8 +25,8 @@ def throttled() -> dict:
     rough = {"model": "quasi-steady", "roughness": 1e-4}
     links = {"main": pipe("lake", "gate", 500.0, 0.2, 1000.0, 10, friction=rough),
              "tap": valve("gate", "air", 0.02 * area(0.2))}  # fmt: skip
-    limits = {"top": {"on": "main", "quantity": "gauge_pressure", "greatest": "8 bar"},
-              "dry": {"on": "main", "least": "vacuum"}}  # fmt: skip
+    limits = {"top": {"on": "main", "quantity": "gauge_pressure", "maximum": "8 bar"},
+              "dry": {"on": "main", "minimum": "vacuum"}}  # fmt: skip
     return scene(nodes, links, 4.0, {"scheme": "muscl", "courant": 0.8}, ["gate.pressure"], limits=limits)
 
 
@@ -84,7 +84,7 @@ def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_p
 
 def test_processes_and_errors_change_no_verdict(study, tmp_path) -> None:
     one = design.study(study, tmp_path / "one")
-    study.write_text(STUDY.replace("case =", "error = true\ncase ="))
+    study.write_text(STUDY.replace("case =", "estimate_error = true\ncase ="))
     banded = design.study(study, tmp_path / "two", jobs=2)
     for row, beside in zip(one.rows, banded.rows, strict=True):
         assert row["extremes"] == beside["extremes"]
@@ -173,7 +173,7 @@ def test_the_commands_of_the_page_say_what_it_says(fvs, tmp_path, monkeypatch) -
     said = [fvs(*shlex.split(line.replace("--jobs 2", "--jobs 1"))[1:]) for line in lines]
     assert [status for status, _, _ in said] == [0, 0, 0]
     assert "all limits hold in all events with: vessel" in said[0][1]
-    assert "least value that holds all limits: 25.1" in said[1][1]
+    assert "minimum value that holds all limits: 25.1" in said[1][1]
     assert re.search(r"^opening = { time.*$", text, re.M)[0] in said[2][1]
 
 
@@ -184,7 +184,7 @@ def still(least: float | None = None, greatest: float | None = None) -> dict:
     """A lake above a shut main: the gauge pressure at the gate is rho g (head - 10 m)."""
     case = throttled()
     case["links"]["tap"]["opening"] = 0.0
-    bounds = {key: one for key, one in (("least", least), ("greatest", greatest)) if one is not None}
+    bounds = {key: one for key, one in (("minimum", least), ("maximum", greatest)) if one is not None}
     return case | {"limits": {"gate": {"on": "gate", "quantity": "gauge_pressure", **bounds}}}
 
 
@@ -193,35 +193,35 @@ def still(least: float | None = None, greatest: float | None = None) -> dict:
 )
 def test_a_size_is_where_the_limit_is_met(low, high, scale: float) -> None:
     exact = 10.0 + 3e5 / (RHO * GRAVITY)
-    found = size(still(least=3e5), "nodes.lake.head", low, high, rtol=1e-4)
+    found = size(still(minimum=3e5), "nodes.lake.head", low, high, rtol=1e-4)
     assert found.value * scale == pytest.approx(exact, rel=2e-4)
     fails, holds = found.bracket
     assert fails * scale < exact <= holds * scale
     assert all(one.ok == (one.value * scale >= exact) for one in found.runs)
-    most = size(still(greatest=3e5), "nodes.lake.head", low, high, "greatest", rtol=1e-4)
+    most = size(still(maximum=3e5), "nodes.lake.head", low, high, "maximum", rtol=1e-4)
     assert most.value * scale == pytest.approx(exact, rel=2e-4) and most.value <= most.bracket[0]
 
 
 def test_ends_that_hold_or_fail_are_said() -> None:
-    assert size(still(least=1e5), "nodes.lake.head", 40.0, 80.0).value == 40.0
-    assert len(size(still(least=1e5), "nodes.lake.head", 40.0, 80.0).runs) == 1
-    lost = size(still(least=9e5), "nodes.lake.head", 20.0, 80.0)
+    assert size(still(minimum=1e5), "nodes.lake.head", 40.0, 80.0).value == 40.0
+    assert len(size(still(minimum=1e5), "nodes.lake.head", 40.0, 80.0).runs) == 1
+    lost = size(still(minimum=9e5), "nodes.lake.head", 20.0, 80.0)
     assert lost.value is None and lost.nearest.value == 80.0
-    island = size(still(least=3e5, greatest=4.5e5), "nodes.lake.head", 20.0, 100.0, rtol=1e-3)
+    island = size(still(minimum=3e5, maximum=4.5e5), "nodes.lake.head", 20.0, 100.0, rtol=1e-3)
     assert island.value == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=2e-3)
 
 
 def test_ties_follow_in_si() -> None:
-    found = size(still(least=3e5), "nodes.lake.head", "80 ft", "250 ft", ties=tied(["links.main.length = 10 * x"]),
+    found = size(still(minimum=3e5), "nodes.lake.head", "80 ft", "250 ft", ties=tied(["links.main.length = 10 * x"]),
                  rtol=0.01)  # fmt: skip
     assert found.ties == ("links.main.length = 10 * x",)
     assert found.value * 0.3048 == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=0.02)
 
 
 def test_the_command_shows_its_runs(fvs, tmp_path) -> None:
-    (tmp_path / "still.toml").write_text(write(still(least=3e5)))
+    (tmp_path / "still.toml").write_text(write(still(minimum=3e5)))
     status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20 m,80 m")
-    assert status == 0 and "least value that holds all limits" in text and text.count("holds") > 2
+    assert status == 0 and "minimum value that holds all limits" in text and text.count("holds") > 2
     status, text, _ = fvs("size", str(tmp_path / "still.toml"), "--vary", "nodes.lake.head=20,30", "--json")
     said = json.loads(text)
     assert status == 1 and said["value"] is None and said["nearest"]["value"] == 30.0
@@ -234,7 +234,7 @@ def test_what_cannot_be_sized_is_said() -> None:
     with pytest.raises(FvsolveError, match="states no"):
         size(throttled() | {"limits": {}}, "nodes.lake.head", 20.0, 80.0)
     with pytest.raises(FvsolveError, match="words or whole numbers"):
-        size(still(least=3e5), "links.main.cells", 10, 20)
+        size(still(minimum=3e5), "links.main.cells", 10, 20)
     with pytest.raises(FvsolveError, match="is not below"):
         ends("80 m", "20 m")
     with pytest.raises(FvsolveError, match="have different kinds of units"):
@@ -244,20 +244,22 @@ def test_what_cannot_be_sized_is_said() -> None:
     with pytest.raises(FvsolveError, match="expected"):
         tied(["links.main.length"])
     with pytest.raises(CaseError, match='did you mean "lake"'):
-        size(still(least=3e5), "nodes.lkae.head", 20.0, 80.0)
+        size(still(minimum=3e5), "nodes.lkae.head", 20.0, 80.0)
     assert np.isclose(ends("1 km", "2000 m")[0], 1000.0) and AMBIENT > 0.0
 
 
 def test_all_that_is_wrong_of_a_search_comes_at_once(fvs, tmp_path) -> None:
-    (tmp_path / "still.toml").write_text(write(still(least=3e5)))
+    (tmp_path / "still.toml").write_text(write(still(minimum=3e5)))
     case = str(tmp_path / "still.toml")
     status, _, told = fvs("size", case, "--vary", "nodes.lake.head=80,20", "--goal", "lest", "--rtol", "3",
-                          "--tie", "links.main.length", "--set", "links.mian.cells=3")  # fmt: skip
-    assert status == 2 and "5 faults" in told and 'did you mean "least"' in told and 'did you mean "main"' in told
-    status, _, told = fvs("size", case, "--vary", "nodes.lake.haed=20,80", "--tie", "links.main.lenght=x")
+                          "--dependent", "links.main.length", "--set", "links.mian.cells=3")  # fmt: skip
+    assert status == 2 and "5 faults" in told and 'did you mean "minimum"' in told and 'did you mean "main"' in told
+    status, _, told = fvs("size", case, "--vary", "nodes.lake.haed=20,80", "--dependent", "links.main.lenght=x")
     assert status == 2 and "2 faults" in told
-    assert '--vary nodes.lake.haed: unknown key; did you mean "head"' in told and "--tie links.main.lenght" in told
+    assert (
+        '--vary nodes.lake.haed: unknown key; did you mean "head"' in told and "--dependent links.main.lenght" in told
+    )
     status, _, told = fvs(
-        "optimise", case, "--law", "links.tap.openning", "--minimise", "max(gaet.head)", "--knots", "0"
+        "optimise", case, "--schedule", "links.tap.openning", "--minimise", "max(gaet.head)", "--knots", "0"
     )
     assert status == 2 and "3 faults" in told and 'did you mean "links.tap.opening"' in told

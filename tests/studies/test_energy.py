@@ -178,7 +178,7 @@ def test_a_constant_force_on_a_spring_loses_half_its_work_to_the_damper():
 
 
 def test_an_end_stop_takes_what_a_mass_leaves_behind():
-    links = {"stop": {"type": "end-stop", "from": "ground", "to": "load", "greatest": 1.0, "stiffness": 1e5,
+    links = {"stop": {"type": "end-stop", "from": "ground", "to": "load", "maximum": 1.0, "stiffness": 1e5,
                       "damping": 100.0}}  # fmt: skip
     found = energy(pushed({"method": "dormand-prince", "rtol": 1e-10}, 2.0, links, initial_velocity=1.0))
     kinetic = 1.0 + found.stored["load"][-1]

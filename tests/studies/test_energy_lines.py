@@ -18,7 +18,7 @@ def main(law, gate: dict, method: str, h: float, end: float) -> dict:
     """A lake, a main, and what happens at its end."""
     nodes = {"lake": lake(HEAD), "gate": gate}
     links = {"main": pipe("lake", "gate", LENGTH, DIAMETER, SPEED, 20, friction=law)}
-    return scene(nodes, links, end, {"line": "delay", "method": method, "step": h})
+    return scene(nodes, links, end, {"pipe_model": "delay-line", "method": method, "step": h})
 
 
 def chain(h: float, method: str = "rk4", law=STEADY) -> dict:
@@ -30,7 +30,7 @@ def chain(h: float, method: str = "rk4", law=STEADY) -> dict:
         "short": pipe("a", "b", 4.3, 0.25, SPEED, 2, friction=law),
         "last": pipe("b", "gate", 453.7, 0.2, 1100.0, 20, friction=law),
     }
-    return scene(nodes, links, 4.0, {"line": "delay", "method": method, "step": h})
+    return scene(nodes, links, 4.0, {"pipe_model": "delay-line", "method": method, "step": h})
 
 
 @pytest.mark.parametrize("method", ["euler", "rk4", "trapezoid", "rodas-4"])
@@ -59,7 +59,7 @@ def test_stages_outside_a_step_see_jumps_of_its_neighbours(h):
 
 def test_what_is_stored_and_taken_as_by_fine_cells():
     found, cells = chain(0.0025), chain(0.0025)
-    found = energy(found | {"numerics": found["numerics"] | {"accuracy": 1e-3}})
+    found = energy(found | {"numerics": found["numerics"] | {"delay_tolerance": 1e-3}})
     cells["numerics"] = {"scheme": "upwind5", "method": "rk4", "courant": 0.9, "end": 4.0}
     for name, n in (("long", 140), ("short", 2), ("last", 96)):
         cells["links"][name]["cells"] = n
@@ -106,5 +106,5 @@ def test_a_jump_into_a_store_is_booked_as_the_store_has_it():
         "two": pipe("air", "gate", 0.5 * LENGTH, DIAMETER, SPEED, 20, friction=LOSSLESS),
     }
     for h in (0.014, 0.007, 0.0035, 0.0017):
-        found = energy(scene(nodes, links, 3.0, {"line": "delay", "method": "rk4", "step": h}))
+        found = energy(scene(nodes, links, 3.0, {"pipe_model": "delay-line", "method": "rk4", "step": h}))
         assert np.max(np.abs(found.made)) < 30.0 * h**2 * found.through

@@ -28,7 +28,7 @@ from reference.scenes import (
 from fvsolve import jit
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.failure.failure_map import failures
+from fvsolve.studies.failure.failure_map import failure_map
 from fvsolve.studies.failure.verdict import FAR, Measures, excess, pace, ranges_of, ringing, verdict
 from fvsolve.studies.failure.watched import WINDOW, watched
 from fvsolve.studies.points import Points, package_hash
@@ -130,7 +130,7 @@ def closing(**numerics) -> dict:
 
 def verdicts(case: dict, **asked) -> dict[str, list[str]]:
     (scheme,) = asked["schemes"]
-    made = failures(load(case), **asked)
+    made = failure_map(load(case), **asked)
     return {method: [one.verdict for one in made.row(scheme, method)] for method in made.methods}
 
 
@@ -143,7 +143,7 @@ def test_a_map_goes_by_the_exact_solution_of_a_case_and_without_it_knows_how_far
     case = closing()
     case["links"]["valve"]["opening"] = step(0.1, 1.0, 0.0)  # whose front all finer runs blur alike
     asked = {"schemes": ["upwind5"], "methods": ["rk4"], "courants": [0.5], "tolerance": 0.1}
-    found, exact = (failures(load(case | more), **asked) for more in ({}, {"exact": {"name": "rays"}}))
+    found, exact = (failure_map(load(case | more), **asked) for more in ({}, {"exact": {"name": "rays"}}))
     assert exact.reference.startswith('exact solution "rays", checked by ') and "exact" not in found.reference
     apart = abs(found.squares[0].measures.error - exact.squares[0].measures.error)
     assert 0.0 < apart <= found.doubt
@@ -151,7 +151,7 @@ def test_a_map_goes_by_the_exact_solution_of_a_case_and_without_it_knows_how_far
 
 def test_a_linear_fifth_order_scheme_is_stable_to_its_limit_and_implicit_euler_is_coarse():
     methods = ["rk4", "implicit-euler", "radau-iia-5"]
-    made = failures(load(closing()), ["upwind5"], methods, courants=[0.5, 1.0, 2.5])
+    made = failure_map(load(closing()), ["upwind5"], methods, courants=[0.5, 1.0, 2.5])
     said = {method: [one.verdict for one in made.row("upwind5", method)] for method in methods}
     assert said["rk4"] == ["stable", "stable", "blown up"]
     assert said["implicit-euler"] == ["coarse"] * 3 and said["radau-iia-5"] == ["stable"] * 3
@@ -179,7 +179,7 @@ def stiff() -> dict:
 def test_the_trapezoidal_rule_rings_after_a_stiff_step_and_an_l_stable_method_does_not():
     asked = {"schemes": ["muscl"], "methods": ["trapezoid", "radau-iia-5"], "steps": [5e-4]}
     case = stiff()
-    made = failures(load(case), tolerance=0.05, **asked)
+    made = failure_map(load(case), tolerance=0.05, **asked)
     trapezoid, radau = made.squares
     assert (trapezoid.verdict, radau.verdict) == ("ringing", "stable")
     assert trapezoid.measures.ringing > 0.1 and radau.measures.ringing < 1e-6
@@ -187,7 +187,7 @@ def test_the_trapezoidal_rule_rings_after_a_stiff_step_and_an_l_stable_method_do
 
 def test_a_key_of_the_case_may_be_the_columns_and_predicts_where_the_step_is_too_long():
     volumes = [1e-6, 1e-4, 1e-2]
-    made = failures(
+    made = failure_map(
         load(stiff()), ["upwind"], ["euler"], steps=[1e-3], key=("nodes.body.volume", volumes), tolerance=0.2
     )
     blown = [one.verdict == "blown up" for one in made.squares]
@@ -197,15 +197,15 @@ def test_a_key_of_the_case_may_be_the_columns_and_predicts_where_the_step_is_too
 def test_a_method_that_cannot_go_by_the_case_is_refused_with_its_reason():
     case = closing()
     case["numerics"] = {"end": 3.0, "scheme": "upwind5", "method": "dormand-prince", "rtol": 1e-4}
-    made = failures(load(case), ["upwind5"], ["euler"], key=("links.main.diameter", [0.3]))
+    made = failure_map(load(case), ["upwind5"], ["euler"], key=("links.main.diameter", [0.3]))
     assert made.squares[0].verdict == "refused" and "estimates no error" in made.squares[0].measures.reason
 
 
 def test_finished_squares_are_kept_and_reused(tmp_path):
     asked = {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 1.0]}
-    first = failures(load(closing()), out=tmp_path, **asked)
+    first = failure_map(load(closing()), out=tmp_path, **asked)
     again = Points(tmp_path)
-    assert failures(load(closing()), out=again, **asked) == first
+    assert failure_map(load(closing()), out=again, **asked) == first
     assert again.reused == len((tmp_path / "points.jsonl").read_text().splitlines()) > 2
 
 
@@ -249,7 +249,7 @@ def test_what_is_watched_steps_as_any_run_does():
 )
 def test_what_cannot_be_asked_says_so(asked, said):
     with pytest.raises(FvsolveError, match=said):
-        failures(load(closing()), **asked)
+        failure_map(load(closing()), **asked)
 
 
 def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, monkeypatch, capsys):
@@ -258,7 +258,17 @@ def test_the_command_writes_table_and_pictures_and_speaks_json(tmp_path, monkeyp
 
     path = tmp_path / "scene.toml"
     path.write_text(text.write(closing()))
-    command = ["fvsolve", "map", str(path), "--scheme", "upwind", "--method", "euler,rk4", "--step", "8 ms,0.02"]
+    command = [
+        "fvsolve",
+        "failure-map",
+        str(path),
+        "--scheme",
+        "upwind",
+        "--method",
+        "euler,rk4",
+        "--step",
+        "8 ms,0.02",
+    ]
     monkeypatch.setattr(sys, "argv", [*command, "--out", str(tmp_path / "out"), "--json"])
     with pytest.raises(SystemExit) as ended:
         main()
@@ -277,7 +287,7 @@ def test_no_old_picture_stands_beside_a_new_table(tmp_path, fvs, monkeypatch):
 
     path, out = tmp_path / "scene.toml", tmp_path / "out"
     path.write_text(text.write(closing()))
-    asked = ("map", str(path), "--scheme", "upwind", "--method", "euler", "--step", "8 ms", "--out", str(out))
+    asked = ("failure-map", str(path), "--scheme", "upwind", "--method", "euler", "--step", "8 ms", "--out", str(out))
     assert fvs(*asked)[0] == 0 and (out / "map.png").is_file() and (out / "map.svg").is_file()
     monkeypatch.setitem(sys.modules, "matplotlib.patches", None)
     assert fvs(*asked)[0] != 0
@@ -293,7 +303,7 @@ def test_a_swing_of_the_scene_that_euler_amplifies_is_no_ringing():
     grown = 2.0  # over the run: end omega^2 h / 2 = log 2
     long = 2 * math.log(grown) / (omega**2 * end)
     case = scene(nodes, {"c": column}, end, {"method": "rk4", "step": long}, ["a.level"], end / 200)
-    (euler,) = failures(case, methods=["euler"], steps=[long]).squares
+    (euler,) = failure_map(case, methods=["euler"], steps=[long]).squares
     assert euler.measures.error > TOLERANCE and euler.verdict == "coarse" and euler.measures.variation == 0.0
 
 

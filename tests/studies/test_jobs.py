@@ -11,7 +11,7 @@ from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.output.summary import plain
 from fvsolve.steppers.tableau import tableau
-from fvsolve.studies import chart, failures, order, stability
+from fvsolve.studies import chart, failure_map, order, stability
 
 CLOCKS = ("seconds", "processor", "compile_seconds", "front", "default_seconds", "by_updates")
 
@@ -44,11 +44,11 @@ def test_an_order_is_the_same(line):
 def test_a_map_is_the_same_by_a_method_that_only_this_process_knows(line, tmp_path):
     tableau("midpoint-of-mine", "0 |\n1/2 | 1/2\n----+----\n | 0 1")
     asked = {"schemes": ["upwind"], "methods": ["euler", "midpoint-of-mine"], "courants": [0.5, 0.9, 1.5]}
-    alone = failures(line, tolerance=0.05, **asked)
-    together = failures(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)
+    alone = failure_map(line, tolerance=0.05, **asked)
+    together = failure_map(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)
     assert timeless(plain(together.plain())) == timeless(plain(alone.plain()))
     assert len({one.verdict for one in alone.squares}) > 1  # some of them judged by shorter steps too
-    again = failures(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)  # all of whose runs are known
+    again = failure_map(line, tolerance=0.05, jobs=2, out=tmp_path, **asked)  # all of whose runs are known
     assert again.squares == together.squares
 
 
@@ -69,7 +69,7 @@ def test_rows_of_stability_are_the_same(line):
     [
         (order, {"levels": 3, "cells": 8, "against": "finer"}),
         (chart, {"schemes": ["upwind5"], "methods": ["rk4", "ssp-rk3"], "cells": [10, 20]}),
-        (failures, {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 0.9, 1.5], "tolerance": 0.05}),
+        (failure_map, {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 0.9, 1.5], "tolerance": 0.05}),
         (stability, {"schemes": ["upwind", "upwind5"], "methods": ["euler", "rk4"], "steps": 50}),
     ],
 )
@@ -89,7 +89,7 @@ def test_what_has_no_name_to_be_sent_by_is_refused(line):
 
 def test_commands_take_jobs(line, fvs, tmp_path):
     (tmp_path / "line.toml").write_text(write(line))
-    words = ("order", tmp_path / "line.toml", "--levels", "2", "--cells", "8", "--against", "finer", "--json")
+    words = ("order", tmp_path / "line.toml", "--levels", "2", "--cells", "8", "--reference", "finer", "--json")
     code, out, _ = fvs(*words, "--jobs", "2", "--out", tmp_path / "two")
     assert code == 0 and len(json.loads(out)["studies"][0]["rows"]) == 2
     code, _, err = fvs("stability", "--jobs", "2")

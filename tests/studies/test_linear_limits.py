@@ -92,7 +92,7 @@ def test_auto_is_the_method_it_begins_with_once_and_says_so():
 
 
 @pytest.mark.parametrize("arguments, said", [
-    (["--set", "a=1", "--at", "1", "--before"], "--set, --at, --before: needs a case: fvsolve stability CASE"),
+    (["--set", "a=1", "--at", "1", "--left-limit"], "--set, --at, --left-limit: needs a case: fvsolve stability CASE"),
     (["chamber-chain", "--cells", "4", "--courant", "1"], "--cells, --courant: not valid with a case, only without"),
     (["chamber-chain", "--method", ""], '--method "" is an empty list'),
     (["--scheme", ","], '--scheme "," is an empty list'),

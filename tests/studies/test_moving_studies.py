@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.energy.energy import energy
-from fvsolve.studies.failure.failure_map import failures
+from fvsolve.studies.failure.failure_map import failure_map
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.ports.response import response
 
@@ -88,7 +88,7 @@ def test_a_map_names_the_probe_that_its_reference_does_not_know():
     case = SCENES["loop"]("rk4")
     case["output"]["probes"] = ["one.angle", "loop.gap"]
     with pytest.raises(FvsolveError, match="of the range of loop.gap.*leave it out of output.probes"):
-        failures(case, methods=["rk4"], steps=[4e-3])
+        failure_map(case, methods=["rk4"], steps=[4e-3])
 
 
 def test_a_basin_too_large_to_be_predicted_is_measured_and_drawn_no_spectrum(tmp_path, fvs, monkeypatch):

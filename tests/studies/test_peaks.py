@@ -23,7 +23,7 @@ def test_bands_of_shipped_cases_hold_what_four_times_the_resolution_gives(name: 
     peaks = said["peaks"]
     fine = fvsolve.run(case, set=finer(case, 4.0) | {"output.every": case.output.every / 4.0})
     for probe, one in peaks.items():
-        for side, value in (("least", fine.extremes[probe].least), ("greatest", fine.extremes[probe].greatest)):
+        for side, value in (("minimum", fine.extremes[probe].minimum), ("maximum", fine.extremes[probe].maximum)):
             assert abs(value - one[side]["value"]) <= one[side]["error"], (probe, side)
     for claim, one in zip(said["expectations"], fine.expectations, strict=True):
         assert abs(claim["found"] - one.found) <= claim["error"], claim["text"]
@@ -38,8 +38,8 @@ def test_where_liquid_parts_no_order_is_believed() -> None:
     fine = fvsolve.run(case, set={"links.main.cells": 240})
     assert said["cavities"] and "column separation" in said["resolution"]["words"]
     for probe, one in said["peaks"].items():
-        assert one["greatest"]["order"] is one["least"]["order"] is None
-        assert abs(fine.extremes[probe].greatest - one["greatest"]["value"]) <= one["greatest"]["error"], probe
+        assert one["maximum"]["order"] is one["minimum"]["order"] is None
+        assert abs(fine.extremes[probe].maximum - one["maximum"]["value"]) <= one["maximum"]["error"], probe
 
 
 def throttled(**more) -> dict:
@@ -51,22 +51,22 @@ def throttled(**more) -> dict:
 
 def test_the_command_says_how_far_peaks_and_verdicts_are_off(fvs, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
-    case = throttled(limits={"top": {"on": "main", "quantity": "gauge_pressure", "greatest": "13 bar"}})
+    case = throttled(limits={"top": {"on": "main", "quantity": "gauge_pressure", "maximum": "13 bar"}})
     (tmp_path / "scene.toml").write_text(fvsolve.load(case).resolved())
-    status, text, _ = fvs("run", "scene.toml", "--error", "--no-pictures")
+    status, text, _ = fvs("run", "scene.toml", "--estimate-error", "--no-pictures")
     assert status in (0, 1) and "+-" in text and "times the resolution" in text and "within" in text
     said = json.loads((tmp_path / "runs" / "scene" / "summary.json").read_text())
-    peak, verdict = said["peaks"]["gate.pressure"]["greatest"], said["verdicts"][0]
-    assert peak["value"] == said["extremes"]["gate.pressure"]["greatest"]
+    peak, verdict = said["peaks"]["gate.pressure"]["maximum"], said["verdicts"][0]
+    assert peak["value"] == said["extremes"]["gate.pressure"]["maximum"]
     assert peak["error"] <= verdict["error"] <= 0.01 * verdict["value"]  # of the whole pipe, whose places differ more
     fine = fvsolve.run(case, set=finer(fvsolve.load(case), 8.0))
-    assert abs(fine.extremes["gate.pressure"].greatest - peak["value"]) <= peak["error"]
+    assert abs(fine.extremes["gate.pressure"].maximum - peak["value"]) <= peak["error"]
     assert abs(fine.verdicts[0].value - verdict["value"]) <= verdict["error"]
     assert fvsolve.open_run(tmp_path / "runs" / "scene").verdicts[0].error == verdict["error"]
     assert "+-" not in fvs("run", "scene.toml", "--out", "plain", "--no-pictures")[1]
     for share, state, wanted in ((0.5, "open", 1), (2.0, "holds", 0), (-0.5, "fails", 1)):  # of the band, as a margin
-        limit = f"limits.top.greatest={verdict['value'] + share * verdict['error']!r} Pag"
-        status, text, _ = fvs("run", "scene.toml", "--error", "--no-pictures", "--set", limit, "--out", state)
+        limit = f"limits.top.maximum={verdict['value'] + share * verdict['error']!r} Pag"
+        status, text, _ = fvs("run", "scene.toml", "--estimate-error", "--no-pictures", "--set", limit, "--out", state)
         (one,) = fvsolve.open_run(tmp_path / state).verdicts
         assert (one.state, status) == (state, wanted) and ("its margin is smaller" in text) == (state == "open")
 
@@ -76,10 +76,10 @@ def test_a_finer_case_is_finer_in_all_that_has_a_resolution() -> None:
     assert finer(case, 2.0) == {"links.main.cells": 60}
     stepped = fvsolve.load(case, {"numerics.step": "2 ms"})
     assert finer(stepped, 2.0) == {"links.main.cells": 60, "numerics.step": 0.001}
-    line = fvsolve.load(case, {"numerics.line": "delay", "numerics.rtol": 1e-5})
-    assert finer(line, 0.5) == {"numerics.rtol": 4e-5, "numerics.accuracy": 0.02, "links.main.cells": 15}
-    line = fvsolve.load(case, {"numerics.line": "delay", "numerics.courant": 0.9})
-    assert finer(line, 2.0) == {"numerics.courant": 0.45, "numerics.accuracy": 0.005}  # by which its steps go
+    line = fvsolve.load(case, {"numerics.pipe_model": "delay-line", "numerics.rtol": 1e-5})
+    assert finer(line, 0.5) == {"numerics.rtol": 4e-5, "numerics.delay_tolerance": 0.02, "links.main.cells": 15}
+    line = fvsolve.load(case, {"numerics.pipe_model": "delay-line", "numerics.courant": 0.9})
+    assert finer(line, 2.0) == {"numerics.courant": 0.45, "numerics.delay_tolerance": 0.005}  # by which its steps go
 
 
 def two_pipes(limits: dict) -> dict:
@@ -97,11 +97,11 @@ def two_pipes(limits: dict) -> dict:
 
 def test_a_trough_that_finer_cells_deepen_leaves_a_limit_open() -> None:
     """On all three resolutions the start is the least; on eight times the cells a later trough is lower by 31 kPa."""
-    case = two_pipes({"low": {"on": "end", "quantity": "pressure", "least": "6.3 bar"}})
+    case = two_pipes({"low": {"on": "end", "quantity": "pressure", "minimum": "6.3 bar"}})
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
-    peak, (verdict,) = said["peaks"]["end.pressure"]["least"], said["verdicts"]
-    fine = fvsolve.run(case, set=finer(fvsolve.load(case), 8.0)).extremes["end.pressure"].least
-    assert said["extremes"]["end.pressure"]["t_least"] == 0.0 and fine < 6.2e5 < verdict["limit"] < peak["value"]
+    peak, (verdict,) = said["peaks"]["end.pressure"]["minimum"], said["verdicts"]
+    fine = fvsolve.run(case, set=finer(fvsolve.load(case), 8.0)).extremes["end.pressure"].minimum
+    assert said["extremes"]["end.pressure"]["t_min"] == 0.0 and fine < 6.2e5 < verdict["limit"] < peak["value"]
     assert peak["value"] - fine < peak["error"] and verdict["state"] == "open"
 
 
@@ -111,14 +111,14 @@ def stub(cells: int, opening: dict, beside: int = 100, **more) -> dict:
     links = {"main": pipe("lake", "j", 1000.0, 0.3, 1000.0, beside),
              "short": pipe("j", "gate", 8.0, 0.15, 1000.0, cells),
              "v": valve("gate", "out", 0.61e-3, opening)}  # fmt: skip
-    return scene(nodes, links, 4.0, {"line": "cells"}, ["gate.head", "main.head@0.5"], **more)
+    return scene(nodes, links, 4.0, {"pipe_model": "finite-volume"}, ["gate.head", "main.head@0.5"], **more)
 
 
 def test_one_cell_cannot_be_halved() -> None:
-    case = stub(1, ramp(0.5, 0.0, 1.0, 0.0), limits={"low": {"on": "gate", "quantity": "head", "least": 0.0}})
+    case = stub(1, ramp(0.5, 0.0, 1.0, 0.0), limits={"low": {"on": "gate", "quantity": "head", "minimum": 0.0}})
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
-    assert said["peaks"]["gate.head"]["least"]["error"] is None and said["verdicts"][0]["state"] == "open"
-    assert said["peaks"]["main.head@0.5"]["least"]["error"] > 0.0
+    assert said["peaks"]["gate.head"]["minimum"]["error"] is None and said["verdicts"][0]["state"] == "open"
+    assert said["peaks"]["main.head@0.5"]["minimum"]["error"] > 0.0
     assert any("links.short.cells = 4" in text for text in said["resolution"]["reasons"])
 
 
@@ -126,11 +126,11 @@ def test_a_pipe_shorter_than_a_cell_beside_it_is_not_known() -> None:
     """The wave from the lake is smeared over more than the short pipe, whatever its own cells: 22.3 m for -63.54."""
     case = stub(8, ramp(0.5, 0.0, 1.0, 0.0))
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
-    assert said["peaks"]["gate.head"]["least"]["error"] is None
+    assert said["peaks"]["gate.head"]["minimum"]["error"] is None
     assert any("links.main.cells = 500" in text for text in said["resolution"]["reasons"])
     case["links"]["main"]["cells"], case["links"]["short"]["cells"] = 500, 4
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
-    peak = said["peaks"]["gate.head"]["least"]
+    peak = said["peaks"]["gate.head"]["minimum"]
     assert abs(peak["value"] + 63.54) <= peak["error"] and "differences of" in peak["reason"]
     assert not any("shorter than a cell" in text for text in said["resolution"]["reasons"])
 
@@ -144,19 +144,19 @@ def slamming(at: float) -> dict:
                               "deceleration": {"rate": [0, 5, 15], "reverse_velocity": [0, 0.3, 1.0]}}  # fmt: skip
     case["numerics"]["end"] = 4.0
     case["output"]["probes"] = ["out.pressure", "main.pressure@0.5", "flap.flow"]
-    return case | {"limits": {"high": {"on": "main", "quantity": "pressure", "greatest": 8.5e5}}}
+    return case | {"limits": {"high": {"on": "main", "quantity": "pressure", "maximum": 8.5e5}}}
 
 
 def test_every_peak_whose_error_is_wide_or_not_known_says_why() -> None:
     case = slamming(20.0)
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
     found = said["peaks"]
-    assert found["out.pressure"]["greatest"]["error"] is None
-    assert "links.main-1.cells = 4" in found["out.pressure"]["greatest"]["reason"]
-    wide = found["flap.flow"]["least"]
-    assert wide["error"] > 0.05 * (found["flap.flow"]["greatest"]["value"] - wide["value"])
+    assert found["out.pressure"]["maximum"]["error"] is None
+    assert "links.main-1.cells = 4" in found["out.pressure"]["maximum"]["reason"]
+    wide = found["flap.flow"]["minimum"]
+    assert wide["error"] > 0.05 * (found["flap.flow"]["maximum"]["value"] - wide["value"])
     assert "flap (2, 2, " in wide["reason"] and "main-1 has 1 cell beside flap, vessel" in wide["reason"]
-    assert found["main.pressure@0.5"]["greatest"]["reason"] is None
+    assert found["main.pressure@0.5"]["maximum"]["reason"] is None
     row = said["verdicts"][0]
     assert row["state"] == "open" and row["reason"] == next(one["reason"] for one in row["worst"])
     assert any("high at main-1" in text for text in said["resolution"]["reasons"])
@@ -166,18 +166,18 @@ def test_wide_errors_of_few_cells_name_the_differences_that_make_them() -> None:
     case = stub(6, ramp(0.5, 0.02, 1.0, 0.0), beside=600)
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))["peaks"]["gate.head"]
     assert any("m between resolutions" in (said[side]["reason"] or "") and "more cells" in said[side]["reason"]
-               for side in ("least", "greatest"))  # fmt: skip
+               for side in ("minimum", "maximum"))  # fmt: skip
 
 
 def test_a_pulse_that_no_cell_shows_is_not_known() -> None:
     opening = {"time": [0.5, 0.502, 0.506], "value": [1.0, 0.1, 0.8], "kind": "linear"}
     opening["time"] = [0.5, 0.501, 0.5015]
     said = peak_errors(fvsolve.run(stub(4, opening, 500)), fvsolve.load(stub(4, opening, 500)))
-    assert said["peaks"]["gate.head"]["greatest"]["error"] is None
+    assert said["peaks"]["gate.head"]["maximum"]["error"] is None
     assert "links.v.opening" in said["resolution"]["reasons"][0]
     opening["time"] = [0.5, 0.54, 0.6]
     said = peak_errors(fvsolve.run(stub(4, opening, 500)), fvsolve.load(stub(4, opening, 500)))
-    assert said["peaks"]["gate.head"]["greatest"]["error"] > 0.0
+    assert said["peaks"]["gate.head"]["maximum"]["error"] > 0.0
 
 
 def test_events_that_differ_between_resolutions_are_named() -> None:

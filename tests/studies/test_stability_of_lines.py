@@ -28,8 +28,8 @@ def system(case: dict, method: str, h: float) -> Delayed:
 @pytest.mark.parametrize("scene", ["vessel", "short", "rough"])
 def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
     """With a chamber, with lines shorter than steps and a valve, with friction: 40 steps from what is on its way."""
-    rough = main(friction={"model": "steady", "factor": 0.1}, numerics={"accuracy": 0.02})
-    case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay"), "rough": rough}[scene]
+    rough = main(friction={"model": "steady", "factor": 0.1}, numerics={"delay_tolerance": 0.02})
+    case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay-line"), "rough": rough}[scene]
     one = system(case, method, 0.01)
     x, before = (part[..., :1] * 1e-6 for part in one.starts())  # of which all moves
     runs = DelayedRuns.__new__(DelayedRuns)

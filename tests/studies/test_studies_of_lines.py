@@ -19,7 +19,7 @@ def rough(**numerics) -> dict:
     case["links"]["main"]["friction"] = {"model": "steady", "factor": 0.5}
     demand = case["nodes"]["gate"]["demand"]
     demand["value"] = [one + 0.2 for one in demand["value"]]
-    given = {"line": "delay", "method": "euler", "step": 0.00125, "accuracy": 0.01, **numerics}
+    given = {"pipe_model": "delay-line", "method": "euler", "step": 0.00125, "delay_tolerance": 0.01, **numerics}
     return case | {"numerics": {"end": pulses.END, **given}}
 
 
@@ -44,7 +44,7 @@ def test_drawn_the_other_way_or_by_two_the_study_is_the_same():
 
 def test_smooth_waves_between_steps_are_of_sixth_order():
     """Against rays, in the middle of a pipe; at the gate each wave is back after whole steps, and exact."""
-    case = pulses.case(line="delay", method="euler", courant=0.9)
+    case = pulses.case(pipe_model="delay-line", method="euler", courant=0.9)
     found = studies.order(case, levels=3)
     errors = [row.errors["main.pressure@0.37"]["L1"] for row in found.rows]
     assert found.kind == "exact" and errors[0] > 30.0 * errors[1] > 30.0**2 * errors[2]
@@ -66,7 +66,7 @@ def test_lines_beside_cells_are_refined_with_them():
         every=0.0499,
         friction={"model": "steady", "factor": 0.05},
     )
-    case["links"]["up"]["line"] = "auto"
+    case["links"]["up"]["pipe_model"] = "auto"
     case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
     found = studies.order(case, levels=3)
     assert [row.level.cells for row in found.rows] == [5, 10, 20]
@@ -77,13 +77,13 @@ def test_lines_beside_cells_are_refined_with_them():
 def test_a_chart_of_lines_is_judged_by_cells():
     """Shorter steps help until friction is left, whose places stay: a fourteenth of it in four times the stretches."""
     steps, methods = [0.013, 0.0031, 0.00078], ["euler"]
-    found = studies.chart(rough(accuracy=0.005), methods=methods, step=steps)
+    found = studies.chart(rough(delay_tolerance=0.005), methods=methods, step=steps)
     assert found.reference.startswith("upwind5 on") and found.floor["trajectory"] < 1e-6 and found.default == "rk4"
     errors = [point.trajectory for point in found.curves()["euler"]]
     assert errors[0] > 20.0 * errors[1] > 20.0 * errors[2]
-    finer = studies.chart(rough(accuracy=0.00125), methods=methods, step=[0.00078])
+    finer = studies.chart(rough(delay_tolerance=0.00125), methods=methods, step=[0.00078])
     assert finer.curves()["euler"][0].trajectory == pytest.approx(errors[2] * (11.0 / 41.0) ** 2, rel=0.2)
-    other = turned(rough(accuracy=0.005))
+    other = turned(rough(delay_tolerance=0.005))
     other["output"]["probes"] = ["gate.pressure", "main.pressure@0.63"]
     two = studies.chart(other, methods=methods, step=steps, jobs=2)
     assert [one.trajectory for one in two.points] == pytest.approx([one.trajectory for one in found.points], rel=1e-8)
@@ -99,7 +99,7 @@ def test_a_chart_of_lines_has_steps_and_no_more():
 
 def test_a_chart_of_lines_beside_cells_refines_the_cells():
     case = fork({"scheme": "upwind5", "method": "rk4", "courant": 0.9}, 2.0, every=0.0499)
-    case["links"]["up"]["line"] = "delay"
+    case["links"]["up"]["pipe_model"] = "delay-line"
     case["nodes"]["gate"]["demand"] |= {"time": [0.0, 0.5, 1.5], "value": [0.03, 0.03, 0.0], "kind": "smooth"}
     found = studies.chart(case, schemes=["upwind5"], methods=["rk4"], cells=[6, 12, 24])
     errors = [one.trajectory for one in found.curves()["upwind5 rk4"]]
@@ -110,7 +110,7 @@ def test_a_chart_of_lines_beside_cells_refines_the_cells():
 def test_a_map_of_lines_says_at_which_step_a_store_makes_waves_grow():
     """A chamber that fills within 10 ms, behind 0.1 s of a line: the limit, and runs beside it."""
     case = vessel("rk4", 0.01, 6.0, 0.15, 60)
-    found = studies.failures(case, methods=["rk4", "implicit-midpoint", "rodas-5p"], steps=[0.0034, 0.0207, 0.068])
+    found = studies.failure_map(case, methods=["rk4", "implicit-midpoint", "rodas-5p"], steps=[0.0034, 0.0207, 0.068])
     assert found.wave_rate is None and found.reference.startswith("upwind5")
     for method, safe in (("rk4", 2), ("implicit-midpoint", 1)):
         row = found.row("weno5", method)
@@ -118,14 +118,14 @@ def test_a_map_of_lines_says_at_which_step_a_store_makes_waves_grow():
         assert [one.verdict == "blown up" for one in row] == [False] * safe + [True] * (3 - safe)
     assert found.row("weno5", "rodas-5p")[0].limit is None
     with pytest.raises(FvsolveError, match="Courant numbers need pipes with cells"):
-        studies.failures(case, courants=[0.5])
+        studies.failure_map(case, courants=[0.5])
 
 
 def test_a_map_of_lines_without_stores_predicts_no_limit():
     case = main(2.0, every=0.0499)
     case["output"]["probes"] = ["gate.pressure"]
-    found = studies.failures(case, methods=["euler"], steps=[0.03, 0.11])
+    found = studies.failure_map(case, methods=["euler"], steps=[0.03, 0.11])
     assert [one.verdict for one in found.squares] == ["stable", "stable"]
     assert all(math.isinf(one.limit) for one in found.squares)
-    two = studies.failures(turned(case), methods=["euler"], steps=[0.03, 0.11], jobs=2)
+    two = studies.failure_map(turned(case), methods=["euler"], steps=[0.03, 0.11], jobs=2)
     assert [one.measures.error for one in two.squares] == [one.measures.error for one in found.squares]

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from fvsolve.cli import studying
-from fvsolve.studies import failures
+from fvsolve.studies import failure_map
 
 CASE = """
 schema = 1
@@ -51,7 +51,7 @@ def path(tmp_path, monkeypatch):
 
 
 def test_a_map_takes_a_path(path):
-    found = failures(str(path), methods=["rk4"], steps=[0.1])
+    found = failure_map(str(path), methods=["rk4"], steps=[0.1])
     assert [one.verdict for one in found.squares] == ["stable"]
 
 
@@ -76,10 +76,10 @@ def test_a_line_of_progress_is_not_repeated_unchanged(monkeypatch, capsys):
     assert capsys.readouterr().err.splitlines() == ["3 of 9: rk4", "4 of 9: rk4"]
 
 
-@pytest.mark.parametrize("study", ["chart", "order", "map", "stability"])
+@pytest.mark.parametrize("study", ["chart", "order", "failure-map", "stability"])
 def test_a_setting_that_belongs_to_the_method_asked_for_is_read_with_it(fvs, path, study):
     own = ["--set", "numerics.rtol=1e-5", "--method", "dormand-prince"]
-    columns = {"map": ["--step", "0.1"], "chart": ["--rtol", "1e-4,1e-6"]}.get(study, [])
+    columns = {"failure-map": ["--step", "0.1"], "chart": ["--rtol", "1e-4,1e-6"]}.get(study, [])
     code, _, said = fvs(study, path, *own, *columns)
     assert "rtol" not in said and code == 0, said
 

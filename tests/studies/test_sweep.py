@@ -46,9 +46,9 @@ def test_rows_are_the_numbers_of_the_runs_in_the_order_of_the_values(line):
     for row in (made.rows[0], made.rows[2]):
         alone = fvsolve.run(line, {key: row[key] for key in VARY})
         assert row["ok"] and row["reason"] == "finished" and row["t [s]"] == 0.5
-        assert row["max(gate.pressure) [Pa]"] == alone.extremes["gate.pressure"].greatest
-        assert row["t_max(gate.pressure) [s]"] == alone.extremes["gate.pressure"].t_greatest
-        assert row["min(valve.flow) [m3/s]"] == alone.extremes["valve.flow"].least
+        assert row["max(gate.pressure) [Pa]"] == alone.extremes["gate.pressure"].maximum
+        assert row["t_max(gate.pressure) [s]"] == alone.extremes["gate.pressure"].t_max
+        assert row["min(valve.flow) [m3/s]"] == alone.extremes["valve.flow"].minimum
         assert row["final(gate.pressure) [Pa]"] == alone["gate.pressure"][-1]
         assert row["steps"] == alone.summary["steps"]
 
@@ -239,7 +239,7 @@ def test_rows_are_the_same_to_the_bit_in_any_engine_and_order(line, cluster):
     assert bare(sweep(line, vary, dask=cluster.scheduler_address).rows) == here
     alone = [fvsolve.run(line, {key: row[key] for key in vary}) for row in here if row["ok"]]
     assert [row["max(gate.pressure) [Pa]"] for row in here if row["ok"]] == [
-        one.extremes["gate.pressure"].greatest for one in alone
+        one.extremes["gate.pressure"].maximum for one in alone
     ]
 
 
@@ -360,7 +360,7 @@ def test_the_table_is_parquet_too_and_every_extreme_has_a_chart(line, fvs, tmp_p
     for name in ("links.valve.area", "ok", "max(gate.pressure) [Pa]", "steps"):
         assert table[name] == [row[name] for row in said["rows"]]
     again = ("sweep", tmp_path / "line.toml", "--set", "links.valve.area=0.01,0.03", *to)
-    assert fvs(*again, "--outcome", "final(valve.flow)")[0] == 0
+    assert fvs(*again, "--quantity", "final(valve.flow)")[0] == 0
     assert [path.name for path in (tmp_path / "o" / "charts").iterdir()] == ["final-valve.flow.png"]
-    code, _, err = fvs(*again, "--outcome", "max(x)")
+    code, _, err = fvs(*again, "--quantity", "max(x)")
     assert code == 2 and 'no outcome "max(x)". Outcomes are' in err

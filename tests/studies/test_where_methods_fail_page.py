@@ -50,7 +50,9 @@ def test_every_command_of_the_page_names_a_case_and_settings_that_it_takes(words
     assert load_case(words[2], settings).name == words[2]
 
 
-@pytest.mark.parametrize("words", [words for words in commands() if words[1] == "map"], ids=lambda words: words[2])
+@pytest.mark.parametrize(
+    "words", [words for words in commands() if words[1] == "failure-map"], ids=lambda words: words[2]
+)
 def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, capsys):
     asked = []
 
@@ -58,7 +60,7 @@ def test_every_map_of_the_page_takes_its_options(words, monkeypatch, tmp_path, c
         asked.append(case.name)
         raise FvsolveError("far enough: nothing is run")
 
-    monkeypatch.setattr(failure_map, "failures", noted)
+    monkeypatch.setattr(failure_map, "failure_map", noted)
     monkeypatch.setattr(sys, "argv", [*words, "--out", str(tmp_path)])
     with pytest.raises(SystemExit) as ended:
         main()

@@ -37,7 +37,9 @@ from fvsolve.kernels.handle import open_tables
 from fvsolve.kernels.records import ALONE, JUNCTION
 
 NAN = float("nan")
-COARSE = 4.0  # multiple of the least jump above which a jump ends a step: about `numerics.accuracy` of the greatest
+COARSE = (
+    4.0  # multiple of the least jump above which a jump ends a step: about `numerics.delay_tolerance` of the greatest
+)
 MANY_JUMPS = 1e6  # jumps travelling at one time; with so many, only a jump as large as the greatest wave ends a step
 
 

@@ -18,8 +18,8 @@ class EndStopRows(Push, kind="end-stop"):
         (row,) = rows
         x, speed = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
-        row["below"] = FAR if link.least is None else x - link.least
-        row["above"] = FAR if link.greatest is None else link.greatest - x
+        row["below"] = FAR if link.minimum is None else x - link.minimum
+        row["above"] = FAR if link.maximum is None else link.maximum - x
         for distance, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
             if distance <= 0.0:
                 row["force"] += sign * contact(

@@ -16,7 +16,7 @@ class PinRows(Lowering, kind="pin"):
         (row,) = rows
         row["from_point"], row["to_point"] = point_row(draft, link.from_), point_row(draft, link.to)
         directions = link.directions()
-        row["rows"], row["pull"] = len(directions), link.pull
+        row["rows"], row["pull"] = len(directions), link.stabilisation
         row["directions"][: directions.size] = directions.ravel()
 
     def probe(self, draft, name, probe, row) -> None:

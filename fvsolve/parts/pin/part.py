@@ -31,7 +31,7 @@ class Pin(TwoPort, kind="pin"):
             about="free direction, in the axes of `from`; none (all three directions constrained) if left out",
         ),
     ] = None
-    pull: Annotated[
+    stabilisation: Annotated[
         float, Quantity("rate", positive, "rate at which a gap closes (Baumgarte stabilisation) [1/s]", changes=VALUE)
     ] = 10.0
 

@@ -26,7 +26,7 @@ class PipeRows(Lowering, kind="pipe"):
         draft.ends(link, row)
         row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
         row["quicker"] = quicker(draft.case.numerics.scheme, n)
-        delayed = draft.followed[name].line == "delay"
+        delayed = draft.followed[name].pipe_model == "delay-line"
         if delayed:
             row["cells"], row["quicker"] = 0, draft.followed[name].rate * link.length / n / speed
         row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
@@ -60,7 +60,7 @@ class PipeRows(Lowering, kind="pipe"):
         row["kind"] = rec.PIPE_FORCE
         pipe = draft.pipe_table[row["index"]]
         if pipe["delay"] >= 0:
-            draft.fault(f"links.{name}", 'a delay line has no force probe; set line = "cells"')
+            draft.fault(f"links.{name}", 'a delay line has no force probe; set pipe_model = "finite-volume"')
         elif pipe["ride"] >= 0:
             draft.fault(
                 f"links.{name}", "a pipe on a body has no force probe; use the forces of the joints of the body"

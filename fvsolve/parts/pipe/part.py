@@ -10,7 +10,7 @@ from pydantic import Field
 from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.conduit import LENGTH, Conduit
 from fvsolve.parts.pipe.profile import Profile, ProfileValue
-from fvsolve.parts.pipe.wall import MODULI, Lining, OfCatalogue, Restraint, Wall, WallOrStiff, wall_faults, yielding
+from fvsolve.parts.pipe.wall import MODULI, Lining, OfCatalogue, Restraint, Wall, WallOrRigid, wall_faults, yielding
 from fvsolve.parts.scalar import Carried
 from fvsolve.parts.table import Inside
 from fvsolve.parts.value import (
@@ -35,7 +35,7 @@ CATALOGUE = frozenset(("material", "class", "lining"))  # keys from which others
 SPANNED = 1e-6  # allowed difference of the span of chainage, over length
 MET = 1e-6  # allowed difference in elevation of profile and nodes [m]
 ENDS = {"from": "begins", "to": "ends"}
-LINES = ("cells", "delay", "auto")  # numerical methods for waves in a pipe
+LINES = ("finite-volume", "delay-line", "auto")  # numerical methods for waves in a pipe
 
 
 WAVES = Usual(30.0, 2000.0, "soft hoses to stiff pipes")  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
@@ -76,7 +76,7 @@ class Pipe(Conduit, kind="pipe"):
     wave_speed: Annotated[
         float | None, Quantity("velocity", positive, "wave speed, instead of wall [m/s]", WAVES, COUNTED)
     ] = None
-    wall: Annotated[Wall | Literal["stiff"] | None, WallOrStiff()] = None
+    wall: Annotated[Wall | Literal["rigid"] | None, WallOrRigid()] = None
     material: Annotated[str | None, OfCatalogue()] = None
     class_: Annotated[
         str | None,
@@ -105,13 +105,13 @@ class Pipe(Conduit, kind="pipe"):
         int | None,
         Whole(between(1, MOST_CELLS), "number of finite volumes; travel time over cell_time if left out"),
     ] = None
-    line: Annotated[
+    pipe_model: Annotated[
         str | None,
         Choice(
-            "line",
+            "pipe model",
             LINES,
-            "pipe model: cells (finite volumes), delay (a delay line, whose cells are only output positions), or auto "
-            "(a delay line where its error bound is below numerics.accuracy); numerics.line if left out",
+            "method for waves: finite volumes, a delay line, whose cells are only output positions, or auto "
+            "(a delay line where its error bound is below numerics.delay_tolerance); numerics.pipe_model if left out",
         ),
     ] = None
     scalars: Annotated[dict[str, Any], Carried("scalar values in the pipe at the start", Number())] = {}

@@ -71,18 +71,18 @@ class OfCatalogue(Value):
         return {"enum": self.names}
 
 
-class WallOrStiff(Value):
-    """Text "stiff" or table of an elastic wall."""
+class WallOrRigid(Value):
+    """Text "rigid" or table of an elastic wall."""
 
-    about = 'wall, elastic or stiff; "stiff" if left out'
-    takes = '`"stiff"`, or `{ youngs_modulus, thickness, poisson_ratio, creep }`, Pa and m'
+    about = 'wall, elastic or rigid; "rigid" if left out'
+    takes = '`"rigid"`, or `{ youngs_modulus, thickness, poisson_ratio, creep }`, Pa and m'
     changes = COUNTED
 
     def read(self, given: Any, setting: Setting) -> Wall | str:
-        if isinstance(given, Wall) or given == "stiff":
+        if isinstance(given, Wall) or given == "rigid":
             return given
         if not isinstance(given, dict):
-            raise ValueError(f'{show(given)} is not a wall; expected "stiff" or {{ youngs_modulus, thickness }}')
+            raise ValueError(f'{show(given)} is not a wall; expected "rigid" or {{ youngs_modulus, thickness }}')
         return Wall.model_validate(given, context=setting)
 
     def below(self, key: str) -> Value | None:
@@ -91,7 +91,7 @@ class WallOrStiff(Value):
     def json(self) -> dict[str, Any]:
         schema = Wall.model_json_schema()
         del schema["required"]  # a material or a nominal size may give them
-        return {"anyOf": [{"const": "stiff"}, schema]}
+        return {"anyOf": [{"const": "rigid"}, schema]}
 
 
 class Restraint(Value):

@@ -75,7 +75,7 @@ class PumpRows(Turning, Device, kind="pump"):
         text = (f"{name}: it leaves its curve at {moment}; outside of it head and torque are those of the Suter "
                 f"table {source}, joined to it, by its specific speed of {speed:.4g} (rpm, m3/s, m); "
                 "for a pump of several stages or inlets give suter")  # fmt: skip
-        return Notice("range", f"links.{name}", text, "outside", speed)
+        return Notice("range", f"links.{name}", text, "curve_extrapolation", speed)
 
     def edge(self, start, k: int):
         row = start.valves[k]

@@ -52,7 +52,7 @@ def steadied(values: np.ndarray) -> np.ndarray:
 
 def joined_table(part, flow: float, head: float) -> Quadrants | None:
     """Table for the specific speed of a pump with `curve` and `rated_speed`; None without, or with a parabola."""
-    if part.curve is None or part.rated_speed is None or part.outside == "parabola":
+    if part.curve is None or part.rated_speed is None or part.curve_extrapolation == "parabola":
         return None
     return quadrants(specific_speed(part, flow, head))
 

@@ -38,7 +38,7 @@ class Pump(TwoPort, kind="pump"):
         None
     )
     suter: Annotated[SuterTable | None, Suter()] = None
-    outside: Annotated[
+    curve_extrapolation: Annotated[
         str | None,
         Choice(
             "law",
@@ -81,10 +81,12 @@ class Pump(TwoPort, kind="pump"):
                                       "schedule"))  # fmt: skip
         if "inertia" in given and "rated_speed" not in given:
             faults.append((("inertia",), 'needs rated_speed, for example "1480 rpm"'))
-        if "outside" in given and "curve" not in given:
-            faults.append((("outside",), "needs a curve; it defines the head outside its flows"))
-        if given.get("outside") == "suter" and "curve" in given and "rated_speed" not in given:
-            faults.append((("outside",), 'needs rated_speed, for example "1480 rpm", for the specific speed'))
+        if "curve_extrapolation" in given and "curve" not in given:
+            faults.append((("curve_extrapolation",), "needs a curve; it defines the head outside its flows"))
+        if given.get("curve_extrapolation") == "suter" and "curve" in given and "rated_speed" not in given:
+            faults.append(
+                (("curve_extrapolation",), 'needs rated_speed, for example "1480 rpm", for the specific speed')
+            )
         if "suter" in given and isinstance(given.get("efficiency"), dict):
             faults.append(
                 (

@@ -104,7 +104,7 @@ def greatest_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
              for name, pipe in in_cells(case).items()]  # fmt: skip
-    rates += [method.rate for method in followed(case).values() if method.line == "delay"]
+    rates += [method.rate for method in followed(case).values() if method.pipe_model == "delay-line"]
     if basins(case):
         own_cells = {key: numbers for key, numbers in counts(case).items() if key.startswith("nodes.")}
         factor = max((max(cells_by_key[key]) / max(numbers) for key, numbers in own_cells.items()), default=1.0)

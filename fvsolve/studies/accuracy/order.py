@@ -94,5 +94,5 @@ def _order(case, settings: Mapping, rows: tuple, against, given, points, progres
     without_basins(case, "order by functions of pipes")
     if delayed := lines(case):
         raise FvsolveError(f"functions along pipes need cells, but {listing(delayed)} would be delay lines. Set "
-                           'numerics.line = "cells", and no `line` of a pipe')  # fmt: skip
+                           'numerics.pipe_model = "finite-volume", and no `pipe_model` of a pipe')  # fmt: skip
     return Manufactured(case, refinement, against, *given).study(points, progress)

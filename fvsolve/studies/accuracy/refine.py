@@ -69,7 +69,7 @@ def resolutions(case) -> dict[str, str]:
     """Keys of a case that set its resolution, with their kind of refinement: "both", "space" or "time"."""
     ways = dict.fromkeys(counts(case), "both")
     if lines(case):
-        ways["numerics.accuracy"] = "space"
+        ways["numerics.delay_tolerance"] = "space"
     if pipes(case) or basins(case):
         ways["numerics.courant"] = "time"
     if by_cell_time(case):
@@ -116,7 +116,7 @@ def plan(
         )
     if refine == "time":
         return time_plan(case, key, levels)
-    if lines(case) and (key == "numerics.accuracy" or not counts(case)):
+    if lines(case) and (key == "numerics.delay_tolerance" or not counts(case)):
         if cells is not None:
             raise FvsolveError(f"cells = {cells}: cells of delay lines are only places of output. Leave it out")
         return lines_plan(case, refine, levels)
@@ -143,8 +143,8 @@ def lines_plan(case, way: str, levels: int) -> Plan:
     tables = [prepared(case, row).tables.delays for row in rows]
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
-        raise FvsolveError("a smaller numerics.accuracy cuts no delay line of this case into more stretches: there is "
-                           'no friction, or stretches are as short as a step. Expected "both" or "time"')  # fmt: skip
+        raise FvsolveError("a smaller numerics.delay_tolerance cuts no delay line of this case into more stretches: "
+                           'there is no friction, or stretches are as short as a step. Expected "both" or "time"')  # fmt: skip
     refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
     return Plan(way, "stretch [s]", tuple(refined), f"{STRETCHES}, one step for all rows")
 
@@ -155,7 +155,7 @@ STRETCHED = {False: f"{STRETCHES}, and steps halved", True: f"{STRETCHES}, and t
 
 def lines_keys(case, way: str, k: int) -> dict:
     """Keys of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if these set the step."""
-    keys = {"numerics.accuracy": case.numerics.accuracy / 2**k} if lines(case) else {}
+    keys = {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k} if lines(case) else {}
     if way == "both" and (case.numerics.rtol is not None or (counts(case) and case.numerics.courant is not None)):
         keys |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in lines(case)}
     return keys

@@ -109,7 +109,7 @@ def delayed(case, pipes: dict[str, Any]) -> dict[str, Any]:
     for name, pipe in pipes.items():
         if reason := what_needs_cells(case, name, pipe):
             raise Unsayable(f"{name} cannot be a delay line: {reason}")
-    return {f"links.{name}.line": "delay" for name in pipes}
+    return {f"links.{name}.pipe_model": "delay-line" for name in pipes}
 
 
 def _survives(probe, pipes: dict) -> bool:

@@ -102,7 +102,7 @@ KEY = Kind(
     jobs=COUNT,
     dask=TEXT,
 )
-def failures(
+def failure_map(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
     courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
     key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, out: str | Path | Points | None = None,

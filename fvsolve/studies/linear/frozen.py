@@ -51,9 +51,13 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
-    delay_lines = [name for name, choice in followed(case).items() if choice.line == "delay"]
+    delay_lines = [name for name, choice in followed(case).items() if choice.pipe_model == "delay-line"]
     if delay_lines:
-        case = load(case, {"numerics.line": "cells"} | {f"links.{name}.line": "cells" for name in delay_lines})
+        case = load(
+            case,
+            {"numerics.pipe_model": "finite-volume"}
+            | {f"links.{name}.pipe_model": "finite-volume" for name in delay_lines},
+        )
     if "scheme" not in case.raw["numerics"] and case.numerics.scheme in LIMITED:
         linear = "upwind" if case.meshes else SCHEMES[case.numerics.scheme].twin
         case = load(case, {"numerics.scheme": linear})

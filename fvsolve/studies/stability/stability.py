@@ -126,7 +126,7 @@ def stability(
     case = load(case, settled(case))
     if lines(case) and at is not None:
         raise FvsolveError("stability of delay lines is computed about the start only: later waves in lines are not "
-                           'included; leave out --at, or set numerics.line = "cells"')  # fmt: skip
+                           'included; leave out --at, or set numerics.pipe_model = "finite-volume"')  # fmt: skip
     schemes = names(schemes) or [case.numerics.scheme]
     requested = names(methods) or [case.numerics.method]
     methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in requested))
