@@ -1,7 +1,8 @@
 """Jumps in delay lines: detection, storage, and passage through friction and the joints of stretches.
 
 An instantaneous change by a schedule, a valve or an event is a jump. A jump below `numerics.delay_tolerance` joins the
-smooth part. Friction in the middle of a stretch reflects the difference of the friction losses with and without the jump.
+smooth part. Friction in the middle of a stretch reflects the difference of the friction losses with and without
+the jump.
 """
 
 from fvsolve.jit import njit

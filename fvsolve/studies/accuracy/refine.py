@@ -144,7 +144,8 @@ def lines_plan(case, way: str, levels: int) -> Plan:
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
         raise FvsolveError("a smaller numerics.delay_tolerance cuts no delay line of this case into more stretches: "
-                           'there is no friction, or stretches are as short as a step. Expected "both" or "time"')  # fmt: skip
+                           'there is no friction, or stretches are as short as a step. '
+                           'Expected "both" or "time"')  # fmt: skip
     refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
     return Plan(way, "stretch [s]", tuple(refined), f"{STRETCHES}, one step for all rows")
 
