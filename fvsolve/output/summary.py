@@ -105,6 +105,6 @@ def _extremes(summary, model) -> dict:
         for side, (value, t) in sides.items():
             valid = not t >= summary.invalid_from
             row |= {side: plain(float(col.from_si(value))) if valid else None,
-                    f"t_{side}": plain(float(t)) if valid else None}  # fmt: skip
+                    f"t_{side[:3]}": plain(float(t)) if valid else None}  # fmt: skip
         extremes[col.name] = row
     return extremes

@@ -54,7 +54,7 @@ def met(model, summary, extent) -> list[Met]:
 
 def valid(part: Met, until: float) -> Met:
     """Places of a part, with nan for extremes from a time on."""
-    sides = {side: np.where(getattr(part, f"t_{side}") < until, getattr(part, side), np.nan)
+    sides = {side: np.where(getattr(part, f"t_{side[:3]}") < until, getattr(part, side), np.nan)
              for side in ("minimum", "maximum")}  # fmt: skip
     return replace(part, **sides)
 

@@ -498,7 +498,10 @@ def test_a_line_has_scalars_and_a_velocity_by_name_its_parameters(tmp_path):
     [
         ({"expression": "swirl", "speed": "fast"}, 'nodes.sheet.velocity.speed: "fast" is not a number with a unit'),
         ({"expression": "shear", "rate": 1, "y1": 0}, 'velocity "shear" has no parameter y1; expected rate, u, y0'),
-        ({"stream": "y", "u": 1}, "nodes.sheet.velocity: has stream, u; expected { u, v } or { stream }"),
+        (
+            {"stream": "y", "u": 1},
+            "nodes.sheet.velocity: has stream, u; expected velocity field: { u, v } or { stream }",
+        ),
         (
             {"expression": "rotation", "centre": [0], "angular_velocity": 1},
             "nodes.sheet.velocity.centre: [0] has 1 values",

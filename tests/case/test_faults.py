@@ -155,7 +155,7 @@ BAD = {
     ),
     "unknown key, nothing near": (
         add("numerics", "zzz = 3"),
-        "numerics.zzz: unknown key; keys are accuracy, below_vapor, ",
+        "numerics.zzz: unknown key; keys are below_vapor, cell_time, courant, delay_tolerance, ",
     ),
     "missing key": (swap('length = "914.4 m"\n', ""), "line 22: links.main: expected one of length, profile"),
     "unknown type": (

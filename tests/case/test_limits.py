@@ -253,11 +253,11 @@ def test_expect_reaches_whole_pipes_and_routes() -> None:
     ("limit", "place", "told"),
     [
         ({"on": "hihg", "maximum": 1e6}, "on", 'did you mean "high"'),
-        ({"on": "high"}, "", "bound is missing; expected one of least, greatest, class_fraction"),
+        ({"on": "high"}, "", "bound is missing; expected one of minimum, maximum, class_fraction"),
         ({"maximum": 1e6}, "", "on is missing"),
         ({"on": "high", "maximum": "3 m/s"}, "maximum", "is a velocity; expected a pressure"),
         ({"on": "high", "quantity": "gas_volume", "maximum": 1.0}, "quantity", "high has no"),
-        ({"on": "high", "minimum": 2e6, "maximum": 1e6}, "minimum", "is not below greatest"),
+        ({"on": "high", "minimum": 2e6, "maximum": 1e6}, "minimum", "is not below maximum"),
         ({"on": "high", "quantity": "velocity", "minimum": "vacuum"}, "minimum", "is a pressure; expected a velocity"),
         ({"on": "high", "minimum": "vaccum"}, "minimum", 'did you mean "vacuum"'),
         ({"on": "high", "class_fraction": 1.0}, "class_fraction", "has no pressure class"),

@@ -361,7 +361,7 @@ def test_check_says_how_pipes_are_followed(fvs, tmp_path):
 BAD = {
     "law": ({"fluid": {"name": "Water", "law": "log"}}, 'law = "log" changes waves as they travel'),
     "unsteady": ({}, "unsteady friction depends on the flow history of every cell"),
-    "rough": ({}, "friction takes"),
+    "rough": ({}, "friction attenuates"),
 }
 
 

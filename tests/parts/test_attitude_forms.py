@@ -137,7 +137,7 @@ BAD = {
             "axis": "has zero length",
             "angle": "not a number",
             "matrix": "from the identity by 7",
-            "zyz": "57.3 deg away",
+            "zyz": "is 57.3 deg from the attitude",
             "x": "unknown key",
         },
     ),

@@ -189,7 +189,7 @@ BAD = {
     ),
     "a stop without a side": (
         swap('minimum = "1 mm"\nmaximum = "199 mm"', ""),
-        "links.stop: expected one of least, greatest",
+        "links.stop: expected one of minimum, maximum",
     ),
     "a stop without room": (swap('"199 mm"', '"1 mm"'), "links.stop.maximum: 0.001 m is not above minimum, 0.001 m"),
     "a force on nothing": (swap('to = "load"\nforce', "force"), "links.push: to is missing"),

@@ -141,7 +141,9 @@ def test_lines_of_a_section_are_those_of_the_envelope(closure):
     lines = {one["name"]: values(one["y"]) for one in figure["data"] if isinstance(one["y"], dict)}
     envelope, fluid = closure.envelope["main"], closure.summary["fluid"]
     for name in ("max_head", "min_head", "initial_head"):
-        assert lines[name.replace("_", " ")] == pytest.approx(envelope[name], rel=1e-6)
+        assert lines[name.replace("min_", "minimum ").replace("max_", "maximum ").replace("_", " ")] == pytest.approx(
+            envelope[name], rel=1e-6
+        )
     below = (fluid["vapor_pressure"] - closure.summary["ambient_pressure"]) / (fluid["density"] * closure.case.gravity)
     assert lines["vapour line"] == pytest.approx(envelope["elevation"] + below, rel=1e-6)
     assert len(figure["moving"]["times"]) == 13 and np.shape(figure["moving"]["heads"]) == (13, 40)

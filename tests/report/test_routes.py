@@ -67,14 +67,14 @@ def test_a_pipe_that_is_cut_has_a_section_where_no_route_has_all_of_it(tmp_path)
 def test_limits_are_lines_and_what_passes_one_is_marked_where_it_is_worst(main):
     one = section(main, ways(main)[0])
     bar = 1e6 / (RHO * GRAVITY)
-    assert one.lines["class, greatest"] == pytest.approx(one.along["elevation"] + bar, rel=1e-9)
-    surge = one.lines["surge, greatest"]
+    assert one.lines["class, maximum"] == pytest.approx(one.along["elevation"] + bar, rel=1e-9)
+    surge = one.lines["surge, maximum"]
     assert np.isnan(surge[one.pipe == "hill"]).all()
     assert surge[one.pipe == "last"] == pytest.approx(one.along["elevation"][one.pipe == "last"] + 400.0)
     verdict = next(found for found in main.verdicts if found.name == "class")
     assert not verdict.ok and (verdict.chainage, verdict.name) in [(at, name) for at, _, name in one.beyond]
     for at, head, name in one.beyond:
-        assert name == "class" and head > np.interp(at, one.chainage, one.lines["class, greatest"])
+        assert name == "class" and head > np.interp(at, one.chainage, one.lines["class, maximum"])
 
 
 def test_the_axis_follows_heads_profile_and_vapour_line_and_names_limits_far_from_them(main):
@@ -84,8 +84,8 @@ def test_the_axis_follows_heads_profile_and_vapour_line_and_names_limits_far_fro
     followed = np.concatenate([heads, one.along["elevation"], one.lines["vapour line"]])
     top, bottom, reach = followed.max(), followed.min(), 0.5 * np.ptp(heads)
     flat = {name: np.full_like(one.chainage, at) for name, at in (
-        ("near, greatest", top + 0.9 * reach), ("far, greatest", top + 1.1 * reach),
-        ("deep, least", bottom - 1.1 * reach))}  # fmt: skip
+        ("near, maximum", top + 0.9 * reach), ("far, maximum", top + 1.1 * reach),
+        ("deep, minimum", bottom - 1.1 * reach))}  # fmt: skip
     planted = replace(one, lines={"vapour line": one.lines["vapour line"]} | flat)
     figure = section_figure(planted, None, "m", "m", 150)
     low, high = figure["layout"]["yaxis"]["range"]
@@ -94,13 +94,13 @@ def test_the_axis_follows_heads_profile_and_vapour_line_and_names_limits_far_fro
     assert [(note["text"].partition(",")[0], note["y"], note["ay"] > 0) for note in arrows] == [
         ("far", 1, True), ("deep", 0, False)]  # fmt: skip
     assert f"{top + 1.1 * reach:.4g} m" in arrows[0]["text"]
-    calm = replace(planted, lines={"vapour line": one.lines["vapour line"], "far, greatest": flat["far, greatest"]})
+    calm = replace(planted, lines={"vapour line": one.lines["vapour line"], "far, maximum": flat["far, maximum"]})
     assert window([calm], "m").high < top + 0.13 * (top - bottom)
 
 
 def test_upper_and_lower_limits_and_the_class_have_dashes_of_their_own(main):
     one = section(main, ways(main)[0])
-    names = ("vapour line", "class line", "a, greatest", "a, least")
+    names = ("vapour line", "class line", "a, maximum", "a, minimum")
     planted = replace(one, lines=dict.fromkeys(names, one.along["elevation"]))
     figure = section_figure(planted, None, "m", "m", 150)
     dashes = {line["name"]: line["line"]["dash"] for line in figure["data"] if "line" in line}

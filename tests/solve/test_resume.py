@@ -120,7 +120,7 @@ def test_an_earlier_end_than_the_checkpoint_is_refused(tmp_path):
 
 
 def test_resume_and_force_contradict(tmp_path):
-    with pytest.raises(fvsolve.RunError, match="state one"):
+    with pytest.raises(fvsolve.RunError, match="state only one of them"):
         fvsolve.run(branched(), out=tmp_path / "run", resume=True, force=True)
 
 

@@ -86,7 +86,7 @@ def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> 
     assert (said["state"], said["ok"], said["bound"]) == ("open", False, "maximum")
     page = write_report(tmp_path / "run", tmp_path / "run.html", False)[0].read_text()
     assert "The verdict of a limit is open" in page
-    (tmp_path / "two.toml").write_text('case = "short.toml"\nerror = true\n[events.close]\n')
+    (tmp_path / "two.toml").write_text('case = "short.toml"\nestimate_error = true\n[events.close]\n')
     found = design.study(tmp_path / "two.toml", tmp_path / "out")
     row = json.loads((tmp_path / "out" / "study.json").read_text())["runs"][0]["verdicts"][0]
     assert row["state"] == "open" and not found.ok and found.holds == []
@@ -99,7 +99,7 @@ def test_a_study_says_why_errors_are_not_known_and_what_helps(fvs, tmp_path, mon
     case = short_pipe(maximum=NEAR)
     case["links"]["short"]["cells"] = 1
     (tmp_path / "short.toml").write_text(write(case))
-    (tmp_path / "two.toml").write_text('case = "short.toml"\nerror = true\n[events.close]\n')
+    (tmp_path / "two.toml").write_text('case = "short.toml"\nestimate_error = true\n[events.close]\n')
     _, text, _ = fvs("study", "two.toml", "--out", "out")
     assert "close: error of gate.head, heads at gate: " in text and "links.short.cells = 4" in text
     row = json.loads((tmp_path / "out" / "study.json").read_text())["runs"][0]

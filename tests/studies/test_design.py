@@ -180,11 +180,11 @@ def test_the_commands_of_the_page_say_what_it_says(fvs, tmp_path, monkeypatch) -
 # sizes ------------------------------------------------------------------------------------------------------------
 
 
-def still(least: float | None = None, greatest: float | None = None) -> dict:
+def still(minimum: float | None = None, maximum: float | None = None) -> dict:
     """A lake above a shut main: the gauge pressure at the gate is rho g (head - 10 m)."""
     case = throttled()
     case["links"]["tap"]["opening"] = 0.0
-    bounds = {key: one for key, one in (("minimum", least), ("maximum", greatest)) if one is not None}
+    bounds = {key: one for key, one in (("minimum", minimum), ("maximum", maximum)) if one is not None}
     return case | {"limits": {"gate": {"on": "gate", "quantity": "gauge_pressure", **bounds}}}
 
 
