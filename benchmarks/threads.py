@@ -21,7 +21,7 @@ from planes_scenes import BASINS, scene, square
 
 from fvsolve.case import load
 from fvsolve.jit import njit
-from fvsolve.kernels import joint
+from fvsolve.kernels import band_exchange
 from fvsolve.model import build
 from fvsolve.model.slate import lined
 from fvsolve.run import ranks
@@ -95,16 +95,20 @@ def apart(model) -> float:
 def meet(own, times):
     """Wait for each other so often."""
     for _ in range(times):
-        joint.wait(own)
+        band_exchange.barrier(own)
 
 
 def waiting(times: int = 2000, rounds: int = 200) -> float:
     """Wall time [s] in which two threads find that both are there, the least."""
     best = np.inf
     for _ in range(rounds):
-        board, owns = lined(2 * joint.LINE), np.zeros((2, joint.HEAD), dtype=np.int64)
-        owns[:, joint.ME], owns[:, joint.MANY], owns[:, joint.BOARD] = (0, 1), 2, board.ctypes.data
-        owns[:, joint.YIELD] = yielding()
+        board, owns = lined(2 * band_exchange.LINE), np.zeros((2, band_exchange.HEAD), dtype=np.int64)
+        owns[:, band_exchange.BAND], owns[:, band_exchange.BAND_COUNT], owns[:, band_exchange.BOARD] = (
+            (0, 1),
+            2,
+            board.ctypes.data,
+        )
+        owns[:, band_exchange.YIELD] = yielding()
         threads = [threading.Thread(target=meet, args=(own, times)) for own in owns]
         start = perf_counter()
         for one in threads:

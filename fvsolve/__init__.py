@@ -2,16 +2,16 @@
 
 import sys
 
-LEAST = 3, 11  # oldest supported version of Python
-if sys.version_info < LEAST:
+OLDEST_PYTHON = 3, 11  # oldest supported version of Python
+if sys.version_info < OLDEST_PYTHON:
     raise ImportError(
-        f"fvsolve needs Python {LEAST[0]}.{LEAST[1]} or later; {sys.executable} is {sys.version.split()[0]}. Create "
+        f"fvsolve needs Python {OLDEST_PYTHON[0]}.{OLDEST_PYTHON[1]} or later; {sys.executable} is {sys.version.split()[0]}. Create "
         "the environment with a later version: python3.12 -m venv .venv"
     )
 
-from fvsolve.names import offer  # noqa: E402
+from fvsolve.lazy_exports import lazy_names  # noqa: E402
 
-_HOMES = {
+_MODULES = {
     "Case": "case",
     "CaseError": "errors",
     "FluidError": "errors",
@@ -34,4 +34,4 @@ _HOMES = {
 }
 
 __version__ = "0.1.0"
-__all__ = offer(__name__, _HOMES)  # noqa: PLE0605
+__all__ = lazy_names(__name__, _MODULES)  # noqa: PLE0605

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-LONGEST = 200  # length of a name above which it is not compared with others
+LONGEST_NAME = 200  # length of a name above which it is not compared with others
 # Control characters, direction marks, line ends other than "\n", halves of surrogate pairs.
-UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+INVISIBLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class CaseError(FvsolveError):
 
 
 @contextmanager
-def gathered(faults: list[Fault], place: str = "") -> Iterator[None]:
+def collect_faults(faults: list[Fault], place: str = "") -> Iterator[None]:
     """Catch the errors of the body and append them to `faults`: all of a CaseError, other errors at `place`."""
     try:
         yield
@@ -104,14 +104,14 @@ class RunError(FvsolveError):
 
 def visible(text: str) -> str:
     """Text that is safe for terminals: invisible characters are replaced by escapes, except line ends and tabs."""
-    return UNSEEN.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+    return INVISIBLE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def nearest(name: str, names: Iterable[str]) -> str | None:
     """Valid name that is most similar to `name`, or None."""
-    if len(name) > LONGEST:
+    if len(name) > LONGEST_NAME:
         return None
-    names = [valid for valid in dict.fromkeys(names) if len(valid) <= LONGEST]
+    names = [valid for valid in dict.fromkeys(names) if len(valid) <= LONGEST_NAME]
     folded = {other.casefold().replace("_", "-"): other for other in names}
     close = difflib.get_close_matches(name.casefold().replace("_", "-"), folded, n=1, cutoff=0.6)
     return folded[close[0]] if close else None
@@ -123,12 +123,12 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     return f'; did you mean "{close}"?' if close else ""
 
 
-FEW = 2  # names above the limit of a listing that are still listed
+EXTRA_NAMES = 2  # names above the limit of a listing that are still listed
 
 
 def listing(names: Iterable[str], limit: int = 12) -> str:
     """Names in a line, sorted, without duplicates; of many names the first `limit` and their total number."""
     names = sorted({*names})
-    if len(names) <= limit + FEW:
+    if len(names) <= limit + EXTRA_NAMES:
         return ", ".join(names)
     return ", ".join(names[:limit]) + f", ... ({len(names)} in all)"

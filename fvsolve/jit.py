@@ -29,22 +29,31 @@ import numpy as np
 from fvsolve import store
 from fvsolve.store import Code
 
-__all__ = ["Intrinsic", "add_sources", "beside", "cache_folder", "inner", "njit", "once", "source_hash"]
+__all__ = [
+    "Intrinsic",
+    "add_sources",
+    "compile_in_parallel",
+    "cache_folder",
+    "inline",
+    "njit",
+    "compile_once",
+    "source_hash",
+]
 
-ROOM = 65536  # bytes that are written to test if a folder can hold caches
+TEST_BYTES = 65536  # bytes that are written to test if a folder can hold caches
 DIGEST = hashlib.sha256().digest_size
-PATIENCE = 60.0  # longest wait for a second process that compiles [s]
-KEPT = 3  # generations of compiled code kept in addition to the present one
+COMPILE_TIMEOUT = 60.0  # longest wait for a second process that compiles [s]
+KEPT_GENERATIONS = 3  # generations of compiled code kept in addition to the present one
 
 PACKAGE = Path(__file__).resolve().parent
 # Sources that compiled code can depend on: packages and modules with compiled functions and, by import contract, all
 # that they may import; of `parts` the law files, of `basins` all files without a prefix of `UNCOMPILED_PREFIXES`.
-ROOMS = ("kernels", "steppers", "jit", "store", "units", "errors")
-PYTHON = ("part", "lower")  # prefixes of files of `basins` without compiled functions
-OUTSIDE: dict[Path, str] = {}  # other folders with compiled functions -> their folder below the code folder
-MAKING = threading.RLock()  # locked while functions are compiled
-LOADED: dict[str, bytes] = {}  # machine code that numba has loaded from its cache, by the symbol of the function
-SETTING = threading.Lock()  # locked while numba's cache folder is set
+SOURCE_ROOTS = ("kernels", "steppers", "jit", "store", "units", "errors")
+UNCOMPILED_PREFIXES = ("part", "lower")  # prefixes of files of `basins` without compiled functions
+EXTRA_FOLDERS: dict[Path, str] = {}  # other folders with compiled functions -> their folder below the code folder
+COMPILE_LOCK = threading.RLock()  # locked while functions are compiled
+LOADED_CODE: dict[str, bytes] = {}  # machine code that numba has loaded from its cache, by the symbol of the function
+CACHE_DIR_LOCK = threading.Lock()  # locked while numba's cache folder is set
 COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 
 
@@ -54,7 +63,7 @@ def cache_folder() -> Path:
 
     `FVSOLVE_CACHE` if set, else the cache folder of the user; if not writable, a folder below the temporary folder.
     """
-    for folder in (_wanted_folder(), Path(tempfile.gettempdir()) / f"fvsolve-cache-{_user()}"):
+    for folder in (_preferred_folder(), Path(tempfile.gettempdir()) / f"fvsolve-cache-{_user()}"):
         if _writable(folder):
             return folder
     return Path(tempfile.mkdtemp(prefix="fvsolve-cache-"))
@@ -69,7 +78,7 @@ def source_hash() -> str:
 def add_sources(folder: Path) -> None:
     """Allow caching of functions of modules in a folder outside the package, under the hash of all its sources."""
     folder = Path(folder).resolve()
-    OUTSIDE[folder] = f"outside/{_digest(folder, sorted(folder.rglob('*.py')))}"
+    EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(folder.rglob('*.py')))}"
 
 
 def _digest(top: Path, paths) -> str:
@@ -108,19 +117,19 @@ class Function:
         self.targetoptions = {"nopython": True, "boundscheck": None} | options  # numba reads this attribute
         self.__code__, self.__defaults__ = function.__code__, function.__defaults__
         self.codes: dict[str, Code] = {}  # by signature; after a dot for code without wrappers
-        self.of_numbers: dict[tuple, Callable] = {}  # callables by types of arguments, all of them numbers
-        self.declared: Declared | None = None
+        self.by_types: dict[tuple, Callable] = {}  # callables by types of arguments, all of them numbers
+        self.declared: DeclaredFunction | None = None
 
     @functools.cached_property
     def folder(self) -> str | None:
         """Folder of its machine code below the code folder; None if no hash covers its source."""
         home = Path(self.__code__.co_filename).resolve()
-        return "" if home in _sources() else next((OUTSIDE[f] for f in home.parents if f in OUTSIDE), None)
+        return "" if home in _sources() else next((EXTRA_FOLDERS[f] for f in home.parents if f in EXTRA_FOLDERS), None)
 
     @functools.cached_property
     def numba(self):
         """Dispatcher of numba for this function."""
-        with MAKING:
+        with COMPILE_LOCK:
             return _dispatcher()(self.py_func, self.folder is not None, self.folder or "", **self.targetoptions)
 
     @property
@@ -130,47 +139,47 @@ class Function:
     def __reduce__(self):
         if "<" in self.__qualname__:
             return Function, (self.py_func, self.options)
-        return _named, (self.__module__, self.__qualname__)
+        return _attribute_of, (self.__module__, self.__qualname__)
 
-    def declare(self, letters: str, kinds: Callable[[str], tuple]) -> Declared:
+    def declare(self, letters: str, kinds: Callable[[str], tuple]) -> DeclaredFunction:
         """Compile for a single signature; calls from Python accept no other.
 
         letters : signature; kinds(letters) : numba types of the arguments
         """
         if self.declared is None:
-            self.declared = Declared(self, letters, self.code(letters, lambda: kinds(letters)))
+            self.declared = DeclaredFunction(self, letters, self.code(letters, lambda: kinds(letters)))
         return self.declared
 
     def address(self, letters: str, kinds: Callable[[str], tuple]) -> int:
         """Address for calls from compiled code, compiled for a signature."""
-        return self.code(letters, lambda: kinds(letters), doors=False).address
+        return self.code(letters, lambda: kinds(letters), wrappers=False).address
 
     def __call__(self, *arguments: Any) -> Any:
         if self.declared is not None:
             return self.declared(*arguments)
-        if (python := self.of_numbers.get(kinds := tuple(map(type, arguments)))) is not None:
+        if (python := self.by_types.get(kinds := tuple(map(type, arguments)))) is not None:
             return python(*arguments)
         try:
-            letters = "".join(map(letter_of, arguments))
+            letters = "".join(map(signature_of, arguments))
         except KeyError:  # a type without letter
             return self.numba(*arguments)
         python = self.code(letters, lambda: tuple(map(_numba().typeof, arguments))).python
         if LETTERS.keys() >= set(kinds):
-            self.of_numbers[kinds] = python
+            self.by_types[kinds] = python
         return python(*arguments)
 
-    def code(self, letters: str, kinds: Callable[[], tuple], doors: bool = True) -> Code:
+    def code(self, letters: str, kinds: Callable[[], tuple], wrappers: bool = True) -> Code:
         """Machine code for a signature; doors : with wrappers for calls from Python and C, else without."""
-        key = letters if doors else f".{letters}"
+        key = letters if wrappers else f".{letters}"
         if key not in self.codes:
-            with MAKING:
+            with COMPILE_LOCK:
                 if key not in self.codes:
-                    self.codes[key] = self._kept(key) or self._compiled(key, kinds(), doors)
+                    self.codes[key] = self._stored(key) or self._compiled(key, kinds(), wrappers)
         return self.codes[key]
 
-    def _kept(self, key: str) -> Code | None:
+    def _stored(self, key: str) -> Code | None:
         path = self._path(key)
-        return None if path is None else store.read(path, self._who(key))
+        return None if path is None else store.read(path, self._identity(key))
 
     def _compiled(self, key: str, kinds: tuple, doors: bool) -> Code:
         compiler = self.numba if doors else self.numba.within
@@ -178,37 +187,39 @@ class Function:
         compiled = compiler.overloads[kinds]
         if (path := self._path(key)) is not None:
             try:
-                loaded = LOADED.pop(compiled.fndesc.llvm_func_name, None)
-                store.write(path, self._who(key), compiled, loaded or compiled.library._get_compiled_object(), doors)
+                loaded = LOADED_CODE.pop(compiled.fndesc.llvm_func_name, None)
+                store.write(
+                    path, self._identity(key), compiled, loaded or compiled.library._get_compiled_object(), doors
+                )
             except OSError as error:
-                _cannot_keep(error.strerror or str(error))
+                _warn_not_cached(error.strerror or str(error))
         return code_of(compiled, doors)
 
     def _path(self, key: str) -> Path | None:
         """File in the store; None for closures and local functions, which have no unique name."""
-        if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.LINKS:
+        if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.CAN_LINK:
             return None
-        digest = hashlib.sha256(self._who(key).encode()).hexdigest()[:12]
+        digest = hashlib.sha256(self._identity(key).encode()).hexdigest()[:12]
         return code_folder() / self.folder / f"{self.__name__}-{digest}{store.SUFFIX}"
 
-    def _who(self, key: str) -> str:
+    def _identity(self, key: str) -> str:
         options = " ".join(f"{name}={value}" for name, value in sorted(self.options.items()))
         return f"{self.__module__}.{self.__qualname__} line {self.__code__.co_firstlineno} {options} ({key})"
 
 
-def _named(module: str, name: str) -> Any:
+def _attribute_of(module: str, name: str) -> Any:
     """Attribute of a module."""
     return getattr(importlib.import_module(module), name)
 
 
-def code_of(compiled, doors: bool = True) -> Code:
+def code_of(compiled, wrappers: bool = True) -> Code:
     """Addresses and Python entry point of a function compiled by numba."""
     find, names = compiled.library.get_pointer_to_function, compiled.fndesc
-    pointer = find(names.llvm_cfunc_wrapper_name) if doors else 0
-    return Code(find(names.llvm_func_name), pointer, compiled.entry_point if doors else None, compiled)
+    pointer = find(names.llvm_cfunc_wrapper_name) if wrappers else 0
+    return Code(find(names.llvm_func_name), pointer, compiled.entry_point if wrappers else None, compiled)
 
 
-class Declared:
+class DeclaredFunction:
     """Compiled function of a single signature, for calls from Python and as an argument of compiled functions.
 
     `.address` is its address for C. Exceptions are lost in such calls: these functions report errors in their output.
@@ -220,7 +231,7 @@ class Declared:
 
     def __call__(self, *arguments: Any) -> Any:
         for i, letter in self.arrays:  # machine code does not check them
-            actual = letter_of(arguments[i]) if type(arguments[i]) is np.ndarray else type(arguments[i]).__name__
+            actual = signature_of(arguments[i]) if type(arguments[i]) is np.ndarray else type(arguments[i]).__name__
             if actual != letter:
                 expected = "{} with {} dimension(s)".format(*ARRAYS[letter])
                 raise TypeError(f"argument {i} is {actual}; expected a writable C-contiguous array of {expected}")
@@ -235,49 +246,49 @@ def plain_kinds() -> dict:
     return kinds | {letter: types.Array(getattr(types, kind), axes, "C") for letter, (kind, axes) in ARRAYS.items()}
 
 
-def declared(function: Callable, letters: str, kinds: Callable[[str], tuple]) -> Callable:
+def declare_function(function: Callable, letters: str, kinds: Callable[[str], tuple]) -> Callable:
     """Compile a function for a single signature; return it unchanged if compilation is disabled."""
     return function.declare(letters, kinds) if isinstance(function, Function) else function
 
 
 LETTERS = {float: "t", np.float64: "t", int: "i", np.int64: "i", bool: "b", np.bool_: "b", complex: "c"}
 ARRAYS = {"v": ("float64", 1), "w": ("float64", 2), "h": ("int64", 1), "s": ("int64", 2), "z": ("complex128", 1)}
-LETTER = {(np.dtype(kind).char, axes): letter for letter, (kind, axes) in ARRAYS.items()}
-WRITTEN, COLUMNS = 0x501, 2  # numpy flags: C-contiguous, aligned and writable; Fortran-contiguous
+ARRAY_LETTERS = {(np.dtype(kind).char, axes): letter for letter, (kind, axes) in ARRAYS.items()}
+WRITABLE, COLUMNS = 0x501, 2  # numpy flags: C-contiguous, aligned and writable; Fortran-contiguous
 
 
-def letter_of(argument: Any) -> str:
+def signature_of(argument: Any) -> str:
     """Signature of an argument in the letters of `kernels.calls`; in brackets for other arrays; else KeyError."""
     if type(argument) is not np.ndarray:
         if isinstance(argument, tuple):
-            return f"({type(argument).__qualname__} {''.join(map(letter_of, argument))})"
-        return f"[{_spelt(argument.dtype)}]" if type(argument) is np.void else LETTERS[type(argument)]
+            return f"({type(argument).__qualname__} {''.join(map(signature_of, argument))})"
+        return f"[{_dtype_text(argument.dtype)}]" if type(argument) is np.void else LETTERS[type(argument)]
     kind, flags = argument.dtype, argument.flags.num
-    if flags & WRITTEN == WRITTEN and (letter := LETTER.get((kind.char, argument.ndim))) is not None:
+    if flags & WRITABLE == WRITABLE and (letter := ARRAY_LETTERS.get((kind.char, argument.ndim))) is not None:
         return letter
-    return f"[{_spelt(kind)} {argument.ndim} {flags & (WRITTEN | COLUMNS)}]"
+    return f"[{_dtype_text(kind)} {argument.ndim} {flags & (WRITABLE | COLUMNS)}]"
 
 
 @functools.cache
-def _spelt(kind: np.dtype) -> str:
+def _dtype_text(kind: np.dtype) -> str:
     """Short text of a dtype; for records a hash of names and offsets of their fields."""
     text = f"{kind.descr} {kind.itemsize} {kind.alignment}" if kind.names else ""
     return hashlib.sha256(text.encode()).hexdigest()[:12] if text else kind.str
 
 
-def once(function: Callable) -> Callable:
+def compile_once(function: Callable) -> Callable:
     """`functools.cache` for functions that compile: concurrent calls of threads wait and get the same result."""
     cached = functools.cache(function)
 
     @functools.wraps(function)
     def locked(*arguments: Any) -> Any:
-        with MAKING:
+        with COMPILE_LOCK:
             return cached(*arguments)
 
     return locked
 
 
-def inner(function: Callable) -> Callable:
+def inline(function: Callable) -> Callable:
     """`njit` with forced inlining, for functions called from a single place: passing arrays costs nothing."""
     return njit(function, forceinline=True)
 
@@ -290,7 +301,7 @@ class Intrinsic:
         self.define = define
 
     def __reduce__(self):
-        return _named, (self.__module__, self.__qualname__)
+        return _attribute_of, (self.__module__, self.__qualname__)
 
     @functools.cached_property
     def _numba_type_(self):
@@ -301,12 +312,12 @@ class Intrinsic:
         return next(kind for value, kind in reversed(builtin_registry.globals) if value is intrinsic_function)
 
 
-def cold() -> bool:
+def is_cold() -> bool:
     """True if nothing of this version has been compiled on this machine yet."""
     return COMPILING and not any(code_folder().glob(f"*{store.SUFFIX}"))
 
 
-def elsewhere() -> str:
+def other_caches() -> str:
     """Text about compiled code in the cache that cannot be used here; "" if there is none."""
     own = code_folder()
     folders = {path.parent for path in cache_folder().glob(f"code/*/*/*{store.SUFFIX}")}
@@ -323,7 +334,7 @@ def elsewhere() -> str:
 
 
 @contextlib.contextmanager
-def beside(code: str, cached: str):
+def compile_in_parallel(code: str, cached: str):
     """Context in which a second process runs `code` to compile other functions; halves the time of a cold start.
 
     cached : name of a function that it compiles; if the store contains this function, no process is started. Functions
@@ -338,16 +349,16 @@ def beside(code: str, cached: str):
     try:
         yield
         with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(PATIENCE)
+            process.wait(COMPILE_TIMEOUT)
     finally:
         process.kill()
 
 
 @functools.cache
 def _sources() -> tuple[Path, ...]:
-    packages = [path for root in ROOMS for path in (PACKAGE / root).rglob("*.py")]
-    modules = [path for root in ROOMS if (path := PACKAGE / f"{root}.py").is_file()]
-    basins = [path for path in (PACKAGE / "basins").rglob("*.py") if not path.name.startswith(PYTHON)]
+    packages = [path for root in SOURCE_ROOTS for path in (PACKAGE / root).rglob("*.py")]
+    modules = [path for root in SOURCE_ROOTS if (path := PACKAGE / f"{root}.py").is_file()]
+    basins = [path for path in (PACKAGE / "basins").rglob("*.py") if not path.name.startswith(UNCOMPILED_PREFIXES)]
     return tuple(sorted([*packages, *modules, *(PACKAGE / "parts").rglob("law*.py"), *basins]))
 
 
@@ -378,14 +389,14 @@ def _dispatcher() -> type:
             super().__init__(function, targetoptions=options)
             self.cache, self.folder, self.options = cache, folder, options
             if cache:
-                with SETTING:
+                with CACHE_DIR_LOCK:
                     before = numba.config.CACHE_DIR
                     numba.config.CACHE_DIR = str(code_folder() / folder)
                     try:
                         self.enable_caching()
                     finally:
                         numba.config.CACHE_DIR = before
-                self._cache._cache_file.__class__ = _kept_file()
+                self._cache._cache_file.__class__ = _cache_file_class()
 
         @functools.cached_property
         def within(self) -> CPUDispatcher:
@@ -405,7 +416,7 @@ def _dispatcher() -> type:
 
 
 @functools.cache
-def _kept_file() -> type:
+def _cache_file_class() -> type:
     """Cache file class of numba that treats a damaged file as missing and does not fail on a full disk."""
     from numba.core.caching import IndexDataCacheFile, dumps
 
@@ -421,7 +432,7 @@ def _kept_file() -> type:
             if hashlib.sha256(data).digest() != digest:
                 raise OSError(f"{name} is damaged")  # numba then compiles it again
             content = pickle.loads(data)
-            (_, _, (LOADED[content[1].llvm_func_name], _)), *_ = content  # LLVM does not return it later
+            (_, _, (LOADED_CODE[content[1].llvm_func_name], _)), *_ = content  # LLVM does not return it later
             return content
 
         def _save_data(self, name: str, data: Any) -> None:
@@ -433,13 +444,13 @@ def _kept_file() -> type:
             try:
                 super().save(key, data)
             except OSError as error:
-                _cannot_keep(error.strerror or str(error))
+                _warn_not_cached(error.strerror or str(error))
 
     return CacheFile
 
 
 @functools.cache
-def _cannot_keep(reason: str) -> None:
+def _warn_not_cached(reason: str) -> None:
     text = f"{cache_folder()}: compiled code cannot be saved: {reason}; each start compiles it again"
     warnings.warn(f"{text}. Free space there, or set FVSOLVE_CACHE to another folder", RuntimeWarning, stacklevel=2)
 
@@ -451,7 +462,7 @@ def code_folder() -> Path:
     own = folder / store.target()["name"]
     own.mkdir(parents=True, exist_ok=True)
     with contextlib.suppress(OSError):  # a full disk is reported when code is saved
-        store.describe(own)
+        store.write_target(own)
     os.utime(folder)
     _prune(folder)
     return own
@@ -466,17 +477,17 @@ def _prune(present: Path) -> None:
         except OSError:
             continue
     others = sorted((item for item in others if item[1] != present), reverse=True)
-    for _, path in others[KEPT:]:
+    for _, path in others[KEPT_GENERATIONS:]:
         shutil.rmtree(path, ignore_errors=True)
 
 
-def _wanted_folder() -> Path:
+def _preferred_folder() -> Path:
     if stated := os.environ.get("FVSOLVE_CACHE"):
         return Path(stated).expanduser().absolute()
     if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "fvsolve" / "cache"
+        return Path(os.environ.get("LOCALAPPDATA") or Path.package() / "AppData" / "Local") / "fvsolve" / "cache"
     if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "fvsolve"
+        return Path.package() / "Library" / "Caches" / "fvsolve"
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fvsolve"
 
 
@@ -488,7 +499,7 @@ def _writable(folder: Path) -> bool:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(bytes(ROOM))  # fails on a full disk
+            file.write(bytes(TEST_BYTES))  # fails on a full disk
         return True
     except OSError:
         return False

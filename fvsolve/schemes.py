@@ -11,8 +11,8 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
-CELLS = range(-2, 3)  # cells that a linear scheme may use, relative to the cell upstream of the face
-ROOM = 5  # number of cells that a pipe needs for a scheme with a stencil of five
+STENCIL = range(-2, 3)  # cells that a linear scheme may use, relative to the cell upstream of the face
+LEAST_CELLS = 5  # number of cells that a pipe needs for a scheme with a stencil of five
 Weights = tuple[Fraction, ...]
 
 
@@ -47,8 +47,8 @@ class Scheme:
     shorter: str = ""
     plane: str = "muscl"
     cavities: bool = False
-    more: int = 0
-    own_quicker: tuple[float, ...] = ()
+    extra_cells: int = 0
+    own_end_factors: tuple[float, ...] = ()
     branches: tuple[tuple[str, Weights], ...] = ()  # linear schemes for fixed switches; for muscl see its limiter
 
     @property
@@ -72,7 +72,7 @@ class Scheme:
     def exact(self, degree: int) -> bool:
         """True if it gives x^degree at x = 1 exactly from averages over cells [k, k + 1]."""
         power = degree + 1
-        averages = (Fraction((k + 1) ** power - k**power, power) for k in CELLS)
+        averages = (Fraction((k + 1) ** power - k**power, power) for k in STENCIL)
         return sum(w * average for w, average in zip(self.smooth.weights, averages, strict=True)) == 1
 
     @property
@@ -83,46 +83,46 @@ class Scheme:
     @cached_property
     def reach(self) -> Reach:
         """Numbers of cells that the rate of a cell depends on."""
-        used = [k for k, w in zip(CELLS, self.smooth.weights, strict=True) if w != 0]
-        return Reach(1 - min(used), max(0, *used), self.degree, self.degree + 1 + self.more)
+        used = [k for k, w in zip(STENCIL, self.smooth.weights, strict=True) if w != 0]
+        return Reach(1 - min(used), max(0, *used), self.degree, self.degree + 1 + self.extra_cells)
 
     @property
-    def quicker(self) -> tuple[float, ...]:
+    def end_factors(self) -> tuple[float, ...]:
         """Factors on the rate of a short pipe because of its ends: those of its linear scheme."""
-        return self.smooth.own_quicker
+        return self.smooth.own_end_factors
 
-    def on(self, rectangle: bool) -> Scheme:
+    def for_basin(self, rectangle: bool) -> Scheme:
         """Scheme for basins on a rectangle, or on an unstructured mesh."""
         scheme = SCHEMES[self.plane]
         return scheme if rectangle or scheme.degree <= 1 else SCHEMES["muscl"]
 
 
-def weighed(denominator: int, *weights: int) -> Weights:
+def fractions(denominator: int, *weights: int) -> Weights:
     """Fractions of integer weights and their common denominator."""
     return tuple(Fraction(w, denominator) for w in weights)
 
 
-UPWIND3, UPWIND5 = weighed(6, 0, -1, 5, 2, 0), weighed(60, 2, -13, 47, 27, -3)
+UPWIND3, UPWIND5 = fractions(6, 0, -1, 5, 2, 0), fractions(60, 2, -13, 47, 27, -3)
 SCHEMES = {one.name: one for one in (
-    Scheme("upwind", "upwind", weighed(1, 0, 0, 1, 0, 0), plane="upwind", cavities=True),
-    Scheme("muscl", "muscl", twin="fromm", cavities=True, more=1),
+    Scheme("upwind", "upwind", fractions(1, 0, 0, 1, 0, 0), plane="upwind", cavities=True),
+    Scheme("muscl", "muscl", twin="fromm", cavities=True, extra_cells=1),
     Scheme("upwind5", weights=UPWIND5, shorter="upwind3", plane="upwind5",
-           own_quicker=(1.0, 1.46, 1.61, 1.22, 1.88, 1.46, 1.25, 1.08)),
+           own_end_factors=(1.0, 1.46, 1.61, 1.22, 1.88, 1.46, 1.25, 1.08)),
     Scheme("weno5", "weno5", twin="upwind5", shorter="muscl", plane="weno5", branches=(
-        ("upwind5", UPWIND5), ("stencil behind", weighed(6, 2, -7, 11, 0, 0)), ("upwind3", UPWIND3),
-        ("stencil ahead", weighed(6, 0, 0, 2, 5, -1)))),
-    Scheme("linear-upwind", weights=weighed(2, 0, -1, 3, 0, 0), own_quicker=(1.0, 1.38, 1.21, 1.11, 1.07, 1.03, 1.01)),
-    Scheme("fromm", weights=weighed(4, 0, -1, 4, 1, 0), own_quicker=(1.0, 1.46, 1.19, 1.08)),
-    Scheme("central", weights=weighed(2, 0, 0, 1, 1, 0)),
-    Scheme("upwind3", weights=UPWIND3, own_quicker=(1.0, 1.46, 1.61, 1.22, 1.03)),
+        ("upwind5", UPWIND5), ("stencil behind", fractions(6, 2, -7, 11, 0, 0)), ("upwind3", UPWIND3),
+        ("stencil ahead", fractions(6, 0, 0, 2, 5, -1)))),
+    Scheme("linear-upwind", weights=fractions(2, 0, -1, 3, 0, 0), own_end_factors=(1.0, 1.38, 1.21, 1.11, 1.07, 1.03, 1.01)),
+    Scheme("fromm", weights=fractions(4, 0, -1, 4, 1, 0), own_end_factors=(1.0, 1.46, 1.19, 1.08)),
+    Scheme("central", weights=fractions(2, 0, 0, 1, 1, 0)),
+    Scheme("upwind3", weights=UPWIND3, own_end_factors=(1.0, 1.46, 1.61, 1.22, 1.03)),
 )}  # fmt: skip
 LINEAR = dict(sorted(((name, one) for name, one in SCHEMES.items() if not one.limited), key=lambda pair: pair[1].order))
 LIMITED = {name: one for name, one in SCHEMES.items() if one.limited}
 
 
-def quicker(scheme: str, cells: int) -> float:
+def end_rate_factor(scheme: str, cells: int) -> float:
     """Factor on the rate of the cells of a pipe because of its ends; 1 for a long pipe."""
-    factors = SCHEMES[scheme].quicker
+    factors = SCHEMES[scheme].end_factors
     return factors[cells - 1] if cells <= len(factors) else 1.0
 
 
@@ -135,13 +135,13 @@ class Limiter(NamedTuple):
     """
 
     tangents: tuple[tuple[Fraction, Fraction], ...]
-    wide: float
+    overshoot: float
 
     @property
     def branches(self) -> dict[str, Weights]:
         """Weights of muscl for fixed switches, by name: linear schemes, or twice the slope behind or ahead."""
         half = [(Fraction(), Fraction()), *((a / 2, b / 2) for a, b in self.tangents)]
-        schemes = [(NONE, -a, 1 + a - b, b, NONE) for a, b in half]
+        schemes = [(ZERO, -a, 1 + a - b, b, ZERO) for a, b in half]
         known = {scheme.weights: name for name, scheme in LINEAR.items()}
         return {known.get(w, "twice behind" if w[1] else "twice ahead"): w for w in schemes}
 
@@ -151,11 +151,11 @@ class Limiter(NamedTuple):
         return max(max(pair) for pair in self.tangents)
 
 
-ONE, TWO, HALF, NONE = Fraction(1), Fraction(2), Fraction(1, 2), Fraction(0)
+UNITY, DOUBLE, HALF, ZERO = Fraction(1), Fraction(2), Fraction(1, 2), Fraction(0)
 LIMITERS = {
-    "minmod": Limiter(((ONE, NONE), (NONE, ONE)), 1.0),
-    "van-leer": Limiter(((HALF, HALF), (TWO, NONE), (NONE, TWO)), 2.0),
-    "monotonized-central": Limiter(((HALF, HALF), (TWO, NONE), (NONE, TWO)), 2.0),
+    "minmod": Limiter(((UNITY, ZERO), (ZERO, UNITY)), 1.0),
+    "van-leer": Limiter(((HALF, HALF), (DOUBLE, ZERO), (ZERO, DOUBLE)), 2.0),
+    "monotonized-central": Limiter(((HALF, HALF), (DOUBLE, ZERO), (ZERO, DOUBLE)), 2.0),
 }
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-DENSE = 300  # number of unknowns up to which a dense solver is faster
+DENSE_LIMIT = 300  # number of unknowns up to which a dense solver is faster
 DAMPING = 1e-12  # weight of |x|^2 in the least-squares solution of a singular system
 ROUNDING = 1e-13  # Newton change below which only rounding is left, relative to the scales
 SMALL_DROP = 1e-12  # relative difference of potentials that counts as rounding
@@ -33,13 +33,17 @@ class Edge:
     flow: float = 0.0
     shut: bool = False
     drop: Callable[[float], float] | None = None  # potential drop [Pa] at a fixed flow
-    senses: int = -1  # node whose potential is the third argument of `row`; its coefficient is then a fourth result
-    holds: tuple[int, float] | None = None  # (node, potential [Pa] that the flow maintains there), in place of `row`
+    sensed_node: int = (
+        -1
+    )  # node whose potential is the third argument of `row`; its coefficient is then a fourth result
+    held_potential: tuple[int, float] | None = (
+        None  # (node, potential [Pa] that the flow maintains there), in place of `row`
+    )
     drives: bool = False  # it drives flow between equal potentials
 
 
 @dataclass
-class Steady:
+class SteadyState:
     """Potentials [Pa] of nodes, flows [kg/s] of edges, nodes without balance.
 
     split : True if the flows of a loop are not unique; then they are those of least norm
@@ -52,7 +56,7 @@ class Steady:
     no_solution: list[int] = field(default_factory=list)  # nodes whose demand cannot be supplied
 
 
-def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale: tuple[float, float]) -> Steady:
+def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale: tuple[float, float]) -> SteadyState:
     """Solve for the flows of edges that balance the demands of nodes, and for the potentials of these nodes.
 
     held : float64[n]  given potential [Pa], nan for nodes to be solved; demand : float64[n]  mass demand [kg/s]
@@ -67,7 +71,7 @@ def solve_steady(held: np.ndarray, demand: np.ndarray, edges: list[Edge], scale:
     flow = np.array([edge.flow for edge in edges])
     dropped, entries = _references(held, demand, edges, parts, free_sets)
     floating = {i for group in free_sets if group not in entries.values() for i in group}
-    result = Steady(potential, flow, True)
+    result = SteadyState(potential, flow, True)
     result.no_solution = [
         i for i in floating if abs(sum(demand[k] for k in _group_of(free_sets, i))) > SMALL * scale[1]
     ]
@@ -95,7 +99,7 @@ def _quiet(held, demand, edges) -> set[int]:
     quiet = set()
     for group in _components(held, edges)[0]:
         given = [held[i] for i in group if held[i] == held[i]]
-        driven = any(edge.i in group and (edge.drives or edge.holds is not None) for edge in edges)
+        driven = any(edge.i in group and (edge.drives or edge.held_potential is not None) for edge in edges)
         if driven or not given or any(demand[i] != 0.0 or (i in fed and held[i] != held[i]) for i in group):
             continue
         if max(given) - min(given) <= SMALL_DROP * (1e5 + max(map(abs, given))):
@@ -204,25 +208,25 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
 
 def _columns(column, e, edge) -> tuple[int, ...]:
     """Columns of the row of an edge in the order of its values; -1 for a quantity that is not an unknown."""
-    if edge.holds is not None:
-        return (column["node", edge.holds[0]],)
+    if edge.held_potential is not None:
+        return (column["node", edge.held_potential[0]],)
     flow = column.get(("flow", e), -1)
-    sensed = -1 if flow < 0 else column.get(("node", edge.senses), -1)
+    sensed = -1 if flow < 0 else column.get(("node", edge.sensed_node), -1)
     return sensed, flow, column.get(("node", edge.i), -1), column.get(("node", edge.j), -1)
 
 
 def _edge_row(values, columns, e, edge, result, scale) -> float:
     """Append the values of the row of an edge in scaled unknowns; return its right-hand side."""
-    if edge.holds is not None:
+    if edge.held_potential is not None:
         values.append(1.0)
-        return (edge.holds[1] - result.potential[edge.holds[0]]) / scale[0]
+        return (edge.held_potential[1] - result.potential[edge.held_potential[0]]) / scale[0]
     flow, drop = result.flow[e], result.potential[edge.i] - result.potential[edge.j]
     sensed, own, start, end = columns
     if own >= 0:
-        if edge.senses < 0:
+        if edge.sensed_node < 0:
             alpha, beta, gamma = edge.row(flow, drop)
         else:
-            alpha, beta, gamma, lift = edge.row(flow, drop, result.potential[edge.senses])
+            alpha, beta, gamma, lift = edge.row(flow, drop, result.potential[edge.sensed_node])
             if sensed >= 0:
                 values.append(-lift)
         values.append(alpha * scale[1] / scale[0])
@@ -242,7 +246,7 @@ def _solve(places, values, right, size, result):
     """
     if not (np.isfinite(values).all() and np.isfinite(right).all()):
         return np.full(size, np.nan)
-    if max(len(right), size) > DENSE:
+    if max(len(right), size) > DENSE_LIMIT:
         solution, singular = _solve_sparse(values, places // size, places % size, right, size)
         result.split = result.split or singular
         return solution

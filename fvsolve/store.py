@@ -24,11 +24,11 @@ from typing import Any, NamedTuple
 
 DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".code"
-LINKS = sys.platform != "win32"  # LLVM's linker can link numba's objects there
+CAN_LINK = sys.platform != "win32"  # LLVM's linker can link numba's objects there
 # Environment variables of numba that do not change code; all others are part of the target.
-HARMLESS = re.compile(r"NUMBA_(CACHE|CHROME|COLOR|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"
+IGNORED_SETTINGS = re.compile(r"NUMBA_(CACHE|CHROME|COLOR|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"
                       r"FORCE_CUDA|FULL|HIGHLIGHT|NUM_|NRT_STATS|PARALLEL_DIAG|THREADING|TRACE)")  # fmt: skip
-NUMBERS = itertools.count()  # for unique names of libraries
+LIBRARY_NUMBERS = itertools.count()  # for unique names of libraries
 
 
 class Code(NamedTuple):
@@ -37,7 +37,7 @@ class Code(NamedTuple):
     address: int
     pointer: int
     python: Callable | None
-    kept: Any  # owner of the memory, kept alive as long as the function
+    owner: Any  # owner of the memory, kept alive as long as the function
 
 
 @functools.cache
@@ -63,7 +63,7 @@ def target() -> dict[str, str]:
         "llvmlite": llvmlite.__version__,
         "numpy": numpy.__version__,
         "settings": " ".join(sorted(f"{name}={value}" for name, value in os.environ.items()
-                                    if name.startswith("NUMBA_") and not HARMLESS.match(name))),
+                                    if name.startswith("NUMBA_") and not IGNORED_SETTINGS.match(name))),
     }  # fmt: skip
     digest = hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:8]
     return settings | {"name": f"{settings['processor']}-{digest}"}
@@ -84,7 +84,7 @@ def numba_folder() -> Path | None:
     return Path(spec.origin).parent if spec and spec.origin else None
 
 
-def describe(folder: Path) -> None:
+def write_target(folder: Path) -> None:
     """Write the properties of the target to its folder, once."""
     path = folder / "target.json"
     if not path.exists():
@@ -100,7 +100,7 @@ def write(path: Path, identity: str, compiled, code: bytes, doors: bool) -> None
             return
         symbols |= {"pointer": names.llvm_cfunc_wrapper_name, "python": names.llvm_cpython_wrapper_name}
         symbols["environment"] = names.env_name
-    needed = [name for name in helpers() if name.encode() in code]
+    needed = [name for name in runtime_symbols() if name.encode() in code]
     head = {"function": identity, "target": target()["name"], "symbols": symbols, "wanted": needed}
     data = json.dumps(head).encode() + b"\n" + code
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -129,26 +129,26 @@ def read(path: Path, identity: str) -> Code | None:
     header, _, object_code = data.partition(b"\n")
     head = json.loads(header)
     if head["target"] != target()["name"]:
-        _refuse(f"{path.parent} contains code compiled for {head['target']}; this machine is {target()['name']}; it is "
+        _warn(f"{path.parent} contains code compiled for {head['target']}; this machine is {target()['name']}; it is "
                 "compiled again")  # fmt: skip
         return None
     if head["function"] != identity:
         return None
-    missing = [name for name in head["wanted"] if name not in helpers()]
+    missing = [name for name in head["wanted"] if name not in runtime_symbols()]
     if not missing:
         with contextlib.suppress(RuntimeError):  # LLVM writes missing symbols to standard error
-            return _linked(head["symbols"], head["wanted"], object_code, identity)
+            return _link(head["symbols"], head["wanted"], object_code, identity)
     reason = f"numba {numba_version()} has no {', '.join(missing)}" if missing else "it calls what is not loaded"
-    _refuse(f"{path}: code of {identity.split()[0]} cannot be loaded: {reason}; it is compiled again")
+    _warn(f"{path}: code of {identity.split()[0]} cannot be loaded: {reason}; it is compiled again")
     return None
 
 
 @functools.cache
-def _refuse(text: str) -> None:
+def _warn(text: str) -> None:
     warnings.warn(text, RuntimeWarning, stacklevel=2)
 
 
-def _linked(symbols: dict[str, str], needed: list[str], object_code: bytes, identity: str) -> Code:
+def _link(symbols: dict[str, str], needed: list[str], object_code: bytes, identity: str) -> Code:
     """Link machine code in a library of its own, so that symbols of different functions do not conflict."""
     from llvmlite import binding
 
@@ -156,11 +156,11 @@ def _linked(symbols: dict[str, str], needed: list[str], object_code: bytes, iden
     for symbol in symbols.values():
         built.export_symbol(symbol)
     for name in needed:
-        built.import_symbol(name, helpers()[name])
-    library = built.link(linker(), f"{identity} {next(NUMBERS)}")
+        built.import_symbol(name, runtime_symbols()[name])
+    library = built.link(linker(), f"{identity} {next(LIBRARY_NUMBERS)}")
     python = None
     if "python" in symbols:
-        own = extension("_dynfunc")
+        own = numba_extension("_dynfunc")
         environment = own.Environment({})
         ctypes.c_void_p.from_address(library[symbols["environment"]]).value = id(environment)
         python = own.make_function(
@@ -182,19 +182,19 @@ def linker():
 
 
 @functools.cache
-def helpers() -> dict[str, int]:
+def runtime_symbols() -> dict[str, int]:
     """Addresses of functions and objects of numba and Python that machine code uses and that are not found by name."""
     import builtins
 
     addresses = {"_Py_NoneStruct": id(None)}
-    for module in (extension("_helperlib"), extension("_dynfunc")):
+    for module in (numba_extension("_helperlib"), numba_extension("_dynfunc")):
         addresses |= {f"numba_{name}": address for name, address in module.c_helpers.items()}
     exceptions = (e for e in vars(builtins).values() if isinstance(e, type) and issubclass(e, BaseException))
     return addresses | {f"PyExc_{e.__name__}": id(e) for e in exceptions}
 
 
 @functools.cache
-def extension(name: str):
+def numba_extension(name: str):
     """Compiled extension module of numba, loaded without importing numba."""
     full = f"numba.{name}"
     if full in sys.modules:

@@ -128,7 +128,7 @@ def processor_seconds() -> float:
 if FOLDER in os.environ:  # before fvsolve is imported
     import fvsolve.jit
 
-    fvsolve.jit.once = recording(fvsolve.jit.once)
+    fvsolve.jit.compile_once = recording(fvsolve.jit.compile_once)
     functools.cache = recording(functools.cache)
 
 

@@ -13,7 +13,7 @@ from fvsolve.basins.bounds import bound, bound_work
 from fvsolve.basins.fifth_order import grid_excesses, grid_excesses_work, settle_excesses
 from fvsolve.basins.second_order import second_order_rates, second_order_work
 from fvsolve.jit import njit
-from fvsolve.kernels.records import MUSCL, UPWIND, WENO5
+from fvsolve.kernels.dtypes import MUSCL, UPWIND, WENO5
 
 INFINITE = float("inf")
 THIN = 1e-6  # depth below which values fade to zero [m]

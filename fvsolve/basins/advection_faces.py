@@ -35,7 +35,7 @@ from fvsolve.basins.faces import (
     put_sides,
 )
 from fvsolve.jit import njit
-from fvsolve.kernels.records import UPWIND
+from fvsolve.kernels.dtypes import UPWIND
 
 THIN = 1e-6  # depth below which values fade to zero [m]
 

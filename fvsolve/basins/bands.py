@@ -2,8 +2,8 @@
 
 from fvsolve.basins.patches import book_open
 from fvsolve.jit import njit
-from fvsolve.kernels import joint
-from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels import band_exchange
+from fvsolve.kernels.table_handle import open_tables
 
 REACH = 5  # rows beyond a band that its rates read: three, or the five of the boundary closure of a liquid
 
@@ -27,7 +27,7 @@ def cells_near(tables, b):
 def book_together(t, y, dydt, out, handle):
     """Compute the flows through open boundaries of all basins again, after all bands have computed their fluxes."""
     tables = open_tables(handle)
-    joint.fetch(tables.joint, joint.OF_FLOWS, tables.work)
+    band_exchange.get_runs(tables.joint, band_exchange.SEND_FLOWS, tables.work)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
         if basin["given"] == 0 and basin["through"] >= 0:

@@ -3,7 +3,7 @@
 The result of upwind is within the bounds. Each cell accepts excess fluxes only up to its distance from the bounds.
 """
 
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
 
 
 @njit
@@ -21,7 +21,7 @@ def rise(a, b, c, d):
     return (a + b) + (c + d)
 
 
-@inner
+@inline
 def row_shares(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, rate, aw, ae, south, north, up, down):
     """Fractions of the rises and falls of a row of cells, by flows through its faces, that keep the bounds."""
     for i in range(s.size):
@@ -33,7 +33,7 @@ def row_shares(step, factor, kx, ky, fw, fe, fs, fn, depth, least, most, s, rate
         down[i] = share(then - least * deep, rise(-a, -b, -c, -d))
 
 
-@inner
+@inline
 def cut(factor, up, down, up_then, down_then, excess):
     """Multiply excesses by the fraction that both cells of a face allow.
 

@@ -11,10 +11,10 @@ from fvsolve.basins.behind import counted, is_given, weight
 from fvsolve.basins.diffusion import add_decay
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mixing import lose
-from fvsolve.kernels.records import CELL_SCALAR
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.dtypes import CELL_SCALAR
+from fvsolve.kernels.node_mixing import record_loss
+from fvsolve.kernels.schedule_pieces import schedule_value
+from fvsolve.kernels.table_handle import open_tables
 
 LEAST = 1e-12  # weight of a dry cell in the value at a patch [m]
 
@@ -83,7 +83,11 @@ def made_ready(t, tables, b, y):
     plane, basin, patches = tables.plane, tables.basins[b], tables.patches
     n, o, at, seen = basin["n"], basin["y"], basin["plan"], seen_of(basin, tables.seen, y)
     if basin["deep"] == 1:
-        depth, rest, change = tables.work[basin["toil"] : basin["toil"] + n], plane[at : at + n], seen[o : o + n]
+        depth, rest, change = (
+            tables.work[basin["scalar_work"] : basin["scalar_work"] + n],
+            plane[at : at + n],
+            seen[o : o + n],
+        )
         first, stop = cells_near(tables, b)
         for i in range(first, stop):
             depth[i] = max(rest[i] + change[i], 0.0)
@@ -112,7 +116,7 @@ def settle_amounts(t, y, dydt, out, handle):
     for b in range(tables.basins.size if dydt.size > 0 else 0):
         basin = tables.basins[b]
         seen = seen_of(basin, tables.seen, y)
-        n, depth = basin["n"], work[basin["toil"] : basin["toil"] + deep(basin)]
+        n, depth = basin["n"], work[basin["scalar_work"] : basin["scalar_work"] + deep(basin)]
         per = tables.settings[0]["rho"]
         if basin["deep"] == 0:
             per = basin["density"] * basin["thickness"]
@@ -132,7 +136,7 @@ def settle(tables, b, basin, q, factor, per, depth, outside, y, s, rate, out):
         area = tables.plane[basin["area"] : basin["area"] + n]
         for i in range(n):
             cell_depth = depth[i] if depth.size > 0 else 1.0
-            lose(
+            record_loss(
                 out,
                 tables,
                 q,
@@ -183,7 +187,7 @@ def bring(tables, patch, basin, q, y, rate, out):
     node = patch["node"]
     supplied = out[layout["gain"] + q * nodes + node]
     flow = min(out[layout["net"] + node] + out[layout["supply"] + node], 0.0) / (rho * counted(tables, patch, True, y))
-    inflow, plane = (out[layout["brought"] + q * nodes + node] + supplied) / rho, tables.plane
+    inflow, plane = (out[layout["scalar_inflow"] + q * nodes + node] + supplied) / rho, tables.plane
     for m in range(patch["count"] if flow < 0.0 else 0):
         i = tables.integers[patch["first"] + m]
         loss = flow * weight(plane, basin, True, i, y) * cell_value(tables, basin, q, y, i)

@@ -5,8 +5,8 @@ from fvsolve.basins.behind import is_given
 from fvsolve.basins.carried import deep, made_ready, turned
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import RATE
+from fvsolve.kernels.dtypes import RATE
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit
@@ -22,14 +22,14 @@ def carry_on_meshes(t, y, dydt, out, handle):
         flow = flows[basin["flows"] : basin["flows"] + basin["faces"]]
         made_ready(t, tables, b, y)
         seen = seen_of(basin, tables.seen, y)
-        factor, depth = turned(t, basin), work[basin["toil"] : basin["toil"] + deep(basin)]
+        factor, depth = turned(t, basin), work[basin["scalar_work"] : basin["scalar_work"] + deep(basin)]
         for q in range(scalars.size):
             o, ring = basin["carried"] + q * n, basin["outside"] + q * basin["outer"]
             quickest = advection_rates(
                 basin["scheme"], basin["wide"], scalars[q]["diffusivity"], factor, plane[basin["mesh"] :],
                 integers[basin["links"] :],
                 flow, depth, work[ring : ring + basin["outer"]], scalars[q]["least"], scalars[q]["greatest"],
-                seen[o : o + n], work[basin["toil"] + n :], dydt[o : o + n],
+                seen[o : o + n], work[basin["scalar_work"] + n :], dydt[o : o + n],
             )  # fmt: skip
             full_rate = (
                 (1.0 - abs(factor)) * basin["unsplit"] * basin["fastest"]

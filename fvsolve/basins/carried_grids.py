@@ -7,9 +7,19 @@ from fvsolve.basins.diffusion import grid_diffusion
 from fvsolve.basins.second_order import second_order_rates
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import MUSCL, RATE, UPWIND
-from fvsolve.kernels.sums import BOTH, CELLS, LOOK, MODE, OFF, asked, form, form_looked_at, look
+from fvsolve.kernels.dtypes import MUSCL, RATE, UPWIND
+from fvsolve.kernels.stage_sums import (
+    CELLS,
+    CHECK,
+    MODE,
+    OFF,
+    STAGE_AND_END,
+    check_rows,
+    form_checked_runs,
+    form_rows,
+    requested_mode,
+)
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)
@@ -23,7 +33,7 @@ def parts(tables, basin):
     """1 / widths and heights of a grid, flows along x and y, depths from `prepare_scalars`, and a work array."""
     plane, work = tables.plane, tables.work
     flows = plane if is_given(basin) else work
-    nx, ny, k, f, toil = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["toil"]
+    nx, ny, k, f, toil = basin["nx"], basin["ny"], basin["spacing"], basin["flows"], basin["scalar_work"]
     across = f + ny * (nx + 1)
     return (
         plane[k : k + nx], plane[k + nx : k + nx + ny], flows[f:across], flows[across : across + (ny + 1) * nx],
@@ -48,7 +58,7 @@ def carry_on_grids(t, y, dydt, out, handle):
             out[RATE] = max(out[RATE], quick + tables.scalars[q]["decay"])
             n, ring = basin["n"], basin["outside"] + q * basin["outer"]
             at, outside = basin["carried"] + q * n, tables.work[ring : ring + basin["outer"]]
-            if asked(tables, b) != OFF:
+            if requested_mode(tables, b) != OFF:
                 by_blocks(
                     tables.sums, at, basin["scheme"], basin["limiter"], begin, stop, kx, ky, turned(t, basin), flow_x,
                     flow_y, outside, y, work, dydt[at : at + n],
@@ -58,8 +68,8 @@ def carry_on_grids(t, y, dydt, out, handle):
                 basin["scheme"], basin["limiter"], kx.size, ky.size, begin, stop, kx, ky, turned(t, basin), flow_x,
                 flow_y, depth, outside, seen[at : at + n], work, dydt[at : at + n],
             )  # fmt: skip
-    if tables.sums.size > 0 and tables.sums[MODE] == BOTH:
-        form_looked_at(tables.sums)
+    if tables.sums.size > 0 and tables.sums[MODE] == STAGE_AND_END:
+        form_checked_runs(tables.sums)
 
 
 @njit
@@ -70,17 +80,17 @@ def by_blocks(sums, at, scheme, limiter, begin, stop, kx, ky, factor, flow_x, fl
     for row in range(begin, stop, rows):
         block_stop = min(row + rows, stop)
         ahead = min(block_stop + 2, stop)
-        if sums[MODE] != LOOK:
-            form(sums, False, at, nx, formed_ahead, ahead, 0, nx)
+        if sums[MODE] != CHECK:
+            form_rows(sums, False, at, nx, formed_ahead, ahead, 0, nx)
         formed_ahead = ahead
         second_order_rates(
             scheme if scheme == MUSCL else UPWIND, limiter, nx, ny, row, block_stop, stop, row == begin, kx, ky, factor,
             flow_x, flow_y, outside, y[at : at + n], work[n:], rate,
         )  # fmt: skip
-        if sums[MODE] == LOOK:
-            look(sums, y, at, nx, row, block_stop, 0, nx)
-        elif sums[MODE] == BOTH:  # rates of the next row read the last of these rows
-            form(sums, True, at, nx, formed_end, block_stop if block_stop == stop else block_stop - 1, 0, nx)
+        if sums[MODE] == CHECK:
+            check_rows(sums, y, at, nx, row, block_stop, 0, nx)
+        elif sums[MODE] == STAGE_AND_END:  # rates of the next row read the last of these rows
+            form_rows(sums, True, at, nx, formed_end, block_stop if block_stop == stop else block_stop - 1, 0, nx)
             formed_end = block_stop - 1
 
 

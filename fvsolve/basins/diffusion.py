@@ -4,7 +4,7 @@ s_t = div(D depth grad c) - decay (s - depth ambient), for amounts s = depth c p
 """
 
 from fvsolve.basins.advection import THIN, near_values
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
 
 
 @njit
@@ -13,7 +13,7 @@ def between(a, b):
     return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0
 
 
-@inner
+@inline
 def conduct(across, a, b, to):
     """Conductances of a row of faces: `across` times the depth between a and b, which are empty if the depth is 1."""
     if a.size == 0:
@@ -24,7 +24,7 @@ def conduct(across, a, b, to):
             to[i] = across * between(max(a[i], 0.0), max(b[i], 0.0))
 
 
-@inner
+@inline
 def spread(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
     """Add diffusion to the rates of a row. p : its values, with one beyond either end.
 

@@ -7,15 +7,15 @@ squares are those of cell means.
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.accounts import OF_BASIN, basin_rows
-from fvsolve.kernels.energy import potential
-from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.energy_rows import BASIN_ROWS, basin_power_row
+from fvsolve.kernels.linear_energy import total_pressure
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit
 def row_of(tables, power, b):
     """First row of `power` of basin b."""
-    return basin_rows(tables, power) + OF_BASIN * b
+    return basin_power_row(tables, power) + BASIN_ROWS * b
 
 
 @njit(forceinline=True)
@@ -34,4 +34,4 @@ def patch_power(t, y, dydt, out, handle, power):
     for k in range(patches.size):
         node = patches[k]["node"]
         flow = out[layout["net"] + node] + out[layout["supply"] + node]
-        power[row_of(tables, power, patches[k]["basin"])] += potential(tables, out, node) * flow / rho
+        power[row_of(tables, power, patches[k]["basin"])] += total_pressure(tables, out, node) * flow / rho

@@ -6,8 +6,8 @@ and second Legendre coefficients along the face. The flux through a face minus t
 `limit_excesses` may reduce.
 """
 
-from fvsolve.jit import inner, njit
-from fvsolve.kernels.records import WENO5
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import WENO5
 
 SMALL = 1e-30  # prevents a division by zero between squares of differences
 GHOSTS = 3
@@ -94,7 +94,7 @@ def ghosts(n, known, o, v, at, step):
     return beyond(known, o, v[at], v[at + step], v[at + 2 * step], v[at + 3 * step], v[at + 4 * step])
 
 
-@inner
+@inline
 def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
     """Add the mean of products minus the product of means, from five faces in line along the side."""
     for i in range(excess.size):

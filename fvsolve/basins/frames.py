@@ -12,10 +12,10 @@ pressure (`liquid_on_body`). So water at rest in the frame stays at rest to roun
 z away from the origin, and vertical momentum: both are of the order of angle times depth over wave length.
 """
 
-from fvsolve.jit import inner, njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanism.room import ATTITUDE, BIAS, SPIN, SPIN_BIAS, cross, row_of, turned
-from fvsolve.kernels.records import GN, NO_WEIGHT, STATUS, WHERE
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import GN, NO_WEIGHT, STATUS, WHERE
+from fvsolve.kernels.mechanism.body_layout import ATTITUDE, BIAS, SPIN, SPIN_BIAS, body_row, cross, rotate
+from fvsolve.kernels.table_handle import open_tables
 
 # Places of the numbers of a frame in `plane`, from the offset basin["frame"].
 AT, TURN = 0, 3  # position of the origin and rotation matrix (by rows) in the axes of the body
@@ -51,15 +51,15 @@ def seen_along(out, row, plane, at, k, x, y, z):
 
     Its rotation matrix relative to its body is at plane[at].
     """
-    ax, ay, az = turned(out, row + ATTITUDE, plane[at + k : at + k + 7 : 3], 0)
+    ax, ay, az = rotate(out, row + ATTITUDE, plane[at + k : at + k + 7 : 3], 0)
     return ax * x + ay * y + az * z
 
 
 @njit
 def set_frame(tables, basin, out):
     """Compute G, W, dW/dt and gravity alone in the axes of a basin."""
-    plane, at, row = tables.plane, basin["frame"], row_of(tables, basin["body"])
-    rx, ry, rz = turned(out, row + ATTITUDE, plane[at : at + 3], 0)
+    plane, at, row = tables.plane, basin["frame"], body_row(tables, basin["body"])
+    rx, ry, rz = rotate(out, row + ATTITUDE, plane[at : at + 3], 0)
     ex, ey, ez = cross(out, row + SPIN_BIAS, rx, ry, rz)
     vx, vy, vz = cross(out, row + SPIN, rx, ry, rz)
     cx, cy, cz = cross(out, row + SPIN, vx, vy, vz)
@@ -128,7 +128,7 @@ def lift_rows(phi, x, y, values, lifted):
         lift_row(x, base, fx + xy * y[j], xx, y[j] * (fy + yy * y[j]), lifted[a:z])
 
 
-@inner
+@inline
 def lift_row(x, values, slope, xx, constant, lifted):
     """Write values plus the potential at a row of cells to `lifted`."""
     for i in range(lifted.size):

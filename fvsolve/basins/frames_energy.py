@@ -13,24 +13,24 @@ from fvsolve.basins.frames import DOWN, GN, WX, WY, WZ, ground, place_of
 from fvsolve.basins.frames_load import arm_of, mass_per, yielded
 from fvsolve.basins.free_surface.energy import per_flow
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanism.room import (
+from fvsolve.kernels.mechanism.basin_inertia import BASIN_LOAD, EAST, MOMENTS, TANK_OUT
+from fvsolve.kernels.mechanism.body_layout import (
     ACCELERATION,
-    PLACE,
+    POSITION,
     SPIN,
-    TURNING,
+    SPIN_RATE,
     VELOCITY,
+    body_row,
     cross,
     dot,
-    row_of,
 )
-from fvsolve.kernels.mechanism.tanks import EAST, LOAD, MOMENTS, TANK_OUT
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit
 def origin_moves(tables, basin, b, out):
     """Velocity of a basin's origin, in its own axes."""
-    row, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+    row, tank = body_row(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     x, y, z = arm_of(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
     u, v, w = u + out[row + VELOCITY], v + out[row + VELOCITY + 1], w + out[row + VELOCITY + 2]
@@ -41,12 +41,12 @@ def origin_moves(tables, basin, b, out):
 @njit
 def origin_gathers(tables, basin, b, out):
     """Solved accelerations of a basin's origin and of its rotation, in its own axes."""
-    row, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+    row, tank = body_row(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     x, y, z = arm_of(tables, basin, out)
     u, v, w = cross(out, row + SPIN, x, y, z)
     cx, cy, cz = cross(out, row + SPIN, u, v, w)
-    tx, ty, tz = cross(out, row + TURNING, x, y, z)
-    a, t, e = row + ACCELERATION, row + TURNING, tank + EAST
+    tx, ty, tz = cross(out, row + SPIN_RATE, x, y, z)
+    a, t, e = row + ACCELERATION, row + SPIN_RATE, tank + EAST
     x, y, z = out[a] + cx + tx, out[a + 1] + cy + ty, out[a + 2] + cz + tz
     return (
         dot(out, e, x, y, z), dot(out, e + 3, x, y, z), dot(out, e + 6, x, y, z),
@@ -66,7 +66,7 @@ def felt(tables, basin, b, out):
     normal_force = out[m] * a + out[m + 1] * c + out[m + 2] * d
     moment_x = out[m + 2] * a + out[m + 4] * c + out[m + 5] * d
     moment_y = out[m + 1] * a + out[m + 3] * c + out[m + 4] * d
-    f = tank + LOAD
+    f = tank + BASIN_LOAD
     return out[f], out[f + 1], out[f + 2] - normal_force, out[f + 3] - moment_x, out[f + 4] + moment_y, out[f + 5]
 
 
@@ -169,8 +169,8 @@ def add_stored(t, y, dydt, out, handle, stored):
         total = 0.5 * mass * (vx * vx + vy * vy + vz * vz)
         total += vx * (qx - wz * sy) + vy * (qy + wz * sx) + vz * (wx * sy - wy * sx)
         total += 0.5 * (yy * wx * wx - 2.0 * xy * wx * wy + xx * wy * wy + (xx + yy) * wz * wz) + wz * turn + inner
-        row = row_of(tables, basin["body"])
-        total += mass * tables.settings[0]["gravity"] * (out[row + PLACE + 2] + arm_of(tables, basin, out)[2])
+        row = body_row(tables, basin["body"])
+        total += mass * tables.settings[0]["gravity"] * (out[row + POSITION + 2] + arm_of(tables, basin, out)[2])
         total -= plane[at + DOWN] * sx + plane[at + DOWN + 1] * sy + plane[at + DOWN + 2] * lever
         k = stored.size - tables.basins.size + b
         stored[k] = total + (0.0 if basin["deep"] == 1 else stored[k])

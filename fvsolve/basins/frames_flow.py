@@ -13,10 +13,10 @@ from fvsolve.basins.frames import AZ, WZ
 from fvsolve.basins.frames_load import load_body, yielded
 from fvsolve.basins.frames_push import push_flow
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanism.room import dot
-from fvsolve.kernels.mechanism.tanks import EAST, TANK_OUT
-from fvsolve.kernels.records import LAW_LINEAR, RATE
+from fvsolve.kernels.dtypes import LAW_LINEAR, RATE
+from fvsolve.kernels.mechanism.basin_inertia import EAST, TANK_OUT
+from fvsolve.kernels.mechanism.body_layout import dot
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit
@@ -32,11 +32,11 @@ def turn_fluid(t, y, dydt, out, handle):
             continue
         twice, euler = 2.0 * tables.plane[basin["frame"] + WZ], tables.plane[basin["frame"] + AZ]
         out[RATE] = max(out[RATE], abs(twice))
-        to, first = (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["unused"])
+        to, first = (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
         own = 0.0 if basin["deep"] == 0 and tables.settings[0]["law"] == LAW_LINEAR else 1.0
-        if (twice != 0.0 or euler != 0.0) and (basin["heavy"] == 0 or basin["nx"] == 0):
+        if (twice != 0.0 or euler != 0.0) and (basin["loads_body"] == 0 or basin["nx"] == 0):
             push_flow(tables.plane, basin, y, to, first, own, twice, 0.0, 0.0, euler)
-        if basin["heavy"] == 1:
+        if basin["loads_body"] == 1:
             load_body(tables, basin, b, y, to, first, own, twice, euler, out)
 
 

@@ -3,28 +3,28 @@
 from fvsolve.basins.frames import AT, AX, AY, AZ, DOWN, GN, GX, GY, LEVEL, PLACES, SURFACE, TURN, WX, WY, WZ
 from fvsolve.basins.frames_push import push_cells
 from fvsolve.jit import njit
-from fvsolve.kernels.mechanism.room import (
+from fvsolve.kernels.mechanism.basin_inertia import BASIN_ARM, BASIN_LOAD, EAST, MOMENTS, TANK_OUT
+from fvsolve.kernels.mechanism.body_layout import (
     ACCELERATION,
     ARM,
     ATTITUDE,
     BIAS,
     SPIN_BIAS,
-    TURNING,
+    SPIN_RATE,
     add_force,
     add_torque,
-    back,
-    put,
-    row_of,
-    turned,
+    body_row,
+    rotate,
+    rotate_back,
+    write_vector,
 )
-from fvsolve.kernels.mechanism.tanks import ARM_OF, EAST, LOAD, MOMENTS, TANK_OUT
 
 
 @njit
 def arm_of(tables, basin, out):
     """Vector from the origin of the body to that of a basin, in axes of the world [m]."""
     at = basin["frame"] + AT
-    return turned(out, row_of(tables, basin["body"]) + ATTITUDE, tables.plane[at : at + 3], 0)
+    return rotate(out, body_row(tables, basin["body"]) + ATTITUDE, tables.plane[at : at + 3], 0)
 
 
 @njit(forceinline=True)
@@ -109,17 +109,19 @@ def load_body(tables, basin, b, y, rates, first, own, twice, euler, out):
     tx = sy * gz - lever * plane[at + DOWN + 1] - (yy * ax - xy * ay) - (dyy * wx - dxy * wy) - (wy * lz - wz * ly)
     ty = -sx * gz + lever * plane[at + DOWN] - (xx * ay - xy * ax) - (dxx * wy - dxy * wx) - (wz * lx - wx * lz)
     tz = sx * gy - sy * gx - (xx + yy) * az - (dxx + dyy) * wz - spin - (wx * ly - wy * lx)
-    body, tank = row_of(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
+    body, tank = body_row(tables, basin["body"]), tables.layout[0]["tank"] + TANK_OUT * b
     rx, ry, rz = arm_of(tables, basin, out)
-    put(out, tank + MOMENTS, m, sx, sy)
-    put(out, tank + MOMENTS + 3, xx, xy, yy)
+    write_vector(out, tank + MOMENTS, m, sx, sy)
+    write_vector(out, tank + MOMENTS + 3, xx, xy, yy)
     for k in range(3):
-        put(out, tank + EAST + 3 * k, *turned(out, body + ATTITUDE, plane[at + TURN + k : at + TURN + 9 : 3], 0))
-    put(out, tank + ARM_OF, out[body + ARM] + rx, out[body + ARM + 1] + ry, out[body + ARM + 2] + rz)
-    put(out, tank + LOAD, hx, hy, hz)
-    put(out, tank + LOAD + 3, tx, ty, tz)
-    add_force(out, body, rx, ry, rz, *back(out, tank + EAST, hx, hy, hz))
-    add_torque(out, body, *back(out, tank + EAST, tx, ty, tz))
+        write_vector(
+            out, tank + EAST + 3 * k, *rotate(out, body + ATTITUDE, plane[at + TURN + k : at + TURN + 9 : 3], 0)
+        )
+    write_vector(out, tank + BASIN_ARM, out[body + ARM] + rx, out[body + ARM + 1] + ry, out[body + ARM + 2] + rz)
+    write_vector(out, tank + BASIN_LOAD, hx, hy, hz)
+    write_vector(out, tank + BASIN_LOAD + 3, tx, ty, tz)
+    add_force(out, body, rx, ry, rz, *rotate_back(out, tank + EAST, hx, hy, hz))
+    add_torque(out, body, *rotate_back(out, tank + EAST, tx, ty, tz))
 
 
 @njit(forceinline=True)
@@ -131,8 +133,8 @@ def beyond(out, i, j):
 @njit
 def yielded(tables, basin, out):
     """Accelerations of a basin's origin and of its rotation minus those with locked joints, in axes of the world."""
-    row = row_of(tables, basin["body"])
+    row = body_row(tables, basin["body"])
     rx, ry, rz = arm_of(tables, basin, out)
-    wx, wy, wz = beyond(out, row + TURNING, row + SPIN_BIAS)
+    wx, wy, wz = beyond(out, row + SPIN_RATE, row + SPIN_BIAS)
     ax, ay, az = beyond(out, row + ACCELERATION, row + BIAS)
     return ax + wy * rz - wz * ry, ay + wz * rx - wx * rz, az + wx * ry - wy * rx, wx, wy, wz

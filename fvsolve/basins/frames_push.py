@@ -1,7 +1,7 @@
 """Momentum terms of the accelerated frame of a basin on a body (see `basin_frames`), added to rates of flow."""
 
 from fvsolve.basins.frames import PLACES
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
 
 
 @njit
@@ -35,7 +35,7 @@ def push_cells(plane, basin, y, rates, first, row, own, twice, east, north, turn
     )  # fmt: skip
 
 
-@inner
+@inline
 def push_row(x, rest, dh, qx, qy, own, twice, east, north, turn, rate_x, rate_y):
     """Add the terms of `accelerate_flow` to the arrays of a row of cells."""
     for i in range(rate_x.size):

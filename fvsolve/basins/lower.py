@@ -6,7 +6,7 @@ from importlib import import_module
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 
 def lower_basins(draft) -> None:

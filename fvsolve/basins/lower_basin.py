@@ -18,7 +18,7 @@ from fvsolve.case.basins import behind
 from fvsolve.case.cells import is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.schemes import CODES, family
 from fvsolve.model.state_names import Numbered
 from fvsolve.schemes import LIMITERS, SCHEMES
@@ -26,7 +26,7 @@ from fvsolve.steppers.analysis.monotone import ssp_radius
 from fvsolve.steppers.methods import METHODS
 
 if TYPE_CHECKING:
-    from fvsolve.kernels.phases import Pieces
+    from fvsolve.kernels.rhs_assembly import RhsTerms
     from fvsolve.mesh.points import MeshPoints
 
 ROUNDING = 1e-12  # relative error of rates
@@ -64,7 +64,7 @@ class BasinRows:
         """Fill the columns of the row that its law needs, and reserve the work arrays of its kernels."""
         raise NotImplementedError
 
-    def pieces(self, valves: bool) -> Iterator[Pieces]:
+    def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         """Terms of its right-hand side and its probes, in order. valves : True if there are valves in the network"""
         raise NotImplementedError
 
@@ -124,7 +124,7 @@ class BasinRows:
     @property
     def scheme(self) -> str:
         """Scheme of its kernels."""
-        return SCHEMES[self.case.numerics.scheme].on(self.is_grid).name
+        return SCHEMES[self.case.numerics.scheme].for_basin(self.is_grid).name
 
     def lower_probe(self, row, field: str, cells: np.ndarray, weights: np.ndarray) -> None:
         """Fill the columns of a probe that define its field; fields other than velocities belong to the physics."""
@@ -299,14 +299,14 @@ class BasinRows:
             self.given,
         )
         row["scheme"] = family(self.scheme)
-        row["limiter"], row["wide"] = CODES[numerics.limiter], LIMITERS[numerics.limiter].wide
+        row["limiter"], row["wide"] = CODES[numerics.limiter], LIMITERS[numerics.limiter].overshoot
         row["area"] = row["drawn"] = draft.to_plane(mesh.area)
         if self.is_grid:
             grid = mesh.grid
             row["nx"], row["ny"] = grid.nx, grid.ny
             row["spacing"] = draft.to_plane(np.concatenate([1.0 / np.diff(grid.x), 1.0 / np.diff(grid.y)]))
         else:
-            if self.scheme != SCHEMES[numerics.scheme].on(True).name:
+            if self.scheme != SCHEMES[numerics.scheme].for_basin(True).name:
                 text = f"basin {self.name}: {numerics.scheme} needs a rectangle without holes; muscl is used there"
                 draft.warnings.append(Notice("scheme", f"nodes.{self.name}", text, "scheme"))
             floats, self.integers = lower_mesh(mesh)
@@ -317,7 +317,7 @@ class BasinRows:
         row["reflect"], row["outer_given"] = draft.to_plane(reflections), reflections.size
         row["outer"] = mesh.left.size - mesh.inner
         row["through"] = draft.to_work(reflections.size) if reflections.size else -1
-        row["unused"] = draft.to_work(
+        row["boundary_rates"] = draft.to_work(
             len(self.quantities) * self.n if reflections.size or self.moves or self.part.on else 0
         )
         row["carried"] = row["flows"] = -1
@@ -354,7 +354,7 @@ class BasinRows:
             flows, work_size = mesh.left.size, self.n + advection_faces.work_size(self.integers)
         if row["flows"] < 0:
             row["flows"] = draft.to_work(flows)
-        row["toil"] = draft.to_work(work_size)
+        row["scalar_work"] = draft.to_work(work_size)
         violation = self.may_leave(row)
         if violation:
             numerics = self.case.numerics

@@ -35,7 +35,7 @@ def lower_frame(draft, basin, row) -> None:
     numbers[PLACES] = draft.to_plane(np.concatenate(places))
     row["body"], row["frame"] = draft.body_names.index(part.on), draft.to_plane(numbers)
     joint_probes = asked_of_joints(draft.case)
-    row["heavy"] = any(joint_probes) or any(free_joints(part.on, draft.case.nodes))
+    row["loads_body"] = any(joint_probes) or any(free_joints(part.on, draft.case.nodes))
     chain = set(carriers(part.on, draft.case.nodes))
     for k, body in joint_probes:
         if basin.opening is not None and body in chain:
@@ -86,9 +86,9 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
 
 def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarray]:
     """Origin float64[3] [m] and axes float64[3, 3], by columns, of a basin on a body, in the world."""
-    from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE
-    from fvsolve.kernels.records import BODY_OUT
+    from fvsolve.kernels.dtypes import BODY_OUT
+    from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION
 
     first = int(layout["body"]) + BODY_OUT * int(basin.row["body"])
-    place, turn = out[first + PLACE :][:3], out[first + ATTITUDE :][:9].reshape(3, 3)
+    place, turn = out[first + POSITION :][:3], out[first + ATTITUDE :][:9].reshape(3, 3)
     return place + turn @ np.array(basin.part.place), turn @ basin.part.turn

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csr_array, eye_array, kron
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 WIDE = 3  # stencil radius of the fifth order
 

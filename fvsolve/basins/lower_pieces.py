@@ -4,32 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fvsolve.kernels.phases import MIXED, Pieces
+from fvsolve.kernels.rhs_assembly import MIXED, RhsTerms
 
 HOME = "fvsolve.basins"
-ALL = Pieces(home=HOME, observe="observe: observe_flows", power="energy: patch_power")
-DENSE = Pieces(home=HOME, observe="observe: observe_dense_flows")  # all laws but linear
-MARKED = Pieces(home=HOME, record="patches: record_patches")
-WALLS = Pieces(
-    home=HOME, see="walls: see", prepare="walls: drive_lines", enter="walls: push_bodies", swell="walls: swell",
+ALL = RhsTerms(package=HOME, observe="observe: observe_flows", power="energy: patch_power")
+DENSE = RhsTerms(package=HOME, observe="observe: observe_dense_flows")  # all laws but linear
+MARKED = RhsTerms(package=HOME, record="patches: record_patches")
+WALLS = RhsTerms(
+    package=HOME, derive_state="walls: see", prepare="walls: drive_lines", boundary_inflow="walls: push_bodies", stretching="walls: swell",
     observe="walls: observe_walls", power="walls: wall_power",
 )  # fmt: skip
-SIDES = Pieces(home=HOME, see="moving_meshes: see_meshes", prepare="moving_meshes: drive_sides")
-FRAMES = Pieces(home=HOME, prepare="frames: set_frames")  # before patches
-TURNING = Pieces(
-    home=HOME, enter="frames_flow: turn_fluid", follow="frames_flow: follow_bodies",
+SIDES = RhsTerms(package=HOME, derive_state="moving_meshes: see_meshes", prepare="moving_meshes: drive_sides")
+FRAMES = RhsTerms(package=HOME, prepare="frames: set_frames")  # before patches
+TURNING = RhsTerms(
+    package=HOME, boundary_inflow="frames_flow: turn_fluid", fluid_response="frames_flow: follow_bodies",
     power="frames_energy: add_power", stored="frames_energy: add_stored",
 )  # fmt: skip
-VALUES = Pieces(home=HOME, leave="carried: patch_values", observe="carried: observe_values")
-GRIDS = Pieces(home=HOME, carry="carried_grids: carry_on_grids")
-FIFTH = Pieces(home=HOME, carry="carried_grids: add_on_grids")
-SPREAD = Pieces(home=HOME, carry="carried_grids: spread_on_grids")
-MESHES = Pieces(home=HOME, carry="carried_faces: carry_on_meshes")
-SETTLED = Pieces(home=HOME, carry="carried: settle_amounts")
+VALUES = RhsTerms(package=HOME, outlet_values="carried: patch_values", observe="carried: observe_values")
+GRIDS = RhsTerms(package=HOME, scalar_rates="carried_grids: carry_on_grids")
+FIFTH = RhsTerms(package=HOME, scalar_rates="carried_grids: add_on_grids")
+SPREAD = RhsTerms(package=HOME, scalar_rates="carried_grids: spread_on_grids")
+MESHES = RhsTerms(package=HOME, scalar_rates="carried_faces: carry_on_meshes")
+SETTLED = RhsTerms(package=HOME, scalar_rates="carried: settle_amounts")
 CARRIED = (VALUES, MIXED, GRIDS, FIFTH, SPREAD, MESHES, SETTLED)  # in the order in which they run within a phase
 
 
-def of_basins(basins: list, valves: bool) -> tuple[Pieces, ...]:
+def of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
     """Terms of basins without scalars. valves : True if there are valves in the network"""
     shared = [ALL] if basins and basins[0].case.law.linear else [ALL, DENSE] if basins else []
     shared += [FRAMES] if any(basin.part.on is not None for basin in basins) else []
@@ -38,13 +38,13 @@ def of_basins(basins: list, valves: bool) -> tuple[Pieces, ...]:
     return tuple(dict.fromkeys([*shared, *(terms for basin in basins for terms in basin.pieces(valves)), *moving]))
 
 
-def of_scalars(basins: list) -> tuple[Pieces, ...]:
+def of_scalars(basins: list) -> tuple[RhsTerms, ...]:
     """Terms of scalars in basins; each term selects its basins itself."""
     needed = {piece for basin in basins for piece in carrying(basin)}
     return tuple(terms for terms in CARRIED if terms in needed)
 
 
-def carrying(basin) -> Iterator[Pieces]:
+def carrying(basin) -> Iterator[RhsTerms]:
     """Terms of the scalars of a basin, if it has scalars."""
     if not basin.scalars:
         return

@@ -8,7 +8,7 @@ from fvsolve.basins import faces, moving_meshes
 from fvsolve.basins.lower_mesh import lower_ends
 from fvsolve.basins.walls import BESIDE
 from fvsolve.case import walls as case
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 SCALE = 1e-2  # a small travel [m]
 

@@ -36,8 +36,8 @@ from fvsolve.basins.faces import (
     blocks,
 )
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import RATE
+from fvsolve.kernels.dtypes import RATE
+from fvsolve.kernels.table_handle import open_tables
 
 START, STOP, BEYOND, ENDS = range(4)
 # Rows of BLOCK in the scratch of a block: sums over sides, 1 / area, centre; of the current side its ends, the centre

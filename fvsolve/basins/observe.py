@@ -7,8 +7,8 @@ from math import sqrt
 
 from fvsolve.jit import njit
 from fvsolve.kernels.density import density
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import PATCH_FLOW
+from fvsolve.kernels.dtypes import PATCH_FLOW
+from fvsolve.kernels.table_handle import open_tables
 
 U, V, SPEED, OWN = range(4)  # fields of velocities; numbers from OWN on are fields of the physics
 

@@ -2,8 +2,8 @@
 
 from fvsolve.basins.behind import through_patch
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import GN
+from fvsolve.kernels.dtypes import GN
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)

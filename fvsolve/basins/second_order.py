@@ -6,9 +6,9 @@ value times the divergence, to the bit. The slope of an upwind cell uses the dif
 face behind the cell.
 """
 
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import UPWIND
 from fvsolve.kernels.limiters import by_limiter, limited, slope
-from fvsolve.kernels.records import UPWIND
 
 
 @njit
@@ -18,7 +18,7 @@ def value(limiter, forward, b, c, d, e):
     return c + half if forward else d - half
 
 
-@inner
+@inline
 def along_limited(limiter, factor, flow, b, c, d, e, q):
     """Values q at faces between c and d with a limiter."""
     for i in range(q.size):
@@ -33,7 +33,7 @@ def settled(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
     return scale * ((x + y) - own * ((fe - fw) + (fn - fs)))
 
 
-@inner
+@inline
 def along(scheme, limiter, factor, flow, b, c, d, e, q):
     """Values q at faces between c and d, from the upwind side of factor times flow."""
     if scheme == UPWIND:
@@ -53,7 +53,7 @@ def one_value(scheme, limiter, forward, b, c, d, e):
     return c + half if forward else d - half
 
 
-@inner
+@inline
 def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
     """Values q at the nx + 1 faces of a row of cells c; west and east are values outside.
 
@@ -72,7 +72,7 @@ def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
         q[nx - 1] = one_value(scheme, limiter, factor * flow[nx - 1] > 0.0, c[nx - 3], c[nx - 2], c[nx - 1], e)
 
 
-@inner
+@inline
 def across_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
     """`north_values_and_rates` with a limiter."""
     fe, qe = fx[1:], qx[1:]
@@ -82,7 +82,7 @@ def across_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, 
         rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
 
 
-@inner
+@inline
 def across(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
     """Values qn at the northern faces of a row of cells c, and rates of the row. ky : 1 / height of the row"""
     if scheme == UPWIND:

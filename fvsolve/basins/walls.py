@@ -13,13 +13,13 @@ from math import sqrt
 from fvsolve.basins.energy import row_of
 from fvsolve.basins.stretch import fill, multiply, row_across, see_densities, see_depths, stretched, widen
 from fvsolve.jit import njit
-from fvsolve.kernels.accounts import OF_WALL, wall_rows
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.masses import motion
-from fvsolve.kernels.mechanism.room import FORCE
-from fvsolve.kernels.mechanism.room import row_of as row_of_body
-from fvsolve.kernels.records import NO_DRAG, NO_ROOM, RATE, STATUS, WALL_VALUE, WHERE
-from fvsolve.kernels.schedules import schedule_slopes
+from fvsolve.kernels.dtypes import NO_DRAG, NO_WIDTH, RATE, STATUS, WALL_VALUE, WHERE
+from fvsolve.kernels.energy_rows import WALL_ROWS, wall_power_row
+from fvsolve.kernels.mass_dynamics import motion
+from fvsolve.kernels.mechanism.body_layout import FORCE
+from fvsolve.kernels.mechanism.body_layout import body_row as row_of_body
+from fvsolve.kernels.schedule_pieces import schedule_slopes
+from fvsolve.kernels.table_handle import open_tables
 
 FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # quantities of probes, in the order of `parts.basin.part.MovingWall`
 ROOM = 1e-3  # least width of a cell over its undeformed width; below it the run stops
@@ -200,7 +200,7 @@ def drive_lines(t, y, dydt, out, handle):
         spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
         for i in range(count):
             if not plane[basin["stretch"] + i] > ROOM:
-                out[STATUS], out[WHERE] = NO_ROOM, nearest(tables, basin, i)
+                out[STATUS], out[WHERE] = NO_WIDTH, nearest(tables, basin, i)
         for i in range(count if basin["nx"] > 0 else 0):
             most = max(most, max(abs(plane[at + i]), abs(plane[at + i + 1])) * plane[spacing + i])
         out[RATE] = max(out[RATE], most)
@@ -342,7 +342,7 @@ def wall_power(t, y, dydt, out, handle, power):
     tables = open_tables(handle)
     for k in range(tables.walls.size):
         work, dissipated = brought(t, tables, k, y, out), lost_beside(tables, tables.walls[k])
-        first = wall_rows(tables, power) + OF_WALL * k
+        first = wall_power_row(tables, power) + WALL_ROWS * k
         power[first], power[first + 1] = work, dissipated
         power[row_of(tables, power, tables.walls[k]["basin"])] += work - dissipated
 

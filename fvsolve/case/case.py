@@ -16,6 +16,7 @@ from fvsolve.case.limits import DesignLimit
 from fvsolve.case.probe import Probe
 from fvsolve.case.routes import Route
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.fluid import LAWS, Fluid
 from fvsolve.fluid.laws import Law
@@ -23,12 +24,11 @@ from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.pipe.wall import softness
 from fvsolve.parts.table import plain
 from fvsolve.schemes import SCHEMES
-from fvsolve.shown import Shown
 from fvsolve.units import show
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Case(Shown):
+class Case(Displayable):
     """Frozen hydraulic scene; SI units, pressures absolute [Pa]. Cases are equal if their tables are equal.
 
     properties : properties of the fluid at its reference state
@@ -67,12 +67,12 @@ class Case(Shown):
 
     picture = "fvsolve.draw.objects:case_figure"
 
-    def said(self) -> str:
+    def summary_line(self) -> str:
         basins = f", {len(self.meshes)} basins" if self.meshes else ""
         return (f"{self.name!r}: {len(self.nodes)} nodes, {len(self.links)} links{basins}, {self.fluid.name} under law "
                 f"{self.fluid.law}, {self.numerics.start:g} to {self.numerics.end:g} s")  # fmt: skip
 
-    def listed(self) -> dict[str, list]:
+    def table_columns(self) -> dict[str, list]:
         parts = {**{("node", name): part for name, part in self.nodes.items()},
                  **{("link", name): part for name, part in self.links.items()}}  # fmt: skip
         joins = [", ".join(map(str, getattr(part, "ports", {}).values())) for part in parts.values()]

@@ -23,7 +23,6 @@ from fvsolve.case.raw import Raw, dotted, opened, override, read_raw
 from fvsolve.case.routes import Route, broken, legs, spread
 from fvsolve.case.routes import misfits as route_misfits
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
-from fvsolve.doors import TABLE, door
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
@@ -45,6 +44,7 @@ from fvsolve.parts.value import (
     nonnegative,
 )
 from fvsolve.units import Kinematic, show
+from fvsolve.validation import TABLE, validated
 
 SCHEMA = 1
 GROUPS = {
@@ -69,7 +69,7 @@ TOP = {
 }
 
 
-@door(set=TABLE)
+@validated(set=TABLE)
 def load(source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, Any] | None = None) -> Case:
     """Read the case of a TOML file, a shipped case by name, a dict shaped like a file, or a case; `set` overrides keys.
 

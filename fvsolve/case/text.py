@@ -6,7 +6,7 @@ import json
 import re
 from typing import Any
 
-from fvsolve.errors import LONGEST
+from fvsolve.errors import LONGEST_NAME
 
 
 def write(table: dict[str, Any]) -> str:
@@ -22,7 +22,7 @@ def path(keys: tuple[Any, ...]) -> str:
     """Key path as text of a message: `links.main.length`, `output.probes[2]`."""
     text = ""
     for key in keys:
-        name = str(key) if len(str(key)) <= LONGEST else f"{str(key)[:57]}..."
+        name = str(key) if len(str(key)) <= LONGEST_NAME else f"{str(key)[:57]}..."
         text += f"[{key}]" if isinstance(key, int) else ("." if text else "") + _key(name)
     return text
 

@@ -74,11 +74,11 @@ def load_case(name: str, overrides: list[str], scheme: str | None = None, method
 
 @functools.cache
 def _tell_of_compiling() -> None:
-    from fvsolve.jit import cold, elsewhere
+    from fvsolve.jit import is_cold, other_caches
 
-    if cold():
+    if is_cold():
         text = "the first run on this machine compiles the solver (about 10 to 30 s); later runs reuse the result"
-        other = elsewhere()
+        other = other_caches()
         print(f"fvsolve: {text}{f'; {other}' if other else ''}", file=sys.stderr)
 
 

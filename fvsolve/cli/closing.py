@@ -8,7 +8,7 @@ import typer
 
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.studying import told
-from fvsolve.errors import CaseError, gathered
+from fvsolve.errors import CaseError, collect_faults
 
 
 @app.command()
@@ -27,7 +27,7 @@ def optimise(
     from fvsolve.studies import closing
 
     faults, loaded = [], None
-    with gathered(faults):
+    with collect_faults(faults):
         loaded = load_case(case, set)
     faults += closing.asked(loaded, schedule, minimise, knots, runs)
     if faults:

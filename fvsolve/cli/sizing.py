@@ -10,7 +10,7 @@ import typer
 from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
 from fvsolve.cli.studying import told
 from fvsolve.cli.sweep import RANGE, values_of
-from fvsolve.errors import CaseError, FvsolveError, gathered
+from fvsolve.errors import CaseError, FvsolveError, collect_faults
 
 
 @app.command()
@@ -39,14 +39,14 @@ def size(
     from fvsolve.studies import sizing
 
     faults, key, values, ties, loaded = [], "", [], {}, None
-    with gathered(faults):
+    with collect_faults(faults):
         key, values = values_of(vary, "--vary", RANGE)
         if len(values) != 2:
             values = []
             raise FvsolveError(f"--vary {vary}: expected {RANGE}")
-    with gathered(faults):
+    with collect_faults(faults):
         ties = sizing.tied(dependent)
-    with gathered(faults):
+    with collect_faults(faults):
         loaded = load_case(case, set)
     faults += sizing.asked(loaded, key, values, goal, ties, rtol)
     if faults:

@@ -17,7 +17,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from fvsolve.shown import save
+from fvsolve.display import save
 
 PACKAGE = Path(__file__).resolve().parents[1]
 

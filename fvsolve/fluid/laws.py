@@ -15,7 +15,7 @@ import numpy as np
 from fvsolve.errors import FluidError
 from fvsolve.fluid.air import AIR_KEYS, Air, mixed
 from fvsolve.fluid.oils import OILS
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 LAWS: dict[str, type[Law]] = {}  # name -> law, from the simplest to the most general
 

@@ -1,40 +1,47 @@
 """Rigid columns under the laws log and table: driving pressures, node pressures and rates of flow."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.barotropic_nodes import drive, mean_density
-from fvsolve.kernels.clusters import settled
-from fvsolve.kernels.columns import add_led, column_rate
+from fvsolve.kernels.barotropic_nodes import driving_pressure, mean_density
+from fvsolve.kernels.column_junctions import (
+    assemble_with_given,
+    body_drive,
+    gate_area,
+    junction_work,
+    number_junctions,
+    solve_junctions,
+)
+from fvsolve.kernels.column_valve_control import control_end, controlled_flow, seating_drop, seating_valve
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.led import led_by_lift, led_end, led_flow, lone_lead
-from fvsolve.kernels.records import NOT_CONVERGED, STATUS
+from fvsolve.kernels.dtypes import NOT_CONVERGED, STATUS
+from fvsolve.kernels.node_clusters import has_converged
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.rigid import body_drive, gate_area, join_given, number_rigid, rigid_space, settle_rigid
+from fvsolve.kernels.rigid_columns import add_controlled_rates, column_rate
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit
-def drive_change(tables, out, k):
+def driving_pressure_change(tables, out, k):
     """Driving pressure of column k minus its value in the profile [Pa]."""
     st, nodes, column = tables.settings[0], tables.nodes, tables.columns[k]
     i, j, at = column["from_node"], column["to_node"], tables.layout[0]["pressure"]
     p_i, p_j = nodes[i]["pressure"] + out[at + i], nodes[j]["pressure"] + out[at + j]
-    now = drive(st, tables.floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
-    if column["ride"] >= 0:
+    now = driving_pressure(st, tables.floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])[0]
+    if column["moving_segment"] >= 0:
         now += mean_density(st, tables.floats, p_i, p_j) * body_drive(tables, out, column)
     return now - column["base"]
 
 
 @njit
-def add_rates(t, y, tables, out, n):
+def add_column_rates_barotropic(t, y, tables, out, n):
     """Add to `right` the rates of flow [kg/s2] that columns bring into each of n column junctions.
 
     Columns controlled by valves are left out; the right side of pinned junctions is zero.
     """
-    rows, _, _, right, pinned, _ = rigid_space(tables, n)
+    rows, _, _, right, pinned, _ = junction_work(tables, n)
     for k in range(tables.columns.size):
         a, b = int(rows[tables.columns[k]["from_node"]]), int(rows[tables.columns[k]["to_node"]])
-        if led_end(tables, out, k) == 0 and (a >= 0 or b >= 0):
-            rate = column_rate(t, y, tables, out, k, drive_change(tables, out, k))
+        if control_end(tables, out, k) == 0 and (a >= 0 or b >= 0):
+            rate = column_rate(t, y, tables, out, k, driving_pressure_change(tables, out, k))
             if a >= 0:
                 right[a] -= rate
             if b >= 0:
@@ -44,35 +51,35 @@ def add_rates(t, y, tables, out, n):
 
 
 @njit
-def hold_rigid_barotropic(t, y, tables, out):
+def junction_pressures_barotropic(t, y, tables, out):
     """Pressures of column junctions by iteration: driving pressures are nearly linear in the end pressures."""
-    n = number_rigid(tables, out)
+    n = number_junctions(tables, out)
     if n == 0:
         return
     pressure, change = tables.layout[0]["pressure"], 1e300
-    add_led(t, y, tables, out, n)
-    join_given(tables, out, n)
-    rows, _, _, right, pinned, _ = rigid_space(tables, n)
+    add_controlled_rates(t, y, tables, out, n)
+    assemble_with_given(tables, out, n)
+    rows, _, _, right, pinned, _ = junction_work(tables, n)
     for i in range(rows.size):
         if rows[i] >= 0.0 and pinned[int(rows[i])] == 0.0:
             out[pressure + i] = 0.0
     for _ in range(100):
-        join_given(tables, out, n)
-        add_rates(t, y, tables, out, n)
-        settle_rigid(tables, out, n)
+        assemble_with_given(tables, out, n)
+        add_column_rates_barotropic(t, y, tables, out, n)
+        solve_junctions(tables, out, n)
         last_change, change = change, 0.0
         for i in range(rows.size):
             if rows[i] >= 0.0:
                 step = right[int(rows[i])]
                 out[pressure + i] += step
                 change = max(change, abs(step) / (1e5 + abs(out[pressure + i])))
-        if settled(change, last_change):
+        if has_converged(change, last_change):
             return
     out[STATUS] = NOT_CONVERGED
 
 
 @njit
-def hold_columns_barotropic(t, y, dydt, out, handle):
+def column_pressures_barotropic(t, y, dydt, out, handle):
     """Set the pressures of column junctions and of the valve-controlled ends of columns.
 
     The enthalpy at a controlled end is that of the far end, less the height difference, the body force and inertia.
@@ -80,9 +87,9 @@ def hold_columns_barotropic(t, y, dydt, out, handle):
     tables = open_tables(handle)
     st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
     pressure = tables.layout[0]["pressure"]
-    hold_rigid_barotropic(t, y, tables, out)
+    junction_pressures_barotropic(t, y, tables, out)
     for k in range(tables.columns.size):
-        column, end = tables.columns[k], led_end(tables, out, k)
+        column, end = tables.columns[k], control_end(tables, out, k)
         if end == 0:
             continue
         i, controlled = column["from_node"], column["to_node"]
@@ -93,15 +100,15 @@ def hold_columns_barotropic(t, y, dydt, out, handle):
         )
         h = enthalpy(st, floats, nodes[i]["pressure"] + out[pressure + i])
         out[pressure + controlled] = pressure_of_enthalpy(st, floats, h - rise) - nodes[controlled]["pressure"]
-        if lone_lead(tables, controlled) >= 0:
-            drive_with_lift(t, y, tables, out, k, controlled, lone_lead(tables, controlled))
+        if seating_valve(tables, controlled) >= 0:
+            apply_seating_drop(t, y, tables, out, k, controlled, seating_valve(tables, controlled))
         elif gate_area(tables, out, controlled)[0] > 0.0:
-            rate = led_flow(t, y, tables, out, k, end, True)[1]
+            rate = controlled_flow(t, y, tables, out, k, end, True)[1]
             out[pressure + controlled] -= column["length"] / column["area"] * rate
 
 
 @njit
-def drive_with_lift(t, y, tables, out, k, x, index):
+def apply_seating_drop(t, y, tables, out, k, x, index):
     """Change p' of node x from that of a stationary column to that with column and valve in motion.
 
     index : the seating valve that controls column k
@@ -110,7 +117,7 @@ def drive_with_lift(t, y, tables, out, k, x, index):
     still, ahead = head_drop(tables, out, index)[1], valve["from_node"] == x
     other = out[pressure + (valve["to_node"] if ahead else valve["from_node"])]
     inertia = tables.columns[k]["length"] / tables.columns[k]["area"]
-    drop = led_by_lift(t, y, tables, out, k, index, out[pressure + x], inertia, other, still)[0]
+    drop = seating_drop(t, y, tables, out, k, index, out[pressure + x], inertia, other, still)[0]
     out[pressure + x] += drop - still if ahead else still - drop
 
 
@@ -120,4 +127,4 @@ def column_rates_barotropic(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for k in range(tables.columns.size if dydt.size > 0 else 0):
         at = tables.columns[k]["y"]
-        dydt[at] = column_rate(t, y, tables, out, k, drive_change(tables, out, k))
+        dydt[at] = column_rate(t, y, tables, out, k, driving_pressure_change(tables, out, k))

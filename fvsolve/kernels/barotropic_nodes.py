@@ -7,18 +7,6 @@ h(p_end) + v^2 / 2 = h(p_node). A jet into a tank, chamber or reservoir loses it
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.kernels.clusters import (
-    any_back,
-    finish,
-    let_fall,
-    move,
-    prepare,
-    put_valve,
-    settled,
-    shut_out,
-    solve_dense,
-    whole_inflows,
-)
 from fvsolve.kernels.density import (
     density,
     enthalpy,
@@ -30,11 +18,7 @@ from fvsolve.kernels.density import (
     pressure_of_mass,
     velocity_change,
 )
-from fvsolve.kernels.ends import end_value
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.isolated import find_held, inner_row
-from fvsolve.kernels.pipes import family_of
-from fvsolve.kernels.records import (
+from fvsolve.kernels.dtypes import (
     CHAMBER,
     CLUSTER,
     FIXED,
@@ -44,13 +28,29 @@ from fvsolve.kernels.records import (
     TANK,
     WHERE,
 )
+from fvsolve.kernels.ghost_cells import end_value
+from fvsolve.kernels.isolated_nodes import find_connected, inner_row
+from fvsolve.kernels.node_clusters import (
+    add_valve,
+    apply_step,
+    close_unstable,
+    has_backflow,
+    has_converged,
+    prepare_cluster,
+    solve_dense,
+    total_inflows,
+    write_cluster,
+    zero_isolated,
+)
+from fvsolve.kernels.pipes import scheme_family
 from fvsolve.kernels.restrictions import conductance, restriction_lift, restriction_step
-from fvsolve.kernels.schedules import schedule_value
-from fvsolve.kernels.tanks import tank_level
+from fvsolve.kernels.schedule_pieces import schedule_value
+from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.tank_levels import tank_level
 from fvsolve.kernels.valves import flow_at_drop, transition_of
 
 # Errors of valve flows against their laws up to this fraction of the node's imbalance cannot reverse a Newton step.
-NEARLY = 0.01
+FLOW_ERROR = 0.01
 
 
 @njit
@@ -60,7 +60,7 @@ def head_pressure(st, floats, head):
 
 
 @njit
-def store_barotropic(t, y, dydt, out, handle):
+def known_pressures_barotropic(t, y, dydt, out, handle):
     """Write the pressure deviations [Pa] of fixed nodes, tanks and chambers, and the stiffness of softened chambers."""
     tables = open_tables(handle)
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
@@ -115,7 +115,7 @@ def end_flow(st, floats, pipe, m_inside, into_inside, p_node, still):
 
 
 @njit
-def ends_into_nodes(out, tables, slope, final):
+def end_inflows_barotropic(out, tables, slope, final):
     """Write the change of flow from pipes into every node at the present pressures to out[net], its slope to `slope`.
 
     On entry out[ends] holds both waves extrapolated from the cells at each end; `final` replaces them with the waves of
@@ -149,14 +149,14 @@ def ends_into_nodes(out, tables, slope, final):
 
 
 @njit
-def offer_barotropic(t, y, dydt, out, handle):
+def outgoing_waves_barotropic(t, y, dydt, out, handle):
     """Extrapolate both waves from the cells to both ends of every pipe, into out[ends]."""
     tables = open_tables(handle)
     st, layout, pipes, work = tables.settings[0], tables.layout[0], tables.pipes, tables.scratch
     for i in range(pipes.size):
         pipe = pipes[i]
         n, o = pipe["cells"], pipe["y"]
-        family = family_of(st, n)
+        family = scheme_family(st, n)
         for side in range(2):
             for wave in range(2):
                 cells = y[o + n * wave : o + n * (wave + 1)]
@@ -174,7 +174,7 @@ def mean_density(st, floats, p_i, p_j):
 
 
 @njit
-def drive(st, floats, p_i, z_i, p_j, z_j):
+def driving_pressure(st, floats, p_i, z_i, p_j, z_j):
     """Driving pressure of a link, rho_mean (dh + g dz) [Pa], and upstream density [kg/m3]: p_i - p_j on one level."""
     dp = p_i - p_j
     if z_i != z_j:
@@ -184,14 +184,14 @@ def drive(st, floats, p_i, z_i, p_j, z_j):
 
 
 @njit
-def valve_drive(tables, out, k):
+def valve_driving_pressure(tables, out, k):
     """(driving pressure of valve k [Pa], upstream density over reference density)."""
     st, layout, nodes, floats = tables.settings[0], tables.layout[0], tables.nodes, tables.floats
     valve = tables.valves[k]
     i, j = valve["from_node"], valve["to_node"]
     p_i = nodes[i]["pressure"] + out[layout["pressure"] + i]
     p_j = nodes[j]["pressure"] + out[layout["pressure"] + j]
-    drop, rho = drive(st, floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])
+    drop, rho = driving_pressure(st, floats, p_i, nodes[i]["elevation"], p_j, nodes[j]["elevation"])
     return drop, rho / st["rho"]
 
 
@@ -199,7 +199,7 @@ def valve_drive(tables, out, k):
 def valve_target(tables, out, k, g):
     """(M |M| of a valve by the square-root law, or its flow if the law has a laminar part; its conductance now)."""
     valve = tables.valves[k]
-    drop, denser = valve_drive(tables, out, k)
+    drop, denser = valve_driving_pressure(tables, out, k)
     dense = g * denser
     if drop < 0.0:
         dense *= valve["back"]
@@ -209,7 +209,7 @@ def valve_target(tables, out, k, g):
 
 
 @njit
-def balances(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right):
+def assemble_barotropic(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right):
     """Newton system of a cluster's nodes, as in `node_clusters.assemble`, but with the slopes of the pipe ends."""
     layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
     integers, n = tables.integers, c.size
@@ -223,10 +223,10 @@ def balances(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, 
         i, j = inner_row(nodes, valves[k]["from_node"]), inner_row(nodes, valves[k]["to_node"])
         a[e], s[e], lift[e] = -m[e], 0.0, 0.0
         if g[e] > 0.0:
-            drop, denser = valve_drive(tables, out, k)
+            drop, denser = valve_driving_pressure(tables, out, k)
             a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], drop, denser, wide)
             lift[e] = restriction_lift(tables, out, k, g[e], drop, denser, wide)
-        put_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
+        add_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
     for r in range(n):
         if connected[r] == 0.0:
             right[r], matrix[n * r + r] = 0.0, 1.0
@@ -244,12 +244,12 @@ def newton_step(cluster, out, tables, g, m, c, connected, slope, wide, work):
     matrix, right = work[: n * n], work[n * n : n * n + n]
     at = n * n + n
     a, s, lift = work[at : at + k], work[at + k : at + 2 * k], work[at + 2 * k : at + 3 * k]
-    balances(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right)
-    imbalance = largest(right)
+    assemble_barotropic(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right)
+    imbalance = largest_magnitude(right)
     sign = solve_dense(matrix, right, n)
-    if sign <= 0.0 and not wide and let_fall(cluster, tables, g, m):
-        balances(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right)
-        imbalance = largest(right)
+    if sign <= 0.0 and not wide and close_unstable(cluster, tables, g, m):
+        assemble_barotropic(cluster, out, tables, g, m, c, connected, slope, wide, a, s, lift, matrix, right)
+        imbalance = largest_magnitude(right)
         sign = solve_dense(matrix, right, n)
     if sign == 0.0:
         out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"]]
@@ -257,12 +257,12 @@ def newton_step(cluster, out, tables, g, m, c, connected, slope, wide, work):
     flow_error = 0.0
     for e in range(k):
         flow_error += a[e] * a[e] / max(abs(m[e] + a[e]), 1e-300)
-    shorten(tables.settings[0]["beta"], a, right)
-    return move(cluster, tables, out, m, a, s, lift, right), flow_error <= NEARLY * imbalance
+    limit_step(tables.settings[0]["beta"], a, right)
+    return apply_step(cluster, tables, out, m, a, s, lift, right), flow_error <= FLOW_ERROR * imbalance
 
 
 @njit(forceinline=True)
-def largest(a):
+def largest_magnitude(a):
     """Greatest magnitude of the entries."""
     most = 0.0
     for i in range(a.size):
@@ -271,7 +271,7 @@ def largest(a):
 
 
 @njit
-def shorten(most, a, right):
+def limit_step(most, a, right):
     """Limit a Newton step to a pressure rise of `most` [Pa], over which density grows by a factor e."""
     greatest = 0.0
     for r in range(right.size):
@@ -304,7 +304,7 @@ def given_flows(t, y, out, tables):
 
 
 @njit
-def is_quiet(cluster, tables, out):
+def is_undisturbed(cluster, tables, out):
     """True if pipe ends bring exactly the flow of the profile into every node of a cluster."""
     for i in range(cluster["nodes"]):
         node = tables.integers[cluster["first_node"] + i]
@@ -314,7 +314,7 @@ def is_quiet(cluster, tables, out):
 
 
 @njit
-def node_space(tables):
+def node_work(tables):
     """Work arrays of all clusters: (slope, c, connected, group of nodes; conductance, flow of valves; rest)."""
     n, v, work = tables.nodes.size, tables.valves.size, tables.scratch
     g, m, rest = work[4 * n : 4 * n + v], work[4 * n + v : 4 * n + 2 * v], work[4 * n + 2 * v :]
@@ -330,7 +330,7 @@ def node_space(tables):
 
 
 @njit
-def cluster_space(tables):
+def cluster_work(tables):
     """State of the iteration of each cluster: (done, last change, change before it, wide, sure).
 
     sure : 1 if the last step points to the root; it may point away until the flows of valves have reversed
@@ -352,16 +352,16 @@ def begin_clusters(out, tables, space):
 
     A cluster counts as done if all is as in the profile; pipe ends are checked later.
     """
-    clusters, (_, c, connected, _, g, m, _), (done, change, _, wide, _) = tables.clusters, space, cluster_space(tables)
+    clusters, (_, c, connected, _, g, m, _), (done, change, _, wide, _) = tables.clusters, space, cluster_work(tables)
     a, b = 0, 0
     for k in range(clusters.size):
         cluster = clusters[k]
         i, j = a + cluster["nodes"], b + cluster["valves"]
-        unchanged = prepare(cluster, tables, out, g[b:j], m[b:j])
-        done[k] = 1.0 if whole_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
+        unchanged = prepare_cluster(cluster, tables, out, g[b:j], m[b:j])
+        done[k] = 1.0 if total_inflows(cluster, tables, out, c[a:i]) and unchanged else 0.0
         change[k], wide[k] = 1e300, 1.0
-        find_held(cluster, tables, g[b:j], connected[a:i])
-        shut_out(cluster, tables, g[b:j], m[b:j], connected[a:i])
+        find_connected(cluster, tables, g[b:j], connected[a:i])
+        zero_isolated(cluster, tables, g[b:j], m[b:j], connected[a:i])
         a, b = i, j
 
 
@@ -369,14 +369,14 @@ def begin_clusters(out, tables, space):
 def step_clusters(sweep, out, tables, space):
     """Make a Newton step in every cluster that is disturbed and not done."""
     clusters, (slope, c, connected, _, g, m, rest), (done, change, last_change, wide, sure) = (
-        tables.clusters, space, cluster_space(tables),
+        tables.clusters, space, cluster_work(tables),
     )  # fmt: skip
     a, b = 0, 0
     for k in range(clusters.size):
         cluster = clusters[k]
         i, j = a + cluster["nodes"], b + cluster["valves"]
         if sweep == 1 and done[k] == 1.0:
-            if is_quiet(cluster, tables, out):
+            if is_undisturbed(cluster, tables, out):
                 change[k] = 0.0
             else:
                 done[k] = 0.0
@@ -391,15 +391,15 @@ def step_clusters(sweep, out, tables, space):
 
 
 @njit
-def settle_clusters(out, tables, space):
+def check_clusters(out, tables, space):
     """Mark converged clusters as done, each by its own last change; return True if any cluster is not done."""
     clusters, m, (done, change, last_change, wide, _), b, active = (
-        tables.clusters, space[5], cluster_space(tables), 0, False,
+        tables.clusters, space[5], cluster_work(tables), 0, False,
     )  # fmt: skip
     for k in range(clusters.size):
         j = b + clusters[k]["valves"]
-        if done[k] == 0.0 and settled(change[k], last_change[k]):
-            if wide[k] == 1.0 and any_back(clusters[k], tables, m[b:j]):
+        if done[k] == 0.0 and has_converged(change[k], last_change[k]):
+            if wide[k] == 1.0 and has_backflow(clusters[k], tables, m[b:j]):
                 change[k], wide[k] = 1e300, 0.0
             else:
                 done[k] = 1.0
@@ -409,31 +409,31 @@ def settle_clusters(out, tables, space):
 
 
 @njit
-def finish_clusters(out, tables, space):
+def write_clusters(out, tables, space):
     """Write the flows of the valves of all clusters."""
-    clusters, (_, c, connected, group, g, m, _), change = tables.clusters, space, cluster_space(tables)[1]
+    clusters, (_, c, connected, group, g, m, _), change = tables.clusters, space, cluster_work(tables)[1]
     a, b = 0, 0
     for k in range(clusters.size):
         i, j = a + clusters[k]["nodes"], b + clusters[k]["valves"]
-        finish(clusters[k], tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], group[a:i], change[k])
+        write_cluster(clusters[k], tables, out, g[b:j], m[b:j], c[a:i], connected[a:i], group[a:i], change[k])
         a, b = i, j
 
 
 @njit
-def close_barotropic(t, y, dydt, out, handle):
+def solve_nodes_barotropic(t, y, dydt, out, handle):
     """Solve all nodes by Newton: pressures of nodes, flows of valves, both waves at every pipe end.
 
     In each sweep all clusters that are not done take a step, then all pipe ends are evaluated again. Each cluster stops
     by its own change, so its result does not depend on other clusters. An undisturbed cluster is left as it is.
     """
     tables = open_tables(handle)
-    space = node_space(tables)
+    space = node_work(tables)
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
     for sweep in range(1, 101):
-        ends_into_nodes(out, tables, space[0], False)
+        end_inflows_barotropic(out, tables, space[0], False)
         step_clusters(sweep, out, tables, space)
-        if not settle_clusters(out, tables, space):
+        if not check_clusters(out, tables, space):
             break
-    finish_clusters(out, tables, space)
-    ends_into_nodes(out, tables, space[0], True)
+    write_clusters(out, tables, space)
+    end_inflows_barotropic(out, tables, space[0], True)

@@ -12,16 +12,16 @@ import functools
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.jit import COMPILING, Intrinsic, declared, njit, plain_kinds
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import AMENDED, STATUS, table_types
+from fvsolve.jit import COMPILING, Intrinsic, declare_function, njit, plain_kinds
+from fvsolve.kernels.dtypes import AMENDED, STATUS, table_types
+from fvsolve.kernels.table_handle import open_tables
 
 # Jobs: rows of `calls`, each ended by a zero. CLOSE, the first phases of RHS, must run before event functions.
 # SEE derives from a state the values that the functions of all jobs but RHS read, where these are not the state itself
 # (`basins.walls`). DAMP divides the rates of a stage by 1 + h r, r their fast part (`steppers.semi_implicit`).
-RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, SEE, DAMP, JOBS = range(10)
+RHS, CLOSE, OBSERVE, RECORD, EVENTS, POWER, STORED, DERIVE, DAMP, JOBS = range(10)
 RATES, READS, ENERGIES = "tVVVH", "tVVHV", "tVVVHV"  # argument types of the functions of jobs
-ARGUMENTS = dict.fromkeys((RHS, CLOSE, SEE, DAMP), RATES)
+ARGUMENTS = dict.fromkeys((RHS, CLOSE, DERIVE, DAMP), RATES)
 ARGUMENTS |= dict.fromkeys((OBSERVE, RECORD, EVENTS), READS) | dict.fromkeys((POWER, STORED), ENERGIES)
 HOOKS = {  # functions of the law of a part: types of arguments and of the result
     "set": (
@@ -60,8 +60,8 @@ def argument_types(letters: str) -> tuple:
 def _kinds() -> dict:
     from numba import types
 
-    from fvsolve.kernels.opened import Tables
-    from fvsolve.kernels.vectors import Vector
+    from fvsolve.kernels.table_attributes import Tables
+    from fvsolve.kernels.vector_arguments import Vector
 
     own = {"V": Vector(types.float64), "H": Vector(types.int64), "T": Tables(), "D": table_types().devices.dtype}
     return plain_kinds() | own
@@ -69,10 +69,10 @@ def _kinds() -> dict:
 
 def compile_as(function, letters: str):
     """Compile a function for arguments of these types only; return it unchanged where JIT is off."""
-    return declared(function, letters, argument_types)
+    return declare_function(function, letters, argument_types)
 
 
-def addressed(function, letters: str):
+def function_address(function, letters: str):
     """Address of a compiled function for the tables; the function itself where JIT is off.
 
     The machine code stays in place as long as the function exists.
@@ -198,19 +198,19 @@ else:
 
 
 @njit(forceinline=True)
-def see(t, y, seen, out, handle):
+def derive_state(t, y, seen, out, handle):
     """Write to `seen` the values that functions read in place of the state, in models where they differ.
 
     seen : the array of the tables, or an empty part of it before rates, whose functions need less
     """
     tables, k = open_tables(handle), 0
-    while tables.calls[SEE, k] != 0:
-        call_rates(tables.calls[SEE, k], t, y, seen, out, handle)
+    while tables.calls[DERIVE, k] != 0:
+        call_rates(tables.calls[DERIVE, k], t, y, seen, out, handle)
         k += 1
 
 
 @njit(forceinline=True)
-def run(job, t, y, dydt, out, handle):
+def run_job(job, t, y, dydt, out, handle):
     """Call every function of a job with the arguments of the right-hand side."""
     calls, k = open_tables(handle).calls, 0
     while calls[job, k] != 0:
@@ -225,25 +225,25 @@ def rhs_in_turn(t, y, dydt, out, handle):
     If `dydt` is empty and `out` depends on rates, the rates are computed in `work`.
     """
     tables = open_tables(handle)
-    see(t, y, y[:0], out, handle)
+    derive_state(t, y, y[:0], out, handle)
     at, rates = tables.layout[0]["rates"], dydt
     if dydt.size == 0 and at >= 0:
         rates = tables.work[at : at + y.size]
-    run(RHS, t, y, rates, out, handle)
+    run_job(RHS, t, y, rates, out, handle)
 
 
 @njit
 def damp_in_turn(h, y, rates, quick, handle):
     """Call every function that divides rates of a stage y by 1 + h r; quick : h r of the states that it divides."""
-    see(0.0, y, open_tables(handle).seen, quick, handle)
-    run(DAMP, h, y, rates, quick, handle)
+    derive_state(0.0, y, open_tables(handle).seen, quick, handle)
+    run_job(DAMP, h, y, rates, quick, handle)
 
 
 @njit
 def observe_in_turn(t, y, out, handle, values):
     """Call every function that writes probe values."""
     tables, k = open_tables(handle), 0
-    see(t, y, tables.seen, out, handle)
+    derive_state(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[OBSERVE, k] != 0:
         call_reader(calls[OBSERVE, k], t, seen, out, handle, values)
@@ -267,9 +267,9 @@ def record_in_turn(t, y, out, handle, values):
 
 
 @njit
-def close_in_turn(t, y, out, handle, g):
+def solve_nodes_in_turn(t, y, out, handle, g):
     """Solve the nodes before event functions are evaluated."""
-    run(CLOSE, t, y, y[:0], out, handle)
+    run_job(CLOSE, t, y, y[:0], out, handle)
 
 
 @njit
@@ -277,7 +277,7 @@ def events_in_turn(t, y, handle, g):
     """Call every function that writes event functions."""
     tables, k = open_tables(handle), 0
     calls, out = tables.calls, tables.spare
-    see(t, y, tables.seen, out, handle)
+    derive_state(t, y, tables.seen, out, handle)
     seen = tables.seen if tables.seen.size > 0 else y
     while calls[EVENTS, k] != 0:
         call_reader(calls[EVENTS, k], t, seen, out, handle, g)
@@ -288,7 +288,7 @@ def events_in_turn(t, y, handle, g):
 def power_in_turn(t, y, dydt, out, handle, power):
     """Call every function that fills `power`."""
     tables, k = open_tables(handle), 0
-    see(t, y, tables.seen, out, handle)
+    derive_state(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[POWER, k] != 0:
         call_energies(calls[POWER, k], t, seen, dydt, out, handle, power)
@@ -299,7 +299,7 @@ def power_in_turn(t, y, dydt, out, handle, power):
 def stored_in_turn(t, y, dydt, out, handle, stored):
     """Call every function that fills `stored`."""
     tables, k = open_tables(handle), 0
-    see(t, y, tables.seen, out, handle)
+    derive_state(t, y, tables.seen, out, handle)
     calls, seen = tables.calls, tables.seen if tables.seen.size > 0 else y
     while calls[STORED, k] != 0:
         call_energies(calls[STORED, k], t, seen, dydt, out, handle, stored)

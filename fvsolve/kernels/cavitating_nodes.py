@@ -7,24 +7,24 @@ node has no effect on an end where the flow out of the pipe is supersonic; no pr
 from fvsolve.jit import njit
 from fvsolve.kernels.barotropic_nodes import (
     begin_clusters,
-    cluster_space,
-    finish_clusters,
+    check_clusters,
+    cluster_work,
     given_flows,
-    node_space,
-    settle_clusters,
+    node_work,
     step_clusters,
+    write_clusters,
 )
-from fvsolve.kernels.clusters import BAR
 from fvsolve.kernels.density import pressure_of_mass
-from fvsolve.kernels.density.mixture import enthalpy, relative_volume
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import JUNCTION, NOT_CONVERGED, STATUS, WHERE
-from fvsolve.kernels.riemann import FALL, UNBOUNDED, beside, between, jump, side_at
+from fvsolve.kernels.density.mixture_law import enthalpy, relative_volume
+from fvsolve.kernels.dtypes import JUNCTION, NOT_CONVERGED, STATUS, WHERE
+from fvsolve.kernels.node_clusters import BAR
+from fvsolve.kernels.riemann import FALL, UNBOUNDED, intermediate_pressure, sample_wave, state_at, wave_jump
+from fvsolve.kernels.table_handle import open_tables
 
 ROUNDING = 1e-12  # least gas pressure of a node, relative to its pressure
-LEFT = 1e-7  # greatest imbalance by rounding, relative to the flow that the whole pressure of the node drives
+BALANCE_ERROR = 1e-7  # greatest imbalance by rounding, relative to the flow that the whole pressure of the node drives
 NARROW = 1e-9  # relative width of bounds: if they are narrower and Newton steps out of them, they have lost the root
-LONG = 30  # sweeps after which Newton steps are replaced by bisection or halved
+BISECTION_START = 30  # sweeps after which Newton steps are replaced by bisection or halved
 
 
 @njit
@@ -37,8 +37,8 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
     Where the flow runs into the node at more than half the speed of sound, or into a vessel at rest, the pressure of
     the end is that of the node: v^2 / 2 is lost.
     """
-    floor, target, side = st["floor"], enthalpy(st, floats, p_node), side_at(st, floats, pipe, p_node)
-    change, rise = jump(st, floats, pipe, inside, side)
+    floor, target, side = st["floor"], enthalpy(st, floats, p_node), state_at(st, floats, pipe, p_node)
+    change, rise = wave_jump(st, floats, pipe, inside, side)
     v = v_in - change
     if (still and v >= 0.0) or 2.0 * v * side[1] > side[3]:
         return side, v, -rise
@@ -54,22 +54,22 @@ def end_side(st, floats, pipe, inside, v_in, p_node, still):
         if abs(step) <= 1e-15 * abs(p) + 1e-12 * (p - floor):
             break
         p -= step
-        side = side_at(st, floats, pipe, p if low < p < high else between(floor, low, high, side[0]))
-        change, rise = jump(st, floats, pipe, inside, side)
+        side = state_at(st, floats, pipe, p if low < p < high else intermediate_pressure(floor, low, high, side[0]))
+        change, rise = wave_jump(st, floats, pipe, inside, side)
         v = v_in - change
     return side, v, -rise * rho * relative_volume(st, p_node)[0] / (slope * st["rho"])
 
 
 @njit
-def end_of_state(st, floats, pipe, p_in, v_in, p_node, still):
+def end_flow_of_state(st, floats, pipe, p_in, v_in, p_node, still):
     """(flow into the node [kg/s], its slope over p_node, mass per length [kg/m]) of a pipe end.
 
     p_in, v_in : pressure and velocity towards the node, extrapolated from the cells
     """
-    inside = side_at(st, floats, pipe, p_in)
+    inside = state_at(st, floats, pipe, p_in)
     side, v, slope = end_side(st, floats, pipe, inside, v_in, p_node, still)
     if v >= 0.0:
-        m, at, _ = beside(st, floats, pipe, inside, v_in, side, v)
+        m, at, _ = sample_wave(st, floats, pipe, inside, v_in, side, v)
         return m * at, side[1] * slope, m
     return side[1] * v, side[1] * slope, side[1]
 
@@ -78,11 +78,11 @@ def end_of_state(st, floats, pipe, p_in, v_in, p_node, still):
 def end_flow_cavitating(st, floats, pipe, m_inside, into_inside, p_node, still):
     """`end_flow_of_state` from mass per length and mass flow extrapolated from the cells."""
     p = pressure_of_mass(st, floats, pipe, m_inside)
-    return end_of_state(st, floats, pipe, p, into_inside / m_inside, p_node, still)
+    return end_flow_of_state(st, floats, pipe, p, into_inside / m_inside, p_node, still)
 
 
 @njit
-def cavitating_ends(out, tables, slope, final):
+def end_inflows_cavitating(out, tables, slope, final):
     """Write the change of flow from pipes into every node at the present pressures to out[net], its slope to `slope`.
 
     On entry out[ends] holds pressure and velocity [Pa, m/s] extrapolated from the cells at each end; `final` replaces
@@ -102,7 +102,7 @@ def cavitating_ends(out, tables, slope, final):
             base_mass = pipe["to_mass"] if side == 1 else pipe["from_mass"]
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
             still = nodes[i]["kind"] != JUNCTION
-            into, rise, m = end_of_state(st, floats, pipe, out[at], sign * out[at + 1], p, still)
+            into, rise, m = end_flow_of_state(st, floats, pipe, out[at], sign * out[at + 1], p, still)
             change = into - base
             out[layout["net"] + i] += change
             slope[i] += rise
@@ -113,7 +113,7 @@ def cavitating_ends(out, tables, slope, final):
 
 
 @njit
-def hold_back(sweep, out, tables, before, low, high):
+def bound_steps(sweep, out, tables, before, low, high):
     """Keep the Newton step of every node within the bounds of its root; write the relative change of each cluster.
 
     The inflow of a node that is alone in its cluster falls as its pressure rises. So each step with a sure direction
@@ -121,7 +121,7 @@ def hold_back(sweep, out, tables, before, low, high):
     take half steps after LONG sweeps.
     """
     st, nodes, clusters = tables.settings[0], tables.nodes, tables.clusters
-    pressure, floor, (done, change, _, _, sure) = tables.layout[0]["pressure"], st["floor"], cluster_space(tables)
+    pressure, floor, (done, change, _, _, sure) = tables.layout[0]["pressure"], st["floor"], cluster_work(tables)
     for c in range(clusters.size):
         if done[c] == 1.0 or clusters[c]["nodes"] == 0:
             continue
@@ -131,26 +131,30 @@ def hold_back(sweep, out, tables, before, low, high):
             base = nodes[i]["pressure"]
             p, q, least = base + before[i], base + out[pressure + i], floor + ROUNDING * (1e5 + base)
             if clusters[c]["nodes"] > 1:
-                q = max(p + 0.5 * (q - p) if sweep > LONG else q, floor + FALL * (p - floor), least)
+                q = max(p + 0.5 * (q - p) if sweep > BISECTION_START else q, floor + FALL * (p - floor), least)
             elif q != p:
-                if sure[c] == 1.0 or sweep > LONG:
+                if sure[c] == 1.0 or sweep > BISECTION_START:
                     low[i], high[i] = (p, high[i]) if q > p else (low[i], p)
-                if sweep <= LONG and high[i] - low[i] <= NARROW * (BAR + p):  # a bound was wrong, or there is a kink
+                if sweep <= BISECTION_START and high[i] - low[i] <= NARROW * (
+                    BAR + p
+                ):  # a bound was wrong, or there is a kink
                     low[i], high[i] = floor, UNBOUNDED
-                if sweep > LONG or not low[i] < q < high[i]:  # at a kink Newton can alternate between two points
+                if (
+                    sweep > BISECTION_START or not low[i] < q < high[i]
+                ):  # at a kink Newton can alternate between two points
                     lower, upper = (p, high[i]) if q > p else (low[i], p)
-                    q = max(between(floor, lower, upper, p), least)
+                    q = max(intermediate_pressure(floor, lower, upper, p), least)
             out[pressure + i] = q - base
             change[c] = max(change[c], abs(q - p) / (1e5 + abs(p)))
 
 
 @njit
-def unbind(tables, low, high, first):
+def reset_bounds(tables, low, high, first):
     """Reset the bounds of clusters that begin.
 
     They begin at the first sweep, and again when the search with lifted valves held wide open has ended.
     """
-    clusters, (_, change, _, _, _) = tables.clusters, cluster_space(tables)
+    clusters, (_, change, _, _, _) = tables.clusters, cluster_work(tables)
     for c in range(clusters.size):
         if first or change[c] == 1e300:
             for k in range(clusters[c]["nodes"]):
@@ -159,25 +163,25 @@ def unbind(tables, low, high, first):
 
 
 @njit
-def close_cavitating(t, y, dydt, out, handle):
+def solve_nodes_cavitating(t, y, dydt, out, handle):
     """`solve_nodes_barotropic` with pressures above the floor; a cluster is done when its pressures do not change."""
     tables = open_tables(handle)
-    space, n, work = node_space(tables), tables.nodes.size, tables.scratch
+    space, n, work = node_work(tables), tables.nodes.size, tables.scratch
     pressure, last_pressure = tables.layout[0]["pressure"], space[3]
     low, high = work[work.size - 2 * n : work.size - n], work[work.size - n :]
     given_flows(t, y, out, tables)
     begin_clusters(out, tables, space)
     for sweep in range(1, 101):
-        unbind(tables, low, high, sweep == 1)
-        cavitating_ends(out, tables, space[0], False)
+        reset_bounds(tables, low, high, sweep == 1)
+        end_inflows_cavitating(out, tables, space[0], False)
         for i in range(n):
             last_pressure[i] = out[pressure + i]
         step_clusters(sweep, out, tables, space)
-        hold_back(sweep, out, tables, last_pressure, low, high)
-        if not settle_clusters(out, tables, space):
+        bound_steps(sweep, out, tables, last_pressure, low, high)
+        if not check_clusters(out, tables, space):
             break
-    finish_clusters(out, tables, space)
-    cavitating_ends(out, tables, space[0], True)
+    write_clusters(out, tables, space)
+    end_inflows_cavitating(out, tables, space[0], True)
 
 
 @njit
@@ -198,7 +202,7 @@ def balance_junctions(t, y, dydt, out, handle):
             out[layout["net"] + i] -= imbalance[i]
             unbalanced = unbalanced or imbalance[i] != 0.0
             p = nodes[i]["pressure"] + out[layout["pressure"] + i]
-            if p - floor > BAR and abs(imbalance[i]) > LEFT * nodes[i]["admittance"] * (BAR + abs(p)):
+            if p - floor > BAR and abs(imbalance[i]) > BALANCE_ERROR * nodes[i]["admittance"] * (BAR + abs(p)):
                 out[STATUS], out[WHERE] = NOT_CONVERGED, i
     for sweep in range(2 if unbalanced else 0):
         for k in range(pipes.size):

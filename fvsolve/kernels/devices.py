@@ -1,7 +1,6 @@
 """Loops over all devices of a model that call the hooks of their laws."""
 
 from fvsolve.jit import njit
-from fvsolve.kernels.accounts import OF_DEVICE, device_rows, device_stores
 from fvsolve.kernels.calls import (
     HOOKS,
     call_events,
@@ -12,13 +11,14 @@ from fvsolve.kernels.calls import (
     call_stored,
     call_value,
 )
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import DEVICE_VALUE
+from fvsolve.kernels.dtypes import DEVICE_VALUE
+from fvsolve.kernels.energy_rows import DEVICE_ROWS, device_power_row, device_stored_row
+from fvsolve.kernels.table_handle import open_tables
 
 SET, MOVE, EVENTS, VALUE, OUTSIDE, POWER, STORED, STEP, SLOPE, LIFT, BENDS, LEAD = range(
     len(HOOKS)
 )  # columns of `hooks`
-PASSING = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
+TEMPORARY = 2  # result of a hook `outside`: to be reported, but it ends by itself when a check valve closes
 
 
 @njit
@@ -33,7 +33,7 @@ def set_devices(t, y, dydt, out, handle):
 
 
 @njit
-def move_devices(t, y, dydt, out, handle):
+def device_rates(t, y, dydt, out, handle):
     """d/dt of the states of devices, unless `dydt` is empty; raise out[RATE] to their greatest rates."""
     tables = open_tables(handle)
     for k in range(tables.devices.size):
@@ -79,7 +79,7 @@ def record_devices(t, y, out, handle, values):
     for k in range(devices.size):
         hook = tables.hooks[devices[k]["hooks"], OUTSIDE]
         beyond = call_outside(hook, out, tables, devices[k]) if hook != 0 else 0
-        at = first + k + (devices.size if beyond == PASSING else 0)
+        at = first + k + (devices.size if beyond == TEMPORARY else 0)
         if beyond != 0 and marks[at] != marks[at]:
             marks[at] = t
 
@@ -88,20 +88,20 @@ def record_devices(t, y, out, handle, values):
 def power_devices(t, y, dydt, out, handle, power):
     """Rows of devices in `power` [W]: power supplied, rate of stored energy, dissipation."""
     tables = open_tables(handle)
-    devices, at = tables.devices, device_rows(tables, power)
+    devices, at = tables.devices, device_power_row(tables, power)
     for k in range(devices.size):
         hook = tables.hooks[devices[k]["hooks"], POWER]
         power[at], power[at + 1], power[at + 2] = 0.0, 0.0, 0.0
         if hook != 0:
             power[at], power[at + 1], power[at + 2] = call_power(hook, t, y, dydt, out, tables, devices[k])
-        at += OF_DEVICE
+        at += DEVICE_ROWS
 
 
 @njit
 def stored_devices(t, y, dydt, out, handle, stored):
     """Rows of devices in `stored`: changes since the profile [J]."""
     tables = open_tables(handle)
-    devices, first = tables.devices, device_stores(tables, stored)
+    devices, first = tables.devices, device_stored_row(tables, stored)
     for k in range(devices.size):
         hook = tables.hooks[devices[k]["hooks"], STORED]
         stored[first + k] = call_stored(hook, y, tables, devices[k]) if hook != 0 else 0.0

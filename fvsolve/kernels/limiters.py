@@ -6,8 +6,8 @@ A limiter is a function of the two differences beside a cell. Its slope is a fra
 
 from math import nan
 
-from fvsolve.jit import inner, njit
-from fvsolve.kernels.records import FLAT, MINMOD, MONOTONIZED_CENTRAL, VAN_LEER
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import FLAT, MINMOD, MONOTONIZED_CENTRAL, VAN_LEER
 
 # A slope is zero for products of differences below this, so that the product of two denominators does not underflow.
 LEAST = 1e-280
@@ -38,7 +38,7 @@ def monotonized_central(a, b):
 
 
 @njit
-def none(a, b):
+def unknown_limiter(a, b):
     """Result for an unknown limiter code: NaN."""
     return nan, 1.0
 
@@ -51,14 +51,14 @@ def slope(limiter, a, b):
 
 
 @njit
-def halves(limiter, a, b, c, d):
+def half_slopes(limiter, a, b, c, d):
     """Halves of the slopes from two pairs of differences, with a single division."""
     (p, s), (q, t) = limiter(a, b), limiter(c, d)
     r = 1.0 / (s * t)
     return 0.5 * p * (t * r), 0.5 * q * (s * r)
 
 
-@inner
+@inline
 def by_limiter(work, code, *given):
     """Call `work` with the limiter of a code; each limiter gives vectorised code of its own."""
     if code == MINMOD:
@@ -67,7 +67,7 @@ def by_limiter(work, code, *given):
         return work(van_leer, *given)
     if code == MONOTONIZED_CENTRAL:
         return work(monotonized_central, *given)
-    return work(none, *given)
+    return work(unknown_limiter, *given)
 
 
 @njit

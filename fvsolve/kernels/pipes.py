@@ -5,16 +5,16 @@ length m = rho A and mass flow M from the profile. r_t + c r_x = -drag'/2, l_t -
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.ends import edge_cells, entering_cells, leaving_cells
-from fvsolve.kernels.friction import EXPONENT, drag, power_of_square
+from fvsolve.kernels.dtypes import FRICTION_HAZEN, FRICTION_ROUGH, LINEAR, MUSCL, SHORT, UPWIND, WENO5
+from fvsolve.kernels.ghost_cells import edge_cells, entering_ghosts, leaving_ghosts
 from fvsolve.kernels.reconstruction import faces
-from fvsolve.kernels.records import FRICTION_HAZEN, FRICTION_ROUGH, LINEAR, MUSCL, SHORT, UPWIND, WENO5
+from fvsolve.kernels.steady_friction import EXPONENT, drag, power_of_square
 
 GAUSS = 0.28867513459481287  # 1 / sqrt(12): two Gauss points of a cell, in cell widths from its centre
 
 
 @njit
-def family_of(settings, n):
+def scheme_family(settings, n):
     """Scheme family for a pipe of n cells: below five cells fifth-order stencils would be unstable or would not fit."""
     family = settings["scheme"]
     if n < 5 and family == LINEAR and settings["degree"] > 2:
@@ -49,14 +49,14 @@ def wave_faces(settings, family, small, backward, c, left, right, scratch, f):
 def both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl):
     """Face values of both waves; at the ends those given: incoming from the node, outgoing from the cells."""
     n, small = r.size, pipe["noise"]
-    family, degree, limiter = family_of(settings, n), settings["degree"], settings["limiter"]
+    family, degree, limiter = scheme_family(settings, n), settings["degree"], settings["limiter"]
     edge, ghosts, beyond = scratch[16:21], scratch[21:24], scratch[24:27]
     for backward in range(2):
         c = l if backward == 1 else r
         edge_cells(c, backward, edge)
-        entering_cells(edge, n, family, degree, l_in if backward == 1 else r_in, small, ghosts)
+        entering_ghosts(edge, n, family, degree, l_in if backward == 1 else r_in, small, ghosts)
         edge_cells(c, 1 - backward, edge)
-        leaving_cells(edge, n, family, degree, limiter, small, beyond)
+        leaving_ghosts(edge, n, family, degree, limiter, small, beyond)
         left, right = (beyond, ghosts) if backward == 1 else (ghosts, beyond)
         wave_faces(settings, family, small, backward, c, left, right, scratch, fl if backward == 1 else fr)
     fr[0], fr[n] = r_in, r_out
@@ -72,7 +72,7 @@ def rates_from_faces(k, fr, fl, dr, dl):
 
 
 @njit
-def weigh(e0, e1, e2, e3, e4, e5, c, d):
+def convolve(e0, e1, e2, e3, e4, e5, c, d):
     """d[i] = sum of e_k c[i+k], in pairs from the outside in: the mirror image has the same bits."""
     c1, c2, c3, c4, c5 = c[1:], c[2:], c[3:], c[4:], c[5:]
     for i in range(d.size):
@@ -85,9 +85,9 @@ def rates_linear(settings, k, backward, c, datum, edge, d):
     n, inside, enter, leave = c.size, settings["inside"], settings["enter"], settings["leave"]
     e0, e1, e2, e3, e4, e5 = k * inside[0], k * inside[1], k * inside[2], k * inside[3], k * inside[4], k * inside[5]
     if backward == 1:
-        weigh(e5, e4, e3, e2, e1, e0, c, d[2 : n - 3])
+        convolve(e5, e4, e3, e2, e1, e0, c, d[2 : n - 3])
     else:
-        weigh(e0, e1, e2, e3, e4, e5, c, d[3 : n - 2])
+        convolve(e0, e1, e2, e3, e4, e5, c, d[3 : n - 2])
     edge_cells(c, backward, edge)
     for j in range(3):
         total = enter[j, 0] * datum
@@ -103,7 +103,7 @@ def rates_linear(settings, k, backward, c, datum, edge, d):
 
 
 @njit
-def rub(k, flow, loss, base, r, l, dr, dl):
+def subtract_friction(k, flow, loss, base, r, l, dr, dl):
     """Subtract loss |M| M - drag from rates that hold -k and k times the differences of face values.
 
     Averaged over two Gauss points of a cell: fourth order, and no kink of the law is missed.
@@ -119,7 +119,7 @@ def rub(k, flow, loss, base, r, l, dr, dl):
 
 
 @njit
-def rub_rough(k, pipe, base, r, l, dr, dl):
+def subtract_friction_rough(k, pipe, base, r, l, dr, dl):
     """`subtract_friction` for a friction factor that follows from roughness."""
     loss, rough = pipe["loss"], pipe["rough"]
     e, reynolds, flow, spread = pipe["roughness"], pipe["reynolds"], pipe["flow"], GAUSS / k
@@ -134,7 +134,7 @@ def rub_rough(k, pipe, base, r, l, dr, dl):
 
 
 @njit
-def rub_hazen(k, flow, loss, rough, base, r, l, dr, dl):
+def subtract_friction_hazen(k, flow, loss, rough, base, r, l, dr, dl):
     """`subtract_friction` for Hazen-Williams, whose power is evaluated once for both points.
 
     M (M^2 + 1.852 d^2)^0.426 is the mean of |M|^0.852 M over M - d and M + d with a relative error of 0.43 (d/M)^4.
@@ -194,8 +194,8 @@ def pipe_rates(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, dr, dl):
         both_faces(settings, pipe, r, l, r_in, l_out, r_out, l_in, scratch, fr, fl)
         rates_from_faces(k, fr, fl, dr, dl)
     if pipe["friction"] == FRICTION_ROUGH:
-        rub_rough(k, pipe, base, r, l, dr, dl)
+        subtract_friction_rough(k, pipe, base, r, l, dr, dl)
     elif pipe["friction"] == FRICTION_HAZEN:
-        rub_hazen(k, pipe["flow"], pipe["loss"], pipe["rough"], base, r, l, dr, dl)
+        subtract_friction_hazen(k, pipe["flow"], pipe["loss"], pipe["rough"], base, r, l, dr, dl)
     elif pipe["loss"] != 0.0 or base != 0.0:
-        rub(k, pipe["flow"], pipe["loss"], base, r, l, dr, dl)
+        subtract_friction(k, pipe["flow"], pipe["loss"], base, r, l, dr, dl)

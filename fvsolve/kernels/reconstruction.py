@@ -4,9 +4,9 @@ Every loop reads a window P and writes F: face j lies between P[j+2] and P[j+3].
 backward wave P[j+5] .. P[j+1].
 """
 
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import LINEAR, MUSCL, SHORT, UPWIND
 from fvsolve.kernels.limiters import by_limiter, limited, slope
-from fvsolve.kernels.records import LINEAR, MUSCL, SHORT, UPWIND
 
 
 @njit
@@ -41,14 +41,14 @@ def faces_linear(w0, w1, w2, w3, w4, w5, p, f):
         f[j] = (w0 * p[j] + w1 * p[j + 1]) + (w2 * p[j + 2] + w3 * p[j + 3]) + (w4 * p[j + 4] + w5 * p[j + 5])
 
 
-@inner
+@inline
 def muscl_forward(limiter, p, f):
     """Limited second-order face values of forward waves."""
     for j in range(f.size):
         f[j] = p[j + 2] + 0.5 * slope(limiter, p[j + 2] - p[j + 1], p[j + 3] - p[j + 2])
 
 
-@inner
+@inline
 def muscl_backward(limiter, p, f):
     """Limited second-order face values of backward waves."""
     for j in range(f.size):

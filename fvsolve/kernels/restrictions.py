@@ -6,9 +6,9 @@ from fvsolve.jit import njit
 from fvsolve.kernels.calls import call_bends, call_lift, call_slope, call_step
 from fvsolve.kernels.density import density, enthalpy
 from fvsolve.kernels.devices import BENDS, LIFT, SLOPE, STEP
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.isolated import inner_row
-from fvsolve.kernels.records import LAW_LINEAR
+from fvsolve.kernels.dtypes import LAW_LINEAR
+from fvsolve.kernels.isolated_nodes import inner_row
+from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.valves import LEAST, flow_slope, transition_of, valve_conductance, valve_step
 
 
@@ -98,7 +98,7 @@ def root_slope(tables, k, g, drop):
 
 
 @njit
-def lifts(tables, k):
+def is_lifted(tables, k):
     """True if pressure lifts restriction k by its law: it is neither closed (flag 0) nor fully open (flag 2)."""
     valve = tables.valves[k]
     if valve["hooks"] < 0 or tables.hooks[valve["hooks"], LIFT] == 0:
@@ -110,15 +110,15 @@ def lifts(tables, k):
 @njit
 def restriction_lift(tables, out, k, g, drop, denser, wide):
     """d flow / d upstream pressure at constant drop of restriction k [kg/s/Pa]; 0 if pressure does not lift it."""
-    if not lifts(tables, k):
+    if not is_lifted(tables, k):
         return 0.0
     return call_lift(tables.hooks[tables.valves[k]["hooks"], LIFT], out, tables, k, g, drop, denser, wide)
 
 
 @njit
-def runs_back(tables, k, m):
+def has_lifted_backflow(tables, k, m):
     """True if the upstream pressure lifts restriction k and its flow m is negative."""
-    return m < 0.0 and lifts(tables, k)
+    return m < 0.0 and is_lifted(tables, k)
 
 
 @njit

@@ -9,7 +9,7 @@ A state is (pressure p [Pa], mass per length m [kg/m], F [N], m c [kg/s], the in
 from math import exp, log, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.density.mixture import impedance, mass_of_pressure, velocity_change, wall_stretch
+from fvsolve.kernels.density.mixture_law import area_ratio, impedance, mass_of_pressure, velocity_change
 
 NEAR = 1e-3  # fraction of the gas pressure; smaller jumps use the mean of 1 / (m c), because differences would cancel
 LEAST = 1e-10  # gas pressure of a vacuum [Pa]
@@ -18,7 +18,7 @@ UNBOUNDED = 1e300
 
 
 @njit(forceinline=True)
-def plain_integral(st, compliance, x):
+def isothermal_integral(st, compliance, x):
     """Integral of sqrt((a + b / x + gas / x^2) / rho_ref) dx [m/s]: dp / (rho c) without the stretch of the wall.
 
     a = 1 / beta + compliance, b = compliance gas; closed form by sqrt(R), R = a x^2 + b x + gas.
@@ -31,24 +31,24 @@ def plain_integral(st, compliance, x):
 
 
 @njit
-def side_at(st, floats, pipe, p):
+def state_at(st, floats, pipe, p):
     """State of a pipe at a pressure."""
     m, dm = mass_of_pressure(st, floats, pipe, p)
     over = p - st["reference"]
     force = pipe["area"] * over * (1.0 + 0.5 * pipe["compliance"] * over)
-    area = pipe["area"] * wall_stretch(st, pipe["compliance"], p)
-    integral = plain_integral(st, pipe["compliance"], p - st["floor"]) if is_plain(st) else 0.0
+    area = pipe["area"] * area_ratio(st, pipe["compliance"], p)
+    integral = isothermal_integral(st, pipe["compliance"], p - st["floor"]) if is_isothermal(st) else 0.0
     return p, m, force, m * sqrt(area / dm), integral
 
 
 @njit(forceinline=True)
-def is_plain(st):
+def is_isothermal(st):
     """True if the gas is isothermal and does not dissolve."""
     return st["gas_power"] == 1.0 and st["saturation"] > UNBOUNDED
 
 
 @njit
-def lead(st, floats, pipe, p):
+def stretch_factor(st, floats, pipe, p):
     """Integrand of dp / (rho c) over that of `isothermal_integral` at a pressure: 1 but for the stretch of the wall."""
     x = p - st["floor"]
     plain = 1.0 / st["beta"] + pipe["compliance"] + st["gas"] / x * (pipe["compliance"] + 1.0 / x)
@@ -56,28 +56,32 @@ def lead(st, floats, pipe, p):
 
 
 @njit
-def thinned(st, floats, pipe, low, high):
+def rarefaction_change(st, floats, pipe, low, high):
     """Integral of dp / (rho c) between two states [m/s]."""
-    if not is_plain(st):
+    if not is_isothermal(st):
         return velocity_change(st, floats, pipe, low[0], high[0])
-    return (high[4] - low[4]) * 0.5 * (lead(st, floats, pipe, low[0]) + lead(st, floats, pipe, high[0]))
+    return (
+        (high[4] - low[4])
+        * 0.5
+        * (stretch_factor(st, floats, pipe, low[0]) + stretch_factor(st, floats, pipe, high[0]))
+    )
 
 
 @njit
-def jump(st, floats, pipe, side, to):
+def wave_jump(st, floats, pipe, side, to):
     """(velocity that a wave subtracts on its way from a state to another [m/s], its slope over the second pressure)."""
-    area = pipe["area"] * wall_stretch(st, pipe["compliance"], to[0])
+    area = pipe["area"] * area_ratio(st, pipe["compliance"], to[0])
     if abs(to[0] - side[0]) <= NEAR * (to[0] - st["floor"]):
         return (to[2] - side[2]) * 0.5 * (1.0 / side[3] + 1.0 / to[3]), area / to[3]
     if to[0] < side[0]:
-        return -thinned(st, floats, pipe, to, side), area / to[3]
+        return -rarefaction_change(st, floats, pipe, to, side), area / to[3]
     force, contraction = to[2] - side[2], 1.0 / side[1] - 1.0 / to[1]
     change = sqrt(force * contraction)
     return change, 0.5 * area * (contraction + force / (to[3] * to[3])) / change
 
 
 @njit
-def star(st, floats, pipe, left, v_l, right, v_r):
+def star_state(st, floats, pipe, left, v_l, right, v_r):
     """(state between the waves of two states, its velocity after the left and after the right wave), by Newton.
 
     Both velocities are equal, except where the states part so fast that a vacuum remains between them.
@@ -88,9 +92,9 @@ def star(st, floats, pipe, left, v_l, right, v_r):
     if p <= floor:
         p = floor + LEAST
     for _ in range(100):
-        middle = side_at(st, floats, pipe, p)
-        change_l, rise_l = jump(st, floats, pipe, left, middle)
-        change_r, rise_r = jump(st, floats, pipe, right, middle)
+        middle = state_at(st, floats, pipe, p)
+        change_l, rise_l = wave_jump(st, floats, pipe, left, middle)
+        change_r, rise_r = wave_jump(st, floats, pipe, right, middle)
         gap, before = (v_l - change_l) - (v_r + change_r), p
         if gap > 0.0:
             low = p
@@ -100,12 +104,12 @@ def star(st, floats, pipe, left, v_l, right, v_r):
         if abs(p - before) <= 1e-11 * (before - floor) + 1e-16 * before or (gap <= 0.0 and before - floor <= LEAST):
             return middle, v_l - change_l, v_r + change_r
         if p <= low or p >= high:
-            p = between(floor, low, high, before)
+            p = intermediate_pressure(floor, low, high, before)
     return middle, v_l - change_l, v_r + change_r
 
 
 @njit(forceinline=True)
-def between(floor, low, high, p):
+def intermediate_pressure(floor, low, high, p):
     """Pressure between two bounds, of which one may be unknown, by the ratio of gas pressures."""
     if low <= floor:
         return floor + max(FALL * (p - floor), LEAST)
@@ -115,15 +119,15 @@ def between(floor, low, high, p):
 
 
 @njit
-def sonic(st, floats, pipe, side, v0, end):
+def sonic_state(st, floats, pipe, side, v0, end):
     """(state, velocity) where the rarefaction from a state to `end` has the speed of sound, by bisection."""
     floor = st["floor"]
     low, high = log(end[0] - floor), log(side[0] - floor)
     state, v = side, v0
     for _ in range(50):
         middle = 0.5 * (low + high)
-        state = side_at(st, floats, pipe, floor + exp(middle))
-        v = v0 - jump(st, floats, pipe, side, state)[0]
+        state = state_at(st, floats, pipe, floor + exp(middle))
+        v = v0 - wave_jump(st, floats, pipe, side, state)[0]
         if v > state[3] / state[1]:
             low = middle
         else:
@@ -134,7 +138,7 @@ def sonic(st, floats, pipe, side, v0, end):
 
 
 @njit
-def beside(st, floats, pipe, side, v0, end, v):
+def sample_wave(st, floats, pipe, side, v0, end, v):
     """(m, v, F) at a face from the wave between a state and `end`; the wave runs left and leaves v >= 0 behind it."""
     if end[0] > side[0]:
         if end[1] * v >= side[1] * v0 and end[1] > side[1]:
@@ -143,19 +147,19 @@ def beside(st, floats, pipe, side, v0, end, v):
     if v0 * side[1] >= side[3]:
         return side[1], v0, side[2]
     if v * end[1] > end[3]:
-        end, v = sonic(st, floats, pipe, side, v0, end)
+        end, v = sonic_state(st, floats, pipe, side, v0, end)
     return end[1], v, end[2]
 
 
 @njit
 def face_flux(st, floats, pipe, p_l, v_l, p_r, v_r):
     """Flux of mass [kg/s] and of momentum M^2 / m + F [N] between two states; p [Pa], v [m/s]."""
-    left, right = side_at(st, floats, pipe, p_l), side_at(st, floats, pipe, p_r)
-    middle, after, ahead = star(st, floats, pipe, left, v_l, right, v_r)
+    left, right = state_at(st, floats, pipe, p_l), state_at(st, floats, pipe, p_r)
+    middle, after, ahead = star_state(st, floats, pipe, left, v_l, right, v_r)
     m, v, force = middle[1], 0.5 * (after + ahead), middle[2]
     if after >= 0.0 and v >= 0.0:
-        m, v, force = beside(st, floats, pipe, left, v_l, middle, after)
+        m, v, force = sample_wave(st, floats, pipe, left, v_l, middle, after)
     elif ahead <= 0.0 and v <= 0.0:
-        m, v, force = beside(st, floats, pipe, right, -v_r, middle, -ahead)
+        m, v, force = sample_wave(st, floats, pipe, right, -v_r, middle, -ahead)
         v = -v
     return m * v, m * v * v + force

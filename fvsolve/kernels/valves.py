@@ -6,7 +6,7 @@ M |M| = G dp with G = 2 rho (Cd A)^2, which is q = Cd A sqrt(2 dp / rho), equati
 from math import exp, log, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.schedule_pieces import schedule_value
 
 LEAST = 1e-4  # chords are not steeper than at a drop of LEAST squared [Pa], the rounding of pressures
 
@@ -45,7 +45,7 @@ def conductance_of(tables, index, opening):
 @njit(forceinline=True)
 def transition_of(valve, g):
     """Flow below which the law of a restriction with conductance g is laminar [kg/s]."""
-    return max(valve["transition"], sqrt(g * valve["unseen"]))
+    return max(valve["transition"], sqrt(g * valve["rounding_drop"]))
 
 
 @njit(forceinline=True)

@@ -10,7 +10,7 @@ import functools
 
 import numpy as np
 
-from fvsolve.kernels.friction import drag_slope
+from fvsolve.kernels.steady_friction import drag_slope
 from fvsolve.limits.symbol import symbol
 from fvsolve.model.creep import elements
 from fvsolve.schemes import SCHEMES

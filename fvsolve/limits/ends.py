@@ -12,10 +12,10 @@ import functools
 
 import numpy as np
 
-from fvsolve.kernels.ends import END_ENTERING, END_LEAVING, END_VALUE, GHOSTS
+from fvsolve.kernels.ghost_cells import END_ENTERING, END_LEAVING, END_VALUE, GHOSTS
 from fvsolve.limits.plane import GROWTH
 from fvsolve.limits.symbol import weights_of
-from fvsolve.schemes import ROOM, SCHEMES
+from fvsolve.schemes import LEAST_CELLS, SCHEMES
 from fvsolve.steppers.analysis.stability_function import stability_function
 from fvsolve.steppers.tableau import method_named
 
@@ -53,7 +53,7 @@ def pipe_growth(scheme: str, method: str, cells: int, courant: float, returned: 
 @functools.lru_cache(maxsize=1024)
 def pipe_modes(scheme: str, cells: int, returned: tuple[float, ...] = WORST) -> np.ndarray:
     """Eigenvalues of a pipe in units of the cell rate, for given products of the end reflections : complex[m]."""
-    a, b, v = one_wave((SCHEMES[scheme].shorter or scheme) if cells < ROOM else scheme, cells)
+    a, b, v = one_wave((SCHEMES[scheme].shorter or scheme) if cells < LEAST_CELLS else scheme, cells)
     roots = [sign * np.sqrt(complex(product)) for product in returned for sign in (1.0, -1.0)]
     return np.concatenate([np.linalg.eigvals(a + s * np.outer(b, v)) for s in roots])
 

@@ -18,7 +18,6 @@ from numbers import Rational
 
 import numpy as np
 
-from fvsolve.doors import NAME, NAMES, POSITIVE, TEXT, Kind, door, is_row
 from fvsolve.limits.boxes import negative_point, value
 from fvsolve.limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers.analysis.stability import a_stable
@@ -26,6 +25,7 @@ from fvsolve.steppers.analysis.stability_function import StabilityFunction, stab
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 from fvsolve.steppers.numbers.sturm import count_roots, odd_part
 from fvsolve.steppers.tableau import METHODS, Method, method_named
+from fvsolve.validation import NAME, NAMES, POSITIVE, TEXT, Kind, is_row, validated
 
 RAYS = 240  # number of waves whose roots are computed first
 ZOOMS, ZOOM_RAYS = 9, 17
@@ -90,7 +90,7 @@ class AdvectionLimit:
         return values
 
 
-@door(scheme=NAME, method=NAME, courant=POSITIVE)
+@validated(scheme=NAME, method=NAME, courant=POSITIVE)
 def advection_limit(scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
     """Exact Courant limit of a linear scheme and a method, and the growth at `courant`.
 
@@ -99,7 +99,7 @@ def advection_limit(scheme: str, method: str, courant: float | None = None) -> A
     return limit_of(weights_of(scheme), scheme, method, courant)
 
 
-@door(schemes=NAMES, methods=NAMES, courant=POSITIVE)
+@validated(schemes=NAMES, methods=NAMES, courant=POSITIVE)
 def advection_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, courant: float | None = None
 ) -> list[AdvectionLimit]:
@@ -118,7 +118,7 @@ WHOLE = Kind(
 )
 
 
-@door(weights=WHOLE, scheme=TEXT, method=NAME, courant=POSITIVE)
+@validated(weights=WHOLE, scheme=TEXT, method=NAME, courant=POSITIVE)
 def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
     """Exact Courant limit for any face weights of cells u-2 .. u+2 with sum 1, and the growth at `courant`."""
     tableau = method_named(method)

@@ -12,9 +12,9 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.delay.history import four, six, three
-from fvsolve.kernels.delay.lines import drag_and_slope
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
+from fvsolve.kernels.delay_lines.wave_history import lagrange_four, lagrange_six, lagrange_three
 from fvsolve.limits.lumped import GROWS, times
 from fvsolve.steppers.tableau import Method
 
@@ -86,7 +86,7 @@ def read(steps: float) -> np.ndarray:
     """Interpolated value of waves with phases ANGLES per step, read `steps` steps after they were sent."""
     steps_up = int(np.ceil(steps - 1e-9))
     x = max(0.0, steps_up - steps)
-    weights = six(x) if steps_up >= 3 else four(x) if steps_up >= 2 else three(x)
+    weights = lagrange_six(x) if steps_up >= 3 else lagrange_four(x) if steps_up >= 2 else lagrange_three(x)
     if x < 1e-9:
         weights = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
     places = np.arange(-2, 4) - steps_up

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.limits.ends import LONG, pipe_growth, pipe_limit
 from fvsolve.limits.grid import advection_limit, growth_of
 from fvsolve.limits.lines import line_growth
@@ -23,7 +23,7 @@ from fvsolve.limits.plane import holds_well, plane_limit
 from fvsolve.limits.swings import swings
 from fvsolve.limits.symbol import weights_of
 from fvsolve.model.slate import Slate
-from fvsolve.schemes import ROOM, SCHEMES
+from fvsolve.schemes import LEAST_CELLS, SCHEMES
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 
@@ -124,14 +124,14 @@ def pipe_rooms(model, method: str) -> list[Room]:
     if numerics.step is not None:
         courant = numerics.step * waves
     else:
-        courant = numerics.courant * waves / (waves * model.tables.pipes["quicker"]).max()
+        courant = numerics.courant * waves / (waves * model.tables.pipes["rate_factor"]).max()
     cells, scheme = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
     long = cells >= (
-        ROOM if scheme.limited and scheme.shorter else LONG
+        LEAST_CELLS if scheme.limited and scheme.shorter else LONG
     )  # at the ends of short pipes the order of limited schemes is lower
     short = np.flatnonzero(own & ~long)
     checks = [check for k in short if (check := short_pipe(model, method, int(k), float(courant[k])))]
-    inner = own & (cells >= ROOM if proved(model) else long)  # waves of a long pipe grow in few cells, too
+    inner = own & (cells >= LEAST_CELLS if proved(model) else long)  # waves of a long pipe grow in few cells, too
     if inner.any():
         k = int(np.argmax(np.where(inner, courant, -1.0)))
         checks += long_pipe(model, method, k, float(courant[k]))

@@ -11,7 +11,7 @@ import numpy as np
 from fvsolve import attitude, units
 from fvsolve.case.bodies import coordinate
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.bodies_start import CLOSE
 from fvsolve.model.places import Displaced
 from fvsolve.parts.attitude import Attitude

@@ -7,9 +7,9 @@ import math
 import numpy as np
 
 from fvsolve.kernels import density as kernels
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.barotropic_nodes import drive, end_flow, valve_target
-from fvsolve.kernels.density.profile import profile_along
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.barotropic_nodes import driving_pressure, end_flow, valve_target
+from fvsolve.kernels.density.steady_profile import profile_along
 from fvsolve.model.start import PRESSURE_SCALE, Start
 
 
@@ -98,7 +98,7 @@ class BarotropicStart(Start):
     def denser(self, i: int, j: int) -> tuple[float, float]:
         """Upstream density / rho, and driving pressure / change of potential."""
         z, p = self.nodes["elevation"], [self.pressure(i), self.pressure(j)]
-        drop, rho = drive(self.st, self.floats, p[0], z[i], p[1], z[j])
+        drop, rho = driving_pressure(self.st, self.floats, p[0], z[i], p[1], z[j])
         change = self.answer.potential[i] - self.answer.potential[j]
         ratio = drop / change if abs(change) > 1e-3 else rho / self.rho
         return rho / self.rho, ratio
@@ -157,7 +157,7 @@ class BarotropicStart(Start):
             self.flux(row, faces, profile)
 
     def flux(self, row, faces, profile) -> None:
-        from fvsolve.kernels.barotropic import momentum_flux
+        from fvsolve.kernels.barotropic_pipes import momentum_flux
 
         for i, m in enumerate(faces):
             profile[row["flux"] + i] = momentum_flux(self.st, self.floats, row, float(m), float(row["flow"]))
@@ -196,7 +196,7 @@ class BarotropicStart(Start):
             i, j = int(row["from_node"]), int(row["to_node"])
             row["drag"] = self.pipe_drop(row)
             z, p = self.nodes["elevation"], self.nodes["pressure"]
-            row["base"] = drive(self.st, self.floats, p[i], z[i], p[j], z[j])[0]
+            row["base"] = driving_pressure(self.st, self.floats, p[i], z[i], p[j], z[j])[0]
             friction = row["drag"] * row["length"] / row["area"]
             change = self.answer.potential[i] - self.answer.potential[j]
             offset = row["base"] - friction
@@ -206,7 +206,7 @@ class BarotropicStart(Start):
     def drive_of(self, k: int) -> tuple[float, float]:
         i, j = int(self.valves[k]["from_node"]), int(self.valves[k]["to_node"])
         p, z = self.nodes["pressure"], self.nodes["elevation"]
-        drop, rho = drive(self.st, self.floats, p[i], z[i], p[j], z[j])
+        drop, rho = driving_pressure(self.st, self.floats, p[i], z[i], p[j], z[j])
         return drop, rho / self.rho
 
     def fill_valves(self) -> None:

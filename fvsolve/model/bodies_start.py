@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.statics import ACCELERATE, GAPS, HOLD, MOTION, PINNED, Statics
 
 ALIKE = 1e-8  # a row of pins is redundant if its independent part is below this share of the largest row

@@ -11,8 +11,8 @@ import numpy as np
 from fvsolve.basins.lower import at_start, lower_basins
 from fvsolve.case.case import Case
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import limits
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels import tank_limits
 from fvsolve.model.cavities import coarse_for_cavities
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.delay import at_ends, cut_lines, followed, lower_delays, tables_for_jumps
@@ -94,7 +94,7 @@ def packed(case: Case, unfit: Collection[str] = ()) -> Draft:
 def fill_places(draft: Draft) -> None:
     """Fill a row for every node of the fluid."""
     table = draft.node_table = np.zeros(len(draft.case.places), rec.NODE)
-    table["y"] = table["shape"] = table["schedule"] = table["row"] = table["ride"] = -1
+    table["y"] = table["shape"] = table["schedule"] = table["row"] = table["moving_segment"] = -1
     table["full"] = np.inf
     for row, (name, node) in zip(table, draft.case.places.items(), strict=True):
         row["elevation"] = draft.case.elevations[name]
@@ -163,9 +163,9 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
         draft.wall_table, draft.delay_table,
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
-    draft.shapes = rec.Written(
+    draft.shapes = rec.RunArrays(
         clock=1, work=draft.work_size, marks=marks_of(draft),
-        armed=limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
+        armed=tank_limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
         scratch=scratch_of(draft), spare=spare_of(draft), seen=draft.size if len(draft.wall_table) else 0,
         bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
         envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=past_size(draft.delay_table),
@@ -187,7 +187,7 @@ def settings_of(draft: Draft) -> np.ndarray:
         method = method_named(automatic.first_method(case.numerics.method))
         s["weights"], s["stages"] = len(draft.floats), method.stages
         draft.floats += [*map(float, method.b), *method.times]
-    s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["quicker"]), *column_rates(draft)])
+    s["rate"] = max([0.0, *(pipes["speed"] / pipes["dx"] * pipes["rate_factor"]), *column_rates(draft)])
     return table
 
 
@@ -220,7 +220,7 @@ def layout_of(draft: Draft) -> np.ndarray:
         layout[name], at = at, at + size
     layout["size"] = at
     layout["forces"] = draft.to_work(most_states(draft)) if (draft.probe_table["kind"] == rec.PIPE_FORCE).any() else -1
-    layout["rates"] = draft.to_work(most_states(draft)) if draft.ride_table["heavy"].any() else -1
+    layout["rates"] = draft.to_work(most_states(draft)) if draft.ride_table["loads_body"].any() else -1
     return layout
 
 

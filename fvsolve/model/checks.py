@@ -12,8 +12,8 @@ import numpy as np
 from fvsolve.attitude import roll_pitch_yaw
 from fvsolve.case.basins import behind, patch_names
 from fvsolve.errors import Notice, listing
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.friction import drag
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.steady_friction import drag
 from fvsolve.parts.pipe.materials import materials
 from fvsolve.parts.pipe.wall import Wall, restraint_factor
 from fvsolve.steppers.automatic import first_method
@@ -173,7 +173,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
     if numerics.rtol is not None:
         return None, f"error control, rtol = {numerics.rtol:g}"
     if method_named(numerics.method).explicit:
-        own = model.wave_rates * model.tables.pipes["quicker"]
+        own = model.wave_rates * model.tables.pipes["rate_factor"]
         for facts in (model.steady["unsteady"], model.steady["creep"]):
             own = np.maximum(own, [facts.get(pipe.name, {"rate": 0.0})["rate"] for pipe in model.pipes])
         rate = float(model.evaluate(numerics.start, model.start, numerics.start)[1][rec.RATE])

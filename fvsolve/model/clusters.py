@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.steady import union
 
 
@@ -188,7 +188,7 @@ def soften(draft, ks) -> None:
             link = draft.case.conduits[draft.valve_names[k]]
             neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
             soften_root(draft, draft.valve_names[k], link, row)
-            row["unseen"] = max(1.0 if neck else 0.0, unseen)
+            row["rounding_drop"] = max(1.0 if neck else 0.0, unseen)
 
 
 def soften_root(draft, name: str, link, row) -> None:

@@ -53,7 +53,7 @@ def pace_creep(draft, unsteady: dict) -> dict[str, dict]:
         if row["elements"] == 0:
             continue
         gain, rate = elements(draft.tables.floats, row).T
-        waves = unsteady.get(name, {}).get("rate", row["speed"] / row["dx"] * row["quicker"])
+        waves = unsteady.get(name, {}).get("rate", row["speed"] / row["dx"] * row["rate_factor"])
         fastest = float(max(waves, 0.5 * rate.max()) + 0.5 * gain.sum())
         settings["rate"] = max(settings["rate"], fastest)
         slow = float(row["speed"]) / float(np.sqrt(1.0 + (gain / rate).sum()))

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.delay.lines import drag_and_slope
-from fvsolve.kernels.schedules import POWER, WAVE
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
+from fvsolve.kernels.schedule_pieces import POWER, WAVE
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.past import past_size, rings_of
 from fvsolve.steppers import automatic
@@ -184,7 +184,7 @@ def cut_lines(draft) -> list[str]:
         if row["now"] > 0.0:
             count = 1
         row["stretches"], row["stretch"], row["tau"] = count, at, travel / count
-        row["passes"] = 1.0 / (1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1])
+        row["transmission"] = 1.0 / (1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1])
         row["hold"] = row["hold"] if row["now"] > 0.0 else row["tau"]
         at += count
         smoothed = by_interpolation(float(row["tau"]), chosen.longest, scale, ramp)

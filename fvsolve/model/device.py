@@ -10,7 +10,7 @@ import numpy as np
 
 from fvsolve.errors import Notice
 from fvsolve.kernels import calls
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.valves import flow_at_drop, transition_of
 from fvsolve.model.lowering import Lowering, Restriction, lowering_of
 
@@ -115,8 +115,12 @@ def lower_devices(draft) -> None:
     for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
         states = device.states_of(draft, name, part)
         row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
-        row["data"], row["sudden"], row["event"] = len(draft.floats), device.sudden, draft.flags(name, device.events)
-        row["leads"] = row["event"] + device.leads if device.leads >= 0 else -1
+        row["data"], row["opens_by_event"], row["event"] = (
+            len(draft.floats),
+            device.sudden,
+            draft.flags(name, device.events),
+        )
+        row["controls_column"] = row["event"] + device.leads if device.leads >= 0 else -1
         if name in draft.valve_names:
             row["valve"] = draft.valve_names.index(name)
             sets_up(draft.valve_table[row["valve"]], device, k, row)
@@ -145,7 +149,7 @@ def opening_of(start, k: int) -> float:
     flow = abs(float(valve["flow"]))
     if flow == 0.0 or not conductance * drop > 0.0:
         return 0.0
-    if flow >= valve["transition"] and drop >= valve["unseen"]:
+    if flow >= valve["transition"] and drop >= valve["rounding_drop"]:
         return min(flow / math.sqrt(conductance * drop), 1.0)
     low, high, x = 0.0, 1.0, 0.5
     for _ in range(60):

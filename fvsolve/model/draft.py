@@ -11,8 +11,8 @@ import numpy as np
 
 from fvsolve.case.case import Case
 from fvsolve.errors import CaseError, Fault, Notice
-from fvsolve.kernels import limits
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels import tank_limits
 from fvsolve.model.device import Device
 from fvsolve.model.hydraulics import Hydraulics
 from fvsolve.model.lowering import Lowering, lowered
@@ -97,7 +97,7 @@ class Draft:
     line_table: np.ndarray = rows(rec.LINE)
     pin_table: np.ndarray = rows(rec.PIN)
     bushing_table: np.ndarray = rows(rec.BUSHING)
-    ride_table: np.ndarray = rows(rec.RIDE)
+    ride_table: np.ndarray = rows(rec.MOVING_SEGMENT)
     mass_table: np.ndarray = rows(rec.MASS)
     brace_table: np.ndarray = rows(rec.BRACE)
     stop_table: np.ndarray = rows(rec.STOP)
@@ -183,7 +183,7 @@ class Draft:
 
     def flags(self, name: str, events: tuple[str, ...]) -> int:
         """Offset in `armed` of new flags, one for each event function of a part."""
-        first = limits.EVENTS * self.tanks + len(self.events)
+        first = tank_limits.EVENTS * self.tanks + len(self.events)
         self.events += [(name.removesuffix(".inside"), text) for text in events]
         return first
 

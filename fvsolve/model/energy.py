@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.creep import elements
 from fvsolve.model.lowering import rows_in
 from fvsolve.model.scalars import bounds

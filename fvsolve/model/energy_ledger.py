@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.case.riding_networks import unfelt
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.lowering import lowering_of, rows_in
 from fvsolve.model.slate import Slate
 
@@ -36,14 +36,14 @@ class Accounts:
         model, case = run_data.model, run_data.model.case
         refuse_unfelt(case)
         if len(model.tables.rides):
-            run_data.tables.rides["heavy"] = rec.ASKED
+            run_data.tables.rides["loads_body"] = rec.JOINT_LOAD_READ
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of a basin on a body with an open side is not supported")
         if model.basins and not case.law.linear:
             raise FvsolveError('the energy of basins is computed for law = "linear" only')
         self.power, self.stored = model.functions.energies
         if model.basins and len(model.tables.bodies):  # include loads of the fluid in basins on bodies, for its work
-            run_data.tables.basins["heavy"] = 1
+            run_data.tables.basins["loads_body"] = 1
         self.accounts: list[Account] = []
         self.held: list[Account] = []  # accounts of stored energy, by rows of `stored`
         self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop

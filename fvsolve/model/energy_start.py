@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.creep import elements
 from fvsolve.model.lowering import rows_in
 from fvsolve.model.model import Model
@@ -56,8 +56,8 @@ def vessels_above(model: Model):
     st, floats = model.tables.settings[0], model.tables.floats
     if model.case.law.linear:
         return lambda row: 0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
+    from fvsolve.kernels.barotropic_energy import vessel_energy
     from fvsolve.kernels.density import density, enthalpy, pressure_of_enthalpy
-    from fvsolve.kernels.energy_barotropic import vessel_energy
 
     def energy(row) -> float:
         ambient, height = float(st["ambient"]), float(row["elevation"] - st["datum"])
@@ -130,8 +130,8 @@ def creep_above(model: Model, k: int) -> float:
 
 def tank_above(model: Model, row) -> float:
     """Energy of a tank above that with its surface at the datum, or as near as its bottom and rim allow [J]."""
-    from fvsolve.kernels.energy import tank_energy
-    from fvsolve.kernels.tanks import tank_level
+    from fvsolve.kernels.linear_energy import tank_energy
+    from fvsolve.kernels.tank_levels import tank_level
 
     st, floats = model.tables.settings[0], model.tables.floats
     rho, target = float(row["density"]), float(st["datum"] - row["elevation"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 HAZEN_WILLIAMS = 4.727 * 0.3048**-0.685  # h / L = 10.667 q^1.852 / (C^1.852 D^4.871), EPANET's 4.727 in feet, as SI
 MANNING = 4.0 ** (10.0 / 3.0) / math.pi**2  # h / L = 10.294 n^2 q^2 / D^(16/3), SI

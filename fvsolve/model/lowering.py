@@ -11,7 +11,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from fvsolve.kernels import calls
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.restrictions import step_at
 from fvsolve.parts.schedule import constant
 from fvsolve.steady import Edge
@@ -146,7 +146,7 @@ class Restriction(Lowering):
 
     def stepper(self, start, k: int, g: float, density_ratio: float):
         """Function (flow [kg/s], drop [Pa]) -> a, s of its law's `step`, before any event."""
-        hook = calls.addressed(self.law.step, calls.HOOKS["step"][0])
+        hook = calls.function_address(self.law.step, calls.HOOKS["step"][0])
         return lambda flow, drop: step_at(hook, start.out, start.handle, k, g, float(flow), float(drop), density_ratio)
 
     def follow(self, start, k: int) -> None:

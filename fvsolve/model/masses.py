@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.bodies_start import rounding
 from fvsolve.model.lowering import Lowering
 from fvsolve.model.mechanism import add_line, apart

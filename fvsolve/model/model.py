@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.creep import held_by_wall
 from fvsolve.model.past import without_past
 from fvsolve.model.scalars import node_values, pipe_values
 from fvsolve.model.slate import Slate
-from fvsolve.shown import Shown
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class PipeMesh:
 
 
 @dataclass(repr=False)
-class State(Shown):
+class State(Displayable):
     """Time [s], flat state vector y, and memory of the integrator in one flat array (empty at a fresh start)."""
 
     t: float
@@ -69,10 +69,10 @@ class State(Shown):
             if array.ndim != 1:
                 raise FvsolveError(f"{name} has shape {array.shape}; expected a one-dimensional array of numbers")
 
-    def said(self) -> str:
+    def summary_line(self) -> str:
         return f"at t = {self.t:g} s: {self.y.size} numbers"
 
-    def listed(self) -> dict[str, np.ndarray]:
+    def table_columns(self) -> dict[str, np.ndarray]:
         return {"y": self.y}
 
 
@@ -121,7 +121,7 @@ def given_time(t: Any) -> float:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Model(Shown):
+class Model(Displayable):
     """Compiled case. It is frozen, so that several runs can share it: each run writes to its own `RunData`.
 
     tables : arrays that kernels read, by name; shapes : shapes of the arrays that a run writes, see `RunData`
@@ -131,7 +131,7 @@ class Model(Shown):
 
     case: Case
     tables: rec.Tables
-    shapes: rec.Written
+    shapes: rec.RunArrays
     state_names: StateNames
     scale: np.ndarray
     breaks: list[tuple[float, bool]]
@@ -167,11 +167,11 @@ class Model(Shown):
         for array in (*self.tables, self.scale, self.start, *self.profiles.values(), *self.sharp.values()):
             array.flags.writeable = False
 
-    def said(self) -> str:
+    def summary_line(self) -> str:
         cells = f", {self.all_cells} cells" if self.all_cells else ""
         return f"of {self.case.name!r}: {self.y_size} states{cells}, {len(self.probes)} probes"
 
-    def listed(self) -> dict[str, Any]:
+    def table_columns(self) -> dict[str, Any]:
         return {"state": self.state_names, "start": self.start, "scale": self.scale}
 
     @property
@@ -198,7 +198,7 @@ class Model(Shown):
     def wave_rates(self) -> np.ndarray:
         """Cells that a wave crosses per second, for every pipe [1/s]."""
         pipes = self.tables.pipes
-        rates = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["quicker"], 1.0)
+        rates = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["rate_factor"], 1.0)
         rates.flags.writeable = False
         return rates
 
@@ -223,16 +223,16 @@ class Model(Shown):
     @cached_property
     def places(self) -> tuple:
         """Memory addresses of the tables, for handles."""
-        from fvsolve.kernels.handle import places_of
+        from fvsolve.kernels.table_handle import addresses_of
 
-        return places_of(self.tables)
+        return addresses_of(self.tables)
 
     @cached_property
     def functions(self):
         """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and parts of this model."""
         from fvsolve.basins.lower_pieces import of_basins, of_scalars
-        from fvsolve.kernels.functions import functions
-        from fvsolve.kernels.phases import Cast
+        from fvsolve.kernels.compiled_functions import functions
+        from fvsolve.kernels.rhs_assembly import ModelFeatures
 
         has = rec.Tables(*(len(table) > 0 for table in self.tables))
         mechanics = [has.clusters, has.columns, has.masses, has.bodies, has.lines, has.pins, has.bushings]
@@ -241,7 +241,7 @@ class Model(Shown):
         alone = bool(self.basins) and not (self.pipes or valves or has.devices or any(mechanics))
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
-        cast = Cast(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
+        cast = ModelFeatures(self.case.law.family, cells, *mechanics, self.unsteady, self.creeps, has.devices,
                     tuple(self.laws), basins, carried, has.scalars, valves, has.delays, alone,
                     forces=bool(self.layout["forces"] >= 0))  # fmt: skip
         return functions(cast)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels.delay import history as at
+from fvsolve.kernels.delay_lines import wave_history as at
 
 JUMPS, LEAST_JUMPS, MOST_JUMPS = 2**16, 32, 1024  # stored jumps: in all lines together, least and most of each wave
 # spare entries beyond a delay: in all lines together, least and most of each
@@ -24,8 +24,8 @@ def rings_of(delays: np.ndarray, longest: float) -> None:
     count = int(delays["stretches"].sum())
     spare = min(MOST_SPARE, max(LEAST_SPARE, ENTRIES // max(1, count)))
     entries = OLDER * delays["hold"] / longest + BESIDE + spare
-    delays["room"] = 1 << np.ceil(np.log2(entries)).astype(np.int64)
-    sizes = delays["room"] * delays["stretches"]
+    delays["ring_size"] = 1 << np.ceil(np.log2(entries)).astype(np.int64)
+    sizes = delays["ring_size"] * delays["stretches"]
     delays["ring"] = np.cumsum(sizes) - sizes
 
 
@@ -33,9 +33,9 @@ def past_size(delays: np.ndarray, wider: int = 1) -> int:
     """Size of the history array of these lines, with rings `wider` times as long as at first."""
     if not len(delays):
         return 0
-    count, entries = int(delays["stretches"].sum()), wider * int((delays["room"] * delays["stretches"]).sum())
-    per_stretch = at.ARRIVALS + 2 * at.HEADS + 6 * queue_of(count) + at.APART
-    return at.HEAD + wider * int(delays["room"].max()) + per_stretch * count + 2 * entries
+    count, entries = int(delays["stretches"].sum()), wider * int((delays["ring_size"] * delays["stretches"]).sum())
+    per_stretch = at.ARRIVALS_SIZE + 2 * at.HEAD_SIZE + 6 * queue_of(count) + at.RING_GAP
+    return at.HEADER_SIZE + wider * int(delays["ring_size"].max()) + per_stretch * count + 2 * entries
 
 
 def queue_of(count: int) -> int:
@@ -48,10 +48,10 @@ def begin_past(past: np.ndarray, delays: np.ndarray) -> None:
     if not len(delays):
         return
     past[:], count = 0.0, int(delays["stretches"].sum())
-    sizes = [at.CAPACITY, at.QUEUE, at.STRETCHES, at.WIDER, at.KNOWN_TIME, at.MENDED]
+    sizes = [at.CAPACITY, at.JUMP_CAPACITY, at.STRETCHES, at.RING_FACTOR, at.ARRIVALS_TIME, at.CORRECTED_TIME]
     wider = 1 if past.size == past_size(delays) else wider_of(past, delays)
-    past[sizes] = wider * int(delays["room"].max()), queue_of(count), count, wider, math.nan, -math.inf
-    past[at.NEXT] = at.INFINITE
+    past[sizes] = wider * int(delays["ring_size"].max()), queue_of(count), count, wider, math.nan, -math.inf
+    past[at.NEXT_ARRIVAL] = at.INFINITE
 
 
 def wider_of(past: np.ndarray, delays: np.ndarray) -> int:
@@ -75,45 +75,45 @@ def without_past(memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def kept_entries(past: np.ndarray) -> np.ndarray:
     """Numbers of all entries whose times are stored."""
-    return np.arange(max(at.ZEROS, int(past[at.COUNT]) - int(past[at.CAPACITY])), int(past[at.COUNT]))
+    return np.arange(max(at.PROFILE_ENTRIES, int(past[at.COUNT]) - int(past[at.CAPACITY])), int(past[at.COUNT]))
 
 
 def times_of_jumps(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -> np.ndarray:
     """Times at which jumps reach ends or middles of stretches, between `begin` and `end` [s], increasing."""
-    places, queue = at.places_of(past), int(past[at.QUEUE])
-    heads = past[places[1] : places[2]].reshape(-1, at.HEADS)
+    places, queue = at.offsets_of(past), int(past[at.JUMP_CAPACITY])
+    heads = past[places[1] : places[2]].reshape(-1, at.HEAD_SIZE)
     line_of, arrivals = np.repeat(np.arange(len(delays)), delays["stretches"]), []
-    for head in np.flatnonzero(heads[:, at.MANY]):
+    for head in np.flatnonzero(heads[:, at.JUMP_COUNT]):
         line, first = delays[line_of[head // 2]], places[2] + 3 * queue * head
-        order = (int(heads[head, at.FIRST]) + np.arange(int(heads[head, at.MANY]))) % queue
+        order = (int(heads[head, at.FIRST_JUMP]) + np.arange(int(heads[head, at.JUMP_COUNT]))) % queue
         sent = past[first + order]
         arrivals += [sent + line["tau"], sent + 0.5 * line["tau"]]
-    times, tolerance = np.sort(np.concatenate([[], *arrivals])), at.same_time(past)
+    times, tolerance = np.sort(np.concatenate([[], *arrivals])), at.time_tolerance(past)
     times = times[(times > begin + tolerance) & (times < end - tolerance)]
     return times[np.diff(times, prepend=-np.inf) > tolerance]
 
 
 def room_left(past: np.ndarray, delays: np.ndarray) -> int:
     """Steps that can be taken before an entry is lost that is still needed."""
-    count, sizes = int(past[at.COUNT]), int(past[at.WIDER]) * delays["room"]
+    count, sizes = int(past[at.COUNT]), int(past[at.RING_FACTOR]) * delays["ring_size"]
     if count == 0:
         return int(sizes.min()) - BESIDE - LEAST_ROOM
     stored = kept_entries(past)
-    times = past[at.HEAD + (stored & (int(past[at.CAPACITY]) - 1))]
+    times = past[at.HEADER_SIZE + (stored & (int(past[at.CAPACITY]) - 1))]
     oldest = stored[0] + np.maximum(0, np.searchsorted(times, times[-1] - OLDER * delays["hold"]) - BESIDE)
     return int((sizes - (count - oldest)).min())
 
 
 def doubled(past: np.ndarray, delays: np.ndarray) -> np.ndarray:
     """History with rings twice as long, with the same entries."""
-    wider = 2 * int(past[at.WIDER])
+    wider = 2 * int(past[at.RING_FACTOR])
     result = np.zeros(past_size(delays, wider))
-    result[: at.HEAD] = past[: at.HEAD]
-    result[[at.CAPACITY, at.WIDER]] *= 2.0
+    result[: at.HEADER_SIZE] = past[: at.HEADER_SIZE]
+    result[[at.CAPACITY, at.RING_FACTOR]] *= 2.0
     stored = kept_entries(past)
-    old, new = at.HEAD, at.HEAD
+    old, new = at.HEADER_SIZE, at.HEADER_SIZE
     result[new + (stored & (int(result[at.CAPACITY]) - 1))] = past[old + (stored & (int(past[at.CAPACITY]) - 1))]
-    here, there = at.places_of(past), at.places_of(result)
+    here, there = at.offsets_of(past), at.offsets_of(result)
     result[there[0] : there[3]] = past[here[0] : here[3]]  # all except rings
     for row in delays:
         for q in range(row["stretches"]):
@@ -126,11 +126,11 @@ def doubled(past: np.ndarray, delays: np.ndarray) -> np.ndarray:
 
 def crowded(past: np.ndarray) -> list[Notice]:
     """Notice if there was no storage for some jumps."""
-    if not past.size or past[at.CROWDED] == 0.0:
+    if not past.size or past[at.GREATEST_UNSTORED_JUMP] == 0.0:
         return []
-    share = past[at.CROWDED] / past[at.GREATEST]
+    share = past[at.GREATEST_UNSTORED_JUMP] / past[at.GREATEST_JUMP]
     text = (
-        f"more than {int(past[at.QUEUE])} jumps were travelling in one pipe: some of them, up to {share:.3g} of the "
+        f"more than {int(past[at.JUMP_CAPACITY])} jumps were travelling in one pipe: some of them, up to {share:.3g} of the "
         "greatest, were smoothed over a step; raise numerics.delay_tolerance, so that fewer are stored, or set "
         'pipe_model = "finite-volume"'
     )

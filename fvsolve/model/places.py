@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.basins.lower import at_start
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.masses import pushed_masses
 from fvsolve.model.statics import GAPS, HOLD, LINES, MOTION, Statics
 
 BESIDE = 1e-6  # step of finite differences [rad], [m]
-CHAMBERS, PUSHES = "kernels.masses: chambers", "kernels.masses: finish_masses"
+CHAMBERS, PUSHES = "kernels.mass_dynamics: piston_chambers", "kernels.mass_dynamics: mass_rates"
 
 
 class Displaced(Statics):
@@ -201,7 +201,7 @@ class Displaced(Statics):
 
     def attitudes(self) -> dict[str, np.ndarray]:
         """Rotation matrix of every body in the present configuration, by name."""
-        from fvsolve.kernels.mechanism.room import ATTITUDE
+        from fvsolve.kernels.mechanism.body_layout import ATTITUDE
 
         return {name: self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3).copy()
                 for i, name in enumerate(self.draft.body_names)}  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.case import sloshing
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.lowering import lowering_of
 from fvsolve.model.mechanism import point_row
 from fvsolve.model.reading import along
@@ -46,7 +46,7 @@ def scalar_probe(draft, row, probe) -> None:
 
 def lower_point_of_body(draft, row, probe) -> None:
     """Probe of a quantity at a named point."""
-    from fvsolve.kernels.mechanism.observe import POINT_QUANTITIES
+    from fvsolve.kernels.mechanism.body_probes import POINT_QUANTITIES
 
     row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
     row["index"] = point_row(draft, probe.name)

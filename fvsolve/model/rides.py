@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.case import riding_networks
 from fvsolve.case.riding import free_joints
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 SMALL = 1e-9  # specific force times length [J/kg] below which it counts as rounding
 
@@ -21,7 +21,7 @@ def lower_rides(draft) -> None:
         first, last = places[link.from_], places[link.to]
         if getattr(first, "on", None) is None:
             continue
-        row["ride"] = len(rows)
+        row["moving_segment"] = len(rows)
         ends = np.array(first.place), np.array(last.place)
         if "cells" in row.dtype.names:
             shares = np.linspace(0.0, 1.0, int(row["cells"]) + 1)[:, None]
@@ -29,16 +29,16 @@ def lower_rides(draft) -> None:
             rows += [stretch(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
         else:
             points = np.array([ends[0], *link.route, ends[1]])
-            row["rides"] = len(points) - 1
+            row["moving_segments"] = len(points) - 1
             rows += [stretch(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
     for node, row in zip(places.values(), draft.node_table, strict=True):
         if getattr(node, "on", None) is None or row["kind"] == rec.PATCH:
             continue
-        row["ride"] = len(rows)
+        row["moving_segment"] = len(rows)
         foot, high = np.array(node.place), node.level if row["kind"] == rec.TANK else 0.0
         body, start, end, swept, rise, heavy = stretch(draft, node.on, np.array([foot, foot + [0.0, 0.0, high]]))
         rows.append((body, start, end, swept, -rise, heavy))
-    draft.ride_table = np.array(rows, rec.RIDE) if rows else np.zeros(0, rec.RIDE)
+    draft.ride_table = np.array(rows, rec.MOVING_SEGMENT) if rows else np.zeros(0, rec.MOVING_SEGMENT)
     if asked(draft):
         for place, text in riding_networks.unfelt(draft.case.nodes, draft.case.links):
             draft.fault(".".join(place), f"{text}, but a probe reads forces of joints")
@@ -52,7 +52,9 @@ def asked(draft) -> bool:
 def stretch(draft, on: str, points: np.ndarray) -> tuple:
     """Row of `rides` for a straight line between two points in axes of a body [m]."""
     rise = (draft.case.poses[on].attitude @ (points[1] - points[0]))[2]
-    heavy = rec.ASKED if asked(draft) else rec.FELT if any(free_joints(on, draft.case.nodes)) else 0
+    heavy = (
+        rec.JOINT_LOAD_READ if asked(draft) else rec.MOVED_BY_FORCES if any(free_joints(on, draft.case.nodes)) else 0
+    )
     return draft.body_names.index(on), *points, np.cross(*points), -draft.case.gravity * rise, heavy
 
 
@@ -64,15 +66,15 @@ def driven_at_start(draft, start) -> list[str]:
 
     at = Statics(draft, start.t)
     at.run(MOTION, DRIVES)
-    first, rho = int(at.layout["ride"]), draft.fluid.density
+    first, rho = int(at.layout["moving_segment"]), draft.fluid.density
     drives = at.out[first : first + len(draft.ride_table)]
     texts = []
     for kind, names, table in (("pipe", draft.pipe_names, draft.pipe_table),
                                ("rigid column", draft.column_names, draft.column_table)):  # fmt: skip
         for name, row in zip(names, table, strict=True):
-            if row["ride"] >= 0:
+            if row["moving_segment"] >= 0:
                 count = int(row["cells" if "cells" in row.dtype.names else "rides"])
-                push = float(drives[row["ride"] : row["ride"] + count].sum())
+                push = float(drives[row["moving_segment"] : row["moving_segment"] + count].sum())
                 if abs(push) > SMALL:
                     texts.append(
                         f"{kind} {name}: the motion of its body drives its flow with "

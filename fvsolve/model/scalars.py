@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.cells import means, samples
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.steppers.methods import METHODS
 
 STORES = (rec.TANK, rec.CHAMBER)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fvsolve.kernels.records import PIECE_COLUMNS, SCHEDULE
-from fvsolve.kernels.schedules import CREST, POWER, WAVE
+from fvsolve.kernels.dtypes import PIECE_COLUMNS, SCHEDULE
+from fvsolve.kernels.schedule_pieces import CREST, POWER, WAVE
 
 AWAKE = 8  # least number of steps in a period
 LONG = 32  # schedules with more entries are samples of a smooth function

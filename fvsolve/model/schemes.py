@@ -2,8 +2,8 @@
 
 import functools
 
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.ends import difference_rows
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.ghost_cells import difference_rows
 from fvsolve.schemes import LIMITERS, SCHEMES
 
 FAMILIES = {"upwind": rec.UPWIND, "linear": rec.LINEAR, "muscl": rec.MUSCL, "weno5": rec.WENO5}

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.delay.history import COUNT
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.delay_lines.wave_history import COUNT
 from fvsolve.model.past import LEAST_ROOM, begin_past, doubled, room_left, without_past
 
 if TYPE_CHECKING:
@@ -25,16 +25,16 @@ def lined(size: int) -> np.ndarray:
     return buffer[first : first + size]
 
 
-def wiped(shapes: rec.Written) -> rec.Written:
+def wiped(shapes: rec.RunArrays) -> rec.RunArrays:
     """Arrays that a run writes, of these shapes, filled with zeros."""
     arrays = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
     arrays |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
     arrays |= {"clock": np.zeros(1, rec.CLOCK), "work": lined(shapes.work)}
     if shapes.sharp:
-        from fvsolve.kernels.handle import room_within
+        from fvsolve.kernels.table_handle import empty_handle
 
-        arrays["sharp"] = room_within()
-    return rec.Written(**arrays)
+        arrays["sharp"] = empty_handle()
+    return rec.RunArrays(**arrays)
 
 
 class Slate:
@@ -71,14 +71,14 @@ class Slate:
         functions = self.model.functions
         return self.linked(self.written, (functions.calls, functions.hooks))
 
-    def linked(self, written: rec.Written, callables: tuple) -> np.ndarray:
+    def linked(self, written: rec.RunArrays, callables: tuple) -> np.ndarray:
         """Handle of the tables with these written arrays and these functions."""
-        from fvsolve.kernels.handle import linked, places_of
+        from fvsolve.kernels.table_handle import addresses_of, linked_handles
 
         model = self.model
-        shared = model.places if self.tables is model.tables else places_of(self.tables)
-        sharp = places_of(self.tables._replace(**model.sharp)) if model.sharp else shared
-        return linked(shared, sharp, written, callables)
+        shared = model.places if self.tables is model.tables else addresses_of(self.tables)
+        sharp = addresses_of(self.tables._replace(**model.sharp)) if model.sharp else shared
+        return linked_handles(shared, sharp, written, callables)
 
     def blank(self, armed: np.ndarray | float = 0.0) -> None:
         """Reset for another state: flags as given, no waves in delay lines."""
@@ -119,12 +119,12 @@ class Slate:
         """Pipe -> both waves of a delay line in the middle of each of `parts` equal parts of its cells [kg/s]."""
         waves = {}
         if len(self.model.tables.delays):
-            from fvsolve.kernels.delay.along import along_lines
+            from fvsolve.kernels.delay_lines.line_interior import waves_along_line_number
 
             for index, row in enumerate(self.model.tables.delays):
                 n = parts * int(row["places"])
                 waves[int(row["pipe"])] = r, l = np.zeros(n), np.zeros(n)  # noqa: E741
-                along_lines(t, out, self.handle, index, r, l)
+                waves_along_line_number(t, out, self.handle, index, r, l)
         return waves
 
     def evaluate(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:

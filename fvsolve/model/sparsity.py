@@ -14,7 +14,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.basins import lower_pattern as pattern
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.schemes import SCHEMES, Reach
 from fvsolve.steady import union
 
@@ -276,13 +276,13 @@ class Couplings:
     def carried(self) -> Iterator[tuple[int, np.ndarray]]:
         """Fluid on bodies : (row of `rides`, its states and those that set its pressures)."""
         for i, node in enumerate(self.nodes):
-            if node["ride"] >= 0:
-                yield node["ride"], states(self.own(i), self.sets[i])
+            if node["moving_segment"] >= 0:
+                yield node["moving_segment"], states(self.own(i), self.sets[i])
         for row in (*self.pipes, *self.columns):
-            if row["ride"] >= 0:
+            if row["moving_segment"] >= 0:
                 own = row["y"] + np.arange(2 * row["cells"]) if "cells" in row.dtype.names else row["y"]
                 at_ends = (self.sets[row[end]] for end in ("from_node", "to_node"))
-                yield row["ride"], states(own, *at_ends)
+                yield row["moving_segment"], states(own, *at_ends)
 
     # pipes ------------------------------------------------------------------------------------------------------
 

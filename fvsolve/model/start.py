@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import Notice, listing
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.friction import drag, drag_slope, factor_times_reynolds
-from fvsolve.kernels.handle import make_handle
-from fvsolve.kernels.schedules import value_until
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.schedule_pieces import value_with_limit
+from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
+from fvsolve.kernels.table_handle import make_handle
 from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
 from fvsolve.model.bodies_start import start_bodies
 from fvsolve.model.lowering import lowering_of
@@ -71,7 +71,7 @@ class Start:
         return np.zeros(int(self.draft.tables.layout[0]["size"]))
 
     @cached_property
-    def slate(self) -> rec.Written:
+    def slate(self) -> rec.RunArrays:
         """Arrays that runs write, before any event."""
         return wiped(self.draft.shapes)
 
@@ -93,7 +93,7 @@ class Start:
         values, key = self.draft.schedules.given, (int(schedule), self.t)
         if key not in values:
             schedules, pieces = self.draft.tables.schedules, self.draft.tables.pieces
-            values[key] = float(value_until(schedules, pieces, key[0], self.t, self.t))
+            values[key] = float(value_with_limit(schedules, pieces, key[0], self.t, self.t))
         return values[key]
 
     def solve(self) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.basins.lower import at_start
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.handle import make_handle
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.slate import wiped
 
 HOME = "fvsolve"  # package of the kernel functions
@@ -27,17 +27,17 @@ NONE = np.zeros(0)
 def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE) -> None:
     """Call these kernel functions only, as the right-hand side does."""
     from fvsolve.kernels import calls  # not loaded for cases without bodies
-    from fvsolve.kernels.phases import found
+    from fvsolve.kernels.rhs_assembly import load_function
 
     addresses = calls.empty_calls(calls.JOBS, len(pieces) + 1)
     for k, piece in enumerate(pieces):
-        addresses[calls.RHS, k] = calls.addressed(found(HOME, piece), calls.RATES)
+        addresses[calls.RHS, k] = calls.function_address(load_function(HOME, piece), calls.RATES)
     run = calls.compile_as(calls.rhs_in_turn, calls.RATES.lower())
     handle = make_handle((*tables, addresses, calls.empty_calls(0, len(calls.HOOKS))))
     run(t, y, rates, out, handle)
 
 
-def plain(shapes: rec.Written) -> rec.Written:
+def plain(shapes: rec.RunArrays) -> rec.RunArrays:
     """Run arrays without `seen`, so that kernels read the state as given: none of them reads wetted cells."""
     return wiped(shapes)._replace(seen=np.zeros(0))
 
@@ -96,7 +96,7 @@ class Statics:
 
     def loads(self) -> np.ndarray:
         """Force and torque of every body, a view of `out` : float64[bodies, 6]."""
-        from fvsolve.kernels.mechanism.room import FORCE
+        from fvsolve.kernels.mechanism.body_layout import FORCE
 
         first, count = int(self.layout["body"]), len(self.draft.body_table)
         return self.out[first : first + rec.BODY_OUT * count].reshape(count, rec.BODY_OUT)[:, FORCE : FORCE + 6]
@@ -149,20 +149,20 @@ class Statics:
 
     def place_of(self, point: int) -> np.ndarray:
         """Position of a point in the present configuration [m]."""
-        from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE
+        from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION
 
         i, place = int(self.tables.points[point]["body"]), self.tables.points[point]["place"]
         if i < 0:
             return place
         body_row = self.row_of(i)
-        return body_row[PLACE : PLACE + 3] + body_row[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
+        return body_row[POSITION : POSITION + 3] + body_row[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
 
     def reach(self, i: int, place: np.ndarray, force: float, torque: float) -> np.ndarray:
         """Largest effect of a force on body i at a place in its axes, and of a torque, on each freedom.
 
         Needs S in scratch.
         """
-        from fvsolve.kernels.mechanism.room import ARM, ATTITUDE
+        from fvsolve.kernels.mechanism.body_layout import ARM, ATTITUDE
 
         bodies, effects = self.draft.body_table, np.zeros(len(self.draft.freedom_table))
         columns = self.written.scratch[: 6 * len(effects)].reshape(-1, 6)

@@ -154,7 +154,7 @@ def add_terms(draft) -> dict[str, dict]:
         names = [f"{name}.memory{k}[{i}]" for k in range(m.size) for i in range(mesh.cells)]
         row["memory"] = draft.states(names, 1e5 * row["admittance"])
         # upwind schemes reach twice that, so the other terms count half
-        waves = row["speed"] / row["dx"] * row["quicker"]
+        waves = row["speed"] / row["dx"] * row["rate_factor"]
         fastest = float(max(waves, 0.5 * rate[-1]) + 0.5 * gain.sum())
         settings["rate"] = max(settings["rate"], fastest)
         facts[name] = {

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from fvsolve.case import load, located
-from fvsolve.doors import TABLE, door, made
 from fvsolve.errors import CaseError
 from fvsolve.model.build import built
 from fvsolve.model.model import Model
+from fvsolve.validation import TABLE, instance_of, validated
 
 
-@door(model=made(Model), set=TABLE)
+@validated(model=instance_of(Model), set=TABLE)
 def vary(model: Model, set: Mapping[str, Any]) -> Model:
     """Build the model of the same case with changed keys, for example `{"links.valve.area": 0.002}`.
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE, SPIN, VELOCITY
-from fvsolve.kernels.records import BODY_OUT, PRISMATIC
+from fvsolve.kernels.dtypes import BODY_OUT, PRISMATIC
+from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION, SPIN, VELOCITY
 
 UNITS = {"body": "-", "speed": "m/s"}
 
@@ -71,6 +71,6 @@ def moved(model, out: np.ndarray, owner: np.ndarray, place: np.ndarray) -> tuple
     for i, row in enumerate(out[first : first + BODY_OUT * n].reshape(n, BODY_OUT)):
         own = owner == i
         arms = place[own] @ row[ATTITUDE : ATTITUDE + 9].reshape(3, 3).T
-        points[own] = row[PLACE : PLACE + 3] + arms
+        points[own] = row[POSITION : POSITION + 3] + arms
         speed[own] = row[VELOCITY : VELOCITY + 3] + np.cross(row[SPIN : SPIN + 3], arms)
     return points, speed

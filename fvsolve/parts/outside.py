@@ -11,17 +11,17 @@ from importlib.metadata import entry_points
 from importlib.util import module_from_spec
 from pathlib import Path
 
-from fvsolve.doors import PATH, door
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import add_sources
 from fvsolve.units import show
+from fvsolve.validation import PATH, validated
 
 GROUP = "fvsolve.parts"
 NAMED = "FVSOLVE_PARTS"  # environment variable with the folders of registered parts, for other processes
 HOME = "fvsolve_parts"  # package in which registered folders appear
 
 
-@door(folder=PATH)
+@validated(folder=PATH)
 def register_part(folder: str | os.PathLike) -> None:
     """Register the part in a folder: `part.py`, and `lower.py` and `law.py` if the part has a law.
 

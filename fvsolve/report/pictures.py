@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from fvsolve.display import save_if_path
 from fvsolve.draw.plot import history_figure
 from fvsolve.draw.section import phase_figure, section_figure
 from fvsolve.errors import FvsolveError, did_you_mean, listing
@@ -13,7 +14,6 @@ from fvsolve.report.legs import SectionWay, ways
 from fvsolve.report.report import opened
 from fvsolve.report.section import section, window
 from fvsolve.run.result import not_valid
-from fvsolve.shown import kept
 from fvsolve.units import show
 
 
@@ -50,7 +50,7 @@ def write_pictures(
         raise FvsolveError(f"{directory}: the {reason}, so it has no long section. Choose --probes or --phase X:Y")
     folder.mkdir(parents=True, exist_ok=True)
     for name, figure in drawn.items():
-        kept(figure, folder / name)
+        save_if_path(figure, folder / name)
     return [folder / name for name in drawn]
 
 

@@ -8,7 +8,6 @@ import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from fvsolve.doors import CALL, FLAG, PATH, TABLE, THREADS, door
 from fvsolve.draw.beside import Painter, Picture
 from fvsolve.errors import CaseError, RunError
 from fvsolve.output.directory import ENDED, RunDirectory, pictures_there, read_directory
@@ -18,11 +17,12 @@ from fvsolve.output.summary import described, write_summary
 from fvsolve.run import ranks
 from fvsolve.run.claims import claims
 from fvsolve.run.result import Result
+from fvsolve.validation import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 
 __all__ = ["Result", "open_run", "run"]
 
 
-@door(set=TABLE, out=PATH, force=FLAG, resume=FLAG, progress=CALL, threads=THREADS, pictures=FLAG)
+@validated(set=TABLE, out=PATH, force=FLAG, resume=FLAG, progress=FUNCTION, threads=COUNT_FROM_ONE, pictures=FLAG)
 def run(
     case,
     set: Mapping | None = None,
@@ -57,7 +57,7 @@ def run(
         return result
 
 
-@door(directory=PATH)
+@validated(directory=PATH)
 def open_run(directory: str | Path) -> Result:
     """Read a run directory. Raises RunError if it holds no finished run, or a run of another version."""
     from fvsolve.run.complete import check

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.doors import AMOUNT, NUMBER, PATH, TEXT, door
+from fvsolve.display import Displayable, save_if_path
 from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
 from fvsolve.output.column import UnitColumn
 from fvsolve.output.fields import read_series
-from fvsolve.shown import Shown, kept
 from fvsolve.units import show
+from fvsolve.validation import COUNT_FROM_ZERO, NUMBER, PATH, TEXT, validated
 
 FIELDED = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
 
@@ -119,7 +119,7 @@ class Comparison(NamedTuple):
     t_computed_peak: float | None
 
 
-class Result(Shown):
+class Result(Displayable):
     """Probes over time, and facts about the run, in the units of `[output]`.
 
     `result.t` [s], `result["gate.pressure"]` float64[rows] in `result.units["gate.pressure"]`, `.probes`,
@@ -257,12 +257,12 @@ class Result(Shown):
         headers = [f"{name} [{unit}]" for name, unit in self.units.items()]
         return pandas.DataFrame(self._table[:, 1:].copy(), index=index, columns=headers)
 
-    @door(path=PATH)
+    @validated(path=PATH)
     def plot(self, path=None):
         """Figure (matplotlib) of the probes over time, also written to `path` if given."""
         from fvsolve.draw.plot import history_figure
 
-        return kept(history_figure(**self.history_drawn()), path)
+        return save_if_path(history_figure(**self.history_drawn()), path)
 
     def history_drawn(self) -> dict[str, Any]:
         """Arguments of the history figure, empty without probes."""
@@ -275,12 +275,12 @@ class Result(Shown):
             "time_unit": self._time.unit, "marks": marks, "measured": self._measured(), "title": self.summary["title"],
         }  # fmt: skip
 
-    @door(path=PATH)
+    @validated(path=PATH)
     def plot_envelope(self, path=None):
         """Figure (matplotlib) of least and maximum head along the pipes, also written to `path` if given."""
         from fvsolve.draw.plot import envelope_figure
 
-        return kept(envelope_figure(**self.envelope_drawn()), path)
+        return save_if_path(envelope_figure(**self.envelope_drawn()), path)
 
     def envelope_drawn(self) -> dict[str, Any]:
         """Arguments of the envelope figure, empty without pipes."""
@@ -290,7 +290,7 @@ class Result(Shown):
             "envelope": self.envelope, "units": self.summary["envelope_units"], "title": self.summary["title"],
         }  # fmt: skip
 
-    @door(time=NUMBER, field=TEXT, path=PATH, contours=AMOUNT)
+    @validated(time=NUMBER, field=TEXT, path=PATH, contours=COUNT_FROM_ZERO)
     def view(self, time: float | None = None, field: str | None = None, path=None, contours: int = 0) -> Path:
         """Draw `field` at the frame nearest to `time` [s] (default: the last) with PyVista; return its path.
 
@@ -304,7 +304,7 @@ class Result(Shown):
         t = times[-1] if time is None else min(times, key=lambda frame_time: abs(frame_time - time))
         return self._draw([t], field, path, ".png", contours)
 
-    @door(path=PATH, field=TEXT, contours=AMOUNT)
+    @validated(path=PATH, field=TEXT, contours=COUNT_FROM_ZERO)
     def animate(self, path=None, field: str | None = None, contours: int = 0) -> Path:
         """Draw all frames as `view` does, as a .gif or .mp4; return its path."""
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
@@ -367,11 +367,11 @@ class Result(Shown):
         """Values of a probe in SI, pressures absolute: float64[rows]."""
         return self.column(probe).to_si(self[probe])
 
-    def said(self) -> str:
+    def summary_line(self) -> str:
         summary = self.summary
         return f"{summary['case']!r}: {self.reason}, t = {summary['t']:g} s, {len(self.units)} probes"
 
-    def listed(self) -> dict[str, list]:
+    def table_columns(self) -> dict[str, list]:
         """Unit, least and greatest of every probe, with times."""
         columns = {"probe": self.probes, "unit": list(self.units.values())}
         return columns | {key: [getattr(row, key) for row in self.extremes.values()] for key in Extremes._fields}

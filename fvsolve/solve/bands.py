@@ -12,7 +12,7 @@ import numpy as np
 
 from fvsolve.basins.bands import REACH
 from fvsolve.errors import FvsolveError, Notice, listing
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.basins.bands import REACH
-from fvsolve.kernels import sums
+from fvsolve.kernels import stage_sums
 from fvsolve.solve.bands import Cut, looked_at, quantities
 
 BLOCK = 4096  # cells of a block: their arrays and the work arrays of the rates fit into a second-level cache
@@ -30,10 +30,10 @@ def formed(cut: Cut, k: int) -> np.ndarray:
             edges.append(rows_at(model, b, q, first, min(first + REACH, stop)))
             edges.append(rows_at(model, b, q, max(stop - REACH, first), stop))
             common_cells += cells_at(model, b, q, first, stop)
-    head = np.zeros(sums.HEAD + len(model.basins), dtype=np.int64)
-    head[[sums.OTHERS, sums.LOOKED, sums.EDGES]] = len(others), len(common_cells), len(edges)
-    head[sums.BASINS], head[sums.CELLS] = len(model.basins), BLOCK
-    head[[sums.HEAD + b for b in blocked_basins]] = 1
+    head = np.zeros(stage_sums.HEAD + len(model.basins), dtype=np.int64)
+    head[[stage_sums.OTHERS, stage_sums.CHECKED, stage_sums.EDGES]] = len(others), len(common_cells), len(edges)
+    head[stage_sums.BASINS], head[stage_sums.CELLS] = len(model.basins), BLOCK
+    head[[stage_sums.HEAD + b for b in blocked_basins]] = 1
     return np.concatenate([head, np.array([*others, *common_cells, *edges], dtype=np.int64).ravel()])
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels.delay.history import MENDED
+from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
 from fvsolve.limits.drives import lumped, spreads
 from fvsolve.limits.step import DOUBTFUL, WRONG
 from fvsolve.steppers import automatic, slots
@@ -153,4 +153,4 @@ class Halves:
 def mended(loop) -> bool:
     """True if a delay line corrected a store for a jump within the last step; half steps have no such correction."""
     past = loop.slate.past
-    return past.size > 0 and past[MENDED] == loop.t
+    return past.size > 0 and past[CORRECTED_TIME] == loop.t

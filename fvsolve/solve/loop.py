@@ -7,9 +7,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fvsolve.kernels import limits
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.functions import leap_function
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels import tank_limits
+from fvsolve.kernels.compiled_functions import fused_step_function
 from fvsolve.model import Model, Slate
 from fvsolve.model.scalars import amounts
 from fvsolve.model.within import within
@@ -47,7 +47,7 @@ class Loop:
         call = model.functions
         self.rhs, self.observe, self.record, self.events = call.rhs, call.observe, call.record, call.events
         fused_allowed = leap_allowed(model, method)
-        self.leap = leap_function(fused_allowed)
+        self.leap = fused_step_function(fused_allowed)
         ledgers, structure = model.ledgers, structure or (lambda: model.structure)
         self.stepper = stepper = Stepper(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
         sums = [
@@ -170,7 +170,7 @@ class Loop:
 
     def note(self, before: np.ndarray) -> None:
         """Record the events since the flags were `before`, and apply their immediate effects."""
-        first, count = limits.EVENTS * self.tanks.size, len(self.model.events)
+        first, count = tank_limits.EVENTS * self.tanks.size, len(self.model.events)
         now = self.armed[first : first + count] > before[first : first + count]
         self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
         self.settle()
@@ -179,7 +179,7 @@ class Loop:
         """Apply the immediate effects of events on tanks and devices."""
         for i in self.tanks:
             node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(SUMS, -1)
-            part = limits.overshot(node, self.armed, float(node["mass"] + self.now[node["y"]]))
+            part = tank_limits.overshoot_correction(node, self.armed, float(node["mass"] + self.now[node["y"]]))
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
         for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
@@ -218,7 +218,9 @@ class Loop:
         places = shut_places(self.model, out)
         for k, row in enumerate(self.model.tables.columns):
             flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
-            collides = out[layout["led"] + k] == 0.0 and (row["from_node"] in places or row["to_node"] in places)
+            collides = out[layout["valve_controlled"] + k] == 0.0 and (
+                row["from_node"] in places or row["to_node"] in places
+            )
             if flow != new and (collides or new == 0.0):
                 self.now[row["y"]] = new - row["flow"]
                 stopped.append((k, flow - new))

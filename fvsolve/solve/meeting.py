@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels.rigid import gate_inflow
+from fvsolve.kernels.column_junctions import gate_inflow
 from fvsolve.model import Model, Slate
 
 NONE = 1e-9  # relative to a small flow: columns that separate more slowly separate by rounding
@@ -59,7 +59,7 @@ def impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: list[in
     for k, column in enumerate(model.tables.columns):
         ends = [(row.get(int(column["from_node"]), -1), -1.0), (row.get(int(column["to_node"]), -1), 1.0)]
         at = model.layout["column"] + k
-        valve_controlled = out[model.layout["led"] + k] != 0.0 and out[at] != 0.0
+        valve_controlled = out[model.layout["valve_controlled"] + k] != 0.0 and out[at] != 0.0
         change = out[at] - column["flow"] if valve_controlled else carried[k]
         for r, sign in ends:
             if r >= 0:

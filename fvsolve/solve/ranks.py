@@ -13,7 +13,7 @@ import traceback
 
 import numpy as np
 
-from fvsolve.kernels import joint
+from fvsolve.kernels import band_exchange
 from fvsolve.solve.bands import Cut
 from fvsolve.solve.team import SMALL, WRITTEN, Member, banded, undisturbed, yielding
 from fvsolve.steppers import slots
@@ -71,9 +71,9 @@ class Ranks:
         """Exchange values of the given kind within a step; compiled code on all ranks must call it."""
         try:
             values = np.ctypeslib.as_array((ctypes.c_double * size).from_address(address))
-            if request in (joint.OF_STATES, joint.OF_FLOWS):
+            if request in (band_exchange.SEND_STATES, band_exchange.SEND_FLOWS):
                 self.exchanges[request](values)
-            elif request == joint.OF_RATES:
+            elif request == band_exchange.SEND_RATES:
                 values[0] = self.greatest(values[0])
             else:
                 values[self.others] = 0.0

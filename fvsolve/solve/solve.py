@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from fvsolve.errors import FvsolveError, RunError, listing
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, State
 from fvsolve.model.past import without_past
 from fvsolve.model.scalars import scalar_ledgers
@@ -384,7 +384,7 @@ class Run:
             return f"stopped: the demand{place} cannot be supplied at {when}; all connections to it are shut"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
             return f"stopped: the chamber volume{place} is zero at {when}; give the piston an end-stop"
-        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_ROOM:
+        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WIDTH:
             return f"stopped: the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone"
         if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WEIGHT:
             index = int(loop.out[rec.WHERE])

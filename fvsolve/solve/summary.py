@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, Slate
 
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given

@@ -18,8 +18,8 @@ from queue import SimpleQueue
 
 import numpy as np
 
-from fvsolve.kernels import joint
-from fvsolve.kernels.functions import functions
+from fvsolve.kernels import band_exchange
+from fvsolve.kernels.compiled_functions import functions
 from fvsolve.model import Slate
 from fvsolve.model.slate import lined
 from fvsolve.solve.bands import Cut
@@ -52,11 +52,20 @@ class Member:
         self.stepper.sums = np.zeros(cut.sums)
         self.own = [slice(begin, stop) for begin, stop, *_ in self.stepper.spans[len(cut.alike()) :].tolist()]
         states, flows = cut.states(k), cut.flows(k)
-        own = np.zeros(joint.HEAD + 3 * (len(states) + len(flows)), dtype=np.int64)
-        own[joint.ME], own[joint.MANY], own[joint.YIELD], own[joint.TELL] = k, cut.many, team.yielding, team.tell
-        own[joint.BOARD], own[joint.ROOM] = team.board.ctypes.data, team.room.ctypes.data
-        own[joint.ALIKE], own[joint.STATES], own[joint.FLOWS] = len(cut.alike()), len(states), len(flows)
-        own[joint.HEAD :] = np.concatenate([states, flows]).ravel()
+        own = np.zeros(band_exchange.HEAD + 3 * (len(states) + len(flows)), dtype=np.int64)
+        (
+            own[band_exchange.BAND],
+            own[band_exchange.BAND_COUNT],
+            own[band_exchange.YIELD],
+            own[band_exchange.PROCESS_CALL],
+        ) = k, cut.many, team.yielding, team.tell
+        own[band_exchange.BOARD], own[band_exchange.SUM_BUFFER] = team.board.ctypes.data, team.room.ctypes.data
+        own[band_exchange.COMMON_SPANS], own[band_exchange.STATES], own[band_exchange.FLOWS] = (
+            len(cut.alike()),
+            len(states),
+            len(flows),
+        )
+        own[band_exchange.HEAD :] = np.concatenate([states, flows]).ravel()
         self.stepper.shape = formed(cut, k)
         self.mine = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.shape}
         self.called = team.functions.calls, team.functions.hooks
@@ -123,7 +132,7 @@ def twin(stepper: Stepper) -> Stepper:
 def banded(cut: Cut) -> tuple:
     """(functions of a model with exchange between bands, compiled function that combines partial sums)."""
     features = replace(cut.model.functions.cast, bands=True, together=cut.together)
-    return functions(features), compiled_as(joint.share, JOIN)
+    return functions(features), compiled_as(band_exchange.gather_sums, JOIN)
 
 
 class Team:
@@ -132,7 +141,7 @@ class Team:
     def __init__(self, loop, cut: Cut) -> None:
         self.loop, self.cut, self.yielding, self.tell, self.seconds = loop, cut, yielding(), 0, 0.0
         self.functions, self.join = banded(cut)
-        self.board = lined(joint.LINE * cut.many)
+        self.board = lined(band_exchange.LINE * cut.many)
         self.room = lined(2 * cut.sums)
         self.members = [Member(self, 0, loop.slate, loop.stepper)]
         self.members += [Member(self, k, Slate(loop.model), twin(loop.stepper)) for k in range(1, cut.many)]

@@ -55,16 +55,16 @@ class Unfelt:
         self, out: np.ndarray, i: int, place: np.ndarray, normal: np.ndarray, modal: bool
     ) -> tuple[float, float]:
         """(effective gravity along the normal of the bed, gravity that the waves use) [m/s2]."""
-        from fvsolve.kernels.mechanism import room
-        from fvsolve.kernels.records import BODY_OUT
+        from fvsolve.kernels.dtypes import BODY_OUT
+        from fvsolve.kernels.mechanism import body_layout
 
         row = out[int(self.model.layout["body"]) + BODY_OUT * i :][:BODY_OUT]
-        turn, gravity = row[room.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
-        spin, arm, up = row[room.SPIN :][:3], turn @ place, turn @ normal
+        turn, gravity = row[body_layout.ATTITUDE :][:9].reshape(3, 3), self.model.case.gravity
+        spin, arm, up = row[body_layout.SPIN :][:3], turn @ place, turn @ normal
         down = np.cross(spin, np.cross(spin, arm)) + (0.0, 0.0, gravity)
         weight, reference = (
             up @ (row[a:][:3] + np.cross(row[b:][:3], arm) + down)
-            for a, b in ((room.ACCELERATION, room.TURNING), (room.BIAS, room.SPIN_BIAS))
+            for a, b in ((body_layout.ACCELERATION, body_layout.SPIN_RATE), (body_layout.BIAS, body_layout.SPIN_BIAS))
         )
         return float(weight), gravity if modal else float(reference)
 

@@ -1,6 +1,6 @@
 """Runge-Kutta methods as data, their properties, and the compiled time loop that steps them."""
 
-from fvsolve.names import offer
+from fvsolve.lazy_exports import lazy_names
 from fvsolve.steppers import methods  # noqa: F401  (declares them)
 
 _HOMES = {
@@ -18,4 +18,4 @@ _HOMES = {
     "stability_function": "analysis.stability_function",
 }
 
-__all__ = offer(__name__, _HOMES)  # noqa: PLE0605
+__all__ = lazy_names(__name__, _HOMES)  # noqa: PLE0605

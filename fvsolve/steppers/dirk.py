@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import sqrt
 
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.newton import (
     BASE,
@@ -46,7 +46,7 @@ from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 
 
-@inner
+@inline
 def predict(b, c, x, first, vectors, k):
     """k <- predicted slope at x last steps beyond the end of the last step.
 
@@ -64,7 +64,7 @@ def predict(b, c, x, first, vectors, k):
                 k[i] -= w * last[i]
 
 
-@inner
+@inline
 def solve_stage(
     rhs, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, controls, loop_state,
     nnz, work, vectors, factors
@@ -95,7 +95,7 @@ def solve_stage(
     return status
 
 
-@inner
+@inline
 def try_stages(
     rhs, factor, solve, handle, coefficients, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out, scale,
     controls, loop_state, nnz, work, vectors, factors,

@@ -3,7 +3,7 @@
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.sums import AHEAD, BOTH, EDGES, LOOKED, MODE, OFF, OTHERS, ask, sum_runs
+from fvsolve.kernels.stage_sums import CHECKED, EDGES, MODE, OFF, OTHERS, STAGE, STAGE_AND_END, request_sums, sum_runs
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.slots import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
 from fvsolve.steppers.step import BEGIN, STOP, combine, error_of_bands
@@ -38,9 +38,11 @@ def attempt(
         target = y[new] if last and (last_is_new or blocked) else y[3]
         if blocked:
             sum_runs(
-                structure, 0, structure[OTHERS] + structure[LOOKED] + structure[EDGES], y[now], h, row, i, k, target
+                structure, 0, structure[OTHERS] + structure[CHECKED] + structure[EDGES], y[now], h, row, i, k, target
             )
-            ask(structure, BOTH if last and not last_is_new else AHEAD, y[now], h, row, i, k, target, b)
+            request_sums(
+                structure, STAGE_AND_END if last and not last_is_new else STAGE, y[now], h, row, i, k, target, b
+            )
         else:
             for m in range(row_blocks.shape[0]):
                 combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, row, i, k, target)
@@ -50,7 +52,7 @@ def attempt(
         for m in range(ledger_rates.shape[1]):
             ledger_rates[i, m] = out[ledger_offset + m]
     if blocked and s > 1 and not last_is_new:
-        sum_runs(structure, 0, structure[OTHERS] + structure[LOOKED], y[now], h, b, s, k, y[new])
+        sum_runs(structure, 0, structure[OTHERS] + structure[CHECKED], y[now], h, b, s, k, y[new])
     elif not last_is_new:
         for m in range(row_blocks.shape[0]):
             combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, b, s, k, y[new])

@@ -14,7 +14,7 @@ from math import sqrt
 
 import numpy as np
 
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, weights_of
 from fvsolve.steppers.newton import (
     CONVERGED,
@@ -98,7 +98,7 @@ def blend(base_weight, base, m, at, q, first, vectors, target):
                 target[e] = base_weight * base[e] + (c0 * v0[e] + (c1 * v1[e] + c2 * v2[e]))
 
 
-@inner
+@inline
 def predict(coefficients, h, h_last, s, buffer, vectors):
     """W <- T^-1 of the stage increments extrapolated from the slopes of the last step; buffer : float64[q q]."""
     q, c = s - 1, nodes_of(coefficients, s)
@@ -117,7 +117,7 @@ def predict(coefficients, h, h_last, s, buffer, vectors):
         blend(0.0, vectors[s + WEIGHTS], buffer, i * q, q, 1, vectors, vectors[s + STAGES + i])
 
 
-@inner
+@inline
 def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, factors, complex_factors, n):
     """Factor every block of L / h and store the factors one after another; returns their number, 0 if a pivot fails."""
     q, blocks, b, real, pair, count = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
@@ -139,7 +139,7 @@ def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, f
     return count
 
 
-@inner
+@inline
 def solve_blocks(solve, solve_complex, structure, coefficients, s, size, factors, complex_factors, vectors):
     """Solve (L / h x I - I x J) dW = R in place of R."""
     q, blocks, b, real, n = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, vectors.shape[1]
@@ -158,7 +158,7 @@ def solve_blocks(solve, solve_complex, structure, coefficients, s, size, factors
             b, real = b + 1, real + size
 
 
-@inner
+@inline
 def iterate(
     rhs, solve, solve_complex, handle, coefficients, structure, t, h, y, y_stage, k0, ledger_rates, ledger_offset, out,
     controls, loop_state, work, vectors, factors, complex_factors,
@@ -215,7 +215,7 @@ def iterate(
     return status
 
 
-@inner
+@inline
 def finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors):
     """Compute the slopes k of the stages from W, and add the last Newton increment to their ledger rates."""
     s = k.shape[0]
@@ -230,7 +230,7 @@ def finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors):
             book_increment(structure, nnz, d, ledger_rates, i + 1, work)
 
 
-@inner
+@inline
 def filtered_error(
     rhs,
     solve,
@@ -281,7 +281,7 @@ def filtered_error(
     return norm
 
 
-@inner
+@inline
 def unseen(
     rhs,
     solve,

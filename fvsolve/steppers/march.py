@@ -7,7 +7,7 @@ every model (functions of declared type).
 from math import isfinite
 
 from fvsolve.jit import COMPILING, njit
-from fvsolve.kernels.sums import BAD, LOOK, MODE, OFF
+from fvsolve.kernels.stage_sums import BAD, CHECK, MODE, OFF
 from fvsolve.steppers.coefficients import bend_of, error_of, row_of, weights_of
 from fvsolve.steppers.control import (
     APPROACH,
@@ -195,7 +195,7 @@ def march(
                     copy(k[s - 1, begin:end], k[0, begin:end])
             else:
                 if blocked:
-                    structure[MODE], structure[BAD] = LOOK, 0
+                    structure[MODE], structure[BAD] = CHECK, 0
                 rhs(loop_state[T], y[now], k[0], out, handle)
                 if blocked:
                     structure[MODE] = OFF

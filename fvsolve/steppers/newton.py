@@ -15,7 +15,7 @@ from math import sqrt
 
 import numpy as np
 
-from fvsolve.jit import inner
+from fvsolve.jit import inline
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.slots import (
     CALLS,
@@ -64,7 +64,7 @@ def forget(work: np.ndarray) -> None:
     work[SURE] = 1.0
 
 
-@inner
+@inline
 def begin(k, y, scale, controls, loop_state, work, vectors):
     """Prepare the first attempt of a step: store the last stages for prediction, discard a slow Jacobian."""
     s, n = k.shape
@@ -84,7 +84,7 @@ def begin(k, y, scale, controls, loop_state, work, vectors):
     work[SEEN], work[RATIO] = loop_state[STEPS], 0.0
 
 
-@inner
+@inline
 def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, out, loop_state, work, moved, rate):
     """Compute the Jacobian at y from f and ledger rates evaluated there; moved, rate : work rows for a state and f."""
     calls = differences(
@@ -95,7 +95,7 @@ def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, o
     work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, loop_state[STEPS], 0.0, 0.0
 
 
-@inner
+@inline
 def spectral_radius(structure, work, nnz, scale, v):
     """Approximate largest |eigenvalue| of the Jacobian, by five iterations of the power method."""
     n, product, before, now = v.size, work[HEADER + nnz :], 0.0, 0.0
@@ -112,7 +112,7 @@ def spectral_radius(structure, work, nnz, scale, v):
     return sqrt(before * now)  # for a complex pair the single quotients oscillate
 
 
-@inner
+@inline
 def size_of(d, weights):
     """Sum of squares of an increment in units of the tolerance."""
     total = 0.0
@@ -121,7 +121,7 @@ def size_of(d, weights):
     return total
 
 
-@inner
+@inline
 def along(d, other, weights):
     """(<d, other> / <d, d>, |other|^2 / |d|^2): component along d and squared length of the next increment."""
     square = dot = size = 0.0
@@ -133,7 +133,7 @@ def along(d, other, weights):
     return dot / square, size / square
 
 
-@inner
+@inline
 def shortened(part, ahead, size):
     """Damping factor of an increment after a trial with `part`; `part` itself if the trial is accepted.
 
@@ -150,7 +150,7 @@ def shortened(part, ahead, size):
     return part * min(0.7, max(0.1, 1.0 / (1.0 - ahead)))
 
 
-@inner
+@inline
 def goal(controls):
     """(increment at which Newton may stop, increment that counts as rounding), in units of the tolerance."""
     if controls[CONTROL] == TOLERANCE:
@@ -159,7 +159,7 @@ def goal(controls):
     return 1.0, ROUNDED / FIXED
 
 
-@inner
+@inline
 def tight(controls):
     """(increment to stop at, increment that counts as rounding, greatest increment accepted) of damped Newton.
 
@@ -170,7 +170,7 @@ def tight(controls):
     return FIXED / unit, min(ROUNDED / unit, floor), floor
 
 
-@inner
+@inline
 def find_worst(d, f, weights, loop_state):
     """Store in loop_state[WORST] a component whose rate is not finite, else that of the greatest weighted increment."""
     worst = -1.0
@@ -180,7 +180,7 @@ def find_worst(d, f, weights, loop_state):
             worst, loop_state[WORST] = e, i
 
 
-@inner
+@inline
 def verdict(turn, size, before, controls, work):
     """(True to stop, CONVERGED or FAILED) after iteration `turn`; size, before : norms of this and last increment."""
     enough, rounded = goal(controls)
@@ -203,7 +203,7 @@ def verdict(turn, size, before, controls, work):
     return turn == MOST - 1, CONVERGED if turn > 0 and work[SURE] * size <= rounded else FAILED
 
 
-@inner
+@inline
 def book_increment(structure, nnz, d, ledger_rates, i, work):
     """Add to the ledger rates of stage i their change J d by the last increment d of its state."""
     n, product = d.size, work[HEADER + nnz :]
@@ -212,7 +212,7 @@ def book_increment(structure, nnz, d, ledger_rates, i, work):
         ledger_rates[i, m] += product[n + m]
 
 
-@inner
+@inline
 def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, residual):
     """Compute f at the stage with slope ki, and the residual f - ki."""
     for j in range(ki.size):
@@ -224,7 +224,7 @@ def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, res
         residual[j] = f[j] - ki[j]
 
 
-@inner
+@inline
 def damp(
     rhs, factor, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, scale, controls,
     loop_state, nnz, work, vectors, factors,
@@ -293,7 +293,7 @@ def damp(
     return FAILED
 
 
-@inner
+@inline
 def reach(
     rhs, factor, solve, handle, structure, t, h_gamma, i, k, y, y_stage, ledger_rates, ledger_offset, out, scale,
     controls, loop_state, nnz, work, vectors, factors,
@@ -332,7 +332,7 @@ def reach(
     return FAILED
 
 
-@inner
+@inline
 def smoothed_error(
     rhs, factor, solve, handle, structure, ledger_offset, t, h, y, y_new, k, ledger_rates, error, shift, scale, out,
     controls, loop_state, work, vectors, factors,

@@ -13,7 +13,7 @@ import numpy as np
 from numba import objmode
 
 from fvsolve.errors import FvsolveError
-from fvsolve.jit import COMPILING, Declared, code_of, once
+from fvsolve.jit import COMPILING, DeclaredFunction, code_of, compile_once
 from fvsolve.steppers import automatic, slots
 from fvsolve.steppers.methods import AUTO
 from fvsolve.steppers.signatures import EVENTS, LEAP, OBSERVE, RHS, kinds_of
@@ -224,14 +224,14 @@ def _functions(f, t0, y0):
     return *watchers(), _taken(numba.njit(_rhs(f, t0, y0)), RHS)
 
 
-def _taken(function, letters: str) -> Declared:
+def _taken(function, letters: str) -> DeclaredFunction:
     """Compile a numba function for arguments of these types, in the form that the loop calls."""
     kinds = kinds_of(letters)
     function.compile(kinds)
-    return Declared(function, letters, code_of(function.overloads[kinds]))
+    return DeclaredFunction(function, letters, code_of(function.overloads[kinds]))
 
 
-@once
+@compile_once
 def watchers() -> tuple:
     """(fused step, observe, record, events) of a system without events, whose rows are its states."""
     functions = (_no_leap, LEAP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)

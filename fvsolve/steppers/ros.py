@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
 from fvsolve.steppers.newton import BASE, INCREMENT, MOVED, RATE, renew, spectral_radius
@@ -35,7 +35,7 @@ from fvsolve.steppers.structure import STARTS
 SLOPE = BASE  # row of `vectors`, after the stages, for df/dt: Rosenbrock stages do not use the row BASE
 
 
-@inner
+@inline
 def slope_in_time(rhs, handle, t, h, y, k, ledger_rates, ledger_offset, out, loop_state, work, vectors):
     """Compute df/dt and, at the end of `work`, the time slopes of the ledger rates, by a difference within the step."""
     s, n = k.shape
@@ -51,7 +51,7 @@ def slope_in_time(rhs, handle, t, h, y, k, ledger_rates, ledger_offset, out, loo
         work[work.size - ledgers + m] = (out[ledger_offset + m] - ledger_rates[0, m]) * per
 
 
-@inner
+@inline
 def book_stage(structure, nnz, i, gamma, time_weight, row, d, ledger_rates, ledger_offset, out, work):
     """Ledger rates of stage i: gamma (rates + J d + time_weight slope + sum of C_ij ledger_rates_j), d = u_i.
 

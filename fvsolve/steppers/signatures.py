@@ -9,7 +9,7 @@ import functools
 
 import numpy as np
 
-from fvsolve.jit import COMPILING, Intrinsic, declared, njit, plain_kinds
+from fvsolve.jit import COMPILING, Intrinsic, declare_function, njit, plain_kinds
 
 FACTOR, SOLVE, FACTOR_COMPLEX, SOLVE_COMPLEX = "hvtv", "hvv", "hvcz", "hzz"
 ATTEMPT = "hvhsvttwiiwwivvvvvwvz"  # arguments of a step, after its functions
@@ -96,7 +96,7 @@ def no_joint():
 
 def compiled_as(function, letters: str):
     """Compile a function for arguments of these types only, in the form that the loop calls."""
-    return declared(function, letters, kinds_of)
+    return declare_function(function, letters, kinds_of)
 
 
 def compiled_step(attempt):

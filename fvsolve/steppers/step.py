@@ -3,7 +3,7 @@
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.sums import BAD, BASINS, HEAD, HUGE, OTHERS, combine, copy, endless
+from fvsolve.kernels.stage_sums import BAD, BASINS, HEAD, HUGE, OTHERS, combine, copy, count_not_finite
 
 __all__ = ["HUGE", "combine", "copy"]
 
@@ -128,12 +128,12 @@ def all_finite(join, handle, row_blocks, sums, y, stage_sums, checked):
     if checked:
         bad, first = stage_sums[BAD], HEAD + stage_sums[BASINS]
         for r in range(stage_sums[OTHERS]):
-            bad += endless(stage_sums[first + 2 * r], stage_sums[first + 2 * r + 1], y)
+            bad += count_not_finite(stage_sums[first + 2 * r], stage_sums[first + 2 * r + 1], y)
     elif sums.size == 1:
-        bad = endless(0, y.size, y)
+        bad = count_not_finite(0, y.size, y)
     else:
         for m in range(row_blocks.shape[0]):
-            bad += endless(row_blocks[m, BEGIN], row_blocks[m, STOP], y)
+            bad += count_not_finite(row_blocks[m, BEGIN], row_blocks[m, STOP], y)
     return sum_of_bands(bad, join, handle, row_blocks, sums) == 0.0
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fvsolve.jit import beside, once
+from fvsolve.jit import compile_in_parallel, compile_once
 from fvsolve.steppers import slots
 from fvsolve.steppers.coefficients import bent, coefficients
 from fvsolve.steppers.ledger import SUMS
@@ -184,7 +184,7 @@ KINDS = {
 }
 
 
-@once
+@compile_once
 def attempt_of(kind: str, algebra: str = ""):
     """Compiled step of a kind of methods, compiled on first use.
 
@@ -195,5 +195,5 @@ def attempt_of(kind: str, algebra: str = ""):
         return compiled_step(importlib.import_module(module).attempt)
     shifts = {False, kind == "full"}
     code = f"from fvsolve.steppers.structure import functions; [functions({algebra!r}, of) for of in {shifts}]"
-    with beside(code, "factor"):
+    with compile_in_parallel(code, "factor"):
         return compiled_step(importlib.import_module(module).attempt)

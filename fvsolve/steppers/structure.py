@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import FvsolveError, nearest
-from fvsolve.jit import njit, once
+from fvsolve.jit import compile_once, njit
 from fvsolve.steppers.signatures import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COMPLEX, compiled_as
 
 # The header: lengths, then offsets into the same array.
@@ -137,7 +137,7 @@ def kind_module(kind: str):
     return importlib.import_module(f"fvsolve.steppers.linear_{kind}")
 
 
-@once
+@compile_once
 def functions(kind: str, complex: bool) -> tuple:
     """(factor, solve) of a kind, compiled for real or complex shifts."""
     module = kind_module(kind)

@@ -13,7 +13,7 @@ from math import sqrt
 
 import numpy as np
 
-from fvsolve.jit import inner
+from fvsolve.jit import inline
 from fvsolve.steppers.coefficients import nodes_of, row_of
 from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, reach, tight
 from fvsolve.steppers.slots import CONTROL, TOLERANCE
@@ -24,7 +24,7 @@ MOST = 40
 SLOW, FARTHEST = 0.4, 10.0
 
 
-@inner
+@inline
 def sweep(
     rhs, factor, solve, handle, coefficients, low, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out,
     scale, controls, loop_state, nnz, first_row, work, vectors, factors,
@@ -83,7 +83,7 @@ def sweep(
     return FAILED
 
 
-@inner
+@inline
 def lead_on(q, k, first_row, weights, vectors, weight):
     """K <- K - weight g (K - K_before), g = <d, d - d_before> / |d - d_before|^2 with the changes d.
 

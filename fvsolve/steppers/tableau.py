@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.doors import COUNT, ROW, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.steppers.analysis.trees import Conditions, stage_order
 from fvsolve.steppers.collocation import collocation, extrapolated
 from fvsolve.steppers.numbers.algebraic import MIXED, Algebraic
 from fvsolve.steppers.numbers.expression import digits, root, value_of
 from fvsolve.units import show
+from fvsolve.validation import COUNT, ROW, TABLE, TEXT, validated
 
 METHODS: dict[str, Method] = {}  # some methods have two names: `gauss-2` is `implicit-midpoint`
 LARGEST = 10**30  # greatest size of an entry
@@ -164,7 +164,7 @@ class Method:
         return Conditions(self.exact.a, self.rounding)
 
 
-@door(name=TEXT, dense=ROW, start_weight=TEXT, numbers=TABLE, digits=COUNT, source=TEXT)
+@validated(name=TEXT, dense=ROW, start_weight=TEXT, numbers=TABLE, digits=COUNT, source=TEXT)
 def tableau(
     name: str, text: str | Sequence, b: Sequence | None = None, c: Sequence | None = None, *, source: str = "user",
     dense: Sequence = (), start_weight: str | None = None, numbers: Mapping[str, tuple[str, float]] | None = None,

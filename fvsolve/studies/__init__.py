@@ -1,6 +1,6 @@
 """Studies of a case by many runs: order of convergence, accuracy against cost, stability, energy, sizing, sweeps."""
 
-from fvsolve.names import offer
+from fvsolve.lazy_exports import lazy_names
 
 _HOMES = {  # public name -> module of this package
     "LineImpedance": "ports.line",
@@ -33,4 +33,4 @@ _HOMES = {  # public name -> module of this package
     "sweep_positive_real": "ports.line",
 }
 
-__all__ = offer(__name__, _HOMES)  # noqa: PLE0605
+__all__ = lazy_names(__name__, _HOMES)  # noqa: PLE0605

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import Case, load
-from fvsolve.doors import AMOUNT, CALL, COUNT, TABLE, TEXT, door
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.run.comparison import interpolated
 from fvsolve.studies.many import many
@@ -18,6 +17,7 @@ from fvsolve.studies.plans import ranges, sampled
 from fvsolve.studies.row import RowMaker
 from fvsolve.studies.sheet import Column, Plain, Sheet
 from fvsolve.studies.sweep import VARY
+from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 
 FIRST = 16  # sample points per key; the minimisations start at the best of them
 DESCENTS = 3  # number of minimisations
@@ -90,7 +90,7 @@ def spread(measured: np.ndarray) -> float:
     return float(np.ptp(measured)) or 1.0
 
 
-@door(free=VARY, set=TABLE, seed=AMOUNT, jobs=COUNT, dask=TEXT, progress=CALL)
+@validated(free=VARY, set=TABLE, seed=COUNT_FROM_ZERO, jobs=COUNT, dask=TEXT, progress=FUNCTION)
 def calibrate(
     case,
     free: Mapping[str, Sequence[Any]],

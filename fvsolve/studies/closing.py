@@ -10,7 +10,7 @@ import numpy as np
 
 from fvsolve.case import Case, load
 from fvsolve.case.text import path
-from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean, gathered, listing
+from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean, listing
 from fvsolve.parts.schedule import Schedule
 from fvsolve.run import run
 from fvsolve.units import show
@@ -106,7 +106,7 @@ def optimise(
 
     faults: list[Fault] = []
     loaded = None
-    with gathered(faults):
+    with collect_faults(faults):
         loaded = load(case, dict(set or {}))
     faults += asked(loaded, key, minimise, knots, runs)
     if faults:
@@ -137,10 +137,10 @@ def asked(case: Case | None, key: str, minimise: str, knots: int, runs: int) -> 
             Fault("runs", f"{runs} are too few. Expected {fewest} or more for {fewest // len(STARTS) - 2} knots")
         )
     if case is not None:
-        with gathered(faults, f"--schedule {key}"):
+        with collect_faults(faults, f"--schedule {key}"):
             span_of(case, key)
         load_faults: list[Fault] = []
-        with gathered(load_faults):
+        with collect_faults(load_faults):
             load(case, {"expect": claim(minimise)})
         faults += [Fault(f"--minimise {minimise}", fault.message) for fault in load_faults]
     return faults

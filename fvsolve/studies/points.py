@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import jit
-from fvsolve.doors import PATH, Kind
 from fvsolve.errors import RunError
 from fvsolve.output.lock import let_go, locked
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import plain
 from fvsolve.steppers.tableau import METHODS, OWN
+from fvsolve.validation import PATH, Kind
 
 
 class Points:
@@ -120,13 +120,13 @@ def package_hash() -> str:
 
 def hashed(who: dict) -> str:
     """Hash of everything that a point depends on, with the sources of fvsolve, plugins and user-defined methods."""
-    who = who | {"package": package_hash(), "outside": sorted(jit.OUTSIDE.values())}
+    who = who | {"package": package_hash(), "outside": sorted(jit.EXTRA_FOLDERS.values())}
     text = json.dumps(who, sort_keys=True, default=str)
     arrays = [method.text for name, method in METHODS.items() if name not in OWN and f'"{name}"' in text]
     return hashlib.sha256("\n".join([text, *arrays]).encode()).hexdigest()[:24]
 
 
-OUT = Kind(lambda given: PATH.holds(given) or isinstance(given, Points), PATH.wanted)
+OUT = Kind(lambda given: PATH.accepts(given) or isinstance(given, Points), PATH.expected)
 
 
 def kept_in(out: str | Path | Points | None):

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import load
-from fvsolve.doors import AMOUNT, CALL, COUNT, PATH, TABLE, TEXT, door
+from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
-from fvsolve.shown import Shown
 from fvsolve.studies.plans import ranges
 from fvsolve.studies.sheet import Column, Plain, Sheet
 from fvsolve.studies.sweep import VARY, sweep
 from fvsolve.units import show
+from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, PATH, TABLE, TEXT, validated
 
 COLUMNS = ("S1", "S1_conf", "ST", "ST_conf", "mu_star", "mu_star_conf", "mu", "sigma")
 LEVELS = 4  # levels of the Morris grid
@@ -26,7 +26,7 @@ LEAST = 2  # least base sample size of Sobol
 
 
 @dataclass(frozen=True, repr=False)
-class Sensitivity(Shown, Plain):
+class Sensitivity(Displayable, Plain):
     """Sensitivity indices of every key.
 
     S1, ST : first-order and total index, the fraction of the variance of the outcome due to a key alone, and due to the
@@ -50,7 +50,7 @@ class Sensitivity(Shown, Plain):
 
     picture = "fvsolve.draw.sweep:sensitivity_figure"
 
-    def said(self) -> str:
+    def summary_line(self) -> str:
         strongest = max(range(len(self.keys)), key=lambda k: self.ST[k])
         return f"of {self.outcome} to {len(self.keys)} keys, {self.runs} runs: greatest for {self.keys[strongest]}"
 
@@ -60,11 +60,21 @@ class Sensitivity(Shown, Plain):
         rows = [{"key": key, **{name: getattr(self, name)[k] for name in COLUMNS}} for k, key in enumerate(self.keys)]
         return Sheet([Column("key"), *(Column(name, words=".4g") for name in COLUMNS)], rows)
 
-    def listed(self) -> dict[str, list]:
+    def table_columns(self) -> dict[str, list]:
         return self.sheet.listed()
 
 
-@door(vary=VARY, outcome=TEXT, samples=COUNT, seed=AMOUNT, set=TABLE, jobs=COUNT, dask=TEXT, out=PATH, progress=CALL)
+@validated(
+    vary=VARY,
+    outcome=TEXT,
+    samples=COUNT,
+    seed=COUNT_FROM_ZERO,
+    set=TABLE,
+    jobs=COUNT,
+    dask=TEXT,
+    out=PATH,
+    progress=FUNCTION,
+)
 def sensitivity(
     case,
     vary: Mapping[str, Sequence[Any]],

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import Case, load
-from fvsolve.errors import CaseError, Fault, FvsolveError, did_you_mean, gathered
+from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.result import FAILS
@@ -223,7 +223,7 @@ def size(
     """
     faults: list[Fault] = []
     loaded = None
-    with gathered(faults):
+    with collect_faults(faults):
         loaded = load(case, dict(set or {}))
     faults += asked(loaded, key, (low, high), goal, ties or {}, rtol)
     if faults:
@@ -249,12 +249,12 @@ def asked(
     if not 0.0 < rtol < 1.0:
         faults.append(Fault("rtol", f"{rtol} is out of range. Expected a number between 0 and 1"))
     count = len(faults)
-    with gathered(faults, f"--vary {key}"):
+    with collect_faults(faults, f"--vary {key}"):
         low, high, unit = ends(*span) if span else (0.0, 1.0, "")
         if case is not None and is_known(case.raw, key) and quantity_of(case.raw, key) is None:
             raise ValueError("has words or whole numbers as values, so it has no range. Use a sweep")
     for name, text in ties.items():
-        with gathered(faults, f"--dependent {name}"):
+        with collect_faults(faults, f"--dependent {name}"):
             Arithmetic(text)
             if name == key:
                 raise ValueError("is the key that is sized. Expected another key")
@@ -263,7 +263,7 @@ def asked(
         faults.append(Fault("", f"{case.name} {text}"))
     if case is not None and span and len(faults) == count + (not case.limits):
         run_faults: list[Fault] = []
-        with gathered(run_faults):
+        with collect_faults(run_faults):
             load(case, Sizing(case, key, unit, ties, None).keys(high if goal == "maximum" else low))
         options = {key: "--vary", **dict.fromkeys(ties, "--dependent")}
         faults += [Fault(f"{options[run_fault.place]} {run_fault.place}", run_fault.message)

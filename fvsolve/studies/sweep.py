@@ -15,17 +15,17 @@ from fvsolve.case import Case, load
 from fvsolve.case.load import named
 from fvsolve.case.raw import read_raw
 from fvsolve.case.text import inline
-from fvsolve.doors import AMOUNT, CALL, COUNT, PATH, ROW, SERIES, TABLE, TEXT, Kind, door
+from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
 from fvsolve.fluid.cache import coolprop
 from fvsolve.output.restart import programs
-from fvsolve.shown import Shown
 from fvsolve.studies.many import many
 from fvsolve.studies.plans import grid, of_file, refuse_unknown, sampled
 from fvsolve.studies.points import Points, hashed, writing
 from fvsolve.studies.row import REFUSED, RowMaker
 from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.units import show
+from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
 
 FIRST = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
 LAST = ("expectations", "verdicts", "steps", "seconds")
@@ -34,7 +34,7 @@ WORDS = ("title", "description", "source")  # keys of a case that do not change 
 
 
 @dataclass(frozen=True, repr=False)
-class Sweep(Shown):
+class Sweep(Displayable):
     """Results of a sweep, rows in the order of the values (last key fastest); a missing value is None.
 
     keys : the keys that vary
@@ -51,11 +51,11 @@ class Sweep(Shown):
 
     picture = "fvsolve.draw.objects:sweep_figure"
 
-    def said(self) -> str:
+    def summary_line(self) -> str:
         failed = sum(not row["ok"] for row in self.rows)
         return f"over {', '.join(self.keys)}: {len(self.rows)} runs, {failed} of them not ok"
 
-    def listed(self) -> dict[str, list]:
+    def table_columns(self) -> dict[str, list]:
         return Sheet([Column(name) for name in self.columns], self.rows).listed()
 
     @property
@@ -116,16 +116,26 @@ class Sweep(Shown):
 
 
 VARY = Kind(
-    lambda given: TABLE.holds(given) and all(ROW.holds(row) or SERIES.holds(row) for row in given.values()),
+    lambda given: TABLE.accepts(given) and all(ROW.accepts(row) or SERIES.accepts(row) for row in given.values()),
     'a table of lists, for example {"links.main.cells": [100, 200]}',
 )
 POINTS = Kind(
-    lambda given: PATH.holds(given) or (ROW.holds(given) and all(TABLE.holds(one) for one in given)),
+    lambda given: PATH.accepts(given) or (ROW.accepts(given) and all(TABLE.accepts(one) for one in given)),
     'the path of a CSV file, or a list of tables such as {"links.main.cells": 100}',
 )
 
 
-@door(vary=VARY, set=TABLE, jobs=COUNT, out=PATH, progress=CALL, points=POINTS, sample=TEXT, seed=AMOUNT, dask=TEXT)
+@validated(
+    vary=VARY,
+    set=TABLE,
+    jobs=COUNT,
+    out=PATH,
+    progress=FUNCTION,
+    points=POINTS,
+    sample=TEXT,
+    seed=COUNT_FROM_ZERO,
+    dask=TEXT,
+)
 def sweep(
     case,
     vary: Mapping[str, Sequence[Any]] | None = None,
@@ -165,7 +175,7 @@ def planned(source: Any, raw: dict, base: dict, vary: Mapping, points, sample: s
     if points is not None:
         if vary or sample:
             raise FvsolveError("points have all values of every run. Expected no vary and no sample in addition")
-        runs = of_file(Path(points), source, raw) if PATH.holds(points) else [dict(point) for point in points]
+        runs = of_file(Path(points), source, raw) if PATH.accepts(points) else [dict(point) for point in points]
         if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
             raise FvsolveError("points have different keys. Expected at least one key, with a value in every run")
         return runs

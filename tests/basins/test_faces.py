@@ -18,7 +18,7 @@ from fvsolve.basins import advection_faces
 from fvsolve.basins.free_surface import faces as shallow_faces
 from fvsolve.basins.liquid import faces as liquid_faces
 from fvsolve.basins.lower_mesh import lower_mesh
-from fvsolve.kernels.records import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
+from fvsolve.kernels.dtypes import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
 from fvsolve.mesh import Mesh, read, rectangle
 
 G, C, RHO = 9.8, 10.0, 1000.0

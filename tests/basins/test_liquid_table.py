@@ -18,7 +18,7 @@ from fvsolve.basins.liquid.lower_waves import Waves
 from fvsolve.errors import CaseError
 from fvsolve.fluid import Fluid, FluidTable
 from fvsolve.kernels import density as law
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 REST = 6e6
 FLUID = {"name": "CO2", "temperature": 280.0, "pressure": REST, "law": "table"}  # 519 m/s, at 300 bar 697 m/s

@@ -48,8 +48,8 @@ class Belt(Physics, name="belt"):
 """Rates of the cells of a belt, and what probes read there."""
 from fvsolve.basins.kinds import kind_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import CELL_FIELD, RATE
+from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.dtypes import CELL_FIELD, RATE
 
 MINE = kind_of(__package__)
 
@@ -82,7 +82,7 @@ def read(t, y, out, handle, values):
 """A belt lowered to rows of tables."""
 import numpy as np
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.kernels.phases import Pieces
+from fvsolve.kernels.rhs_assembly import Pieces
 
 class BeltRows(BasinRows):
     """One state a cell."""

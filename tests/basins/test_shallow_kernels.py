@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from fvsolve.basins.free_surface.friction import add_held_friction
 from fvsolve.basins.free_surface.grid import PLANS, WORK, grid_rates
 from fvsolve.basins.free_surface.smooth import put_push
-from fvsolve.kernels.records import DARCY, LINEAR, MANNING, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
+from fvsolve.kernels.dtypes import DARCY, LINEAR, MANNING, MINMOD, MONOTONIZED_CENTRAL, MUSCL, UPWIND, VAN_LEER, WENO5
 
 G = 9.80665
 SCHEMES = {"upwind": UPWIND, "muscl": MUSCL, "upwind5": LINEAR, "weno5": WENO5}

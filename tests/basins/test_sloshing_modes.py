@@ -172,10 +172,10 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
 
     def momentum(state):
         out = model.evaluate(state.t, state.y)[1]
-        from fvsolve.kernels.mechanism.observe import centre_of
-        from fvsolve.kernels.mechanism.room import row_of
+        from fvsolve.kernels.mechanism.body_layout import body_row
+        from fvsolve.kernels.mechanism.body_probes import centre_of
 
-        return sum(row["mass"] * centre_of(row, out, row_of(model.tables, k))[3] for k, row in enumerate(bodies))
+        return sum(row["mass"] * centre_of(row, out, body_row(model.tables, k))[3] for k, row in enumerate(bodies))
 
     first = advance(model, State(0.0, model.start.copy()), 0.5)
     last = advance(model, first, 3.0)

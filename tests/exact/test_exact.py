@@ -15,7 +15,7 @@ from fvsolve import exact
 from fvsolve.case import load
 from fvsolve.errors import CaseError
 from fvsolve.exact.solution import averages
-from fvsolve.kernels.schedules import value_until
+from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.run import model_of
 from fvsolve.studies.outcome import outcome
 from fvsolve.studies.truth import start_of
@@ -296,7 +296,9 @@ def test_schedules_have_the_values_that_kernels_read(schedule):
 
     index = int(model.tables.nodes[model.node_names.index("gate")]["schedule"])
     t = np.array([0.0, 0.1, 0.15, 0.2, 0.33, 0.5, 0.7])
-    read = [value_until(model.tables.schedules, model.tables.pieces, index, float(s), np.inf) / scenes.RHO for s in t]
+    read = [
+        value_with_limit(model.tables.schedules, model.tables.pieces, index, float(s), np.inf) / scenes.RHO for s in t
+    ]
     assert value(model.case.nodes["gate"].demand, t) == approx(read, abs=1e-14)
     assert value(model.case.nodes["gate"].demand, t - 1e-12) == approx(
         value(model.case.nodes["gate"].demand, t, left=True), abs=1e-9

@@ -15,7 +15,7 @@ from fvsolve.case.sections import FluidSpec
 from fvsolve.fluid import LAWS, properties
 from fvsolve.fluid.laws import DenseLaw, LinearLaw
 from fvsolve.kernels import density as kernels
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 AMBIENT, GRAVITY, REFERENCE = 98000.0, 9.81, 2e5
 GIVEN = {"mixture": {"air_fraction": 0.004}}  # what a law needs beside its name

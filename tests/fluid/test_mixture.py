@@ -16,7 +16,7 @@ from fvsolve.errors import CaseError
 from fvsolve.fluid import properties
 from fvsolve.fluid.laws import MixtureLaw
 from fvsolve.kernels import density as law
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.studies.energy.energy import energy
 
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.6e9, "viscosity": 0.04}

@@ -9,8 +9,8 @@ import pytest
 from reference.folders import CASES
 
 import fvsolve
-from fvsolve.kernels.handle import make_handle
-from fvsolve.kernels.phases import PHASES
+from fvsolve.kernels.rhs_assembly import PHASES
+from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model import Slate
 
 BANDED = ("answer", "rates")  # phases in which pipes write nothing that another reads

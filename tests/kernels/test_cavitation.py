@@ -14,7 +14,7 @@ from reference.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, va
 
 import fvsolve
 from fvsolve.errors import CaseError
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.dependence import sparsity
 from fvsolve.studies.energy.energy import energy
 

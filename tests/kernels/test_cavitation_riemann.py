@@ -10,7 +10,7 @@ from reference.orders import observed_order
 from reference.scenes import AMBIENT, junction, reservoir, scene, stiff_pipe
 
 import fvsolve
-from fvsolve.kernels.riemann import face_flux, side_at, star
+from fvsolve.kernels.riemann import face_flux, star_state, state_at
 
 AIR, FLOOR = 1.2e-3, 2000.0
 LENGTH, DIAMETER, START = 100.0, 0.5, 3e5
@@ -66,8 +66,8 @@ def test_the_state_between_the_waves_is_the_exact_one(fluid, speed, near):
     law = Mixture(fluid["density"], fluid["bulk_modulus"], AMBIENT, FLOOR, gas, float(pipe["compliance"]), EXACT.area)
     for left, right in random_states(np.random.default_rng(5), law, 200):
         p, v = Riemann(law, left, right).middle()
-        sides = side_at(st, floats, pipe, left[0]), side_at(st, floats, pipe, right[0])
-        middle, after, ahead = star(st, floats, pipe, sides[0], left[1], sides[1], right[1])
+        sides = state_at(st, floats, pipe, left[0]), state_at(st, floats, pipe, right[0])
+        middle, after, ahead = star_state(st, floats, pipe, sides[0], left[1], sides[1], right[1])
         assert middle[0] - FLOOR == pytest.approx(p - FLOOR, rel=10.0 * near)
         assert [after, ahead] == pytest.approx([v, v], abs=near * (1.0 + abs(v)))
 

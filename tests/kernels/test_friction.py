@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from fvsolve.kernels.friction import drag, power_of_square
-from fvsolve.kernels.pipes import rub_hazen
-from fvsolve.kernels.records import FRICTION_HAZEN
+from fvsolve.kernels.dtypes import FRICTION_HAZEN
+from fvsolve.kernels.pipes import subtract_friction_hazen
+from fvsolve.kernels.steady_friction import drag, power_of_square
 
 FLOWS = [*2.0 ** np.random.default_rng(5).uniform(-490.0, 490.0, 300), *np.linspace(0.99, 2.01, 103), 1e-150, 1e150]
 
@@ -44,7 +44,7 @@ def rubbed(flows, leans, loss=0.0, rough=1.0):
     forward, backward = np.array(flows, dtype=float), np.zeros(len(flows))
     dr, dl = np.array(leans, dtype=float), np.zeros(len(flows))
     before = dr.copy()
-    rub_hazen(
+    subtract_friction_hazen(
         0.5, 0.0, loss, rough, 0.0, forward, backward, dr, dl
     )  # lean = 2 GAUSS (dr + dl): leans are half differences
     assert before - dr == pytest.approx(dl, rel=1e-9)
@@ -78,6 +78,6 @@ def test_a_mirrored_pipe_rubs_the_same_to_the_bit():
     rng = np.random.default_rng(2)
     ahead = list(rng.normal(size=(4, 47)))  # both waves, then their rates
     mirrored = [ahead[k][::-1].copy() for k in (1, 0, 3, 2)]
-    rub_hazen(0.7, 0.2, 0.3, 1.7, 0.1, *ahead)
-    rub_hazen(0.7, -0.2, 0.3, 1.7, -0.1, *mirrored)
+    subtract_friction_hazen(0.7, 0.2, 0.3, 1.7, 0.1, *ahead)
+    subtract_friction_hazen(0.7, -0.2, 0.3, 1.7, -0.1, *mirrored)
     assert np.array_equal(ahead[2], mirrored[3][::-1]) and np.array_equal(ahead[3], mirrored[2][::-1])

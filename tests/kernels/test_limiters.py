@@ -12,8 +12,8 @@ from fvsolve.basins import second_order
 from fvsolve.basins.free_surface import rows as shallow_rows
 from fvsolve.basins.liquid import grid as liquid
 from fvsolve.basins.liquid import grid_full as liquid_log
-from fvsolve.kernels import limiters, reconstruction, scalars
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels import limiters, reconstruction, scalar_transport
 from fvsolve.kernels.limiters import by_limiter, limited
 from fvsolve.model.schemes import CODES
 
@@ -35,7 +35,7 @@ def pipe_faces(code: int, backward: int) -> np.ndarray:
 
 def pipe_scalars(code: int) -> np.ndarray:
     found = np.zeros(CELLS)
-    by_limiter(scalars.inner_slopes, code, waves(1)[0], found)
+    by_limiter(scalar_transport.inner_slopes, code, waves(1)[0], found)
     return found[1:-1]
 
 
@@ -109,7 +109,7 @@ def test_a_pair_of_halves_is_two_slopes():
     a, b, c, d = (row - 2.0 for row in waves(4))
     for limiter in (limiters.minmod, limiters.van_leer, limiters.monotonized_central):
         for four in zip(a, b, c, d, strict=True):
-            one, two = limiters.halves(limiter, *four)
+            one, two = limiters.half_slopes(limiter, *four)
             assert one == pytest.approx(0.5 * limiters.slope(limiter, *four[:2]), rel=1e-15)
             assert two == pytest.approx(0.5 * limiters.slope(limiter, *four[2:]), rel=1e-15)
 

@@ -8,8 +8,8 @@ from reference.scenes import GRAVITY, scene
 from reference.trees import pinocchio_of, random_tree
 
 import fvsolve
-from fvsolve.kernels.mechanism.room import ACCELERATION, ATTITUDE, PLACE, TURNING
-from fvsolve.kernels.records import BODY_OUT
+from fvsolve.kernels.dtypes import BODY_OUT
+from fvsolve.kernels.mechanism.body_layout import ACCELERATION, ATTITUDE, POSITION, SPIN_RATE
 from fvsolve.model import Slate
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.model.statics import factored
@@ -41,9 +41,9 @@ def test_forward_dynamics_of_random_trees_are_those_of_pinocchio(many, first, se
         placed, here = data.oMi[k + 1], row(model, out, name)
         moved = pin.getClassicalAcceleration(peer, data, k + 1, pin.LOCAL_WORLD_ALIGNED)
         assert here[ATTITUDE : ATTITUDE + 9].reshape(3, 3) == pytest.approx(placed.rotation, abs=1e-13)
-        assert here[PLACE : PLACE + 3] == pytest.approx(placed.translation, abs=1e-13 * many)
+        assert here[POSITION : POSITION + 3] == pytest.approx(placed.translation, abs=1e-13 * many)
         assert here[ACCELERATION : ACCELERATION + 3] == pytest.approx(moved.linear, abs=1e-12 * scale)
-        assert here[TURNING : TURNING + 3] == pytest.approx(moved.angular, abs=1e-12 * scale)
+        assert here[SPIN_RATE : SPIN_RATE + 3] == pytest.approx(moved.angular, abs=1e-12 * scale)
 
 
 def branch(tree: dict, on: str | None = None) -> dict:

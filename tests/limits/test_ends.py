@@ -13,7 +13,7 @@ from fvsolve.limits.ends import pipe_limit
 from fvsolve.limits.grid import advection_limit
 from fvsolve.limits.step import step_limits
 from fvsolve.limits.symbol import WEIGHTS
-from fvsolve.schemes import SCHEMES, quicker
+from fvsolve.schemes import SCHEMES, end_rate_factor
 
 STAGES = {"ssp-rk3": 3, "rk4": 4}
 LENGTH, SPEED = 100.0, 1000.0
@@ -60,8 +60,8 @@ def test_the_factor_is_what_the_ends_ask_for_and_no_more(scheme):
     inside = 0.9 * min(1.0, advection_limit(scheme, "ssp-rk3").limit)
     for cells in range(1, 13):
         asked = max(1.0, inside / courant_limit(scheme, cells, "ssp-rk3"))
-        assert asked <= quicker(scheme, cells) <= asked * 1.06, cells
-        assert inside / quicker(scheme, cells) <= courant_limit(scheme, cells, "rk4")
+        assert asked <= end_rate_factor(scheme, cells) <= asked * 1.06, cells
+        assert inside / end_rate_factor(scheme, cells) <= courant_limit(scheme, cells, "rk4")
 
 
 @pytest.mark.parametrize("scheme", WEIGHTS)
@@ -129,8 +129,8 @@ def test_a_proved_limit_is_one_of_few_cells_too_grown_or_not(cells, turned):
 
 
 def test_upwind_keeps_its_step_so_that_courant_one_stays_exact():
-    assert not SCHEMES["upwind"].quicker
-    assert all(quicker("upwind", cells) == 1.0 for cells in range(1, 20))
+    assert not SCHEMES["upwind"].end_factors
+    assert all(end_rate_factor("upwind", cells) == 1.0 for cells in range(1, 20))
 
 
 @pytest.mark.parametrize("method", ["ssp-rk3", "rk4"])

@@ -12,7 +12,7 @@ from fvsolve import run
 from fvsolve.case.load import load
 from fvsolve.errors import CaseError
 from fvsolve.exact.schedule import value
-from fvsolve.kernels.schedules import piece_slopes, piece_value
+from fvsolve.kernels.schedule_pieces import piece_slopes, piece_value
 from fvsolve.model.schedules import Schedules
 from fvsolve.parts.schedule import Schedule
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.basins import advection, diffusion
 from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.mesh import rectangle
 
 SCHEMES = {

@@ -12,8 +12,8 @@ from reference.scenes import WATER, chamber, junction, pipe, reservoir, scene, t
 
 import fvsolve
 from fvsolve.jit import COMPILING
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.phases import PHASES
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.rhs_assembly import PHASES
 from fvsolve.model import Slate
 from fvsolve.solve.loop import Loop
 from fvsolve.steppers import slots

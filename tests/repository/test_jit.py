@@ -161,7 +161,7 @@ def test_old_generations_are_deleted_and_the_newest_few_kept(package):
     for generation in range(6):
         (package / "units.py").write_text(f"GENERATION = {generation}\n")
         python(package, "from fvsolve import jit; jit.code_folder()")
-    assert len(list((package.parent / "cache" / "code").iterdir())) == jit.KEPT + 1
+    assert len(list((package.parent / "cache" / "code").iterdir())) == jit.KEPT_GENERATIONS + 1
 
 
 def test_without_jit_the_plain_function_comes_back_and_numba_stays_away(package):

@@ -128,7 +128,7 @@ def test_the_first_run_on_a_machine_says_that_it_compiles(fvs, tmp_path, monkeyp
     from fvsolve.cli import app
 
     app._tell_of_compiling.cache_clear()
-    monkeypatch.setattr(jit, "cold", lambda: True)
+    monkeypatch.setattr(jit, "is_cold", lambda: True)
     assert "compiles" in fvs("check", CASE)[2]
     assert "compiles" not in fvs("check", CASE)[2]
 

@@ -7,10 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.limiters import limited
 from fvsolve.model.schemes import CODES, FAMILIES, family
-from fvsolve.schemes import LIMITED, LINEAR, ROOM, SCHEMES, Scheme
+from fvsolve.schemes import LEAST_CELLS, LIMITED, LINEAR, SCHEMES, Scheme
 
 KNOWN = {  # order, reach, in the plane on rectangles, with cavities
     "upwind": (1, (1, 0, 0, 1), "upwind", True),
@@ -31,8 +31,8 @@ def test_every_scheme_is_known():
 @pytest.mark.parametrize("name", KNOWN)
 def test_facts_of_a_scheme_are_those_of_its_weights(name):
     one = SCHEMES[name]
-    assert (one.order, tuple(one.reach), one.on(True).name, one.cavities) == KNOWN[name]
-    assert one.on(False).name == ("upwind" if name == "upwind" else "muscl")
+    assert (one.order, tuple(one.reach), one.for_basin(True).name, one.cavities) == KNOWN[name]
+    assert one.for_basin(False).name == ("upwind" if name == "upwind" else "muscl")
     assert one.smooth is (SCHEMES[one.twin] if one.limited else one)
     assert family(name) == (rec.UPWIND if name == "upwind" else rec.LINEAR if name in LINEAR else FAMILIES[name])
 
@@ -56,7 +56,7 @@ def test_a_scheme_is_one_entry():
 def test_shorter_schemes_have_room():
     """What pipes of fewer cells take is of lower order, and those that need it look at five cells."""
     for one in SCHEMES.values():
-        assert bool(one.shorter) == (one.degree + 1 >= ROOM)
+        assert bool(one.shorter) == (one.degree + 1 >= LEAST_CELLS)
         assert not one.shorter or SCHEMES[one.shorter].order < one.order
 
 

@@ -13,7 +13,7 @@ from reference.scenes import reservoir, scene
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import joint
+from fvsolve.kernels import band_exchange
 from fvsolve.output.memory import MemorySink
 from fvsolve.solve import initial_state
 from fvsolve.solve.bands import alone, shared
@@ -203,7 +203,7 @@ def test_a_row_that_is_not_taken_from_a_neighbour_is_seen(threads):
     """So that equal bits say something: every row that is taken matters."""
 
     def forget(team):
-        team.members[1].written.joint[joint.STATES] -= 1
+        team.members[1].written.joint[band_exchange.STATES] -= 1
 
     case = water(basin={"patches": {}}, link=None)
     whole = stepped(case, 1)
@@ -216,8 +216,10 @@ def test_bands_that_do_not_wait_for_each_other_are_seen():
 
     def race(team):
         for member in team.members:
-            member.written.joint[joint.MANY] = 1
-            team.board.view(np.int64)[joint.LINE * member.number + joint.SHOWN] = member.stepper.y.ctypes.data
+            member.written.joint[band_exchange.BAND_COUNT] = 1
+            team.board.view(np.int64)[band_exchange.LINE * member.number + band_exchange.SHARED_ADDRESS] = (
+                member.stepper.y.ctypes.data
+            )
 
     case = water(basin={"patches": {}, "cells": [40, 40]}, link=None, step=1e-3)
     whole = stepped(case, 1)

@@ -11,8 +11,8 @@ from fvsolve.basins.free_surface.friction import drag_per_flow
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.kinds import kind_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import NO_DRAG
+from fvsolve.kernels.dtypes import NO_DRAG
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 

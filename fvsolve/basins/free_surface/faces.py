@@ -29,7 +29,7 @@ from fvsolve.basins.faces import (
 )
 from fvsolve.basins.stretch import swell
 from fvsolve.jit import njit
-from fvsolve.kernels.records import UPWIND
+from fvsolve.kernels.dtypes import UPWIND
 
 DEPTH, SURFACE, PLANS = 0, 1, 2  # rows of plan: depth of the profile, its surface above the level
 THIN = 1e-6  # depth below which velocities fade to zero [m]

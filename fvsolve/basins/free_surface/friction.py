@@ -9,7 +9,7 @@ from math import sqrt
 
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.jit import njit
-from fvsolve.kernels.records import MANNING
+from fvsolve.kernels.dtypes import MANNING
 
 FASTEST = 20.0  # [1/s]
 LEAST = 1e-300

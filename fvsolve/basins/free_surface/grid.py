@@ -40,7 +40,7 @@ from fvsolve.basins.free_surface.smooth import put_smooth
 from fvsolve.basins.patches import put_inward
 from fvsolve.basins.stretch import fill
 from fvsolve.jit import njit
-from fvsolve.kernels.records import LINEAR, WENO5
+from fvsolve.kernels.dtypes import LINEAR, WENO5
 
 __all__ = ["PLANS", "WORK", "grid_rates"]
 

@@ -17,14 +17,14 @@ from fvsolve.basins.lower_pieces import MARKED, TURNING
 from fvsolve.case.cells import means, samples
 from fvsolve.case.riding import free_joints
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.phases import Pieces
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.rhs_assembly import RhsTerms
 from fvsolve.steppers.analysis.monotone import in_euler_steps
 from fvsolve.steppers.methods import AUTO, METHODS
 
 HOME = __package__
-WATER = Pieces(
-    home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_water",
+WATER = RhsTerms(
+    package=HOME, prepare="patches: patch_pressures", boundary_inflow="patches: patch_flows", observe="observe: observe_water",
     power="energy: add_power", stored="energy: add_stored",
 )  # fmt: skip
 SCALE = 0.1  # [m] of depth
@@ -64,19 +64,21 @@ class FreeSurfaceRows(BasinRows):
         self.bed = self.formula(self.part.bed)
         self.depth = np.maximum(self.part.level - self.bed, 0.0)
 
-    def pieces(self, valves: bool) -> Iterator[Pieces]:
+    def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         kind = "grids" if self.is_grid else "meshes"
-        yield Pieces(home=HOME, rates=f"moving: rates_on_moving_{kind}" if self.moves else f"rates: rates_on_{kind}")
+        yield RhsTerms(
+            package=HOME, rates=f"moving: rates_on_moving_{kind}" if self.moves else f"rates: rates_on_{kind}"
+        )
         yield WATER
         if self.part.on is not None:
             yield TURNING
         if self.damped:
-            yield Pieces(home=HOME, damp="rates: damp_stages")
+            yield RhsTerms(package=HOME, damp="rates: damp_stages")
         if self.moves:
-            yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
+            yield RhsTerms(package=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED
         if valves:
-            yield Pieces(home=HOME, brake="patches: quickest_inflow")
+            yield RhsTerms(package=HOME, rate_limits="patches: quickest_inflow")
 
     @property
     def sums_rows(self) -> bool:

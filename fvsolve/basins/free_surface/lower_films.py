@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.basins.free_surface.friction import FASTEST, add_friction
 from fvsolve.basins.free_surface.lower_watch import Watch
 from fvsolve.errors import Notice
-from fvsolve.kernels.records import DARCY, MANNING
+from fvsolve.kernels.dtypes import DARCY, MANNING
 
 DRY = 1e-4  # depth [m] below which water is ignored here
 WRONG = 0.005  # relative error of the speed above which there is a notice

@@ -5,7 +5,7 @@ from fvsolve.basins.energy import at_rest, row_of
 from fvsolve.basins.free_surface.rates import MINE, on_grid, on_mesh
 from fvsolve.basins.walls import moves_of, widening
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)

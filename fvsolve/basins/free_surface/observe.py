@@ -4,8 +4,8 @@ from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.observe import OWN, of_velocity
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import CELL_FIELD
+from fvsolve.kernels.dtypes import CELL_FIELD
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 DEPTH = OWN

@@ -19,9 +19,9 @@ from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import give_way, weight_of
 from fvsolve.basins.stretch import seen_of, stretched
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import GN, PATCH, RATE
+from fvsolve.kernels.dtypes import GN, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 
@@ -86,7 +86,7 @@ def patch_pressures(t, y, dydt, out, handle):
             pressure = st["rho"] * weight_beyond(tables.plane, basin, patch, stored, depth)
         out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
-        out[layout["had"] + node["row"]] = to_be_had(depth)
+        out[layout["outflow_fraction"] + node["row"]] = to_be_had(depth)
         out[layout["stiffness"] + node["row"]] = slope * spread / content
 
 

@@ -9,9 +9,19 @@ from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import book_open, wanted, weight_of
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import NO_DRAG, RATE
-from fvsolve.kernels.sums import BOTH, CELLS, LOOK, MODE, OFF, asked, form, form_looked_at, look
+from fvsolve.kernels.dtypes import NO_DRAG, RATE
+from fvsolve.kernels.stage_sums import (
+    CELLS,
+    CHECK,
+    MODE,
+    OFF,
+    STAGE_AND_END,
+    check_rows,
+    form_checked_runs,
+    form_rows,
+    requested_mode,
+)
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 
@@ -90,10 +100,10 @@ def finish_block(tables, b, row, block_stop, first, last, y, rates, out):
             rub(tables, b, nx * j + first, nx * j + last, y, rates, out)
     for q in range(3):
         at = basin["y"] + q * basin["n"]
-        if sums[MODE] == LOOK:
-            look(sums, y, at, nx, row, block_stop, first, last)
-        elif sums[MODE] == BOTH:  # ghosts of the previous columns were read from the stage
-            form(sums, True, at, nx, row, block_stop, max(first - grid.GHOSTS, 0), last)
+        if sums[MODE] == CHECK:
+            check_rows(sums, y, at, nx, row, block_stop, first, last)
+        elif sums[MODE] == STAGE_AND_END:  # ghosts of the previous columns were read from the stage
+            form_rows(sums, True, at, nx, row, block_stop, max(first - grid.GHOSTS, 0), last)
 
 
 @njit
@@ -108,8 +118,8 @@ def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y,
         for row in range(begin, stop, rows):
             block_stop = min(row + rows, stop)
             ahead = min(block_stop + grid.REACH, stop)
-            for q in range(3 if tables.sums[MODE] != LOOK else 0):
-                form(tables.sums, False, basin["y"] + q * n, nx, formed_ahead, ahead, left, right)
+            for q in range(3 if tables.sums[MODE] != CHECK else 0):
+                form_rows(tables.sums, False, basin["y"] + q * n, nx, formed_ahead, ahead, left, right)
             formed_ahead = ahead
             rate = grid.column_rates(
                 g, basin["scheme"], basin["limiter"], nx, ny, row, block_stop, row == begin, first, last, kx, ky,
@@ -118,8 +128,8 @@ def by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, through, work, y,
             )  # fmt: skip
             most = max(most, rate)
             finish_block(tables, b, row, block_stop, first, last, y, rates, out)
-    if tables.sums[MODE] == BOTH:
-        form_looked_at(tables.sums)
+    if tables.sums[MODE] == STAGE_AND_END:
+        form_checked_runs(tables.sums)
     return most
 
 
@@ -134,11 +144,11 @@ def on_grid(tables, b, y, dydt, out, moves):
     if f >= 0:  # needed for scalars
         flow_x, flow_y = work[f : f + count], work[f + count : f + count + (ny + 1) * nx]
     dh, qx, qy = y[o : o + n], y[o + n : o + 2 * n], y[o + 2 * n : o + 3 * n]
-    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
+    to, first = (dydt, o) if dydt.size > 0 else (work, basin["boundary_rates"])
     rates = to[first : first + 3 * n]
     kx, ky, passing = plane[k : k + nx], plane[k + nx : k + nx + ny], work[through : through + basin["outer_given"]]
     reflect, scratch = plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], work[basin["work"] :]
-    if moves is None and asked(tables, b) != OFF:
+    if moves is None and requested_mode(tables, b) != OFF:
         rate = by_blocks(tables, b, g, kx, ky, reflect, plan, dh, qx, qy, passing, scratch, y, rates, out)
         finish_water(tables, b, rate, out)
         return
@@ -174,7 +184,7 @@ def on_mesh(tables, b, y, dydt, out, moves):
     n, o, at, f, through = basin["n"], basin["y"], basin["plan"], basin["flows"], basin["through"]
     plan, seen = plane[at : at + grid.PLANS * n].reshape((grid.PLANS, n)), seen_of(basin, tables.seen, y)
     dh, qx, qy = seen[o : o + n], seen[o + n : o + 2 * n], seen[o + 2 * n : o + 3 * n]
-    to, first = (dydt, o) if dydt.size > 0 else (work, basin["unused"])
+    to, first = (dydt, o) if dydt.size > 0 else (work, basin["boundary_rates"])
     rates = to[first : first + 3 * n]
     flow = work[:0]
     if f >= 0:  # needed for scalars

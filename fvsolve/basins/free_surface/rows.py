@@ -8,9 +8,9 @@ momentum minus the pressure on the side before and on the side after, and of tan
 
 from math import sqrt
 
-from fvsolve.jit import inner, njit
-from fvsolve.kernels.limiters import by_limiter, halves
-from fvsolve.kernels.records import UPWIND
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import UPWIND
+from fvsolve.kernels.limiters import by_limiter, half_slopes
 
 THIN = 1e-6  # depth below which velocities fade to zero [m]
 TINY = 1e-300
@@ -23,7 +23,7 @@ MASS, BEFORE, AFTER, ALONG = (k * STRIDE for k in range(4))
 FIELDS, SIDES, FLUXES = 7, 11, 4  # rows of a block
 
 
-@inner
+@inline
 def put_cells(g, depth0, surface0, dh, qx, qy, kx, ky, factors, cells, top):
     """Depth, surface, velocities and wave speed of a row; top[i] becomes the greatest rate of its column so far.
 
@@ -102,7 +102,7 @@ def put_beyond(n, fields, walls, last, mirror, cells):
                 p[i] = walls[i] * sign * b[i] + (1.0 - walls[i]) * a[i]
 
 
-@inner
+@inline
 def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
     """Values at both faces of cell i and depth times the rise of its surface."""
     sides[i], sides[i + SURFACE], sides[i + EAST], sides[i + NORTH] = hl, el, ul, vl
@@ -110,13 +110,15 @@ def put_side(i, hl, el, ul, vl, hr, er, ur, vr, push, sides):
     sides[i + PUSH] = push
 
 
-@inner
+@inline
 def put_sloped(limiter, n, before, here, after, sides):
     """`put_limited` with a limiter."""
     for i in range(n):
         h, e, u, v = here[i], here[i + SURFACE], here[i + EAST], here[i + NORTH]
-        a, b = halves(limiter, h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
-        c, d = halves(limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v)
+        a, b = half_slopes(limiter, h - before[i], after[i] - h, e - before[i + SURFACE], after[i + SURFACE] - e)
+        c, d = half_slopes(
+            limiter, u - before[i + EAST], after[i + EAST] - u, v - before[i + NORTH], after[i + NORTH] - v
+        )
         put_side(i, h - a, e - b, u - c, v - d, h + a, e + b, u + c, v + d, h * (2.0 * b), sides)
 
 
@@ -131,7 +133,7 @@ def put_limited(scheme, limiter, n, before, here, after, sides):
         by_limiter(put_sloped, limiter, n, before, here, after, sides)
 
 
-@inner
+@inline
 def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
     """Fluxes through a row of n faces (HLLC); tangential momentum is carried with the mass by the contact wave.
 
@@ -161,7 +163,7 @@ def put_fluxes(g, n, normal, along, left, right, l, r, f, moves):
         f[i + ALONG] = mass * (tl if mass > 0.0 else tr)
 
 
-@inner
+@inline
 def put_rates(g, kx, ky, push_x, push_y, x, south, north, wide, dh, dx, dy):
     """Rates of a row: fluxes in minus fluxes out, and the force of surface and pressure.
 

@@ -9,8 +9,8 @@ from math import sqrt
 
 from fvsolve.basins.free_surface.rows import EAST, FLOW_EAST, HIGH, NORTH, PUSH, STRIDE, SURFACE, THIN, WAVE
 from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import WENO5
 from fvsolve.kernels.reconstruction import value_weno5
-from fvsolve.kernels.records import WENO5
 
 SMALL = 1e-20  # squares of differences below which WENO's weights are its linear weights [m2, m4/s2]
 STEEP = 0.5  # shallowest of five depths over the deepest, below which values are limited

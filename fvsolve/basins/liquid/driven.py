@@ -4,7 +4,7 @@ A wall that moves outward at `speed` reflects waves so that the velocity at the 
 mass flow is m = speed (rho + r), so that no mass passes. Waves are c r and m, or w and u if `full`, see `grid_linear`.
 """
 
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
 
 BEYOND = 3  # number of ghost cells beyond a side
 
@@ -58,7 +58,7 @@ def feel_full(push, n, thrust, mass, along):
         thrust[i], mass[i], along[i] = push[i], 0.0, 0.0
 
 
-@inner
+@inline
 def sweep(c, rho, speeds, step, forward, backward):
     """Fluxes of mass and momentum from waves at faces, minus the content swept by the faces.
 
@@ -70,7 +70,7 @@ def sweep(c, rho, speeds, step, forward, backward):
         forward[i], backward[i] = m - speed * (rho + per * x), c * x - speed * m
 
 
-@inner
+@inline
 def settle_row(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
     """Rates of a row of cells from faces i and i + 1; momentum along faces is not carried by moving faces."""
     m, p, last = mass[1:], push[1:], rate_r.size - 1
@@ -86,7 +86,7 @@ def settle_row(k, speeds, mass, push, along, rate_r, rate_m, rate_t):
         rate_t[i] = 0.5 * k[i] * (speeds[i + 1] * high - speeds[i] * low)
 
 
-@inner
+@inline
 def settle_column(k, s0, s1, m0, p0, m1, p1, before, here, after, rate_r, rate_m, rate_t):
     """Add the rates of a row of cells between two rows of faces.
 

@@ -7,7 +7,7 @@ see `basin_energy`.
 from fvsolve.basins.energy import at_rest, row_of
 from fvsolve.basins.kinds import kind_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 

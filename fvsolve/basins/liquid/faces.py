@@ -31,7 +31,7 @@ from fvsolve.basins.liquid.grid_full import log_near, log_sum, raise_row, stiffn
 from fvsolve.basins.liquid.waves import invariant, lowered, state
 from fvsolve.basins.stretch import swell
 from fvsolve.jit import njit
-from fvsolve.kernels.records import LAW_LOG, UPWIND
+from fvsolve.kernels.dtypes import LAW_LOG, UPWIND
 
 # Rows of BLOCK in the scratch of a block: values beyond, rates, sum for the step, flow through the side.
 _U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE, _MASS = (k * BLOCK for k in range(1, 11))

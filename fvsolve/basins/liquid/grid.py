@@ -10,11 +10,11 @@ read once: for its own faces, then for those towards the rows before it; the wav
 from fvsolve.basins.liquid import driven
 from fvsolve.basins.liquid.driven import BEYOND, drive_row, feel, mirror_driven, send_driven, sweep
 from fvsolve.basins.stretch import swell_row
-from fvsolve.jit import inner, njit
-from fvsolve.kernels.ends import entering_cells, leaving_cells
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import LINEAR, MUSCL, UPWIND, WENO5
+from fvsolve.kernels.ghost_cells import entering_ghosts, leaving_ghosts
 from fvsolve.kernels.limiters import by_limiter, slope
 from fvsolve.kernels.reconstruction import value_muscl, value_weno5
-from fvsolve.kernels.records import LINEAR, MUSCL, UPWIND, WENO5
 
 WALLS, MIRRORS, OPEN = 0, 1, 2  # kinds of sides
 RING = 8  # stored rows of waves: the six of the stencil of a row of faces, and space for all three beyond a side
@@ -29,7 +29,7 @@ def value_upwind5(a, b, c, d, e):
     return ((2.0 * a - 13.0 * b) + (47.0 * c + 27.0 * d) - 3.0 * e) * (1.0 / 60.0)
 
 
-@inner
+@inline
 def faces_limited(limiter, b, c, d, f):
     """Values at faces after cells c with a limiter."""
     for i in range(f.size):
@@ -83,7 +83,7 @@ def image(j, n):
     return j % (2 * n) >= n
 
 
-@inner
+@inline
 def mirror(n, forward, backward):
     """Fill three values beyond either end of [3 : n + 3] of two waves: each mirrors the opposite wave."""
     for k in range(BEYOND):
@@ -112,7 +112,7 @@ def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, firs
         return
     degree = 0 if scheme == UPWIND else 4
     a, b, c = outgoing[2], outgoing[1], outgoing[0]
-    leaving_cells(outgoing, n, scheme, degree, limiter, small, ghosts)
+    leaving_ghosts(outgoing, n, scheme, degree, limiter, small, ghosts)
     for k in range(BEYOND):
         leaving[first - step * (k + 1)] = ghosts[k]
     datum = c
@@ -122,7 +122,7 @@ def close_side(kind, scheme, limiter, small, reflect, n, entering, leaving, firs
         datum = value_weno5(a, b, c, ghosts[0], ghosts[1], small)
     elif scheme == MUSCL:
         datum = value_muscl(limiter, b, c, ghosts[0])
-    entering_cells(incoming, n, scheme, degree, reflect * datum, small, ghosts)
+    entering_ghosts(incoming, n, scheme, degree, reflect * datum, small, ghosts)
     for k in range(BEYOND):
         entering[first - step * (k + 1)] = ghosts[k]
 
@@ -142,21 +142,21 @@ def close_row(kind, scheme, limiter, small, reflect, n, entering, leaving, first
             entering[at], leaving[at] = incoming[BEYOND - 1 - k], outgoing[BEYOND - 1 - k]
 
 
-@inner
+@inline
 def send_back(reflect, leaving, entering):
     """Incoming waves at the faces of a side: outgoing waves times the reflection coefficients."""
     for i in range(entering.size):
         entering[i] = reflect[i] * leaving[i]
 
 
-@inner
+@inline
 def put_inward(k, entering, leaving, inward):
     """Inward flows through the faces of a side, from waves. k : 1 / lengths of faces"""
     for i in range(inward.size):
         inward[i] = (entering[i] - leaving[i]) / k[i]
 
 
-@inner
+@inline
 def put_waves(half, r, m, forward, backward):
     """Both waves of a row of cells. half : c / 2"""
     for i in range(r.size):
@@ -164,7 +164,7 @@ def put_waves(half, r, m, forward, backward):
         forward[i], backward[i] = a + b, a - b
 
 
-@inner
+@inline
 def settle_row(c, k, forward, backward, rate_r, rate_m, rate_t):
     """Rates of a row of cells from faces i and i + 1."""
     f, b = forward[1:], backward[1:]
@@ -174,7 +174,7 @@ def settle_row(c, k, forward, backward, rate_r, rate_m, rate_t):
         rate_t[i] = 0.0
 
 
-@inner
+@inline
 def settle_column(c, k, f0, b0, f1, b1, rate_r, rate_m):
     """Add the rates of a row of cells between two rows of faces."""
     ck = c * k

@@ -34,10 +34,10 @@ from fvsolve.basins.liquid.grid import (
 from fvsolve.basins.liquid.waves import invariant, lowered, state
 from fvsolve.basins.patches import put_inward
 from fvsolve.basins.stretch import swell_row
-from fvsolve.jit import inner, njit
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import LINEAR, UPWIND, WENO5
 from fvsolve.kernels.limiters import by_limiter, slope
 from fvsolve.kernels.reconstruction import value_weno5
-from fvsolve.kernels.records import LINEAR, UPWIND, WENO5
 
 
 @njit(forceinline=True)
@@ -55,7 +55,7 @@ def log_sum(y):
     return 8.0 * t * (1.0 + z * (1.0 / 3.0 + z * p))
 
 
-@inner
+@inline
 def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
     """w and both velocities of a row [m/s]; top[i] the greatest (|u| + c) kx + (|v| + c) ky so far."""
     if table is not None:
@@ -79,7 +79,7 @@ def put_primitives(c0, rho, table, kx, ky, r, mx, my, w, u, v, top):
         top[i] = rate if rate > top[i] else top[i]
 
 
-@inner
+@inline
 def raise_row(c0, rho, table, phi, w):
     """Subtract a potential from the invariants of a row: those of a liquid at rest are then uniform."""
     for i in range(w.size):
@@ -103,7 +103,7 @@ def stiffness(c0, rho, table, r):
     return 1.0 / (c * c), (rho + r) * c * c
 
 
-@inner
+@inline
 def hold_row(c0, rho, table, k, step, r, phi, low, high, rate):
     """Subtract from the rates of a row of cells the pressures that would keep them at rest, at both faces.
 
@@ -114,7 +114,7 @@ def hold_row(c0, rho, table, k, step, r, phi, low, high, rate):
         rate[i] += k[step * i] * bulk * (log_near(per * (low[i] - phi[i])) - log_near(per * (high[i] - phi[i])))
 
 
-@inner
+@inline
 def carried_limited(limiter, forward, backward, b, c, d, e, f):
     """`faces_carried` with a limiter."""
     for i in range(f.size):
@@ -144,7 +144,7 @@ def faces_carried(scheme, limiter, small, forward, backward, a, b, c, d, e, g, f
         by_limiter(carried_limited, limiter, forward, backward, b, c, d, e, f)
 
 
-@inner
+@inline
 def fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
     """Convert waves and tangential velocity at faces to fluxes of mass, of normal and of tangential momentum.
 
@@ -174,14 +174,14 @@ def fluxes(c0, rho, table, forward, backward, along, speeds, step, phi):
         along[i] = mass * along[i]
 
 
-@inner
+@inline
 def follow(speeds, step, forward, seen):
     """Forward waves minus the speeds of moving faces, for the upwind side relative to the face."""
     for i in range(seen.size):
         seen[i] = forward[i] - speeds[step * i]
 
 
-@inner
+@inline
 def settle_row(k, mass, push, along, rate_r, rate_m, rate_t):
     """Rates of a row of cells from faces i and i + 1."""
     m, p, t = mass[1:], push[1:], along[1:]
@@ -191,7 +191,7 @@ def settle_row(k, mass, push, along, rate_r, rate_m, rate_t):
         rate_t[i] = k[i] * (along[i] - t[i])
 
 
-@inner
+@inline
 def settle_column(k, m0, p0, t0, m1, p1, t1, rate_r, rate_m, rate_t):
     """Add the rates of a row of cells between two rows of faces."""
     for i in range(rate_r.size):

@@ -11,11 +11,11 @@ from fvsolve.basins.liquid import faces, grid, grid_full
 from fvsolve.basins.liquid.observe import PRESSURE
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.basins.lower_pieces import MARKED, TURNING
-from fvsolve.kernels.phases import Pieces
+from fvsolve.kernels.rhs_assembly import RhsTerms
 
 HOME = __package__
-LIQUID = Pieces(
-    home=HOME, prepare="patches: patch_pressures", enter="patches: patch_flows", observe="observe: observe_liquid",
+LIQUID = RhsTerms(
+    package=HOME, prepare="patches: patch_pressures", boundary_inflow="patches: patch_flows", observe="observe: observe_liquid",
     power="energy: add_power", stored="energy: add_stored",
 )  # fmt: skip
 SCALE = 1e5  # [Pa]
@@ -46,16 +46,16 @@ class LiquidRows(BasinRows):
         self.density = fluid.density * (1.0 if self.linear else math.exp(strain))
         self.speed = self.part.wave_speed or math.sqrt(fluid.bulk_modulus / self.density)
 
-    def pieces(self, valves: bool) -> Iterator[Pieces]:
-        yield Pieces(home=HOME, rates=self.rates())
+    def pieces(self, valves: bool) -> Iterator[RhsTerms]:
+        yield RhsTerms(package=HOME, rates=self.rates())
         yield LIQUID
         if self.part.on is not None:
             yield TURNING
         if self.moves:
-            yield Pieces(home=HOME, power="moving: add_power", stored="moving: add_stored")
+            yield RhsTerms(package=HOME, power="moving: add_power", stored="moving: add_stored")
         yield MARKED
         if self.waves is not None:
-            yield Pieces(home=HOME, prepare="table: patch_pressures", observe="table: observe_pressures")
+            yield RhsTerms(package=HOME, prepare="table: patch_pressures", observe="table: observe_pressures")
 
     def rates(self) -> str:
         """Term of the rates of its cells."""

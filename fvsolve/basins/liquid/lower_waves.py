@@ -13,7 +13,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from fvsolve.basins.liquid.waves import HEAD
 from fvsolve.fluid.laws import TableLaw
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 
 FINER, LEAST = 4, 512  # intervals of the kernels' tables per interval of the fluid, and least number over its range
 STRETCH = 2.0  # greatest ln(rho / rho at rest) by compliant walls

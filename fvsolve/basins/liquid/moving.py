@@ -5,7 +5,7 @@ from fvsolve.basins.energy import at_rest, row_of
 from fvsolve.basins.liquid.rates import MINE, any_mesh, full_grid, linear_grid
 from fvsolve.basins.walls import speed_of, widening
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)

@@ -5,8 +5,8 @@ from math import log1p
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.observe import OWN, of_velocity
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import CELL_FIELD, LAW_LINEAR, LAW_LOG
+from fvsolve.kernels.dtypes import CELL_FIELD, LAW_LINEAR, LAW_LOG
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 PRESSURE = OWN

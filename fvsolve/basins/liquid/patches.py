@@ -7,8 +7,8 @@ from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.patches import give_way
 from fvsolve.basins.stretch import seen_of, stretched
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import LAW_LOG
+from fvsolve.kernels.dtypes import LAW_LOG
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 
@@ -40,7 +40,7 @@ def patch_pressures(t, y, dydt, out, handle):
             pressure, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
         out[layout["pressure"] + patch["node"]] = pressure
         out[layout["supply"] + patch["node"]] = 0.0
-        out[layout["had"] + node["row"]] = 1.0
+        out[layout["outflow_fraction"] + node["row"]] = 1.0
         out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * area_of(tables, patch))
 
 

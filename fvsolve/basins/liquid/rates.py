@@ -5,9 +5,19 @@ from fvsolve.basins.liquid import faces, grid, grid_full
 from fvsolve.basins.patches import book_open, wanted
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import RATE
-from fvsolve.kernels.sums import BOTH, CELLS, LOOK, MODE, OFF, asked, form, form_looked_at, look
+from fvsolve.kernels.dtypes import RATE
+from fvsolve.kernels.stage_sums import (
+    CELLS,
+    CHECK,
+    MODE,
+    OFF,
+    STAGE_AND_END,
+    check_rows,
+    form_checked_runs,
+    form_rows,
+    requested_mode,
+)
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 
@@ -34,7 +44,7 @@ def states_of(tables, basin, y):
 @njit(forceinline=True)
 def rates_of(tables, basin, dydt):
     """Arrays for the rates of cells (of contents if walls move); unused work arrays if no rates are needed."""
-    n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["unused"])
+    n, (to, first) = basin["n"], (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
     return to[first : first + n], to[first + n : first + 2 * n], to[first + 2 * n : first + 3 * n]
 
 
@@ -69,20 +79,20 @@ def by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, r
     for row in range(begin, stop, rows):
         block_stop = min(row + rows, stop)
         ahead = min(grid.row_known(block_stop, ny), stop)
-        for q in range(3 if sums[MODE] != LOOK else 0):
-            form(sums, False, basin["y"] + q * basin["n"], nx, formed_ahead, ahead, 0, nx)
+        for q in range(3 if sums[MODE] != CHECK else 0):
+            form_rows(sums, False, basin["y"] + q * basin["n"], nx, formed_ahead, ahead, 0, nx)
         formed_ahead = ahead
         grid.row_rates(
             basin["speed"], basin["small"], basin["scheme"], basin["limiter"], nx, ny, begin, stop, row, block_stop, kx,
             ky, reflect, side_kinds, r, mx, my, through, work, rate_r, rate_x, rate_y, None,
         )  # fmt: skip
         for q in range(3):
-            if sums[MODE] == LOOK:
-                look(sums, y, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx)
-            elif sums[MODE] == BOTH:
-                form(sums, True, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx)
-    if sums[MODE] == BOTH:
-        form_looked_at(sums)
+            if sums[MODE] == CHECK:
+                check_rows(sums, y, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx)
+            elif sums[MODE] == STAGE_AND_END:
+                form_rows(sums, True, basin["y"] + q * basin["n"], nx, row, block_stop, 0, nx)
+    if sums[MODE] == STAGE_AND_END:
+        form_checked_runs(sums)
     return basin["speed"] * grid.steepest(kx, ky)
 
 
@@ -96,7 +106,7 @@ def linear_grid(tables, b, y, dydt, out, moves, raised):
     kx, ky = spacing_of(tables.plane, basin)
     (r, mx, my), (rate_r, rate_x, rate_y) = states_of(tables, basin, y), rates_of(tables, basin, dydt)
     reflect, through, work = outside_of(tables, basin)
-    if moves is None and raised is None and asked(tables, b) != OFF:
+    if moves is None and raised is None and requested_mode(tables, b) != OFF:
         rate = by_blocks(tables, b, kx, ky, reflect, r, mx, my, through, work, y, rate_r, rate_x, rate_y)
         finish_liquid(tables, b, rate, out)
         return

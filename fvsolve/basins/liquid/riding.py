@@ -10,8 +10,8 @@ from fvsolve.basins.faces import BLOCK, blocks
 from fvsolve.basins.frames import PHI, PLACES, lift, lift_points, lift_rows, potential
 from fvsolve.basins.liquid.rates import MINE, any_mesh, full_grid, linear_grid
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import LAW_LINEAR
+from fvsolve.kernels.dtypes import LAW_LINEAR
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)

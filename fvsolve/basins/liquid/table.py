@@ -9,8 +9,8 @@ from fvsolve.basins.liquid.waves import pressure
 from fvsolve.basins.patches import wanted
 from fvsolve.basins.stretch import seen_of
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import CELL_FIELD
+from fvsolve.kernels.dtypes import CELL_FIELD
+from fvsolve.kernels.table_handle import open_tables
 
 MINE = kind_of(__package__)
 

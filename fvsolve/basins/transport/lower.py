@@ -9,8 +9,8 @@ import numpy as np
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.basins.transport.lower_velocity import around_outside, face_flows, grid_flows, velocity_flows
 from fvsolve.errors import CaseError
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.phases import Pieces
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.rhs_assembly import RhsTerms
 
 
 class TransportRows(BasinRows):
@@ -18,8 +18,8 @@ class TransportRows(BasinRows):
 
     given = banded = True
 
-    def pieces(self, valves: bool) -> Iterator[Pieces]:
-        yield Pieces(home=__package__, observe="observe: observe_given_flows")
+    def pieces(self, valves: bool) -> Iterator[RhsTerms]:
+        yield RhsTerms(package=__package__, observe="observe: observe_given_flows")
 
     @property
     def sums_rows(self) -> bool:

@@ -3,8 +3,8 @@
 from fvsolve.basins.behind import through_patch
 from fvsolve.basins.carried import turned
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.records import GIVEN_FLOW
+from fvsolve.kernels.dtypes import GIVEN_FLOW
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit

@@ -9,31 +9,42 @@ d(rho)/dt.
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.accounts import OF_BUSHING, bushing_rows, bushing_stores
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanism.lines import point_at, spin_of
-from fvsolve.kernels.mechanism.matrix import ease, lean_at, lean_by
-from fvsolve.kernels.mechanism.room import ATTITUDE, PLACE, SPIN, VELOCITY, add_force, add_torque, cross, row_of
-from fvsolve.kernels.records import BUSHING_VALUE, RATE
+from fvsolve.kernels.dtypes import BUSHING_VALUE, RATE
+from fvsolve.kernels.energy_rows import BUSHING_ROWS, bushing_power_row, bushing_stored_row
+from fvsolve.kernels.mechanism.body_layout import (
+    ATTITUDE,
+    POSITION,
+    SPIN,
+    VELOCITY,
+    add_force,
+    add_torque,
+    body_row,
+    cross,
+)
+from fvsolve.kernels.mechanism.force_elements import point_at, spin_of
+from fvsolve.kernels.mechanism.mass_matrix import add_body_force, add_body_wrench, mobility
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)
-def entry(out, tables, i, r, c):
+def attitude_entry(out, tables, i, r, c):
     """Entry (r, c) of the attitude of body i; of the identity for the world (i < 0)."""
     if i < 0:
         return 1.0 if r == c else 0.0
-    return out[row_of(tables, i) + ATTITUDE + 3 * r + c]
+    return out[body_row(tables, i) + ATTITUDE + 3 * r + c]
 
 
 @njit
 def gap_of(out, tables, bushing):
     """(position of `to` minus `from`, its rate relative to the body of `from`), in axes of the world: 6 numbers."""
     i = tables.points[bushing["from_point"]]["body"]
-    x, y, z, u, v, w = point_at(out, tables, bushing["to_point"], PLACE)
-    p, q, s, _, _, _ = point_at(out, tables, bushing["from_point"], PLACE)
+    x, y, z, u, v, w = point_at(out, tables, bushing["to_point"], POSITION)
+    p, q, s, _, _, _ = point_at(out, tables, bushing["from_point"], POSITION)
     if i >= 0:
-        here = row_of(tables, i)
-        a, b, c = cross(out, here + SPIN, x - out[here + PLACE], y - out[here + PLACE + 1], z - out[here + PLACE + 2])
+        here = body_row(tables, i)
+        a, b, c = cross(
+            out, here + SPIN, x - out[here + POSITION], y - out[here + POSITION + 1], z - out[here + POSITION + 2]
+        )
         k = here + VELOCITY
         u, v, w = u - out[k] - a, v - out[k + 1] - b, w - out[k + 2] - c
     return x - p, y - q, z - s, u, v, w
@@ -46,12 +57,16 @@ def deviation(out, tables, bushing, r, c):
     total = 0.0
     for k in range(3):
         for m in range(3):
-            total += entry(out, tables, j, r, k) * bushing["attitude"][3 * m + k] * entry(out, tables, i, c, m)
+            total += (
+                attitude_entry(out, tables, j, r, k)
+                * bushing["attitude"][3 * m + k]
+                * attitude_entry(out, tables, i, c, m)
+            )
     return total
 
 
 @njit
-def twist(out, tables, bushing):
+def rotation_deviation(out, tables, bushing):
     """(2 eta eps, relative angular velocity w~, eps.eps), in axes of the world: 7 numbers."""
     x = 0.5 * (deviation(out, tables, bushing, 2, 1) - deviation(out, tables, bushing, 1, 2))
     y = 0.5 * (deviation(out, tables, bushing, 0, 2) - deviation(out, tables, bushing, 2, 0))
@@ -64,33 +79,33 @@ def twist(out, tables, bushing):
 
 
 @njit
-def loads(out, tables, bushing):
+def bushing_loads(out, tables, bushing):
     """(force [N], torque [N m]) on the body of `to`, in axes of the world."""
     x, y, z, u, v, w = gap_of(out, tables, bushing)
-    a, b, c, p, q, s, _ = twist(out, tables, bushing)
+    a, b, c, p, q, s, _ = rotation_deviation(out, tables, bushing)
     k, d, h, e = bushing["stiffness"], bushing["damping"], bushing["turn_stiffness"], bushing["turn_damping"]
     return -k * x - d * u, -k * y - d * v, -k * z - d * w, -h * a - e * p, -h * b - e * q, -h * c - e * s
 
 
 @njit
-def push_bushings(t, y, dydt, out, handle):
+def add_bushing_loads(t, y, dydt, out, handle):
     """Add the forces and torques of all bushings to their bodies."""
     tables = open_tables(handle)
     bushings = tables.bushings
     for k in range(bushings.size):
-        fx, fy, fz, tx, ty, tz = loads(out, tables, bushings[k])
-        px, py, pz, _, _, _ = point_at(out, tables, bushings[k]["to_point"], PLACE)
+        fx, fy, fz, tx, ty, tz = bushing_loads(out, tables, bushings[k])
+        px, py, pz, _, _, _ = point_at(out, tables, bushings[k]["to_point"], POSITION)
         for end, sign in ((bushings[k]["to_point"], 1.0), (bushings[k]["from_point"], -1.0)):
             i = tables.points[end]["body"]
             if i >= 0:
-                here = row_of(tables, i)
-                rx, ry, rz = px - out[here + PLACE], py - out[here + PLACE + 1], pz - out[here + PLACE + 2]
+                here = body_row(tables, i)
+                rx, ry, rz = px - out[here + POSITION], py - out[here + POSITION + 1], pz - out[here + POSITION + 2]
                 add_force(out, here, rx, ry, rz, sign * fx, sign * fy, sign * fz)
                 add_torque(out, here, sign * tx, sign * ty, sign * tz)
 
 
 @njit
-def quicken_by_bushings(t, y, dydt, out, handle):
+def bushing_rate_limit(t, y, dydt, out, handle):
     """Raise out[RATE], the rate that limits steps [1/s], for bushings; bound as in `mass_matrix.body_rate_limit`."""
     tables = open_tables(handle)
     bushings, work, n = tables.bushings, tables.scratch, tables.freedoms.size
@@ -98,18 +113,18 @@ def quicken_by_bushings(t, y, dydt, out, handle):
     for k in range(bushings.size):
         bushing = bushings[k]
         i, j = tables.points[bushing["from_point"]]["body"], tables.points[bushing["to_point"]]["body"]
-        px, py, pz, _, _, _ = point_at(out, tables, bushing["to_point"], PLACE)
+        px, py, pz, _, _, _ = point_at(out, tables, bushing["to_point"], POSITION)
         for axis in range(6):
             x, y0, z = 1.0 * (axis % 3 == 0), 1.0 * (axis % 3 == 1), 1.0 * (axis % 3 == 2)
             for m in range(n):
                 work[7 * n + m] = 0.0
             if axis < 3:
-                lean_at(out, tables, j, px, py, pz, x, y0, z, 7 * n)
-                lean_at(out, tables, i, px, py, pz, -x, -y0, -z, 7 * n)
+                add_body_force(out, tables, j, px, py, pz, x, y0, z, 7 * n)
+                add_body_force(out, tables, i, px, py, pz, -x, -y0, -z, 7 * n)
             else:
-                lean_by(tables, j, x, y0, z, 0.0, 0.0, 0.0, 7 * n)
-                lean_by(tables, i, -x, -y0, -z, 0.0, 0.0, 0.0, 7 * n)
-            inverse_mass = ease(tables, 7 * n)
+                add_body_wrench(tables, j, x, y0, z, 0.0, 0.0, 0.0, 7 * n)
+                add_body_wrench(tables, i, -x, -y0, -z, 0.0, 0.0, 0.0, 7 * n)
+            inverse_mass = mobility(tables, 7 * n)
             stiffness += inverse_mass * (bushing["stiffness"] if axis < 3 else bushing["turn_stiffness"])
             damping += inverse_mass * (bushing["damping"] if axis < 3 else bushing["turn_damping"])
     out[RATE] = max(out[RATE], 0.5 * damping + sqrt(0.25 * damping * damping + stiffness))
@@ -124,7 +139,7 @@ def observe_bushings(t, y, out, handle, values):
         if probes[k]["kind"] == BUSHING_VALUE:
             bushing = tables.bushings[probes[k]["index"]]
             x, y0, z, _, _, _ = gap_of(out, tables, bushing)
-            fx, fy, fz, tx, ty, tz = loads(out, tables, bushing)
+            fx, fy, fz, tx, ty, tz = bushing_loads(out, tables, bushing)
             if probes[k]["side"] == 1:
                 x, y0, z = fx, fy, fz
             elif probes[k]["side"] == 2:
@@ -136,26 +151,26 @@ def observe_bushings(t, y, out, handle, values):
 def power_bushings(t, y, dydt, out, handle, power):
     """Write the power rows of bushings: rate of stored energy, dissipation [W]."""
     tables = open_tables(handle)
-    at = bushing_rows(tables, power)
+    at = bushing_power_row(tables, power)
     for k in range(tables.bushings.size):
         bushing = tables.bushings[k]
         x, y0, z, u, v, w = gap_of(out, tables, bushing)
-        a, b, c, p, q, s, _ = twist(out, tables, bushing)
+        a, b, c, p, q, s, _ = rotation_deviation(out, tables, bushing)
         power[at] = bushing["stiffness"] * (x * u + y0 * v + z * w)
         power[at] += bushing["turn_stiffness"] * (a * p + b * q + c * s)
         power[at + 1] = bushing["damping"] * (u * u + v * v + w * w)
         power[at + 1] += bushing["turn_damping"] * (p * p + q * q + s * s)
-        at += OF_BUSHING
+        at += BUSHING_ROWS
 
 
 @njit
 def stored_bushings(t, y, dydt, out, handle, stored):
     """Write the storage rows of bushings: k gap^2 / 2 + 2 k_turn eps.eps since the start [J]."""
     tables = open_tables(handle)
-    at = bushing_stores(tables, stored)
+    at = bushing_stored_row(tables, stored)
     for k in range(tables.bushings.size):
         bushing = tables.bushings[k]
         x, y0, z, _, _, _ = gap_of(out, tables, bushing)
-        eps = twist(out, tables, bushing)[6]
+        eps = rotation_deviation(out, tables, bushing)[6]
         own = 0.5 * bushing["stiffness"] * (x * x + y0 * y0 + z * z) + 2.0 * bushing["turn_stiffness"] * eps
         stored[at + k] = own - bushing["energy"]

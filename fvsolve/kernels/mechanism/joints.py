@@ -9,31 +9,31 @@ R w. The acceleration at o is A = A_parent + S q'' + V x S q' (Featherstone 2008
 from math import cos, sin
 
 from fvsolve.jit import njit
-from fvsolve.kernels.handle import open_tables
-from fvsolve.kernels.mechanism.lines import stretch
-from fvsolve.kernels.mechanism.room import (
-    APPARENT,
+from fvsolve.kernels.dtypes import BALL, BODY_OUT, FREE, PRISMATIC, REVOLUTE
+from fvsolve.kernels.mechanism.body_layout import (
     ARM,
     ATTITUDE,
     BIAS,
+    BIAS_AT_O,
     FORCE,
-    PLACE,
+    POSITION,
     SPIN,
     SPIN_BIAS,
-    STREAM,
     TORQUE,
     VELOCITY,
+    VELOCITY_AT_O,
+    body_row,
     cross,
-    put,
-    row_of,
-    turned,
+    rotate,
+    write_vector,
 )
-from fvsolve.kernels.records import BALL, BODY_OUT, FREE, PRISMATIC, REVOLUTE
-from fvsolve.kernels.schedules import schedule_slopes, schedule_value
+from fvsolve.kernels.mechanism.force_elements import update_elements
+from fvsolve.kernels.schedule_pieces import schedule_slopes, schedule_value
+from fvsolve.kernels.table_handle import open_tables
 
 
 @njit(forceinline=True)
-def angle_of(body, t, y, tables):
+def joint_coordinate(body, t, y, tables):
     """(angle [rad] or travel [m], rate, acceleration) of a joint with a single axis; acceleration 0 unless driven."""
     if body["schedule"] >= 0:
         rate, change = schedule_slopes(tables, body["schedule"], t)
@@ -42,7 +42,7 @@ def angle_of(body, t, y, tables):
 
 
 @njit(forceinline=True)
-def times(a, i, b, j, c, k):
+def multiply_matrices(a, i, b, j, c, k):
     """Write C = A B of 3 x 3 matrices stored by rows at a[i], b[j] and c[k]."""
     for row in range(i, i + 9, 3):
         x, y, z = a[row], a[row + 1], a[row + 2]
@@ -53,156 +53,156 @@ def times(a, i, b, j, c, k):
 
 
 @njit
-def turn_about(q, k, angle, axis):
+def rotation_about_axis(q, k, angle, axis):
     """Write the rotation matrix about a unit axis, (43), to q[k]."""
     c, s, x, y, z = cos(angle), sin(angle), axis[0], axis[1], axis[2]
     rest = 1.0 - c
-    put(q, k, c + x * x * rest, x * y * rest - z * s, x * z * rest + y * s)
-    put(q, k + 3, x * y * rest + z * s, c + y * y * rest, y * z * rest - x * s)
-    put(q, k + 6, x * z * rest - y * s, y * z * rest + x * s, c + z * z * rest)
+    write_vector(q, k, c + x * x * rest, x * y * rest - z * s, x * z * rest + y * s)
+    write_vector(q, k + 3, x * y * rest + z * s, c + y * y * rest, y * z * rest - x * s)
+    write_vector(q, k + 6, x * z * rest - y * s, y * z * rest + x * s, c + z * z * rest)
 
 
 @njit
-def turn_by(q, k, h, a, b, c):
+def rotation_of_parameters(q, k, h, a, b, c):
     """Write the rotation matrix of normalised Euler parameters, (45), to q[k]: a rotation even if they have drifted."""
     s = 2.0 / (h * h + a * a + b * b + c * c)
-    put(q, k, 1.0 - s * (b * b + c * c), s * (a * b - h * c), s * (a * c + h * b))
-    put(q, k + 3, s * (a * b + h * c), 1.0 - s * (a * a + c * c), s * (b * c - h * a))
-    put(q, k + 6, s * (a * c - h * b), s * (b * c + h * a), 1.0 - s * (a * a + b * b))
+    write_vector(q, k, 1.0 - s * (b * b + c * c), s * (a * b - h * c), s * (a * c + h * b))
+    write_vector(q, k + 3, s * (a * b + h * c), 1.0 - s * (a * a + c * c), s * (b * c - h * a))
+    write_vector(q, k + 6, s * (a * c - h * b), s * (b * c + h * a), 1.0 - s * (a * a + b * b))
 
 
 @njit(forceinline=True)
-def parameters(body, first, y):
+def joint_parameters(body, first, y):
     """Euler parameters (eta, eps) of a joint; first : index of the first among its coordinates."""
     at, e = body["y"] + first, body["start"]
     return e[first] + y[at], e[first + 1] + y[at + 1], e[first + 2] + y[at + 2], e[first + 3] + y[at + 3]
 
 
 @njit(forceinline=True)
-def rates(body, first, y):
+def joint_velocities(body, first, y):
     """Three velocities of a joint from index `first` on."""
     at, v = body["rate"] + first, body["speed"]
     return v[first] + y[at], v[first + 1] + y[at + 1], v[first + 2] + y[at + 2]
 
 
 @njit
-def set_free(body, y, own):
+def set_free_body(body, y, own):
     """Write attitude, position and motion of a free body; o is its centre of mass."""
-    turn_by(own, ATTITUDE, *parameters(body, 3, y))
-    cx, cy, cz = turned(own, ATTITUDE, body["centre"], 0)
+    rotation_of_parameters(own, ATTITUDE, *joint_parameters(body, 3, y))
+    cx, cy, cz = rotate(own, ATTITUDE, body["centre"], 0)
     at, x0 = body["y"], body["start"]
-    put(own, ARM, -cx, -cy, -cz)
-    put(own, PLACE, x0[0] + y[at] - cx, x0[1] + y[at + 1] - cy, x0[2] + y[at + 2] - cz)
-    vx, vy, vz = rates(body, 0, y)
-    put(own, STREAM, vx, vy, vz)
-    put(own, SPIN, *turned(own, ATTITUDE, rates(body, 3, y), 0))
+    write_vector(own, ARM, -cx, -cy, -cz)
+    write_vector(own, POSITION, x0[0] + y[at] - cx, x0[1] + y[at + 1] - cy, x0[2] + y[at + 2] - cz)
+    vx, vy, vz = joint_velocities(body, 0, y)
+    write_vector(own, VELOCITY_AT_O, vx, vy, vz)
+    write_vector(own, SPIN, *rotate(own, ATTITUDE, joint_velocities(body, 3, y), 0))
     ax, ay, az = cross(own, SPIN, vx, vy, vz)
-    put(own, APPARENT, -ax, -ay, -az)
-    put(own, SPIN_BIAS, 0.0, 0.0, 0.0)
+    write_vector(own, BIAS_AT_O, -ax, -ay, -az)
+    write_vector(own, SPIN_BIAS, 0.0, 0.0, 0.0)
 
 
 @njit
-def hang(body, out, tables, own):
+def set_joint_frame(body, out, tables, own):
     """Write position and motion of a body as those of its parent at the joint, and the joint axes to scratch[9:18]."""
     work = tables.scratch
     if body["parent"] < 0:
         for k in range(9):
             work[9 + k] = body["attitude"][k]
         for k in range(3):
-            own[PLACE + k], own[ARM + k] = body["at"][k], 0.0
-            own[SPIN + k] = own[STREAM + k] = 0.0
-            own[SPIN_BIAS + k] = own[APPARENT + k] = 0.0
+            own[POSITION + k], own[ARM + k] = body["at"][k], 0.0
+            own[SPIN + k] = own[VELOCITY_AT_O + k] = 0.0
+            own[SPIN_BIAS + k] = own[BIAS_AT_O + k] = 0.0
         return
-    at = row_of(tables, body["parent"])
+    at = body_row(tables, body["parent"])
     up = out[at : at + BODY_OUT]
-    times(up, ATTITUDE, body["attitude"], 0, work, 9)
-    x, y, z = turned(up, ATTITUDE, body["at"], 0)
+    multiply_matrices(up, ATTITUDE, body["attitude"], 0, work, 9)
+    x, y, z = rotate(up, ATTITUDE, body["at"], 0)
     for k, offset in ((0, x), (1, y), (2, z)):
-        own[PLACE + k] = up[PLACE + k] + offset
+        own[POSITION + k] = up[POSITION + k] + offset
         own[ARM + k] = up[ARM + k] + offset
-        own[SPIN + k], own[STREAM + k] = up[SPIN + k], up[STREAM + k]
-        own[SPIN_BIAS + k], own[APPARENT + k] = up[SPIN_BIAS + k], up[APPARENT + k]
+        own[SPIN + k], own[VELOCITY_AT_O + k] = up[SPIN + k], up[VELOCITY_AT_O + k]
+        own[SPIN_BIAS + k], own[BIAS_AT_O + k] = up[SPIN_BIAS + k], up[BIAS_AT_O + k]
 
 
 @njit
-def turn_joint(body, t, y, tables, own):
+def set_revolute(body, t, y, tables, own):
     """Apply a revolute joint: rotate the axes; add S q' and, if the joint is driven, S q''."""
-    angle, rate, change = angle_of(body, t, y, tables)
-    turn_about(tables.scratch, 0, angle, body["axis"])
-    times(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
-    a, b, c = turned(own, ATTITUDE, body["axis"], 0)
+    angle, rate, change = joint_coordinate(body, t, y, tables)
+    rotation_about_axis(tables.scratch, 0, angle, body["axis"])
+    multiply_matrices(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
+    a, b, c = rotate(own, ATTITUDE, body["axis"], 0)
     if change != 0.0:
-        joint_acceleration(own, a * change, b * change, c * change, 1)
-    move_by(own, a * rate, b * rate, c * rate, *cross(own, ARM, a * rate, b * rate, c * rate))
+        add_drive_acceleration(own, a * change, b * change, c * change, 1)
+    add_joint_velocity(own, a * rate, b * rate, c * rate, *cross(own, ARM, a * rate, b * rate, c * rate))
 
 
 @njit
-def slide_joint(body, t, y, tables, own):
+def set_prismatic(body, t, y, tables, own):
     """Apply a prismatic joint: move the position; add S q' and, if the joint is driven, S q''."""
-    travel, rate, change = angle_of(body, t, y, tables)
-    keep_axes(tables, own)
-    a, b, c = turned(own, ATTITUDE, body["axis"], 0)
+    travel, rate, change = joint_coordinate(body, t, y, tables)
+    copy_joint_axes(tables, own)
+    a, b, c = rotate(own, ATTITUDE, body["axis"], 0)
     for k, x in ((0, a), (1, b), (2, c)):
-        own[PLACE + k] += x * travel
+        own[POSITION + k] += x * travel
         own[ARM + k] += x * travel
     if change != 0.0:
-        joint_acceleration(own, a * change, b * change, c * change, 0)
-    move_by(own, 0.0, 0.0, 0.0, a * rate, b * rate, c * rate)
+        add_drive_acceleration(own, a * change, b * change, c * change, 0)
+    add_joint_velocity(own, 0.0, 0.0, 0.0, a * rate, b * rate, c * rate)
 
 
 @njit
-def keep_axes(tables, own):
+def copy_joint_axes(tables, own):
     """Copy the joint axes to the attitude of the body."""
     for k in range(9):
         own[ATTITUDE + k] = tables.scratch[9 + k]
 
 
 @njit
-def move_by(own, wx, wy, wz, vx, vy, vz):
+def add_joint_velocity(own, wx, wy, wz, vx, vy, vz):
     """Add S q' = (w, v) to the motion of a body, and V x S q' to its bias acceleration."""
     for k, w, v in ((0, wx, vx), (1, wy, vy), (2, wz, vz)):
         own[SPIN + k] += w
-        own[STREAM + k] += v
+        own[VELOCITY_AT_O + k] += v
     ax, ay, az = cross(own, SPIN, wx, wy, wz)
     bx, by, bz = cross(own, SPIN, vx, vy, vz)
-    dx, dy, dz = cross(own, STREAM, wx, wy, wz)
+    dx, dy, dz = cross(own, VELOCITY_AT_O, wx, wy, wz)
     for k, a, b in ((0, ax, bx + dx), (1, ay, by + dy), (2, az, bz + dz)):
         own[SPIN_BIAS + k] += a
-        own[APPARENT + k] += b
+        own[BIAS_AT_O + k] += b
 
 
 @njit
-def set_joined(body, t, y, out, tables, own):
+def set_jointed_body(body, t, y, out, tables, own):
     """Write attitude, position and motion of a body from those of its parent."""
-    hang(body, out, tables, own)
+    set_joint_frame(body, out, tables, own)
     if body["joint"] == REVOLUTE:
-        turn_joint(body, t, y, tables, own)
+        set_revolute(body, t, y, tables, own)
     elif body["joint"] == PRISMATIC:
-        slide_joint(body, t, y, tables, own)
+        set_prismatic(body, t, y, tables, own)
     elif body["joint"] == BALL:
-        turn_by(tables.scratch, 0, *parameters(body, 0, y))
-        times(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
-        a, b, c = turned(own, ATTITUDE, rates(body, 0, y), 0)
-        move_by(own, a, b, c, *cross(own, ARM, a, b, c))
+        rotation_of_parameters(tables.scratch, 0, *joint_parameters(body, 0, y))
+        multiply_matrices(tables.scratch, 9, tables.scratch, 0, own, ATTITUDE)
+        a, b, c = rotate(own, ATTITUDE, joint_velocities(body, 0, y), 0)
+        add_joint_velocity(own, a, b, c, *cross(own, ARM, a, b, c))
     else:
-        keep_axes(tables, own)
+        copy_joint_axes(tables, own)
 
 
 @njit
-def joint_acceleration(own, x, y, z, turns):
+def add_drive_acceleration(own, x, y, z, turns):
     """Add the acceleration S q'' of a driven joint; turns : 1 revolute, 0 prismatic."""
     if turns == 1:
         own[SPIN_BIAS] += x
         own[SPIN_BIAS + 1] += y
         own[SPIN_BIAS + 2] += z
         x, y, z = cross(own, ARM, x, y, z)
-    own[APPARENT] += x
-    own[APPARENT + 1] += y
-    own[APPARENT + 2] += z
+    own[BIAS_AT_O] += x
+    own[BIAS_AT_O + 1] += y
+    own[BIAS_AT_O + 2] += z
 
 
 @njit(forceinline=True)
-def at_origin(out, here, wide, spin):
+def origin_acceleration(out, here, wide, spin):
     """Acceleration of the origin of a body from that at o: a + alpha x r + w x v; v : velocity of the origin.
 
     wide : index of a; spin : offset of alpha in the row of the body
@@ -216,7 +216,7 @@ def at_origin(out, here, wide, spin):
 @njit
 def centre_of(body, out, here):
     """(position of the centre of mass from the origin, its velocity), in axes of the world: 6 numbers."""
-    x, y, z = turned(out, here + ATTITUDE, body["centre"], 0)
+    x, y, z = rotate(out, here + ATTITUDE, body["centre"], 0)
     u, v, w = cross(out, here + SPIN, x, y, z)
     s = here + VELOCITY
     return x, y, z, out[s] + u, out[s + 1] + v, out[s + 2] + w
@@ -228,23 +228,23 @@ def kinematics(t, y, dydt, out, handle):
     tables = open_tables(handle)
     bodies, gravity = tables.bodies, tables.settings[0]["gravity"]
     for i in range(bodies.size):
-        body, at = bodies[i], row_of(tables, i)
+        body, at = bodies[i], body_row(tables, i)
         own = out[at : at + BODY_OUT]
         if body["joint"] == FREE:
-            set_free(body, y, own)
+            set_free_body(body, y, own)
         else:
-            set_joined(body, t, y, out, tables, own)
+            set_jointed_body(body, t, y, out, tables, own)
         x, y0, z = cross(own, SPIN, own[ARM], own[ARM + 1], own[ARM + 2])
-        put(own, VELOCITY, own[STREAM] + x, own[STREAM + 1] + y0, own[STREAM + 2] + z)
-        put(own, BIAS, *at_origin(own, 0, APPARENT, SPIN_BIAS))
+        write_vector(own, VELOCITY, own[VELOCITY_AT_O] + x, own[VELOCITY_AT_O + 1] + y0, own[VELOCITY_AT_O + 2] + z)
+        write_vector(own, BIAS, *origin_acceleration(own, 0, BIAS_AT_O, SPIN_BIAS))
         weight = -body["mass"] * gravity
-        x, y0, z = turned(own, ATTITUDE, body["centre"], 0)
-        put(own, FORCE, 0.0, 0.0, weight)
-        put(own, TORQUE, y0 * weight, -x * weight, 0.0)
-    stretch(out, tables)
+        x, y0, z = rotate(own, ATTITUDE, body["centre"], 0)
+        write_vector(own, FORCE, 0.0, 0.0, weight)
+        write_vector(own, TORQUE, y0 * weight, -x * weight, 0.0)
+    update_elements(out, tables)
 
 
 @njit
-def stretch_again(t, y, out, handle, g):
+def kinematics_for_events(t, y, out, handle, g):
     """Call `kinematics` before event functions, which no right-hand side precedes."""
     kinematics(t, y, y[:0], out, handle)

@@ -9,10 +9,10 @@ as a small chamber.
 from math import exp, expm1, log, log1p
 
 from fvsolve.jit import njit
+from fvsolve.kernels.barotropic_energy import vessel_energy, vessel_power
 from fvsolve.kernels.density import density, log_density, pressure_of_log
-from fvsolve.kernels.energy import height_pressure
-from fvsolve.kernels.energy_barotropic import vessel_energy, vessel_power
-from fvsolve.kernels.records import LAW_LINEAR
+from fvsolve.kernels.dtypes import LAW_LINEAR
+from fvsolve.kernels.linear_energy import height_pressure
 
 EXPONENT, GAS, ROOM, NECK, EMPTY, SHED = 0, 1, 2, 3, 4, 5  # indices into the numbers of an accumulator
 NUMBERS = 6

@@ -9,8 +9,8 @@ dV/dz = R^2 (S(d) - S(d')) / sin.
 from math import acos, cos, pi, sin, sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.energy import level_moment
-from fvsolve.kernels.tanks import level_of_volume
+from fvsolve.kernels.linear_energy import level_moment
+from fvsolve.kernels.tank_levels import level_of_volume
 
 KIND, TOP, FIRST, SECOND, THIRD = 0, 1, 2, 3, 4
 """Numbers of a shape: its kind; the level at which it is full [m]; then an area [m2], or the radius [m], length [m] and

@@ -10,11 +10,11 @@ enthalpy of the node. All quantities then follow from one energy.
 from math import exp, expm1, log, log1p
 
 from fvsolve.jit import njit
+from fvsolve.kernels.barotropic_energy import vessel_energy, vessel_power
 from fvsolve.kernels.density import density, enthalpy, log_density, pressure_of_enthalpy
-from fvsolve.kernels.either import either
-from fvsolve.kernels.energy import height_pressure
-from fvsolve.kernels.energy_barotropic import vessel_energy, vessel_power
-from fvsolve.kernels.records import LAW_LINEAR
+from fvsolve.kernels.dtypes import LAW_LINEAR
+from fvsolve.kernels.event_pair import event_pair
+from fvsolve.kernels.linear_energy import height_pressure
 from fvsolve.parts.accumulator.law import EMPTY, EXPONENT, GAS, ROOM, gas_energy
 from fvsolve.parts.accumulator.law import NUMBERS as SHAPED
 from fvsolve.parts.accumulator.law_shape import TOP, level_at, moment_below, surface_at
@@ -148,7 +148,7 @@ def events(t, y, out, tables, device, g):
     g[flag], g[flag + 1] = left, -left
     if device["states"] > 0:
         level = standing(st, floats, node, at, y[node["y"]], brought(y, device))[3]
-        either(tables, g, flag + 2, floats[at + (STOP if tables.armed[flag + 2] > 0.0 else START)] - level)
+        event_pair(tables, g, flag + 2, floats[at + (STOP if tables.armed[flag + 2] > 0.0 else START)] - level)
 
 
 @njit

@@ -82,13 +82,13 @@ class AccumulatorRows(Device, kind="accumulator"):
 
     def above(self, model, part, row) -> float:
         """Stored energy minus that of the state that can release no more: energy head 0, or no fluid left [J]."""
-        from fvsolve.kernels.energy_barotropic import head_at
+        from fvsolve.kernels.barotropic_energy import energy_head
 
         st, floats = model.tables.settings[0], model.tables.floats
         node, at = model.tables.nodes[row["node"]], int(row["data"])
 
         def head(y: float) -> float:
-            return head_at(st, floats, node, float(node["pressure"] + self.change(model, row, y)))
+            return energy_head(st, floats, node, float(node["pressure"] + self.change(model, row, y)))
 
         low = float(floats[at + law.EMPTY]) if not floats[at + law.NECK] else -0.999 * float(node["mass"])
         high = (1.0 - 1e-6) * model.case.properties.density * float(floats[at + law.GAS])

@@ -13,10 +13,10 @@ through a small bore, until the air is at ambient pressure. An automatic bore re
 from math import expm1, log1p, sqrt
 
 from fvsolve.jit import njit
+from fvsolve.kernels.barotropic_energy import vessel_power
 from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
-from fvsolve.kernels.either import either
-from fvsolve.kernels.energy_barotropic import vessel_power
-from fvsolve.kernels.records import LAW_LINEAR, RATE
+from fvsolve.kernels.dtypes import LAW_LINEAR, RATE
+from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.valves import flow_at_drop
 
@@ -154,10 +154,12 @@ def events(t, y, out, tables, device, g):
         p = tables.nodes[place]["pressure"] + out[tables.layout[0]["pressure"] + place] - st["ambient"]
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
         margin = p - min(gauge, 0.0) + RELUCTANCE
-    either(tables, g, at, margin)
+    event_pair(tables, g, at, margin)
     if throttles(floats, device["data"]):
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
-        either(tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else until_throttled(out, tables, device, gauge))
+        event_pair(
+            tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else until_throttled(out, tables, device, gauge)
+        )
 
 
 @njit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.lowering import Lowering
 
 
@@ -10,7 +10,7 @@ class BodyRows(Lowering, kind="body"):
     """Rigid bodies in space."""
 
     def probe(self, draft, name, probe, row) -> None:
-        from fvsolve.kernels.mechanism.observe import BODY_QUANTITIES  # not loaded by models without bodies
+        from fvsolve.kernels.mechanism.body_probes import BODY_QUANTITIES  # not loaded by models without bodies
 
         quantity = "angle" if probe.quantity == "travel" else probe.quantity
         row["kind"], row["side"] = rec.BODY_VALUE, BODY_QUANTITIES.index(quantity)

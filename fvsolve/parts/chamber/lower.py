@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.lowering import Lowering
 
 

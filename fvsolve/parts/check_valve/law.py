@@ -5,8 +5,8 @@ the drop exceeds its cracking pressure. armed[event] marks it as shut and change
 """
 
 from fvsolve.jit import njit
-from fvsolve.kernels.either import either
-from fvsolve.kernels.records import JUNCTION
+from fvsolve.kernels.dtypes import JUNCTION
+from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
 
 RELUCTANCE = 1.0  # excess over the cracking pressure at which it opens, so that rounding does not [Pa]
@@ -35,7 +35,7 @@ def events(t, y, out, tables, device, g):
         margin = head_drop(tables, out, k)[1] + RELUCTANCE
     if tables.armed[at] > 0.0:
         margin = head_drop(tables, out, k)[1] - tables.floats[device["data"]] - RELUCTANCE
-    either(tables, g, at, margin)
+    event_pair(tables, g, at, margin)
 
 
 @njit

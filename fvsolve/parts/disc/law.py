@@ -10,11 +10,11 @@ A disc that alone joins a rigid column controls its flow near the seat (armed[ev
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.either import either
-from fvsolve.kernels.feedback import loop_rate
-from fvsolve.kernels.lead import lead_events, leads
-from fvsolve.kernels.records import CLOSING, RATE
+from fvsolve.kernels.dtypes import CLOSING, RATE
+from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.valve_feedback import loop_rate
+from fvsolve.kernels.valve_seating import control_events, controls_column
 
 RELIEF, CHECK = 0, 1  # modes
 # indices into its numbers: lift, target and lifting pressure at the start, then the keys
@@ -95,7 +95,7 @@ def move(t, y, dydt, out, tables, device):
         dydt[o + 1] = 0.0 if stopped else swing * (swing * drive - 2.0 * floats[device["data"] + DAMPING] * y[o + 1])
     valve, nodes = tables.valves[device["valve"]], tables.nodes
     on_column = nodes[valve["from_node"]]["gates"] >= 0 or nodes[valve["to_node"]]["gates"] >= 0
-    if on_column and dydt[o] < 0.0 and not leads(tables, device["valve"]):
+    if on_column and dydt[o] < 0.0 and not controls_column(tables, device["valve"]):
         out[CLOSING] = max(out[CLOSING], -dydt[o] / max(disc_lift(y, tables, device), 1e-300))
 
 
@@ -104,7 +104,7 @@ def disc_loop(y, out, tables, device, own):
     """Rate limit including the nodes at its ends; where a column sets the flow, d dP / dx = -2 dP / x."""
     k, speed, nodes = device["valve"], own / tables.floats[device["data"] + SPAN], tables.nodes
     before, behind = tables.valves[k]["from_node"], tables.valves[k]["to_node"]
-    if leads(tables, k):
+    if controls_column(tables, k):
         return own
     rate = own + loop_rate(out, tables, k, before, speed)
     if device["mode"] != RELIEF:
@@ -130,9 +130,9 @@ def events(t, y, out, tables, device, g):
         stop = max(1.0 - x, -onward[1])
     if armed[at + 2] == 0.0:
         seat = max(x + SLAM * min(speed, 0.0), onward[0])
-    either(tables, g, at, stop)
-    either(tables, g, at + 2, seat)
-    lead_events(out, tables, device, g, x, 1.0 if armed[at + 2] > 0.0 else 0.0, disc_slope(tables, device))
+    event_pair(tables, g, at, stop)
+    event_pair(tables, g, at + 2, seat)
+    control_events(out, tables, device, g, x, 1.0 if armed[at + 2] > 0.0 else 0.0, disc_slope(tables, device))
 
 
 @njit

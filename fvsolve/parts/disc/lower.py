@@ -54,7 +54,7 @@ class Lifting(Device, kind=""):
         if k in start.shut or start.modes.setdefault(k, LIFTING) == OPEN:
             return None
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
-        return Edge(i, j, self.row(start, k), 0.0, senses=i)
+        return Edge(i, j, self.row(start, k), 0.0, sensed_node=i)
 
     def follow(self, start, k) -> None:
         """Nothing: `begin` sets the drop."""

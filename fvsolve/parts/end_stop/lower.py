@@ -13,7 +13,7 @@ class EndStopRows(Push, kind="end-stop"):
     table = "stop"
 
     def fill(self, draft, name, link, rows) -> None:
-        from fvsolve.kernels.masses import contact  # not loaded by models without bodies
+        from fvsolve.kernels.mass_dynamics import contact_force  # not loaded by models without bodies
 
         (row,) = rows
         x, speed = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
@@ -22,6 +22,6 @@ class EndStopRows(Push, kind="end-stop"):
         row["above"] = FAR if link.maximum is None else link.maximum - x
         for distance, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
             if distance <= 0.0:
-                row["force"] += sign * contact(
+                row["force"] += sign * contact_force(
                     float(link.stiffness), float(link.damping), -distance, float(-sign * speed)
                 )

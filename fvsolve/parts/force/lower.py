@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.inputs import FORCE, Input
 from fvsolve.model.lowering import rows_in
 from fvsolve.model.masses import Push, join

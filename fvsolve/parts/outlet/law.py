@@ -10,7 +10,7 @@ the outlet passes nothing. With a part of its demand (PART) the power law holds 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.either import either
+from fvsolve.kernels.event_pair import event_pair
 
 LEAST_DROP = 10.0  # drop above `least` below which the cubic applies [Pa]
 EVENTS = 4  # of an outlet: it shuts, opens, supplies all of its demand, or less
@@ -124,8 +124,8 @@ def bends(tables, k, drop, g):
     above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
     if most < NO_END:
         missing = span * (most ** (1.0 / floats[at]) + (-NEAR if armed[event + 2] > 0.0 else NEAR)) - above
-    either(tables, g, event, above - SLIGHT if armed[event] > 0.0 else above + SLIGHT)
-    either(tables, g, event + 2, missing)
+    event_pair(tables, g, event, above - SLIGHT if armed[event] > 0.0 else above + SLIGHT)
+    event_pair(tables, g, event + 2, missing)
 
 
 @njit

@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.creep import add_creep
 from fvsolve.model.lowering import Lowering
 from fvsolve.model.model import PipeMesh
 from fvsolve.model.reading import along
 from fvsolve.model.unsteady import reserve
-from fvsolve.schemes import quicker
+from fvsolve.schemes import end_rate_factor
 
 
 class PipeRows(Lowering, kind="pipe"):
@@ -25,10 +25,10 @@ class PipeRows(Lowering, kind="pipe"):
         speed = draft.case.wave_speed(name)
         draft.ends(link, row)
         row["cells"], row["dx"], row["speed"] = n, link.length / n, speed
-        row["quicker"] = quicker(draft.case.numerics.scheme, n)
+        row["rate_factor"] = end_rate_factor(draft.case.numerics.scheme, n)
         delayed = draft.followed[name].pipe_model == "delay-line"
         if delayed:
-            row["cells"], row["quicker"] = 0, draft.followed[name].rate * link.length / n / speed
+            row["cells"], row["rate_factor"] = 0, draft.followed[name].rate * link.length / n / speed
         row["area"], row["diameter"], row["admittance"] = area, link.diameter, area / speed
         row["cell"], draft.cells = draft.cells, draft.cells + n
         z = draft.node_table["elevation"][[row["from_node"], row["to_node"]]]
@@ -61,7 +61,7 @@ class PipeRows(Lowering, kind="pipe"):
         pipe = draft.pipe_table[row["index"]]
         if pipe["delay"] >= 0:
             draft.fault(f"links.{name}", 'a delay line has no force probe; set pipe_model = "finite-volume"')
-        elif pipe["ride"] >= 0:
+        elif pipe["moving_segment"] >= 0:
             draft.fault(
                 f"links.{name}", "a pipe on a body has no force probe; use the forces of the joints of the body"
             )

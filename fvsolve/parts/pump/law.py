@@ -8,11 +8,11 @@ is n^2 P(q / n) / rated speed, P the shaft power at rated speed, or that of a Su
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices import PASSING
-from fvsolve.kernels.either import either
-from fvsolve.kernels.records import RATE
+from fvsolve.kernels.devices import TEMPORARY
+from fvsolve.kernels.dtypes import RATE
+from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.schedule_pieces import schedule_value
 from fvsolve.parts.check_valve.law import RELUCTANCE
 from fvsolve.parts.pump.law_curve import (
     COUNT,
@@ -189,7 +189,7 @@ def events(t, y, out, tables, device, g):
         rho, drop = head_drop(tables, out, k)
         most = curve_head(floats, valve["data"], out[layout["drive"] + k], 0.0)[0]
         left = drop + rho * tables.settings[0]["gravity"] * most - RELUCTANCE
-    either(tables, g, at, left)
+    event_pair(tables, g, at, left)
 
 
 @njit
@@ -224,9 +224,9 @@ def outside(out, tables, device):
     if -slack <= q <= max(n, 0.0) * last + slack:
         return 0
     if floats[curve + JOIN] > 0.0:
-        return PASSING
+        return TEMPORARY
     down = floats[device["data"] + CHECK] > 0.0 and n < begun and 0.0 < q <= begun * last
-    return PASSING if down else 1
+    return TEMPORARY if down else 1
 
 
 @njit

@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve import units
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump.lower_curve import rated_point
 from fvsolve.parts.pump.lower_shaft import inertia, rated_power, usual_inertia
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.kernels.schedules import value_until
+from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.parts import Schedule
 from fvsolve.parts.pump import law
 
@@ -59,7 +59,7 @@ class Turning:
         if floats[at + law.MODE] == law.TRIPPING:
             trip = float(part.trip)
             tables = draft.tables.schedules, draft.tables.pieces
-            floats[at + law.HELD] = value_until(*tables, int(row["schedule"]), trip, trip)
+            floats[at + law.HELD] = value_with_limit(*tables, int(row["schedule"]), trip, trip)
         if floats[at + law.MODE] != law.TURNED:
             return []
         braking = self.asked(start, row, valve)

@@ -8,12 +8,12 @@ only valve at a rigid column, it controls the flow of the column near its seat (
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.either import either
-from fvsolve.kernels.feedback import loop_rate
-from fvsolve.kernels.lead import lead_events, leads
-from fvsolve.kernels.records import RATE
+from fvsolve.kernels.dtypes import RATE
+from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.kernels.schedules import schedule_value
+from fvsolve.kernels.schedule_pieces import schedule_value
+from fvsolve.kernels.valve_feedback import loop_rate
+from fvsolve.kernels.valve_seating import control_events, controls_column
 
 REDUCING, SUSTAINING, FLOW_CONTROL = 0, 1, 2  # modes
 OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys
@@ -92,7 +92,7 @@ def regulator_rate(y, out, tables, device):
     end = tables.valves[k]["to_node"] if device["mode"] == REDUCING else tables.valves[k]["from_node"]
     if tables.nodes[end]["gates"] < 0:
         return loop_rate(out, tables, k, end, speed)
-    return 0.0 if leads(tables, k) else 2.0 * speed * drop / max(regulator_opening(y, tables, device), 1e-300)
+    return 0.0 if controls_column(tables, k) else 2.0 * speed * drop / max(regulator_opening(y, tables, device), 1e-300)
 
 
 @njit
@@ -111,11 +111,11 @@ def events(t, y, out, tables, device, g):
     if armed[at + 2] == 0.0:
         full = max(full + SETTLED, 1.0 - x)
     if armed[at + 4] == 0.0:  # a controlled column delays it, unlike on the seat
-        seat = max(error + (AT_REST if leads(tables, device["valve"]) else -SETTLED), x)
-    either(tables, g, at, back)
-    either(tables, g, at + 2, full)
-    either(tables, g, at + 4, seat)
-    lead_events(
+        seat = max(error + (AT_REST if controls_column(tables, device["valve"]) else -SETTLED), x)
+    event_pair(tables, g, at, back)
+    event_pair(tables, g, at + 2, full)
+    event_pair(tables, g, at + 4, seat)
+    control_events(
         out, tables, device, g, x, RETURNS if device["mode"] != FLOW_CONTROL else 0.0, 1.0 / stroke(tables, device)
     )
 

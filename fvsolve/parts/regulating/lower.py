@@ -107,8 +107,8 @@ class Regulator(Device, kind=""):
         if not self.end:
             return Edge(i, j, None if start.rest else lambda flow, drop: (1.0, 0.0, goal - flow), drop=lambda flow: 0.0)
         if start.rest:
-            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0, holds=(self.sensed(start, k), goal))
-        return Edge(i, j, lambda flow, drop: (0.0, 0.0, 0.0), 0.0, holds=(self.sensed(start, k), goal))
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0, held_potential=(self.sensed(start, k), goal))
+        return Edge(i, j, lambda flow, drop: (0.0, 0.0, 0.0), 0.0, held_potential=(self.sensed(start, k), goal))
 
     def revise(self, start, part, row) -> bool:
         k = int(row["valve"])

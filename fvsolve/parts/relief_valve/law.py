@@ -7,8 +7,8 @@ armed[event + 2] : it is fully open. Both flags change on accepted states only, 
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.either import either
-from fvsolve.kernels.restrictions import lifts, root_slope, root_step
+from fvsolve.kernels.event_pair import event_pair
+from fvsolve.kernels.restrictions import is_lifted, root_slope, root_step
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of
 
 RELUCTANCE = 1e-10  # margin of lift at events, so that rounding does not open the valve
@@ -40,14 +40,14 @@ def events(t, y, out, tables, device, g):
         left, missing = x - RELUCTANCE, 1.0
     elif armed[at + 2] > 0.0:
         left, missing = 1.0, 1.0 - RELUCTANCE - x
-    either(tables, g, at, left)
-    either(tables, g, at + 2, missing)
+    event_pair(tables, g, at, left)
+    event_pair(tables, g, at + 2, missing)
 
 
 @njit
 def step(out, tables, k, g, m, drop, denser, wide):
     """a, s of the flow x `full`; by the square-root law unless the valve is partly open."""
-    if not lifts(tables, k):
+    if not is_lifted(tables, k):
         return root_step(tables, k, g, m, drop, denser)
     dense = g * denser
     full = flow_at_drop(dense, transition_of(tables.valves[k], dense), drop)
@@ -57,7 +57,7 @@ def step(out, tables, k, g, m, drop, denser, wide):
 @njit
 def slope(out, tables, k, g, drop):
     """d flow / d drop [kg/s/Pa], with the change of lift."""
-    if not lifts(tables, k):
+    if not is_lifted(tables, k):
         return root_slope(tables, k, g, drop)
     transition = transition_of(tables.valves[k], g)
     x, full = max(pressure_lift(tables, out, k), 0.0), flow_at_drop(g, transition, drop)

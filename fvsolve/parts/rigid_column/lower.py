@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.lowering import Lowering
 
 

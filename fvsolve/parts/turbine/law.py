@@ -7,8 +7,8 @@ start, J d(omega)/dt = torque of the water + given torques. Its numbers are thos
 from math import sqrt
 
 from fvsolve.jit import njit
-from fvsolve.kernels.devices import PASSING
-from fvsolve.kernels.records import JUNCTION, RATE
+from fvsolve.kernels.devices import TEMPORARY
+from fvsolve.kernels.dtypes import JUNCTION, RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.valves import valve_conductance
 from fvsolve.parts.pump.law import (
@@ -133,7 +133,7 @@ def outside(out, tables, device):
     """PASSING if the operating angle is outside the chart, else 0."""
     opening, omega, q, _ = point(out, tables, device)
     beyond = is_outside(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
-    return PASSING if beyond else 0
+    return TEMPORARY if beyond else 0
 
 
 @njit

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.model.device import Device
 from fvsolve.model.inputs import TURNING, Input, opening
 from fvsolve.parts.pump.law import INERTIA, RATED

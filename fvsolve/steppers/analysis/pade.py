@@ -5,11 +5,11 @@ from __future__ import annotations
 from fractions import Fraction
 from math import factorial
 
-from fvsolve.doors import AMOUNT, door
 from fvsolve.steppers.numbers.polynomial import Polynomial
+from fvsolve.validation import COUNT_FROM_ZERO, validated
 
 
-@door(k=AMOUNT, m=AMOUNT)
+@validated(k=COUNT_FROM_ZERO, m=COUNT_FROM_ZERO)
 def pade(k: int, m: int) -> tuple[Polynomial, Polynomial]:
     """Return numerator and denominator of P^k_m, the Pade approximation of e^s with degrees k over m.
 

@@ -9,11 +9,11 @@ from fractions import Fraction
 
 import numpy as np
 
-from fvsolve.doors import Kind, door, is_array
 from fvsolve.steppers.analysis.pade import pade
 from fvsolve.steppers.analysis.trees import short
 from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.steppers.tableau import Method, method_named
+from fvsolve.validation import Kind, is_array, validated
 
 NOTHING = Polynomial([])
 PLANE = Kind(lambda given: is_array(given, "fiuc", 0, 9, finite=False), "complex numbers")
@@ -30,7 +30,7 @@ class StabilityFunction:
     denominator: Polynomial
     doubts: tuple[Polynomial, Polynomial] = (NOTHING, NOTHING)
 
-    @door(s=PLANE)
+    @validated(s=PLANE)
     def __call__(self, s):
         """R(s) in floating point; s : complex number or array."""
         s = np.asarray(s, dtype=np.complex128)

@@ -116,7 +116,10 @@ def space_order(case) -> int:
     """Order of the scheme in smooth flow, the least over all parts with cells."""
     scheme = SCHEMES[case.numerics.scheme]
     return min(
-        [scheme.order, *(scheme.on(bool(basin.cells) and not basin.holes).order for basin in basins(case).values())]
+        [
+            scheme.order,
+            *(scheme.for_basin(bool(basin.cells) and not basin.holes).order for basin in basins(case).values()),
+        ]
     )
 
 

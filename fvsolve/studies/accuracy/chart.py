@@ -11,9 +11,8 @@ from pathlib import Path
 from fvsolve.case import load
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
-from fvsolve.doors import CALL, COUNT, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT, door
+from fvsolve.display import Displayable
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.shown import Shown
 from fvsolve.steppers.methods import AUTO, METHODS
 from fvsolve.steppers.tableau import OWN
 from fvsolve.studies.accuracy.cells import from_files
@@ -29,6 +28,7 @@ from fvsolve.studies.outcome import Progress, names, prepared
 from fvsolve.studies.points import Points
 from fvsolve.studies.sheet import Column, Sheet
 from fvsolve.studies.truth import Truth, truth
+from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT, validated
 
 FRAME = (
     "scheme", "method", "cells", "size", "trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates",
@@ -59,7 +59,7 @@ class Aim:
 
 
 @dataclass(frozen=True, repr=False)
-class Chart(Shown):
+class Chart(Displayable):
     """Errors of a case against their cost.
 
     reference, second : the two references in words; floor : their difference, below which errors mean nothing
@@ -82,10 +82,10 @@ class Chart(Shown):
 
     picture = "fvsolve.studies.accuracy.files:figure"
 
-    def said(self) -> str:
+    def summary_line(self) -> str:
         return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
 
-    def listed(self) -> dict[str, list]:
+    def table_columns(self) -> dict[str, list]:
         """Columns TABLE_COLUMNS of all points."""
         return Sheet([Column(key) for key in FRAME], self.rows).listed()
 
@@ -118,7 +118,7 @@ class Chart(Shown):
         return asdict(self) | {"stands": stands} | ({} if self.aim is None else {"paste": "\n".join(self.aim.lines())})
 
 
-@door(
+@validated(
     set=TABLE,
     schemes=NAMES,
     methods=NAMES,
@@ -127,7 +127,7 @@ class Chart(Shown):
     step=NUMBERS,
     target=NUMBER,
     out=PATH,
-    progress=CALL,
+    progress=FUNCTION,
     jobs=COUNT,
     dask=TEXT,
 )

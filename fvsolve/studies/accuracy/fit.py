@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.doors import NUMBER, SERIES, Kind, door, is_array
 from fvsolve.errors import FvsolveError
+from fvsolve.validation import NUMBER, SERIES, Kind, is_array, validated
 
 LEAST_ROWS = 3
 ABOVE_FLOOR = 10.0  # an error below this multiple of the floor is not used
@@ -58,7 +58,7 @@ class Fit:
 ERRORS = Kind(lambda value: is_array(value, "fiu", 1, 1, finite=False), "a row of numbers")
 
 
-@door(sizes=SERIES, errors=ERRORS, floor=NUMBER)
+@validated(sizes=SERIES, errors=ERRORS, floor=NUMBER)
 def fit(sizes, errors, floor: float = 0.0) -> Fit:
     """Fit the order p of errors ~ C sizes^p, sizes falling; errors below ten times `floor` are not used.
 

@@ -11,16 +11,16 @@ import numpy as np
 
 from fvsolve.case.placing import bent, placed
 from fvsolve.case.sloshing import slowest
-from fvsolve.doors import CALL, NUMBER, TABLE, door
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
-from fvsolve.kernels.schedules import value_until
+from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.model.checks import velocities
 from fvsolve.studies.accuracy.rungs import Unsayable, finer, restated, structures, tanks
 from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
 from fvsolve.studies.distance import Gap, moving
 from fvsolve.studies.outcome import Outcome, outcome, without_basins
 from fvsolve.studies.truth import of_run
+from fvsolve.validation import FUNCTION, NUMBER, TABLE, validated
 
 TARGET = 1e-2
 BEST_OF, BRIEF = 3, 0.3  # timed runs of a level; time of the first run above which it is not repeated [s]
@@ -157,7 +157,7 @@ class Ladder:
         return own | laws | levels | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
 
 
-@door(set=TABLE, target=NUMBER, progress=CALL)
+@validated(set=TABLE, target=NUMBER, progress=FUNCTION)
 def whole_pipes(case):
     """Return the case; if parts placed along pipes divide these, with the pieces as its pipes."""
     from fvsolve.case import load
@@ -354,7 +354,7 @@ def change_time(model) -> float:
 
 def given(model, index: int, times) -> np.ndarray:
     """Values of a schedule at the given times."""
-    return np.array([value_until(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
+    return np.array([value_with_limit(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
 
 
 def before(t: float) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from fvsolve.doors import CALL, COUNT, NAMES, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.accuracy.afford import affordable
 from fvsolve.studies.accuracy.rows import Order
@@ -13,11 +12,12 @@ from fvsolve.studies.errands import Errands
 from fvsolve.studies.lines import lines, settled
 from fvsolve.studies.outcome import Progress, names, without_basins
 from fvsolve.studies.points import OUT, Points, kept_in
+from fvsolve.validation import COUNT, FUNCTION, NAMES, TABLE, TEXT, validated
 
 REFERENCES = ("auto", "exact", "finer", "richardson")
 
 
-@door(
+@validated(
     set=TABLE,
     refine=TEXT,
     key=TEXT,
@@ -26,11 +26,11 @@ REFERENCES = ("auto", "exact", "finer", "richardson")
     schemes=NAMES,
     methods=NAMES,
     against=TEXT,
-    initial=CALL,
-    source=CALL,
-    exact=CALL,
+    initial=FUNCTION,
+    source=FUNCTION,
+    exact=FUNCTION,
     out=OUT,
-    progress=CALL,
+    progress=FUNCTION,
     jobs=COUNT,
     dask=TEXT,
 )

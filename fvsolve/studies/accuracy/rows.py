@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from fvsolve.shown import Shown
+from fvsolve.display import Displayable
 from fvsolve.studies.accuracy.fit import Fit
 from fvsolve.studies.accuracy.refine import Level, Plan
 
@@ -30,7 +30,7 @@ class OrderRow:
 
 
 @dataclass(frozen=True, repr=False)
-class Order(Shown):
+class Order(Displayable):
     """Order study of one scheme and method.
 
     fits : variable -> {"L1" | "L2" | "max": Fit}; own : variable -> norm -> error of the reference itself
@@ -55,10 +55,10 @@ class Order(Shown):
 
     picture = "fvsolve.studies.accuracy.picture:order_picture"
 
-    def said(self) -> str:
+    def summary_line(self) -> str:
         return f"of {self.case!r}: {self.scheme}, {self.method}, {len(self.rows)} rows against {self.kind}"
 
-    def listed(self) -> dict[str, list]:
+    def table_columns(self) -> dict[str, list]:
         """Columns over all rows: cells, size, step [s], errors by variable and norm, and cost; SI."""
         columns: dict[str, list] = {"cells": [row.level.cells for row in self.rows]}
         columns |= {"size": [row.level.size for row in self.rows], "step": [row.level.step for row in self.rows]}

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case.defaults import link_said
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.friction import drag
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.steady_friction import drag
 from fvsolve.model.delay import what_needs_cells
 from fvsolve.studies.outcome import prepared
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.kernels.delay.history import LIVE, same_time
+from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.model.past import times_of_jumps
 from fvsolve.solve.loop import Loop
@@ -101,9 +101,9 @@ class Booked(Loop):
         may lie outside the step.
         """
         past, total, h = self.slate.past, np.zeros_like(self.total), self.t - t
-        if not past.size or past[LIVE] == 0.0:
+        if not past.size or past[JUMPS_TRAVELLING] == 0.0:
             return total
-        (_, b, c), separation = self.tableau(), same_time(past)
+        (_, b, c), separation = self.tableau(), time_tolerance(past)
         if self.stepper.method.kind == "linear":
             b = self.weights_beside()
         begin, end = t + min(0.0, float(c.min())) * h, t + max(1.0, float(c.max())) * h

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from fvsolve.doors import CALL, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.model.energy_ledger import Account
 from fvsolve.model.energy_start import available, datum_of
 from fvsolve.solve import initial_state
 from fvsolve.studies.energy.booking import EnergyRun
 from fvsolve.studies.outcome import RowSink, prepared
+from fvsolve.validation import FUNCTION, TABLE, TEXT, validated
 
 ROUNDING = 1e-12  # fraction of the energy throughput below which a remainder is rounding
 SHORT = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds omitted in names of ledger lines
@@ -133,7 +133,7 @@ PLAIN = {"supplied": "supplied", "stored": "stored", "dissipated": "dissipated",
          "law": "law_loss"}  # fmt: skip
 
 
-@door(set=TABLE, port=TEXT, progress=CALL)
+@validated(set=TABLE, port=TEXT, progress=FUNCTION)
 def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
     """Run a case with changed keys and compute its energy ledger; `case` as for `run`, or a Model.
 

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.doors import CALL, NAMES, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.output.summary import plain
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT, TIGHT_BELOW
 from fvsolve.studies.outcome import names
+from fvsolve.validation import FUNCTION, NAMES, validated
 
 CELLS = 20  # cells of the closed pipe
 SLACK = 1e-10  # excess of a norm over 1 that counts as rounding
@@ -91,7 +91,7 @@ class Passivity:
         return plain({"cells": CELLS, "methods": self.methods, "schemes": self.schemes, "pairs": pairs})
 
 
-@door(schemes=NAMES, methods=NAMES, progress=CALL)
+@validated(schemes=NAMES, methods=NAMES, progress=FUNCTION)
 def passivity(schemes=None, methods=None, progress=None) -> Passivity:
     """Compute the passivity of schemes and methods (default all). Raises FvsolveError for unknown names.
 
@@ -174,14 +174,14 @@ def closed_pipe(scheme: str) -> tuple[np.ndarray, np.ndarray]:
 
 def point_matrix(settings, n: int) -> np.ndarray:
     """S with |S c|^2 equal to the sum over cells of the mean squares in the energy ledger, for n dx = 1."""
-    from fvsolve.kernels.energy import POINTS, SHARES, width_of
+    from fvsolve.kernels.linear_energy import GAUSS_WEIGHTS, POINTS, polynomial_width
 
-    width = int(width_of(settings, n))
+    width = int(polynomial_width(settings, n))
     points = np.zeros((3 * n, n))
     for i in range(n):
         start = min(max(i - width // 2, 0), n - width)
         points[3 * i : 3 * i + 3, start : start + width] = (
-            np.sqrt(SHARES)[:, None] * POINTS[width, i - start, :, :width]
+            np.sqrt(GAUSS_WEIGHTS)[:, None] * POINTS[width, i - start, :, :width]
         )
     return np.linalg.cholesky(points.T @ points).T
 

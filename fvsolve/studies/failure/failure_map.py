@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.case import load
-from fvsolve.doors import CALL, COUNT, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, door, is_row
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
 from fvsolve.studies.errands import Errand, Errands
@@ -23,6 +22,7 @@ from fvsolve.studies.lines import lines, settled
 from fvsolve.studies.outcome import Progress, names, without_basins
 from fvsolve.studies.points import OUT, Points, kept_in
 from fvsolve.studies.truth import Truth, truth
+from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, is_row, validated
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
 TOLERANCE = 0.02  # greatest mean error, over the range of a probe
@@ -84,12 +84,14 @@ class FailureMap:
 
 
 KEY = Kind(
-    lambda value: is_row(value, lambda item: True) and len(value) == 2 and TEXT.holds(value[0]) and ROW.holds(value[1]),
+    lambda value: (
+        is_row(value, lambda item: True) and len(value) == 2 and TEXT.accepts(value[0]) and ROW.accepts(value[1])
+    ),
     'a key and its values, for example ("links.main.cells", [20, 40])',
 )
 
 
-@door(
+@validated(
     schemes=NAMES,
     methods=NAMES,
     courants=NUMBERS,
@@ -97,7 +99,7 @@ KEY = Kind(
     key=KEY,
     tolerance=NUMBER,
     out=OUT,
-    progress=CALL,
+    progress=FUNCTION,
     set=TABLE,
     jobs=COUNT,
     dask=TEXT,

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.ends import difference_rows
-from fvsolve.kernels.schedules import POLYNOMIAL, piece_at, piece_slopes, value_until
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.ghost_cells import difference_rows
+from fvsolve.kernels.schedule_pieces import POLYNOMIAL, piece_at, piece_slopes, value_with_limit
 from fvsolve.limits.symbol import symbol
 from fvsolve.model.delay import followed
 from fvsolve.schemes import LIMITED, SCHEMES
@@ -108,7 +108,7 @@ def stopped(model, t: float, before: bool = False):
     """
     tables = model.tables
     schedules, limit = tables.schedules.copy(), t if before else np.inf
-    values = [value_until(tables.schedules, tables.pieces, k, t, limit) for k in range(len(schedules))]
+    values = [value_with_limit(tables.schedules, tables.pieces, k, t, limit) for k in range(len(schedules))]
     for k in range(len(schedules)):
         schedules[k] = (k, 1)
     rows = [[-np.inf, POLYNOMIAL, t, value, 0.0, 0.0, 0.0] for value in values]

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.doors import FLAG, NAMES, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.kernels.schedules import value_until
+from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.model.inputs import PRESSURE, Input, inputs_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import hold
@@ -17,6 +16,7 @@ from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter
 from fvsolve.studies.linear.matrices import output_matrix, responses, state_matrix
 from fvsolve.studies.linear.slopes import COARSE, SMOOTH, longest, one_sided, two_sided
 from fvsolve.units import DIMENSIONS
+from fvsolve.validation import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 
 EPS = ("eps_x", "eps_y", "eps_z")
 STATE_UNITS = {
@@ -95,7 +95,7 @@ def state_unit(name: str, opens: bool) -> str:
     return "1/s" if quantity == "speed" and opens else STATE_UNITS.get(quantity, amount)
 
 
-@door(inputs=NAMES, outputs=NAMES, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
+@validated(inputs=NAMES, outputs=NAMES, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def linearise(
     case, inputs=(), outputs=None, at: float | None = None, before: bool = False, scheme: str | None = None, set=None,
 ) -> Linear:  # fmt: skip
@@ -159,9 +159,9 @@ def input_value(at: Frozen, name: str, input_: Input) -> float:
                          + model.evaluate(at.t, at.y)[1][model.layout["pressure"] + input_.node])  # fmt: skip
         place = model.node_names[input_.node]
         return pressure if input_.sort is PRESSURE else float(model.head(pressure, model.elevation[place]))
-    value = value_until(model.tables.schedules, model.tables.pieces, input_.schedule, at.t, np.inf)
+    value = value_with_limit(model.tables.schedules, model.tables.pieces, input_.schedule, at.t, np.inf)
     if input_.other >= 0:
-        value -= value_until(model.tables.schedules, model.tables.pieces, input_.other, at.t, np.inf)
+        value -= value_with_limit(model.tables.schedules, model.tables.pieces, input_.other, at.t, np.inf)
     return float((value - input_.offset) / input_.scale)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import records as rec
+from fvsolve.kernels import dtypes as rec
 from fvsolve.studies.linear.frozen import Frozen
 from fvsolve.studies.linear.slopes import FINER, NOISE, SMOOTH, STEPS, central, hidden_kinks, kinks, settled
 

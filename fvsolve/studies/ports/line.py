@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.doors import CALL, COMPLEX, NUMBER, POSITIVE, Kind, door, is_number, made
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Plain
 from fvsolve.units import show
+from fvsolve.validation import COMPLEX, FUNCTION, NUMBER, POSITIVE, Kind, instance_of, is_number, validated
 
 MOST = 200_000  # greatest number of samples of a sweep
 ROUNDING = 1e-12  # rounding error of a sample, relative to |H|
@@ -31,12 +31,12 @@ class LineImpedance:
 
     def __post_init__(self) -> None:
         for name, kind in (("z0", POSITIVE), ("time", POSITIVE), ("reflection", NUMBER)):
-            if not kind.holds(getattr(self, name)):
+            if not kind.accepts(getattr(self, name)):
                 raise FvsolveError(
-                    f"LineImpedance {name} = {show(getattr(self, name))} is not valid. Expected {kind.wanted}"
+                    f"LineImpedance {name} = {show(getattr(self, name))} is not valid. Expected {kind.expected}"
                 )
 
-    @door(s=COMPLEX)
+    @validated(s=COMPLEX)
     def __call__(self, s):
         """H at complex numbers s [1/s], Re s >= 0."""
         back = self.reflection * np.exp(-2.0 * self.time * np.asarray(s))
@@ -88,7 +88,7 @@ BESIDE = Kind(lambda given: is_number(given) and given >= 0, "a number from 0 on
 LEFT = Kind(lambda given: is_number(given) or str(given) == "-inf", "a finite number, or -infinity")
 
 
-@door(h=CALL, slope=BOUND, high=POSITIVE, shift=BESIDE, tolerance=POSITIVE, rightmost=LEFT)
+@validated(h=FUNCTION, slope=BOUND, high=POSITIVE, shift=BESIDE, tolerance=POSITIVE, rightmost=LEFT)
 def sweep_positive_real(
     h: Callable, slope, high: float, shift: float = 0.0, tolerance: float = 1e-6, rightmost: float = -math.inf
 ) -> SweepVerdict:
@@ -141,7 +141,7 @@ def _slopes(slope, w: np.ndarray, shift: float) -> np.ndarray:
     return bounds
 
 
-@door(line=made(LineImpedance), shift=BESIDE, tolerance=POSITIVE)
+@validated(line=instance_of(LineImpedance), shift=BESIDE, tolerance=POSITIVE)
 def line_positive_real(line: LineImpedance, shift: float | None = None, tolerance: float = 1e-6) -> SweepVerdict:
     """Test if the impedance of a line is positive real on Re s = shift (default 1e-3 / T), over a whole period.
 

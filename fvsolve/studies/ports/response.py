@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.doors import FLAG, NUMBER, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.ports.state_space import TOLERANCE, StateVerdict, Transfer, state_positive_real
+from fvsolve.validation import FLAG, NUMBER, TABLE, TEXT, validated
 
 LARGEST = 800  # greatest number of states; the Hamiltonian matrix is twice as large
 DECADE = 200  # frequencies per decade in the table
@@ -69,7 +69,7 @@ class Response:
         }  # fmt: skip
 
 
-@door(port=TEXT, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
+@validated(port=TEXT, at=NUMBER, before=FLAG, scheme=TEXT, set=TABLE)
 def response(
     case, port: str, at: float | None = None, before: bool = False, scheme: str | None = None,
     set: Mapping | None = None, frequencies: np.ndarray | None = None,

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.doors import COMPLEX, MATRIX, NUMBER, POSITIVE, SERIES, door, made
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.sheet import Plain
+from fvsolve.validation import COMPLEX, MATRIX, NUMBER, POSITIVE, SERIES, instance_of, validated
 
 TOLERANCE = 1e-9  # values of Re H / |H| closer to zero are undecided, because of differences and rounding
 DECADES = 1.0  # searched below the slowest and above the fastest pole; more if Re H changes sign beyond
@@ -30,7 +30,7 @@ class Transfer:
     [1/s]; seen : bool[n]  True if the pole has a residue in H
     """
 
-    @door(a=MATRIX, b=SERIES, c=SERIES, d=NUMBER, error=NUMBER)
+    @validated(a=MATRIX, b=SERIES, c=SERIES, d=NUMBER, error=NUMBER)
     def __init__(self, a: np.ndarray, b: np.ndarray, c: np.ndarray, d: float, error: float = 0.0):
         from scipy.linalg import matrix_balance, schur
 
@@ -65,7 +65,7 @@ class Transfer:
         """H at complex numbers s : complex128[k]; infinite at a pole."""
         return self.measured(s)[0]
 
-    @door(s=COMPLEX)
+    @validated(s=COMPLEX)
     def measured(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(H, its error by rounding and the error of A) : complex128[k], float64[k]."""
         s = np.atleast_1d(np.asarray(s, complex))
@@ -79,7 +79,7 @@ class Transfer:
         finite = np.isfinite(values)
         return np.where(finite, values, np.inf), np.where(finite, (ROUNDING + self.error) * size, np.inf)
 
-    @door(s=COMPLEX)
+    @validated(s=COMPLEX)
     def angle(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Re H / |H|, the cosine of the phase; its error) : float64[k] each; 1 and 0 at a pole and where H = 0."""
         value, doubt = self.measured(s)
@@ -137,7 +137,7 @@ class StateVerdict(Plain):
         return {True: "yes", False: "no", None: f"undecided within {self.tolerance:.0e}"}[self.positive_real]
 
 
-@door(h=made(Transfer), tolerance=POSITIVE)
+@validated(h=instance_of(Transfer), tolerance=POSITIVE)
 def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdict:
     """Test if H is positive real, from the sign of Re H between all frequencies at which it can change.
 

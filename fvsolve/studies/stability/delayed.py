@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.kernels.delay import history as at
-from fvsolve.kernels.delay.lines import drag_and_slope
+from fvsolve.kernels.delay_lines import wave_history as at
+from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
 from fvsolve.model.energy import energy_form
 from fvsolve.steppers.tableau import Method
 
@@ -85,9 +85,9 @@ class Delayed:
             if entry >= newest:
                 low[k], weights[2, k] = newest, 1.0
             elif entry + 3 <= newest:
-                weights[:, k] = at.six(x)
+                weights[:, k] = at.lagrange_six(x)
             elif entry + 2 <= newest:
-                weights[:, k] = at.four(x)
+                weights[:, k] = at.lagrange_four(x)
             else:
                 weights[2:4, k] = 1.0 - x, x
         return low.astype(int) + np.arange(-2, 4)[:, None], weights
@@ -199,13 +199,15 @@ def local(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     admittance = np.repeat(model.tables.pipes["admittance"][rows["pipe"]], 2)
 
     with model.slate() as data:
-        past, arrivals = data.past, at.places_of(data.past)[0]
-        inputs = arrivals + at.ARRIVALS * np.stack([first, first + rows["stretches"] - 1], axis=1) + np.array([0, 1])
+        past, arrivals = data.past, at.offsets_of(data.past)[0]
+        inputs = (
+            arrivals + at.ARRIVALS_SIZE * np.stack([first, first + rows["stretches"] - 1], axis=1) + np.array([0, 1])
+        )
 
         def evaluate(y: np.ndarray, w: np.ndarray) -> np.ndarray:
             past[inputs.ravel()] = w
-            past[at.COUNT] = past[at.KNOWN_COUNT] = at.ZEROS + 1.0
-            past[at.KNOWN_TIME] = t
+            past[at.COUNT] = past[at.ARRIVALS_COUNT] = at.PROFILE_ENTRIES + 1.0
+            past[at.ARRIVALS_TIME] = t
             dydt, out = data.evaluate(t, y, np.inf)
             return np.append(dydt[states], out[ends.ravel()])
 

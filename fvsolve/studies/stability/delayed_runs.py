@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.kernels.delay import history as at
+from fvsolve.kernels.delay_lines import wave_history as at
 from fvsolve.solve.loop import NO_LIMIT, Loop
 from fvsolve.steppers import slots
 from fvsolve.studies.stability.bracket import RISE, Limit, halved, limit
@@ -86,11 +86,11 @@ def widest(system: Delayed) -> float:
 
 def remember(past: np.ndarray, delays: np.ndarray, t: float, h: float, history: np.ndarray) -> None:
     """Write entries of lines : float64[count, 2, stretches] at t - count h, ..., t - h."""
-    count, places = history.shape[0], at.places_of(past)
-    numbers = at.ZEROS + np.arange(count)
-    past[at.COUNT] = at.ZEROS + count
-    past[[at.STEP, at.STEP_BEFORE]], past[[at.EVEN, at.EVEN_BEFORE]] = h, 1e18
-    past[at.HEAD + (numbers & (int(past[at.CAPACITY]) - 1))] = t + h * np.arange(-count, 0)
+    count, places = history.shape[0], at.offsets_of(past)
+    numbers = at.PROFILE_ENTRIES + np.arange(count)
+    past[at.COUNT] = at.PROFILE_ENTRIES + count
+    past[[at.LAST_STEP, at.STEP_BEFORE]], past[[at.EQUAL_STEPS, at.EQUAL_STEPS_BEFORE]] = h, 1e18
+    past[at.HEADER_SIZE + (numbers & (int(past[at.CAPACITY]) - 1))] = t + h * np.arange(-count, 0)
     for where, s, wave in rings(places, delays, numbers):
         past[where] = history[:, wave, s]
 
@@ -99,7 +99,7 @@ def entries(past: np.ndarray, system: Delayed) -> np.ndarray:
     """Entries of all stretches before the last entry : float64[history_steps, 2, stretches]."""
     values = np.zeros((system.many, 2, system.holds.size))
     numbers = int(past[at.COUNT]) - 1 - system.many + np.arange(system.many)
-    for where, s, wave in rings(at.places_of(past), system.model.tables.delays, numbers):
+    for where, s, wave in rings(at.offsets_of(past), system.model.tables.delays, numbers):
         values[:, wave, s] = past[where]
     return values
 

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.doors import CALL, COUNT, NAMES, door
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.limits.grid import AdvectionLimit, limit_of
 from fvsolve.schemes import LIMITED, LIMITERS, branches
@@ -24,6 +23,7 @@ from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import Progress, names
 from fvsolve.studies.sheet import Plain
 from fvsolve.studies.stability.periodic import THRESHOLD, Circle, check_size, first_failure
+from fvsolve.validation import COUNT, FUNCTION, NAMES, validated
 
 CELLS, STEPS, TIMES = 50, 500, (1, 10, 100)
 CLOSE = 1e-3  # relative width of a measured limit; growth is not a smooth function of the Courant number
@@ -76,7 +76,7 @@ class LimitedLimit(Plain):
         return cells
 
 
-@door(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=CALL)
+@validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
 def limited_limits(
     schemes: Sequence[str] = tuple(LIMITED), methods: Sequence[str] | None = None, cells: int = CELLS,
     steps: int = STEPS, progress: Progress | None = None,

@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.doors import CALL, COUNT, NAMES, door
 from fvsolve.errors import FvsolveError
-from fvsolve.kernels import records as rec
-from fvsolve.kernels.handle import make_handle
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.table_handle import make_handle
 from fvsolve.limits.symbol import WEIGHTS, symbol, weights_of
 from fvsolve.model.schemes import scheme_settings
 from fvsolve.steppers import slots
@@ -27,6 +26,7 @@ from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
 from fvsolve.studies.outcome import Progress, names
 from fvsolve.studies.sheet import Plain
+from fvsolve.validation import COUNT, FUNCTION, NAMES, validated
 
 THRESHOLD = 1e3
 CELLS, STEPS = 100, 1000
@@ -77,7 +77,7 @@ class Circle:
         return stepper.y[stepper.flags[slots.NOW]].copy()
 
 
-@door(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=CALL)
+@validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
 def measured_limits(
     schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
     progress: Progress | None = None,
@@ -151,7 +151,7 @@ def check_size(cells: int, steps: int) -> None:
 
 def _tables(scheme: str, limiter: str, cells: int) -> tuple:
     """Tables of a handle: settings of the scheme, small number of the pipe and work space; all else empty."""
-    tables = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in (*rec.Tables._fields, *rec.Written._fields)}
+    tables = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in (*rec.Tables._fields, *rec.RunArrays._fields)}
     tables["scratch"] = np.zeros(2 * cells + 7)
     scheme_settings(tables["settings"][0], scheme, limiter)
     tables["pipes"]["noise"] = SMALL
@@ -159,7 +159,7 @@ def _tables(scheme: str, limiter: str, cells: int) -> tuple:
 
 
 def _rhs():
-    from fvsolve.kernels.periodic import rhs_periodic
+    from fvsolve.kernels.periodic_advection import rhs_periodic
     from fvsolve.steppers.signatures import RHS, compiled_as
 
     return compiled_as(rhs_periodic, RHS)

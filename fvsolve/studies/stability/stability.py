@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.case import load
-from fvsolve.doors import CALL, COUNT, FLAG, NAMES, NUMBER, PATH, TABLE, TEXT, door
 from fvsolve.errors import FvsolveError, RunError
 from fvsolve.model.energy import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
@@ -37,6 +36,7 @@ from fvsolve.studies.stability.measured import Runs, measure
 from fvsolve.studies.stability.misled import notes
 from fvsolve.studies.stability.row import StabilityRow, read
 from fvsolve.studies.stability.system import predicted, system
+from fvsolve.validation import COUNT, FLAG, FUNCTION, NAMES, NUMBER, PATH, TABLE, TEXT, validated
 
 AUTOMATIC = (
     f"auto starts with {automatic.EXPLICIT}, for which its row holds; a run continues with {automatic.IMPLICIT} or "
@@ -95,7 +95,7 @@ class Side:
         return self.at.model.wave_rate
 
 
-@door(
+@validated(
     schemes=NAMES,
     methods=NAMES,
     at=NUMBER,
@@ -104,7 +104,7 @@ class Side:
     threshold=NUMBER,
     set=TABLE,
     out=PATH,
-    progress=CALL,
+    progress=FUNCTION,
     jobs=COUNT,
     dask=TEXT,
 )

@@ -1,0 +1,77 @@
+"""Display of results at a prompt and in a notebook: a line, a table, a plot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib import import_module
+from typing import Any, ClassVar
+
+from fvsolve.validation import PATH, validated
+
+TABLE_ROWS = 12  # rows of a table in a notebook; `.frame()` contains all rows
+
+
+class Displayable:
+    """Base class of results with a summary line, a table and a plot (`picture`, "module:function" that draws it)."""
+
+    picture: ClassVar[str] = ""
+
+    def summary_line(self) -> str:
+        """Summary in some words."""
+        raise NotImplementedError
+
+    def table_columns(self) -> Mapping[str, Sequence[Any]]:
+        """Columns of the table by name, in the units of the result."""
+        raise NotImplementedError
+
+    def frame(self):
+        """Table as a pandas DataFrame; FvsolveError if pandas is not installed."""
+        from fvsolve.errors import FvsolveError
+
+        try:
+            import pandas
+        except ImportError:
+            raise FvsolveError(f"{type(self).__name__}.frame() needs pandas: pip install pandas") from None
+        return pandas.DataFrame(dict(self.table_columns()))
+
+    @validated(path=PATH)
+    def plot(self, path=None):
+        """Plot as a matplotlib Figure, also written to `path` if given."""
+        module, _, name = self.picture.partition(":")
+        return save_if_path(getattr(import_module(module), name)(self), path)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.summary_line()}>"
+
+    def _repr_html_(self) -> str:
+        columns = {name: list(values) for name, values in self.table_columns().items()}
+        rows = list(zip(*columns.values(), strict=True))
+        head = "".join(f"<th>{escape(str(name))}</th>" for name in columns)
+        body = "".join(
+            "<tr>" + "".join(f"<td>{escape(_cell(x))}</td>" for x in row) + "</tr>" for row in rows[:TABLE_ROWS]
+        )
+        more = f"<p>{len(rows) - TABLE_ROWS} more rows in .frame()</p>" if len(rows) > TABLE_ROWS else ""
+        return f"<p>{escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>{more}"
+
+
+def save(figure, path) -> None:
+    """Write a figure. A .png is drawn once; `savefig` would draw a figure with a layout twice, to the same bytes."""
+    write = figure.canvas.print_png if str(path).endswith(".png") else figure.savefig
+    write(path)
+
+
+def save_if_path(figure, path):
+    """Return a figure, also written to `path` if given; FvsolveError if that fails."""
+    try:
+        if path is not None:
+            save(figure, path)
+    except (OSError, ValueError) as error:  # no such folder, unknown file type
+        from fvsolve.errors import FvsolveError
+
+        raise FvsolveError(f"{path}: the picture cannot be written: {error}") from error
+    return figure
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else "" if value is None else str(value)

@@ -1,0 +1,157 @@
+"""Rates and probes of pipes under the density laws log and table, with the full momentum flux.
+
+m_t + M_x = 0, M_t + (M^2 / m)_x + A p_x = -drag - m g slope. The waves r = (c m' + M') / 2, l = (c m' - M') / 2 are
+each reconstructed from the side they come from. The flux at a face is that of the state which both waves form there
+(a linearised Riemann solution with the reference wave speed c), minus the flux of the profile.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.density import (
+    density,
+    enthalpy,
+    force_of_mass,
+    local_speed,
+    pressure_of_mass,
+)
+from fvsolve.kernels.density.steady_profile import add_slope_force
+from fvsolve.kernels.dtypes import (
+    COLUMN_FLOW,
+    LEVEL,
+    PIPE_FLOW,
+    PIPE_PRESSURE,
+    PRESSURE,
+    RATE,
+    SPOOL_FLOW,
+    VALVE_FLOW,
+)
+from fvsolve.kernels.pipes import GAUSS, both_faces
+from fvsolve.kernels.steady_friction import drag
+from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.tank_levels import tank_level
+
+
+@njit
+def momentum_flux(st, floats, pipe, m, flow):
+    """M^2 / m + integral of A dp [N]."""
+    return flow * flow / m + force_of_mass(st, floats, pipe, m)
+
+
+@njit
+def wall_force(pipe, reference, m, flow):
+    """Friction force per length [kg/s2] of a mass flow in a pipe with m [kg/m] mass per length."""
+    friction = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+    return friction * (reference / m)
+
+
+@njit
+def pipe_rates_barotropic(st, floats, profile, pipe, r, l, ends, scratch, dr, dl):
+    """Write d/dt of both waves of a pipe; return the pipe's greatest rate (|v| + c) / dx [1/s]."""
+    n, c, dx, flow = r.size, pipe["speed"], pipe["dx"], pipe["flow"]
+    fr, fl = scratch[32 : 33 + n], scratch[40 + n : 41 + 2 * n]
+    both_faces(st, pipe, r, l, ends[0], ends[1], ends[2], ends[3], scratch, fr, fl)
+    face, cell = pipe["face"], pipe["center"]
+    reference = st["rho"] * pipe["area"]
+    weight = st["gravity"] * pipe["slope"]
+    least, greatest, quickest = 1e300, 0.0, 0.0
+    left_flow, left_flux, left_mass = 0.0, 0.0, 0.0
+    for i in range(n + 1):
+        dm, dflow = (fr[i] + fl[i]) / c, fr[i] - fl[i]
+        m, total = profile[face + i] + dm, flow + dflow
+        flux = momentum_flux(st, floats, pipe, m, total) - profile[pipe["flux"] + i]
+        least, greatest, quickest = min(least, m), max(greatest, m), max(quickest, abs(total))
+        if i > 0:
+            k = i - 1
+            m0 = profile[cell + k]
+            dm_cell, m_flow = (r[k] + l[k]) / c, flow + (r[k] - l[k])
+            a, b = GAUSS * (dflow - left_flow), GAUSS * (dm - left_mass)
+            friction = wall_force(pipe, reference, m0 + dm_cell + b, m_flow + a)
+            friction += wall_force(pipe, reference, m0 + dm_cell - b, m_flow - a)
+            force = -weight * dm_cell - (0.5 * friction - pipe["drag"] * (reference / m0))
+            mass_rate = -(dflow - left_flow) / dx
+            flow_rate = -(flux - left_flux) / dx + force
+            dr[k] = 0.5 * (c * mass_rate + flow_rate)
+            dl[k] = 0.5 * (c * mass_rate - flow_rate)
+        left_flow, left_flux, left_mass = dflow, flux, dm
+    if pipe["rise"] >= 0:
+        add_slope_force(st, profile, pipe, r, l, dr, dl)
+    low = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, least))
+    high = local_speed(st, floats, pipe, pressure_of_mass(st, floats, pipe, greatest))
+    return (quickest / least + max(low, high)) / dx * pipe["rate_factor"]
+
+
+@njit
+def rates_barotropic(t, y, dydt, out, handle):
+    """Write d/dt of the waves in all pipe cells, unless `dydt` is empty; raise out[RATE] to their greatest rate."""
+    tables = open_tables(handle)
+    st, layout, pipes = tables.settings[0], tables.layout[0], tables.pipes
+    for i in range(pipes.size if dydt.size > 0 else 0):
+        n, o, at = pipes[i]["cells"], pipes[i]["y"], layout["ends"] + 4 * i
+        own = pipe_rates_barotropic(
+            st, tables.floats, tables.profile, pipes[i], y[o : o + n], y[o + n : o + 2 * n], out[at : at + 4],
+            tables.scratch, dydt[o : o + n], dydt[o + n : o + 2 * n],
+        )  # fmt: skip
+        out[RATE] = max(out[RATE], own)
+
+
+@njit
+def pipe_state_at(probe, index, y, out, tables):
+    """(mass per length [kg/m], mass flow [kg/s]) at the position of a probe in pipe `index`."""
+    pipe, at = tables.pipes[index], tables.layout[0]["ends"] + 4 * index
+    r, l = out[at], out[at + 1]
+    if probe["side"] > 0:
+        r, l = out[at + 2], out[at + 3]
+    if probe["side"] == 0:
+        r, l = 0.0, 0.0
+        for k in range(probe["count"]):
+            cell, weight = pipe["y"] + probe["cell"] + k, tables.floats[probe["weights"] + k]
+            r += weight * y[cell]
+            l += weight * y[cell + pipe["cells"]]
+    return probe["mass"] + (r + l) / pipe["speed"], pipe["flow"] + (r - l)
+
+
+@njit
+def pressure_or_head(st, floats, probe, p):
+    """Absolute or gauge pressure [Pa] of a probe, or its head (h(p) - h(ambient)) / g plus elevation [m]."""
+    if probe["head"] == 1:
+        return (enthalpy(st, floats, p) - enthalpy(st, floats, st["ambient"])) / st["gravity"] + probe["offset"]
+    return p + probe["offset"]
+
+
+@njit
+def valve_volume_flow(st, floats, tables, out, k):
+    """Volume flow of a valve [m3/s] at the upstream density."""
+    layout, nodes, valve = tables.layout[0], tables.nodes, tables.valves[k]
+    flow = out[layout["valve"] + k]
+    up = valve["from_node"] if flow >= 0.0 else valve["to_node"]
+    return flow / density(st, floats, nodes[up]["pressure"] + out[layout["pressure"] + up])
+
+
+@njit
+def observe_barotropic(t, y, out, handle, values):
+    """Write the values of all probes; volume flows [m3/s] use the local density, of a valve the upstream one."""
+    tables = open_tables(handle)
+    st, floats, layout, nodes = tables.settings[0], tables.floats, tables.layout[0], tables.nodes
+    probes = tables.probes
+    for k in range(probes.size):
+        probe = probes[k]
+        kind, i = probe["kind"], probe["index"]
+        value = 0.0
+        if kind == PRESSURE:
+            value = pressure_or_head(st, floats, probe, nodes[i]["pressure"] + out[layout["pressure"] + i])
+        elif kind == LEVEL:
+            value = tank_level(nodes[i], floats, nodes[i]["density"], y[nodes[i]["y"]])
+        elif kind == PIPE_PRESSURE or kind == PIPE_FLOW:
+            m, flow = pipe_state_at(probe, i, y, out, tables)
+            p = pressure_of_mass(st, floats, tables.pipes[i], m)
+            if kind == PIPE_PRESSURE:
+                value = pressure_or_head(st, floats, probe, p)
+            else:
+                value = flow / m if probe["head"] == 2 else flow / density(st, floats, p)
+        elif kind == VALVE_FLOW:
+            value = valve_volume_flow(st, floats, tables, out, i)
+        elif kind == SPOOL_FLOW:
+            for e in range(4):
+                value += floats[probe["weights"] + e] * valve_volume_flow(st, floats, tables, out, i + e)
+        elif kind == COLUMN_FLOW:
+            value = out[layout["column"] + i] / st["rho"]
+        values[k] = value

@@ -1,0 +1,293 @@
+"""Junctions of rigid columns whose valves are all closed: balance of flows, pressures, impulses.
+
+No flow leaves such a junction, so the flows into it add up to zero, and its pressure keeps them so:
+sum of (A / L) (P_far - P) = sum of friction terms. Flows that do not add up are equalised by an impulse J [Pa s] of
+pressure, dM = (A / L) J away from the junction: momentum is conserved (an inelastic impact). The rounding of the sum
+is removed in the same way. Columns controlled by valves have a given flow here.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import JUNCTION, NO_SOLUTION, STATUS, WHERE
+from fvsolve.kernels.node_clusters import solve_dense
+from fvsolve.kernels.restrictions import conductance
+from fvsolve.kernels.steady_friction import drag
+
+
+@njit
+def is_air_gate(tables, k):
+    """True if valve k leads into the chamber of an air valve."""
+    device = tables.valves[k]["device"]
+    return device >= 0 and tables.devices[device]["row"] >= 0
+
+
+@njit
+def opens_by_event(tables, out, k):
+    """True if valve k is closed and only an event opens it, as for air valves and ideal check valves."""
+    if conductance(tables, out, k) > 0.0:
+        return False
+    device = tables.valves[k]["device"]
+    return device >= 0 and tables.devices[device]["opens_by_event"] == 1
+
+
+@njit
+def gate_area(tables, out, i):
+    """(sum of the square roots of the conductances of a node's valves, the sum at full opening).
+
+    The second sum leaves out air valves and valves that only an event opens.
+    """
+    node, area, full = tables.nodes[i], 0.0, 0.0
+    for e in range(node["gate_count"]):
+        k = tables.integers[node["gates"] + e]
+        area += sqrt(conductance(tables, out, k))
+        if not (is_air_gate(tables, k) or opens_by_event(tables, out, k)):
+            full += sqrt(tables.valves[k]["conductance"])
+    return area, full
+
+
+@njit
+def is_column_junction(tables, out, i):
+    """True if at least two columns join at node i and nothing else flows there."""
+    node = tables.nodes[i]
+    return node["gates"] >= 0 and node["columns"] > 1 and gate_area(tables, out, i)[0] == 0.0
+
+
+@njit
+def column_drag(column, flow):
+    """Friction of a column [kg/s2] at a flow [kg/s]."""
+    kind, loss, rough = column["friction"], column["loss"], column["rough"]
+    return drag(kind, loss, rough, column["roughness"], column["reynolds"], flow)
+
+
+@njit(forceinline=True)
+def body_drive(tables, out, column):
+    """Energy per mass that the motion of its body gives a column since the start [J/kg]; 0 for a fixed column."""
+    total, at = 0.0, tables.layout[0]["moving_segment"] + column["moving_segment"]
+    for k in range(column["moving_segments"]):
+        total += out[at + k]
+    return total
+
+
+@njit(forceinline=True)
+def driving_offset(tables, out, column):
+    """Driving pressure of a column in addition to that of its ends [Pa]."""
+    return column["offset"] + tables.settings[0]["rho"] * body_drive(tables, out, column)
+
+
+@njit
+def pressure_at(tables, out, i, extra, solved):
+    """p' of node i; of a junction, until nodes are `solved`, an estimate from its pipes and `extra` inflow [kg/s]."""
+    layout, node = tables.layout[0], tables.nodes[i]
+    if node["kind"] != JUNCTION or solved:
+        return out[layout["pressure"] + i]
+    return (out[layout["net"] + i] + extra) / node["admittance"] if node["admittance"] > 0.0 else 0.0
+
+
+@njit
+def has_pressure_reference(tables, out, i, k, seen):
+    """True if columns other than k, not controlled by valves, join junction i to a node of another kind.
+
+    seen[] : 1 for the nodes that these columns join
+    """
+    columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
+    seen[:] = 0.0
+    seen[i], changed = 1.0, True
+    while changed:
+        changed = False
+        for j in range(columns.size):
+            a, b = columns[j]["from_node"], columns[j]["to_node"]
+            if j == k or out[controlled + j] != 0.0 or seen[a] == seen[b]:
+                continue
+            other = b if seen[a] > 0.0 else a
+            if not is_column_junction(tables, out, other):
+                return True
+            seen[other], changed = 1.0, True
+    return False
+
+
+@njit
+def is_pinned(tables, out, i, seen):
+    """True if junction i is the first of a connected group in which no node sets the level of pressure."""
+    if has_pressure_reference(tables, out, i, -1, seen):
+        return False
+    for j in range(i):
+        if seen[j] > 0.0:
+            return False
+    return True
+
+
+@njit
+def junction_work(tables, n):
+    """Work arrays in scratch: (row of each node, marks of nodes, matrix, right side, pinned, given)."""
+    n_nodes, work = tables.nodes.size, tables.scratch
+    at = 2 * n_nodes + n * n
+    right, pinned, given = work[at : at + n], work[at + n : at + 2 * n], work[at + 2 * n : at + 3 * n]
+    return work[:n_nodes], work[n_nodes : 2 * n_nodes], work[2 * n_nodes : at], right, pinned, given
+
+
+@njit
+def number_junctions(tables, out):
+    """Number the column junctions in scratch, -1 for other nodes; return their count."""
+    rows, n = tables.scratch, 0
+    for i in range(tables.nodes.size):
+        rows[i] = -1.0
+        if is_column_junction(tables, out, i):
+            rows[i] = n
+            n += 1
+    return n
+
+
+@njit
+def assemble_junctions(tables, out, n, k):
+    """Matrix of n column junctions: sums of A / L of their columns [m], except valve-controlled columns and column k.
+
+    Clears the right side and marks pinned junctions.
+    """
+    rows, seen, matrix, right, pinned, _ = junction_work(tables, n)
+    columns, controlled = tables.columns, tables.layout[0]["valve_controlled"]
+    matrix[:], right[:] = 0.0, 0.0
+    for j in range(columns.size):
+        if j == k or out[controlled + j] != 0.0:
+            continue
+        a, b = int(rows[columns[j]["from_node"]]), int(rows[columns[j]["to_node"]])
+        mobility = columns[j]["area"] / columns[j]["length"]
+        if a >= 0:
+            matrix[n * a + a] += mobility
+        if b >= 0:
+            matrix[n * b + b] += mobility
+        if a >= 0 and b >= 0:
+            matrix[n * a + b] -= mobility
+            matrix[n * b + a] -= mobility
+    for i in range(rows.size):
+        if rows[i] >= 0.0:
+            pinned[int(rows[i])] = 1.0 if is_pinned(tables, out, i, seen) else 0.0
+
+
+@njit
+def assemble_with_given(tables, out, n):
+    """`assemble_junctions` with the given rates on the right side."""
+    assemble_junctions(tables, out, n, -1)
+    _, _, _, right, _, given = junction_work(tables, n)
+    for r in range(n):
+        right[r] = given[r]
+
+
+@njit
+def solve_junctions(tables, out, n):
+    """right <- matrix^-1 right; a pinned row keeps its value on the right side."""
+    _, _, matrix, right, pinned, _ = junction_work(tables, n)
+    for r in range(n):
+        if pinned[r] > 0.0:
+            matrix[n * r : n * r + n] = 0.0
+            matrix[n * r + r] = 1.0
+    if solve_dense(matrix, right, n) == 0.0:
+        out[STATUS], out[WHERE] = NO_SOLUTION, -1.0
+
+
+@njit
+def value_at(rows, right, i):
+    """Solution at node i, 0 if it is not a column junction."""
+    return right[int(rows[i])] if rows[i] >= 0.0 else 0.0
+
+
+@njit
+def balance_junction_flows(tables, out):
+    """Make the flows into column junctions add up to zero, by impulses.
+
+    Changes out[column] and out[net], which hold flows and changes since the profile.
+    """
+    n = number_junctions(tables, out)
+    if n == 0:
+        return
+    assemble_junctions(tables, out, n, -1)
+    rows, _, _, right, pinned, _ = junction_work(tables, n)
+    layout, columns = tables.layout[0], tables.columns
+    add_flow_sums(tables, out, rows, right)
+    for r in range(n):
+        right[r] *= 1.0 - pinned[r]
+    solve_junctions(tables, out, n)
+    for k in range(columns.size):
+        a, b = columns[k]["from_node"], columns[k]["to_node"]
+        if out[layout["valve_controlled"] + k] == 0.0:
+            impulse = value_at(rows, right, b) - value_at(rows, right, a)
+            change = columns[k]["area"] / columns[k]["length"] * impulse
+            out[layout["column"] + k] -= change
+            out[layout["net"] + a] += change
+            out[layout["net"] + b] -= change
+
+
+@njit
+def gate_inflow(tables, i):
+    """Flow into a node through its valves in the profile [kg/s]."""
+    node, valves, total = tables.nodes[i], tables.valves, 0.0
+    for e in range(node["gate_count"]):
+        k = tables.integers[node["gates"] + e]
+        total += valves[k]["flow"] if valves[k]["to_node"] == i else -valves[k]["flow"]
+    return total
+
+
+@njit
+def add_flow_sums(tables, out, rows, right):
+    """Add to right[] the flows of columns into column junctions [kg/s]; exactly zero in the state of the start."""
+    nodes, columns, at = tables.nodes, tables.columns, tables.layout[0]["column"]
+    for i in range(rows.size):
+        if rows[i] >= 0.0:
+            right[int(rows[i])] += nodes[i]["inflow"] - gate_inflow(tables, i)
+    for k in range(columns.size):
+        change = out[at + k] - columns[k]["flow"]
+        a, b = int(rows[columns[k]["from_node"]]), int(rows[columns[k]["to_node"]])
+        if a >= 0:
+            right[a] -= change
+        if b >= 0:
+            right[b] += change
+
+
+@njit
+def add_column_rates(y, tables, out, n, skip, solved):
+    """Add to the right side the rates of flow of columns into column junctions at p' = 0 there [kg/s2].
+
+    Valve-controlled columns and column `skip` are left out. Until nodes are `solved`, flows come from the state and
+    pressures are estimates.
+    """
+    rows, _, _, right, pinned, _ = junction_work(tables, n)
+    layout, columns = tables.layout[0], tables.columns
+    for k in range(columns.size):
+        column = columns[k]
+        i, j = column["from_node"], column["to_node"]
+        if k == skip or out[layout["valve_controlled"] + k] != 0.0 or (rows[i] < 0.0 and rows[j] < 0.0):
+            continue
+        flow = out[layout["column"] + k] if solved else column["flow"] + y[column["y"]]
+        p_i = 0.0 if rows[i] >= 0.0 else pressure_at(tables, out, i, -flow, solved)
+        p_j = 0.0 if rows[j] >= 0.0 else pressure_at(tables, out, j, flow, solved)
+        rate = column["area"] / column["length"] * (p_i - p_j + driving_offset(tables, out, column))
+        rate -= column_drag(column, flow) - column["drag"]
+        if rows[i] >= 0.0:
+            right[int(rows[i])] -= rate
+        if rows[j] >= 0.0:
+            right[int(rows[j])] += rate
+    for i in range(rows.size):
+        if rows[i] >= 0.0 and pinned[int(rows[i])] > 0.0:
+            right[int(rows[i])] = out[layout["pressure"] + i]
+
+
+@njit
+def far_end_pressure(y, tables, out, k, end, solved):
+    """(p' at the far end of column k while its flow is constant, its fall per d/dt of that flow [Pa s2/kg]).
+
+    end : 1 or -1, the near end is the `to` or `from` end
+    """
+    column = tables.columns[k]
+    i = column["from_node"] if end == 1 else column["to_node"]
+    if not is_column_junction(tables, out, i):
+        return pressure_at(tables, out, i, end * column["flow"], solved), 0.0
+    n = number_junctions(tables, out)
+    assemble_junctions(tables, out, n, k)
+    rows, _, _, right, _, _ = junction_work(tables, n)
+    add_column_rates(y, tables, out, n, k, solved)
+    solve_junctions(tables, out, n)
+    p = right[int(rows[i])]
+    assemble_junctions(tables, out, n, k)
+    right[int(rows[i])] = 1.0
+    solve_junctions(tables, out, n)
+    return p, right[int(rows[i])]

@@ -1,0 +1,303 @@
+"""Flow of a rigid column whose only outlet valves are nearly closed: it follows the valves, not its inertia.
+
+If a column ends at a node without storage, only the valves of that node control it. Where these are nearly closed
+(below a thousandth of their full area), its time constant goes to zero with their area F, and its flow follows them:
+I = sum of F sqrt(dP), with the decelerating pressure (L / A) dI/dt = (L / A) sum of dF/dt sqrt(dP). When the last valve
+closes, no flow is possible: the column is stationary, and the node has the pressure of its far end.
+
+A column also follows a disc that leaves its seat, if this disc is its only outlet, or the stem of a regulating valve.
+Lift x and flow start as powers of time, and dP = M^2 / (G x^2), there 0 / 0, would relax at an infinite rate. Until x
+has grown, dP drives both: (L / A) sqrt(G dP) dx/dt(dP) + dP = the stationary drop. The momentum of the column is
+conserved.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.calls import call_lead
+from fvsolve.kernels.column_junctions import (
+    driving_offset,
+    far_end_pressure,
+    gate_area,
+    has_pressure_reference,
+    is_column_junction,
+    opens_by_event,
+    pressure_at,
+)
+from fvsolve.kernels.devices import LEAD
+from fvsolve.kernels.restrictions import conductance, conductance_at
+from fvsolve.kernels.valve_seating import controls_column
+
+NEARLY_CLOSED = 1e-3  # fraction of their full area below which valves control their column
+SWITCH_LOSS = 0.05  # fraction of the flow at the switch to valve control; larger than the error made there
+PRESSURE_TOLERANCE = 1e-13  # relative tolerance of a pressure in Newton
+RATE_INTERVAL = 1e-7  # interval over which the rate of an area is measured [s]
+
+
+@njit
+def is_controlled(tables, out, i):
+    """True if valves at node i control its column.
+
+    The node joins a single column and valves. These are closed, or nearly closed with known rates of area, or the only
+    valve is near its seat.
+    """
+    node = tables.nodes[i]
+    if node["gates"] < 0 or node["columns"] > 1:
+        return False
+    if node["gate_count"] == 1 and seating_valve(tables, i) >= 0:
+        return True
+    area, full = gate_area(tables, out, i)
+    return area == 0.0 or (area < NEARLY_CLOSED * full and area_rate_known(tables, out, i))
+
+
+@njit
+def area_rate_known(tables, out, i):
+    """True if the rate of area of each valve at node i is known: by schedule, from its seat, or zero until an event."""
+    node = tables.nodes[i]
+    for e in range(node["gate_count"]):
+        k = tables.integers[node["gates"] + e]
+        if tables.valves[k]["device"] >= 0 and not controls_column(tables, k) and not opens_by_event(tables, out, k):
+            return False
+    return True
+
+
+@njit
+def find_control_end(tables, out, k):
+    """1 or -1 if valves control column k at its `to` or `from` end, else 0.
+
+    If the far end is a column junction, it must have a pressure reference besides this column.
+    """
+    column, marks = tables.columns[k], tables.scratch[: tables.nodes.size]
+    for side in (1, -1):
+        near, far = column["to_node"], column["from_node"]
+        if side < 0:
+            near, far = far, near
+        if is_controlled(tables, out, near) and (
+            not is_column_junction(tables, out, far) or has_pressure_reference(tables, out, far, k, marks)
+        ):
+            return side
+    return 0
+
+
+@njit
+def find_controlled_columns(tables, out):
+    """Find the columns that their valves control; write the controlled end of each to `out`: `find_control_end`."""
+    at, n = tables.layout[0]["valve_controlled"], tables.columns.size
+    out[at : at + n] = 0.0
+    for k in range(n):
+        out[at + k] = find_control_end(tables, out, k)
+
+
+@njit
+def control_end(tables, out, k):
+    """1 or -1 if valves control column k at its `to` or `from` end, else 0."""
+    return int(out[tables.layout[0]["valve_controlled"] + k])
+
+
+@njit
+def stationary_pressure(y, tables, out, k, end, solved):
+    """(p' at the controlled end of a column without driving pressure, fall of p' per d/dt of its flow [Pa s2/kg])."""
+    column = tables.columns[k]
+    p, softness = far_end_pressure(y, tables, out, k, end, solved)
+    inertia = column["length"] / column["area"]
+    return p + end * (driving_offset(tables, out, column) + column["drag"] * inertia), inertia + softness
+
+
+@njit
+def lift_drop(drop, still, slope, heavy):
+    """(drop across the valve that controls a column, dx/dt), by Newton on the root r: r^2 + heavy r dx/dt(r^2) = drop.
+
+    drop : the stationary drop; still : dx/dt at it; slope : of dx/dt over the drop; heavy : (L / A) sqrt(G)
+    Newton starts above the root, because the cubic is convex from its greatest root on.
+    """
+    if drop <= 0.0 or still == 0.0:
+        return drop, still
+    r, speed = sqrt(drop), still
+    while r * r - drop + heavy * r * (still + slope * (r * r - drop)) < 0.0:
+        r *= 2.0
+    for _ in range(100):
+        speed = still + slope * (r * r - drop)
+        step = (r * r - drop + heavy * r * speed) / (2.0 * r + heavy * (speed + 2.0 * slope * r * r))
+        r -= step
+        if abs(step) <= 1e-14 * r:
+            break
+    return r * r, still + slope * (r * r - drop)
+
+
+@njit
+def seating_valve(tables, i):
+    """Valve that is the only outlet of the column at node i and controls it from its seat; -1 for none."""
+    k = tables.integers[tables.nodes[i]["gates"]]
+    return k if controls_column(tables, k) else -1
+
+
+@njit
+def seating_drop(t, y, tables, out, k, index, stationary, inertia, other, drop):
+    """(drop across the valve `index` that controls column k, dx/dt), from p' of a stationary column and its drop."""
+    valve, column = tables.valves[index], tables.columns[k]
+    device, heavy = tables.devices[valve["device"]], inertia * sqrt(valve["conductance"])
+    ahead = valve["from_node"] == column["from_node"] or valve["from_node"] == column["to_node"]
+    before, behind = (stationary, other) if ahead else (other, stationary)
+    still, slope = call_lead(tables.hooks[device["hooks"], LEAD], t, y, tables, device, before, behind, drop, ahead)
+    driving, speed = lift_drop(drop, still, slope, heavy)
+    if driving <= 0.0 or conductance(tables, out, index) == 0.0 or tables.clock[0]["step"] == 0.0:
+        return driving, speed
+    way = 1.0 if valve["from_node"] == column["to_node"] or valve["to_node"] == column["from_node"] else -1.0
+    root = relaxed_root(y, tables, out, k, index, way, sqrt(driving), slope, heavy)
+    return root * abs(root), still + slope * (root * abs(root) - drop)
+
+
+@njit
+def relaxed_root(y, tables, out, k, index, way, root, slope, heavy):
+    """Square root of the drop for a given step, relaxed where the step does not resolve the exchange of lift and flow.
+
+    r = r0 + (M / sqrt(G) - x r0) / max(x, x1), x1 = 2 h 2 r0 (1 / heavy + r0 slope): M relaxes to x sqrt(G) r0 over at
+    least two steps, and not faster than by itself. The sum x / slope + (L / A) M is not changed by this.
+    """
+    dense, column = tables.valves[index]["conductance"], tables.columns[k]
+    x = sqrt(conductance(tables, out, index) / dense)
+    own = way * (column["flow"] + y[column["y"]]) / sqrt(dense)
+    least_lift = 4.0 * tables.clock[0]["step"] * root * (1.0 / heavy + root * slope)
+    return root + (own - x * root) / max(x, least_lift)
+
+
+@njit
+def seating_flow(t, y, tables, out, k, end, index, solved):
+    """`controlled_flow` of a column that a valve controls from its seat."""
+    valve, column = tables.valves[index], tables.columns[k]
+    side = 1.0 if valve["from_node"] == (column["to_node"] if end == 1 else column["from_node"]) else -1.0
+    stationary, inertia = stationary_pressure(y, tables, out, k, end, solved)
+    other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
+    still = valve["drop"] + side * (stationary - other)
+    drop, speed = seating_drop(t, y, tables, out, k, index, stationary, inertia, other, still)
+    root = side * (sqrt(drop) if drop >= 0.0 else -sqrt(-drop))
+    rate = speed * sqrt(valve["conductance"]) * root if drop > 0.0 else 0.0
+    return sqrt(conductance(tables, out, index)) * root, rate, stationary + side * (drop - still)
+
+
+@njit
+def gate_flow(t, tables, out, x, p, solved):
+    """(flow out of node x through its valves at p', its rate by the change of their areas, d rate / dp)."""
+    flow, rate, rise = 0.0, 0.0, 0.0
+    for e in range(tables.nodes[x]["gate_count"]):
+        k = tables.integers[tables.nodes[x]["gates"] + e]
+        drop = p - zero_flow_pressure(tables, out, x, k, solved)
+        root = sqrt(drop) if drop >= 0.0 else -sqrt(-drop)
+        later = sqrt(conductance_at(t + RATE_INTERVAL, tables, out, k))
+        widening = (later - sqrt(conductance_at(t, tables, out, k))) / RATE_INTERVAL
+        flow += sqrt(conductance(tables, out, k)) * root
+        rate += widening * root
+        rise += 0.5 * widening / max(abs(root), 1e-300)
+    return flow, rate, rise
+
+
+@njit
+def zero_flow_pressure(tables, out, x, index, solved):
+    """p' of node x at which there is no flow through its valve `index`."""
+    valve = tables.valves[index]
+    side = 1.0 if valve["from_node"] == x else -1.0
+    other = pressure_at(tables, out, valve["to_node"] if side > 0.0 else valve["from_node"], 0.0, solved)
+    return other - side * valve["drop"]
+
+
+@njit
+def zero_flow_range(tables, out, x, solved):
+    """(least, greatest) `zero_flow_pressure` of all valves of node x."""
+    least, most = 1e300, -1e300
+    for e in range(tables.nodes[x]["gate_count"]):
+        level = zero_flow_pressure(tables, out, x, tables.integers[tables.nodes[x]["gates"] + e], solved)
+        least, most = min(least, level), max(most, level)
+    return least, most
+
+
+@njit
+def opening_pressure(t, tables, out, x, stationary, inertia, solved):
+    """p' of node x whose valves open: the only root of p - stationary + inertia rate(p), by bounded Newton."""
+    low, high = zero_flow_range(tables, out, x, solved)
+    low, high, p = min(low, stationary), max(high, stationary), stationary
+    for _ in range(200):
+        _, rate, rise = gate_flow(t, tables, out, x, p, solved)
+        residual = p - stationary + inertia * rate
+        low, high = (low, p) if residual > 0.0 else (p, high)
+        new = p - residual / (1.0 + inertia * rise)
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - p) <= PRESSURE_TOLERANCE * (1e5 + abs(new)):
+            return new
+        p = new
+    return p
+
+
+@njit
+def closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved):
+    """(p' of node x whose valves close on a flow in direction `way`, True if a root exists), by Newton from outside.
+
+    way : 1 for flow out of the node, -1 into it
+    p - stationary + inertia rate(p) is convex there; flows tend to its outermost root.
+    """
+    p = start
+    for _ in range(200):
+        flow, rate, rise = gate_flow(t, tables, out, x, p, solved)
+        slope = 1.0 + inertia * rise
+        if slope <= 0.0 or flow * way <= 0.0:
+            return p, False
+        step = (p - stationary + inertia * rate) / slope
+        p -= step
+        if abs(step) <= PRESSURE_TOLERANCE * (1e5 + abs(p)):
+            break
+    return p, True
+
+
+@njit
+def controlled_pressure(t, tables, out, x, own, stationary, inertia, solved):
+    """p' of node x whose valves control a column that brings the flow `own` [kg/s].
+
+    Closing valves may allow a flow in either direction: the direction of the present flow is tried first.
+    """
+    flow, rate, _ = gate_flow(t, tables, out, x, stationary, solved)
+    if flow == 0.0 and rate == 0.0:
+        return stationary
+    if rate * flow >= 0.0:
+        return opening_pressure(t, tables, out, x, stationary, inertia, solved)
+    brake = -inertia * rate / flow * gate_area(tables, out, x)[0]
+    way = 1.0 if own > 0.0 or (own == 0.0 and flow > 0.0) else -1.0
+    least, most = zero_flow_range(tables, out, x, solved)
+    reach = brake + sqrt(max(abs(stationary - least), abs(stationary - most)))
+    for _ in range(2):
+        start = most + reach * reach if way > 0.0 else least - reach * reach
+        p, exists = closing_pressure(t, tables, out, x, way, start, stationary, inertia, solved)
+        if exists:
+            return p
+        way = -way
+    return stationary
+
+
+@njit
+def controlled_rate(t, y, tables, out, k, end):
+    """d/dt of the flow out of column k that its valves control; its state keeps its direction to the end.
+
+    At the switch to valve control the state has an error of about 1 %. Below the fraction SWITCH_LOSS of the flow it is
+    relaxed to zero instead of changing sign.
+    """
+    flow, rate, _ = controlled_flow(t, y, tables, out, k, end, True)
+    column = tables.columns[k]
+    if rate * flow >= 0.0:
+        return rate
+    area, full = gate_area(tables, out, column["to_node"] if end == 1 else column["from_node"])
+    least = -SWITCH_LOSS * NEARLY_CLOSED * full * column["length"] / column["area"] * rate / flow * area
+    return rate * min(1.0, abs(column["flow"] + y[column["y"]]) / least)
+
+
+@njit
+def controlled_flow(t, y, tables, out, k, end, solved):
+    """(flow out of column k through the valves that control it, its rate, p' of that end)."""
+    column, limit = tables.columns[k], tables.clock[0]["limit"]
+    x = column["to_node"] if end == 1 else column["from_node"]
+    if seating_valve(tables, x) >= 0:
+        return seating_flow(t, y, tables, out, k, end, seating_valve(tables, x), solved)
+    early = t if t + 2.0 * RATE_INTERVAL <= limit else t - RATE_INTERVAL  # the rate before a kink at `limit`
+    stationary, inertia = stationary_pressure(y, tables, out, k, end, solved)
+    own = end * (column["flow"] + y[column["y"]])
+    p = controlled_pressure(early, tables, out, x, own, stationary, inertia, solved)
+    flow, rate, _ = gate_flow(early, tables, out, x, p, solved)
+    return flow, rate, p

@@ -1,0 +1,94 @@
+"""Compiled functions of a model for the stepper, compiled at first use."""
+
+import functools
+
+from fvsolve.jit import compile_in_parallel, compile_once, njit
+from fvsolve.kernels import calls
+from fvsolve.kernels.rhs_assembly import CLOSING, PHASES, ModelFeatures
+
+READER_IMPORTS = "from fvsolve.kernels.rhs_assembly import Cast, Pieces; from fvsolve.kernels.compiled_functions import compile_readers; "
+HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
+RHS_HOOKS, READER_HOOKS = ("set", "move", "step", "slope", "lift"), ("value", "outside", "events", "bends")
+ENERGY_HOOKS = ("power", "stored")
+COMPILE_MARCH = "from fvsolve.steppers.march import compiled; compiled()"
+
+
+class Functions:
+    """Compiled functions of a model: `rhs`, `observe`, `record`, `events`, and `energies` when they are first used.
+
+    calls : int64[jobs, n]  addresses of functions, a row for each job
+    hooks : int64[laws, hooks]  addresses of the functions of parts' laws; both stand behind the handle of a model
+    """
+
+    def __init__(self, cast: ModelFeatures) -> None:
+        self.cast, rates = cast, cast.functions(*PHASES)
+        self.calls = calls.empty_calls(calls.JOBS, len(rates) + 3)
+        self.hooks = calls.empty_calls(len(cast.laws), len(calls.HOOKS))
+        others = "" if all(name.startswith("fvsolve.") for name in cast.packages()) else "import fvsolve.parts; "
+        with compile_in_parallel(f"{others}{READER_IMPORTS}compile_readers({cast!r}); {COMPILE_MARCH}", "march_at"):
+            self.rhs = self.compile_job(calls.RHS, rates, calls.rhs_in_turn)
+            self.store_hooks(*RHS_HOOKS, *["lead"] * cast.columns)
+        self.store_addresses(calls.CLOSE, cast.functions(*CLOSING))
+        self.store_addresses(calls.DERIVE, cast.functions("see"))
+        self.store_addresses(calls.DAMP, cast.functions("damp"))
+        self.observe = self.compile_job(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
+        self.store_addresses(calls.RECORD, cast.functions("record"))
+        self.store_addresses(calls.EVENTS, cast.functions("events"))
+        self.store_hooks(*READER_HOOKS)
+        self.record, self.events = compile_readers(cast)
+
+    def store_addresses(self, job: int, functions: list) -> None:
+        """Write the addresses of the functions of a job to `calls`."""
+        self.calls[job, : len(functions)] = [
+            calls.function_address(function, calls.ARGUMENTS[job]) for function in functions
+        ]
+
+    def store_hooks(self, *hooks: str) -> None:
+        """Write the addresses of these hooks of all laws to `hooks`."""
+        for row, law in zip(self.hooks, self.cast.modules(), strict=True):
+            for hook in hooks:
+                if (function := calls.hook_of(law, hook)) is not None:
+                    row[HOOK[hook]] = calls.function_address(function, calls.HOOKS[hook][0])
+
+    def compile_job(self, job: int, functions: list, in_turn):
+        """Store all functions of a job; return the compiled function that calls them in turn."""
+        self.store_addresses(job, functions)
+        return calls.compile_as(in_turn, calls.ARGUMENTS[job].lower())
+
+    @functools.cached_property
+    def energies(self) -> tuple:
+        """(power, stored), functions of (t, y, dydt, out, handle, rows)."""
+        self.store_hooks(*ENERGY_HOOKS)
+        power, stored = self.cast.functions("power"), self.cast.functions("stored")
+        return self.compile_job(calls.POWER, power, calls.power_in_turn), self.compile_job(
+            calls.STORED, stored, calls.stored_in_turn
+        )
+
+
+functions = compile_once(Functions)
+
+
+def compile_readers(cast: ModelFeatures) -> tuple:
+    """(record, events) of a model, compiled together with all functions that they call."""
+    for function in cast.functions("observe", "record", "events"):
+        calls.function_address(function, calls.READS)
+    for law in cast.modules():
+        for hook in READER_HOOKS:
+            if (function := calls.hook_of(law, hook)) is not None:
+                calls.function_address(function, calls.HOOKS[hook][0])
+    record = calls.compile_as(calls.record_in_turn, calls.READS.lower())
+    return record, calls.compile_as(calls.events_in_turn, "tvhv")
+
+
+@compile_once
+def fused_step_function(needed: bool):
+    """Fused step of upwind and Euler under the linear law if `needed`, else an unused function of that type."""
+    found = unused_step
+    if needed:
+        from fvsolve.kernels.fused_step import fused_step_linear as found
+    return calls.compile_as(found, "ttvvvhv")
+
+
+@njit
+def unused_step(t, h, y, y_new, out, handle, values):
+    """Placeholder; it is never called."""

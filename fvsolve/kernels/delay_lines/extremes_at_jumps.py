@@ -1,0 +1,208 @@
+"""Extremes on both sides of jumps: at nodes, at places within delay lines, and where two jumps cross there.
+
+A jump passes between two recorded states. Values on both sides of it are the smooth part at its time, by linear
+interpolation between both states, plus the jumps that have arrived by then.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.calls import observe_in_turn
+from fvsolve.kernels.delay_lines.line_interior import sent_wave_linear
+from fvsolve.kernels.delay_lines.wave_history import (
+    ARRIVALS_SIZE,
+    COUNT,
+    FIRST_JUMP,
+    HEAD_SIZE,
+    INFINITE,
+    JUMP_CAPACITY,
+    JUMP_COUNT,
+    first_after,
+    jump_head,
+    jump_list,
+    reading_data,
+    ring_of,
+    time_of,
+    wrap_index,
+)
+from fvsolve.kernels.dtypes import PIPE_FLOW, PIPE_PRESSURE
+from fvsolve.kernels.observation import update_extremes
+from fvsolve.kernels.table_handle import open_tables
+
+
+@njit(forceinline=True)
+def spare_offsets(tables):
+    """Offsets in `spare` of: probe values and node pressures of the last record, both without jumps now, work array."""
+    at, probes, nodes = 2 * tables.layout[0]["size"], tables.probes.size, tables.nodes.size
+    return at, at + probes, at + probes + nodes, at + 2 * probes + nodes, at + 2 * (probes + nodes)
+
+
+@njit
+def store_values(tables, out, values):
+    """Store the recorded values of probes and pressures of nodes."""
+    first, second, _, _, _ = spare_offsets(tables)
+    pressure = tables.layout[0]["pressure"]
+    for k in range(tables.probes.size):
+        tables.spare[first + k] = values[k]
+    for i in range(tables.nodes.size):
+        tables.spare[second + i] = out[pressure + i]
+
+
+@njit
+def store_smooth_values(t, y, state, handle):
+    """Store values of probes and pressures of nodes at t for the case that no jump has arrived."""
+    tables = open_tables(handle)
+    _, _, third, fourth, fifth = spare_offsets(tables)
+    pressure = tables.layout[0]["pressure"]
+    observe_in_turn(t, y, state, handle, tables.spare[third:fourth])
+    for i in range(tables.nodes.size):
+        tables.spare[fourth + i] = state[pressure + i]
+
+
+@njit
+def extremes_beside_jump(t, time, y, state, handle):
+    """Update extremes by the state beside a jump that arrives at `time`; state : at t, with jumps up to `time`."""
+    tables = open_tables(handle)
+    past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes
+    first, second, third, fourth, fifth = spare_offsets(tables)
+    probes, pressure, vapor = tables.probes.size, tables.layout[0]["pressure"], tables.settings[0]["vapor"]
+    before = time_of(past, int(past[COUNT]) - 1)
+    share = (t - time) / (t - before)
+    values = spare[fifth : fifth + probes]
+    observe_in_turn(t, y, state, handle, values)
+    for k in range(probes):
+        probe = tables.probes[k]
+        if (probe["kind"] == PIPE_PRESSURE or probe["kind"] == PIPE_FLOW) and probe["side"] == 0:
+            continue  # see `update_line_extremes`
+        value = values[k] + share * (spare[first + k] - spare[third + k])
+        update_extremes(tables.extremes, k, time, value)
+        mark = probe["mark"]
+        if mark >= 0 and value < vapor and marks[mark] != marks[mark]:
+            marks[mark] = time
+    for i in range(nodes.size):
+        p = state[pressure + i] + share * (spare[second + i] - spare[fourth + i])
+        if nodes[i]["pressure"] + p < vapor and marks[pipes.size + i] != marks[pipes.size + i]:
+            marks[pipes.size + i] = time
+
+
+@njit
+def line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t):
+    """(least, its time, greatest, its time) of r + sign l at jumps that pass a share x of stretch q in a step."""
+    least, t_least, greatest, t_greatest = INFINITE, t, -INFINITE, t
+    queue, tau, s, same = int(past[JUMP_CAPACITY]), line["tau"], line["stretch"] + q, clock[4]
+    ring, mask = ring_of(places, line, q)
+    for wave in range(2):
+        head, other = jump_head(places, s, wave), jump_head(places, s, 1 - wave)
+        share = x if wave == 0 else 1.0 - x
+        times, first, count = jump_list(places, queue, head), int(past[head + FIRST_JUMP]), int(past[head + JUMP_COUNT])
+        for i in range(first_after(past, queue, times, first, count, before - share * tau + same), count):
+            sent, size = past[times + wrap_index(first + i, queue)], past[times + wrap_index(first + i, queue) + queue]
+            if sent > t - share * tau + same:
+                break
+            here = sent_wave_linear(past, places, clock, ring, mask, head, wave, sent)
+            there = sent_wave_linear(past, places, clock, ring, mask, other, 1 - wave, sent + (2.0 * share - 1.0) * tau)
+            for side in range(2):
+                moved = here - (1 - side) * size
+                value = moved + sign * there if wave == 0 else there + sign * moved
+                if value < least:
+                    least, t_least = value, sent + share * tau
+                if value > greatest:
+                    greatest, t_greatest = value, sent + share * tau
+    return least, t_least, greatest, t_greatest
+
+
+@njit
+def envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t):
+    """Update the envelope at each point of stretch q where two jumps cross in a step."""
+    queue, tau, s, same, pipe = (
+        int(past[JUMP_CAPACITY]),
+        line["tau"],
+        line["stretch"] + q,
+        clock[4],
+        tables.pipes[line["pipe"]],
+    )
+    ring, mask = ring_of(places, line, q)
+    forward, backward = jump_head(places, s, 0), jump_head(places, s, 1)
+    times, first, count = (
+        jump_list(places, queue, forward),
+        int(past[forward + FIRST_JUMP]),
+        int(past[forward + JUMP_COUNT]),
+    )
+    others, start, others_count = (
+        jump_list(places, queue, backward),
+        int(past[backward + FIRST_JUMP]),
+        int(past[backward + JUMP_COUNT]),
+    )
+    delta, n = past[places[0] + ARRIVALS_SIZE * s + 2], line["places"]
+    for i in range(count):
+        sent, size = past[times + wrap_index(first + i, queue)], past[times + wrap_index(first + i, queue) + queue]
+        begin = first_after(past, queue, others, start, others_count, max(2.0 * before - tau - sent, sent - tau) + same)
+        for j in range(begin, others_count):
+            opposite = past[others + wrap_index(start + j, queue)]
+            if opposite > min(2.0 * t - tau - sent, sent + tau) + same:
+                break
+            x, time = 0.5 * (tau + opposite - sent) / tau, 0.5 * (tau + opposite + sent)
+            r = sent_wave_linear(past, places, clock, ring, mask, forward, 0, sent)
+            l = sent_wave_linear(past, places, clock, ring, mask, backward, 1, opposite)
+            cell = pipe["cell"] + min(int((q + x) * n / line["stretches"]), n - 1)
+            for side in range(4):
+                value = r - (side % 2) * size + l - (side // 2) * past[others + wrap_index(start + j, queue) + queue]
+                update_extremes(tables.envelope, cell, time, value + (1.0 - 2.0 * x) * delta)
+
+
+@njit
+def update_line_extremes(past, places, tables, before, t):
+    """Update envelopes and extremes within lines by the values at jumps that have passed there since `before`."""
+    clock = reading_data(past, int(past[COUNT]) - 1)
+    for number in range(tables.delays.size):
+        line, pipe = tables.delays[number], tables.pipes[tables.delays[number]["pipe"]]
+        stretches, n = line["stretches"], line["places"]
+        for q in range(stretches):
+            head = jump_head(places, line["stretch"] + q, 0)
+            forward, backward = past[head + JUMP_COUNT], past[head + HEAD_SIZE + JUMP_COUNT]
+            if forward + backward == 0.0:
+                continue
+            delta = past[places[0] + ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+            for j in range((q * n) // stretches, min(n, ((q + 1) * n) // stretches + 1)):
+                x = (j + 0.5) / n * stretches - q
+                if 0.0 <= x < 1.0:
+                    least, t_least, greatest, t_greatest = line_extremes_at_jumps(
+                        past, places, clock, line, q, x, 1.0, before, t
+                    )
+                    if least < INFINITE:
+                        mark_vapour(tables, line["pipe"], j, t_least, least + (1.0 - 2.0 * x) * delta)
+                        update_extremes(tables.envelope, pipe["cell"] + j, t_least, least + (1.0 - 2.0 * x) * delta)
+                        update_extremes(
+                            tables.envelope, pipe["cell"] + j, t_greatest, greatest + (1.0 - 2.0 * x) * delta
+                        )
+            if forward > 0.0 and backward > 0.0:
+                envelope_where_jumps_cross(past, places, clock, tables, line, q, before, t)
+    update_probe_extremes(past, places, clock, tables, before, t)
+
+
+@njit(forceinline=True)
+def mark_vapour(tables, number, j, t, value):
+    """Record the first time at which the pressure at a place of a pipe falls below vapour pressure."""
+    marks, cell = tables.marks, tables.pipes[number]["cell"] + j
+    if value < tables.profile[cell] and marks[number] != marks[number]:
+        marks[number] = t
+
+
+@njit
+def update_probe_extremes(past, places, clock, tables, before, t):
+    """Update the extremes of probes within lines by the values at jumps since `before`."""
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if (probe["kind"] != PIPE_PRESSURE and probe["kind"] != PIPE_FLOW) or probe["side"] != 0:
+            continue
+        pipe = tables.pipes[probe["index"]]
+        if pipe["delay"] < 0:
+            continue
+        line = tables.delays[pipe["delay"]]
+        share = tables.floats[probe["weights"]] * line["stretches"]
+        q = min(int(share), line["stretches"] - 1)
+        x, sign = share - q, 1.0 if probe["kind"] == PIPE_PRESSURE else -1.0
+        delta = past[places[0] + ARRIVALS_SIZE * (line["stretch"] + q) + 2]
+        more = (1.0 - 2.0 * x) * delta if sign > 0.0 else pipe["flow"] - delta
+        least, t_least, greatest, t_greatest = line_extremes_at_jumps(past, places, clock, line, q, x, sign, before, t)
+        if least < INFINITE:
+            update_extremes(tables.extremes, k, t_least, probe["scale"] * (least + more) + probe["offset"])
+            update_extremes(tables.extremes, k, t_greatest, probe["scale"] * (greatest + more) + probe["offset"])

@@ -1,0 +1,132 @@
+"""Stored energy, friction power and rate of storage of delay lines, from the waves sent into them.
+
+A stretch contains the waves sent into it at ages u of 0 .. tau: the forward wave at u c from its beginning, the
+backward wave at u c from its end. Behind the middle the forward wave is smaller by delta, the friction loss there; the
+backward wave is larger by delta. In units of 1 / (rho A) per length the stretch stores
+R^2 + L^2 + (q0 + M0) R + (q0 - M0) L above the profile of flow M0 and q0 = Y P0, and q0 falls by drag0. So the power
+that enters at the ends is stored or taken: sum of l (drag(M) - drag0) M of the middles, plus drag0 times the integral
+of M. The power taken is the friction, sum of l drag(M) M, and the error of the midpoint rule for a falling profile.
+A line shorter than a step h stores the share 1 - beta of the waves sent in h, and takes beta (1 - beta) c (s - s_h)^2
+of each wave.
+"""
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.kernels.delay_lines.line_interior import sent_wave
+from fvsolve.kernels.delay_lines.line_rates import friction_loss
+from fvsolve.kernels.delay_lines.wave_history import (
+    COUNT,
+    FIRST_JUMP,
+    JUMP_CAPACITY,
+    JUMP_COUNT,
+    PROFILE_ENTRIES,
+    find_interval,
+    jump_head,
+    jump_list,
+    offsets_of,
+    read_waves,
+    reading_data,
+    time_of,
+    time_tolerance,
+)
+from fvsolve.kernels.steady_friction import drag
+
+GAUSS_POINTS = np.array([-0.5, 0.0, 0.5]) * np.sqrt(
+    0.6
+)  # Gauss points of a cell or interval, in widths from its centre
+GAUSS_WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+
+
+@njit
+def sent_waves(t, out, tables, number, q, at):
+    """Both waves sent into stretch q of a line at a time `at` <= t [kg/s]."""
+    past, newest = tables.past, int(tables.past[COUNT]) - 1
+    if newest >= 0 and (at <= time_of(past, newest) or t <= time_of(past, newest)):
+        return read_waves(past, offsets_of(past), reading_data(past, newest), tables.delays[number], q, at)
+    return sent_wave(t, out, tables, number, q, 0, at), sent_wave(t, out, tables, number, q, 1, at)
+
+
+@njit
+def kink_before(past, places, line, q, t, least):
+    """The latest time before t, not before `least`, at which a wave sent into stretch q may have a kink or jump [s]."""
+    latest, queue, before = least, int(past[JUMP_CAPACITY]), t - time_tolerance(past)
+    k, x = find_interval(past, int(past[COUNT]) - 1, before)
+    k += x == 1.0
+    if k >= PROFILE_ENTRIES and time_of(past, k) < before:
+        latest = max(latest, time_of(past, k))
+    for wave in range(2):
+        at = jump_head(places, line["stretch"] + q, wave)
+        times = jump_list(places, queue, at)
+        for i in range(int(past[at + JUMP_COUNT])):
+            time = past[times + (int(past[at + FIRST_JUMP]) + i) % queue]
+            if time < before:
+                latest = max(latest, time)
+    return latest
+
+
+@njit
+def stretch_integrals(t, out, tables, number, q):
+    """Integrals over stretch q of R - L [kg m/s] and of the energy stored in each wave, times rho A."""
+    past, line, st = tables.past, tables.delays[number], tables.settings[0]
+    pipe, places, hold, share = tables.pipes[line["pipe"]], offsets_of(past), line["hold"], 1.0 - line["now"]
+    first, flow = tables.nodes[pipe["from_node"]], pipe["flow"]
+    height = st["rho"] * st["gravity"] * (first["elevation"] - st["datum"])
+    fall = pipe["drag"] * line["tau"]  # decrease of q0 along a stretch
+    top = pipe["admittance"] * ((first["pressure"] - st["ambient"]) + height) - fall * q
+    net, ahead, back = 0.0, 0.0, 0.0
+    end, oldest, middle = t, t - hold + time_tolerance(past), t - 0.5 * hold
+    while end > oldest:
+        begin = kink_before(past, places, line, q, end, middle if end > middle + time_tolerance(past) else t - hold)
+        for g in range(3):
+            at = end + (GAUSS_POINTS[g] - 0.5) * (end - begin)
+            r, l = sent_waves(t, out, tables, number, q, at)
+            x, w = (t - at) / hold, GAUSS_WEIGHTS[g] * (end - begin) * (pipe["speed"] * share)
+            if share == 1.0 and at < middle:
+                delta = friction_loss(pipe, line, r, l)
+                r, l = r - delta, l + delta
+            net += w * share * (r - l)
+            ahead += w * r * (r + (top - fall * x) + flow)
+            back += w * l * (l + (top - fall * (1.0 - x)) - flow)
+        end = begin
+    return net, ahead, back
+
+
+@njit
+def line_energy(t, out, tables, number, rows):
+    """Change of the energy stored in a line since the profile [J]; rows[0] forward wave, rows[1] backward wave."""
+    line, rows[0], rows[1] = tables.delays[number], 0.0, 0.0
+    per = 1.0 / (tables.settings[0]["rho"] * tables.pipes[line["pipe"]]["area"])
+    for q in range(line["stretches"]):
+        _, ahead, back = stretch_integrals(t, out, tables, number, q)
+        rows[0] += per * ahead
+        rows[1] += per * back
+
+
+@njit
+def line_power(t, out, tables, number, rows):
+    """Write friction power, 0 and rate of storage of a line [W] into rows[1:4].
+
+    rows[0] : power that enters at the ends of the line
+    """
+    line = tables.delays[number]
+    pipe, beta, at = tables.pipes[line["pipe"]], line["now"], tables.layout[0]["ends"] + 4 * line["pipe"]
+    per, length = 1.0 / (tables.settings[0]["rho"] * pipe["area"]), pipe["speed"] * line["tau"]
+    friction, taken = 0.0, 0.0
+    for q in range(line["stretches"]):
+        r, l = sent_waves(t, out, tables, number, q, t - (line["hold"] if beta > 0.0 else 0.5 * line["tau"]))
+        delta = friction_loss(pipe, line, r, l)
+        flow = pipe["flow"] + (r - l - delta)
+        pull = drag(pipe["friction"], pipe["loss"], pipe["rough"], pipe["roughness"], pipe["reynolds"], flow)
+        friction += length * flow * pull
+        taken += length * (pull - pipe["drag"]) * flow
+        mean = 0.0
+        if pipe["drag"] != 0.0:
+            mean = stretch_integrals(t, out, tables, number, q)[0] / length
+        if beta > 0.0:
+            ahead, back = out[at] - r, out[at + 3] - l
+            mean += beta * (out[at] - out[at + 3]) - delta
+            taken += beta * (1.0 - beta) * pipe["speed"] * (ahead * ahead + back * back)
+            taken += length * (pull - pipe["drag"]) * beta * (ahead - back)
+        taken += length * pipe["drag"] * (pipe["flow"] + mean)
+    rows[1], rows[2], rows[3] = per * friction, 0.0, rows[0] - per * taken

@@ -1,0 +1,356 @@
+"""History of the waves sent into delay lines: ring buffers, lists of jumps, interpolation in time.
+
+A wave is the sum of a smooth part u, stored at accepted times, and of jumps, each with its time:
+w(t) = u(t) + sum of jumps up to t. So no interpolation crosses a jump. u is read by the Lagrange polynomial through up
+to six entries, as many before t as after it (in the newest interval one more before), so that no wave is amplified.
+Entries of a step that is not accepted yet are never read.
+
+past = [header; times of entries; arriving waves and friction loss of each stretch; heads of the jumps of both waves of
+each stretch; times, sizes and running sums of these jumps; ring of entries (u forward, u backward) of each stretch, as
+long as its delay needs]. A head holds the sum of the jumps removed from the list, the index of the first jump, the
+number of jumps, and how many of them have arrived. So a step through a large network touches little memory: the ends
+of rings, and heads.
+"""
+
+from fvsolve.jit import njit
+
+HEADER_SIZE = 24
+COUNT, CAPACITY, JUMP_CAPACITY, STRETCHES = (
+    0,
+    1,
+    2,
+    3,
+)  # entries so far, capacity for times, for jumps of a wave, stretches
+RING_FACTOR = 4  # factor by which rings are longer than at first
+LAST_STEP, EQUAL_STEPS = 5, 6  # length of the last step [s], number of last steps of that length
+STEP_BEFORE, EQUAL_STEPS_BEFORE = 7, 8  # values of STEP and EVEN before the last entry
+GREATEST_JUMP, GREATEST_UNSTORED_JUMP, JUMPS_TRAVELLING = (
+    9,
+    10,
+    11,
+)  # greatest jump [Pa], greatest jump that did not fit [Pa], number of jumps now
+ARRIVALS_TIME, ARRIVALS_COUNT = 12, 13  # time and number of entries for which the stored arrivals hold
+CORRECTED_TIME = 14  # time of the last corrected state [s]
+NEXT_ARRIVAL = 15  # arrival of the next jump at a node that acts at once [s]; before this time no reading includes it
+ONLY_PASSED_JUMPS = 16  # 1 while readings include only jumps that have been passed on
+MOST_JUMPS_TRAVELLING = 18  # greatest number of jumps travelling at one time
+GREATEST_WAVE = 17  # greatest wave so far, deviation from the profile [Pa]
+INFINITE = 1e300  # time [s]
+PROFILE_ENTRIES = 8  # entries of the profile (zeros) before the first entry
+REMOVED_SUM, FIRST_JUMP, JUMP_COUNT, ARRIVED_COUNT, HEAD_SIZE = (
+    0,
+    1,
+    2,
+    3,
+    4,
+)  # head of the jumps of a wave, and its size
+ARRIVALS_SIZE = 3  # values per stretch: backward wave at its beginning, forward wave at its end, delta
+RING_GAP = (
+    8  # numbers between rings, one cache line: without them entries of the same time would share a few cache sets
+)
+TIME_TOLERANCE, ROUNDING = 1e-9, 1e-14  # tolerance of equal times: fraction of a step, and at least of the time
+GREATEST_STEP_RATIO = (
+    1.9  # ratio of neighbouring steps above which interpolation is linear; it occurs where a step was shortened
+)
+
+
+@njit(forceinline=True)
+def time_of(past, k):
+    """Time of entry k [s]."""
+    return past[HEADER_SIZE + (k & (int(past[CAPACITY]) - 1))]
+
+
+@njit(forceinline=True)
+def offsets_of(past):
+    """(offsets of arrivals, heads of jumps, jumps and rings in `past`, factor of the present length of rings)."""
+    stretches, arrivals = int(past[STRETCHES]), HEADER_SIZE + int(past[CAPACITY])
+    heads = arrivals + ARRIVALS_SIZE * stretches
+    jumps = heads + 2 * HEAD_SIZE * stretches
+    return arrivals, heads, jumps, jumps + 6 * int(past[JUMP_CAPACITY]) * stretches, int(past[RING_FACTOR])
+
+
+@njit(forceinline=True)
+def ring_of(places, line, q):
+    """(offset of the entries of stretch q of a line, bit mask for entry numbers)."""
+    length = places[4] * line["ring_size"]
+    return places[3] + 2 * (places[4] * line["ring"] + q * length) + RING_GAP * (line["stretch"] + q), length - 1
+
+
+@njit(forceinline=True)
+def jump_head(places, s, wave):
+    """Offset of the head of the jumps of a wave of stretch s."""
+    return places[1] + HEAD_SIZE * (2 * s + wave)
+
+
+@njit(forceinline=True)
+def jump_list(places, queue, at):
+    """Offset of the times of the jumps whose head is at `at`; sizes and running sums follow."""
+    return places[2] + 3 * queue * ((at - places[1]) // HEAD_SIZE)
+
+
+@njit(forceinline=True)
+def time_tolerance(past):
+    """Tolerance below which two times count as equal [s]."""
+    return max(TIME_TOLERANCE * past[LAST_STEP], ROUNDING * abs(time_of(past, int(past[COUNT]) - 1)))
+
+
+@njit(forceinline=True)
+def newest_before(past, t):
+    """Number of the newest entry before t, which a step that ends at t may read."""
+    k = int(past[COUNT]) - 1
+    while k > PROFILE_ENTRIES and time_of(past, k) >= t - time_tolerance(past):
+        k -= 1
+    return k
+
+
+@njit(forceinline=True)
+def lagrange_six(x):
+    """Lagrange weights of entries -2 .. 3 at x in [0, 1)."""
+    a, b, d, e, f = x + 2.0, x + 1.0, x - 1.0, x - 2.0, x - 3.0
+    ab, de, ef = a * b, d * e, e * f
+    return (
+        b * x * d * ef / -120.0, a * x * d * ef / 24.0, ab * d * ef / -12.0, ab * x * ef / 12.0,
+        ab * x * d * f / -24.0, ab * x * de / 120.0,
+    )  # fmt: skip
+
+
+@njit(forceinline=True)
+def lagrange_four(x):
+    """Lagrange weights of entries -1 .. 2 at x in [0, 1), padded to six."""
+    b, d, e = x + 1.0, x - 1.0, x - 2.0
+    return 0.0, x * d * e / -6.0, b * d * e / 2.0, b * x * e / -2.0, b * x * d / 6.0, 0.0
+
+
+@njit(forceinline=True)
+def lagrange_three(x):
+    """Lagrange weights of entries -1 .. 1 at x in [0, 1), padded to six; for the newest interval."""
+    return 0.0, 0.5 * x * (x - 1.0), 1.0 - x * x, 0.5 * x * (x + 1.0), 0.0, 0.0
+
+
+@njit
+def find_interval(past, newest, t):
+    """(entry k, share of the way to entry k + 1) at time t; before the first entry that of the profile."""
+    low, high = max(PROFILE_ENTRIES, int(past[COUNT]) - int(past[CAPACITY]) + PROFILE_ENTRIES), newest
+    if t >= time_of(past, high):
+        return high - 1, 1.0
+    if t < time_of(past, low):
+        return PROFILE_ENTRIES - 1, 0.0
+    while high - low > 1:
+        middle = (low + high) // 2
+        if time_of(past, middle) <= t:
+            low = middle
+        else:
+            high = middle
+    return low, (t - time_of(past, low)) / (time_of(past, low + 1) - time_of(past, low))
+
+
+@njit
+def lagrange_unequal(past, newest, t):
+    """(entry before t, weights) for unequal steps: cubic through four entries, or linear where steps differ much."""
+    low, x = find_interval(past, newest, t)
+    line = (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
+    if low < PROFILE_ENTRIES:
+        return low, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0) if x == 0.0 else line
+    t1, t2 = time_of(past, low), time_of(past, low + 1)
+    if low + 2 > newest or low - 1 < PROFILE_ENTRIES:
+        return low, line
+    t0, t3 = time_of(past, low - 1), time_of(past, low + 2)
+    near, here, far = t1 - t0, t2 - t1, t3 - t2
+    if max(near, here, far) > GREATEST_STEP_RATIO * min(near, here, far):
+        return low, line
+    a, b, c, d = t - t0, t - t1, t - t2, t - t3
+    return low, (
+        0.0, b * c * d / ((t0 - t1) * (t0 - t2) * (t0 - t3)), a * c * d / (near * (t1 - t2) * (t1 - t3)),
+        a * b * d / ((t2 - t0) * here * (t2 - t3)), a * b * c / ((t3 - t0) * (t3 - t1) * far), 0.0,
+    )  # fmt: skip
+
+
+@njit(forceinline=True)
+def reading_data(past, newest):
+    """Data for readings: (newest entry, its time, 1 / step, number of equal steps, tolerance of equal times).
+
+    The result does not depend on whether an entry after `newest` exists already.
+    """
+    step, even = past[LAST_STEP], past[EQUAL_STEPS]
+    if newest != int(past[COUNT]) - 1:
+        step, even = past[STEP_BEFORE], past[EQUAL_STEPS_BEFORE]
+    return newest, time_of(past, newest), 1.0 / step, even, time_tolerance(past)
+
+
+@njit(forceinline=True)
+def stencil(past, clock, t):
+    """(entry k, weights of entries k - 2 .. k + 3) for the smooth part at t, up to the newest entry of `clock`."""
+    newest, latest, per_step, even = clock[0], clock[1], clock[2], clock[3]
+    place = (t - latest) * per_step
+    if place <= -even:
+        return lagrange_unequal(past, newest, t)
+    steps = int(place) - 1 if place < int(place) else int(place)
+    k, x = newest + steps, place - steps
+    if k >= newest:
+        return newest, (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    if k + 3 <= newest and steps - 2 >= -even:
+        return k, lagrange_six(x)
+    if k + 2 <= newest and steps - 1 >= -even:
+        return k, lagrange_four(x)
+    if k + 2 <= newest:
+        return lagrange_unequal(past, newest, t)
+    return k, lagrange_three(x) if steps - 1 >= -even else (0.0, 0.0, 1.0 - x, x, 0.0, 0.0)
+
+
+@njit(forceinline=True)
+def interpolate_waves(past, at, mask, k, w):
+    """Smooth parts of both waves of a stretch by weights of entries k - 2 .. k + 3; at : offset of its entries."""
+    a, b, c = at + 2 * ((k - 2) & mask), at + 2 * ((k - 1) & mask), at + 2 * (k & mask)
+    d, e, f = at + 2 * ((k + 1) & mask), at + 2 * ((k + 2) & mask), at + 2 * ((k + 3) & mask)
+    r = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
+    a, b, c, d, e, f = a + 1, b + 1, c + 1, d + 1, e + 1, f + 1
+    l = w[0] * past[a] + w[1] * past[b] + w[2] * past[c] + w[3] * past[d] + w[4] * past[e] + w[5] * past[f]
+    return r, l
+
+
+@njit(forceinline=True)
+def wrap_index(i, queue):
+    """Index i wrapped to the length of a ring of jumps."""
+    return i if i < queue else i - queue
+
+
+@njit
+def first_after(past, queue, times, first, count, t):
+    """Number of the first jump of a list that was sent after t."""
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if past[times + wrap_index(first + middle, queue)] > t:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@njit(forceinline=True)
+def sum_of_first(past, places, at, count):
+    """Sum of the jumps removed from the list of a wave and of the first `count` jumps in it; at : their head."""
+    if count == 0:
+        return past[at + REMOVED_SUM]
+    queue = int(past[JUMP_CAPACITY])
+    return past[jump_list(places, queue, at) + 2 * queue + wrap_index(int(past[at + FIRST_JUMP]) + count - 1, queue)]
+
+
+@njit
+def sum_listed_jumps(past, places, at, t):
+    """Sum of the jumps of a wave up to t, where its list is not empty; at : offset of their head."""
+    count, queue, first = int(past[at + JUMP_COUNT]), int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
+    times = jump_list(places, queue, at)
+    if past[times + wrap_index(first + count - 1, queue)] <= t:
+        return sum_of_first(past, places, at, count)
+    return sum_of_first(past, places, at, first_after(past, queue, times, first, count, t))
+
+
+@njit(forceinline=True)
+def jumps_until(past, places, at, t):
+    """Sum of the jumps of a wave up to t; at : offset of their head."""
+    return sum_listed_jumps(past, places, at, t) if past[at + JUMP_COUNT] > 0.0 else past[at + REMOVED_SUM]
+
+
+@njit(forceinline=True)
+def passed_jumps(past, places, at):
+    """Sum of the jumps of a wave that have been passed on where they arrive; at : offset of their head."""
+    return sum_of_first(past, places, at, int(past[at + ARRIVED_COUNT]))
+
+
+@njit(forceinline=True)
+def arrived_until(past, places, clock, at, t, tau):
+    """Sum of the jumps of a wave that have arrived by t, after a travel time tau; at : offset of their head."""
+    if past[ONLY_PASSED_JUMPS] > 0.0:
+        return passed_jumps(past, places, at)
+    return jumps_until(past, places, at, min(t + clock[4], past[NEXT_ARRIVAL] - clock[4]) - tau)
+
+
+@njit(forceinline=True)
+def read_waves(past, places, clock, line, q, t):
+    """Both waves sent into stretch q of a line at t [kg/s]: from its beginning and from its end."""
+    at, mask = ring_of(places, line, q)
+    k, w = stencil(past, clock, t)
+    r, l = interpolate_waves(past, at, mask, k, w)
+    until, ahead = t + clock[4], jump_head(places, line["stretch"] + q, 0)
+    return r + jumps_until(past, places, ahead, until), l + jumps_until(past, places, ahead + HEAD_SIZE, until)
+
+
+@njit
+def insert_jump(past, places, at, t, size):
+    """Insert a jump into the list of a wave; False where the list is full, then the jump joins the smooth part."""
+    queue, first, count = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP]), int(past[at + JUMP_COUNT])
+    i, times = count, jump_list(places, queue, at)
+    while i > 0 and past[times + wrap_index(first + i - 1, queue)] > t + time_tolerance(past):
+        i -= 1
+    before = times + wrap_index(first + i - 1, queue) if i > 0 else times
+    if i > int(past[at + ARRIVED_COUNT]) and abs(past[before] - t) <= time_tolerance(past):
+        past[before + queue] += size
+        update_running_sums(past, places, at, i - 1)
+        return True
+    if count == queue:
+        return False
+    for j in range(count, i, -1):
+        here, there = times + wrap_index(first + j, queue), times + wrap_index(first + j - 1, queue)
+        past[here], past[here + queue] = past[there], past[there + queue]
+    here = times + wrap_index(first + i, queue)
+    past[here], past[here + queue] = t, size
+    past[at + JUMP_COUNT] = count + 1.0
+    past[JUMPS_TRAVELLING] += 1.0
+    past[MOST_JUMPS_TRAVELLING] = max(past[MOST_JUMPS_TRAVELLING], past[JUMPS_TRAVELLING])
+    update_running_sums(past, places, at, i)
+    return True
+
+
+@njit
+def update_running_sums(past, places, at, begin):
+    """Update the running sums of the jumps of a wave from jump `begin` on; at : offset of their head."""
+    queue, first = int(past[JUMP_CAPACITY]), int(past[at + FIRST_JUMP])
+    total, times = sum_of_first(past, places, at, begin), jump_list(places, queue, at)
+    for j in range(begin, int(past[at + JUMP_COUNT])):
+        here = times + wrap_index(first + j, queue)
+        total += past[here + queue]
+        past[here + 2 * queue] = total
+
+
+@njit
+def remove_arrived_jumps(past, places, at, t):
+    """Remove the jumps that have arrived and were sent before t from the list."""
+    queue = int(past[JUMP_CAPACITY])
+    times = jump_list(places, queue, at)
+    while past[at + ARRIVED_COUNT] > 0.0 and past[times + int(past[at + FIRST_JUMP])] < t:
+        past[at + REMOVED_SUM] += past[times + int(past[at + FIRST_JUMP]) + queue]
+        past[at + FIRST_JUMP] = wrap_index(int(past[at + FIRST_JUMP]) + 1, queue)
+        past[at + JUMP_COUNT] -= 1.0
+        past[at + ARRIVED_COUNT] -= 1.0
+        past[JUMPS_TRAVELLING] -= 1.0
+
+
+@njit
+def begin_entry(past, t):
+    """Begin an entry at t; return its number."""
+    mask, k = int(past[CAPACITY]) - 1, int(past[COUNT])
+    if k == 0:
+        past[COUNT], past[EQUAL_STEPS], past[LAST_STEP] = PROFILE_ENTRIES + 1.0, 1e18, 1e-300
+        past[STEP_BEFORE], past[EQUAL_STEPS_BEFORE] = past[LAST_STEP], past[EQUAL_STEPS]
+        past[HEADER_SIZE + PROFILE_ENTRIES] = t
+        return PROFILE_ENTRIES
+    h = t - time_of(past, k - 1)
+    past[STEP_BEFORE], past[EQUAL_STEPS_BEFORE] = past[LAST_STEP], past[EQUAL_STEPS]
+    if k == PROFILE_ENTRIES + 1:
+        past[LAST_STEP] = h
+    elif abs(h - past[LAST_STEP]) <= 1e-9 * h:
+        past[EQUAL_STEPS] += 1.0
+    else:
+        past[EQUAL_STEPS], past[LAST_STEP] = 1.0, h
+    past[HEADER_SIZE + (k & mask)] = t
+    past[COUNT] = k + 1.0
+    return k
+
+
+@njit(forceinline=True)
+def write_entry(past, places, line, q, k, wave, value):
+    """Store the smooth part of a wave as entry k; value : whole wave [kg/s]."""
+    at, mask = ring_of(places, line, q)
+    jumps = jumps_until(past, places, jump_head(places, line["stretch"] + q, wave), INFINITE)
+    past[at + 2 * (k & mask) + wave] = value - jumps

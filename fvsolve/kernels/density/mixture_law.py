@@ -1,0 +1,217 @@
+"""Density law `mixture`: liquid with free gas, and vapour if the law has a floor, as a single barotropic law.
+
+x = p - floor > 0 is the pressure of the gas. Volumes are divided by the volume of liquid at the reference pressure:
+
+    rho_ref / rho = 1 - (p - p_ref) / beta + gas (x^-k - x^(1-k) / saturation),   k = 1 / (gas exponent),
+
+There is free gas while x < saturation (it dissolves by Henry's law; an infinite saturation means no dissolution).
+The area is linear in pressure, A = A_ref (1 + compliance (p - p_ref)). So with k = 1 the pressure of a given mass is
+the root of a quadratic.
+"""
+
+from math import exp, log, sqrt
+
+from fvsolve.jit import inline
+from fvsolve.kernels.density.no_inline import law_njit, prevent_inlining
+
+
+@law_njit
+def free_gas(st, x):
+    """(volume of free gas over that of liquid, its decrease with pressure [1/Pa]) at a pressure x of the gas [Pa]."""
+    if x >= st["saturation"]:
+        return 0.0, 0.0
+    k, share = st["gas_power"], x / st["saturation"]
+    size = st["gas"] / x if k == 1.0 else st["gas"] * x**-k
+    return size * (1.0 - share), size / x * (k + (1.0 - k) * share)
+
+
+@law_njit
+def relative_volume(st, p):
+    """(rho_ref / rho, its decrease with pressure [1/Pa])."""
+    prevent_inlining()
+    size, fall = free_gas(st, p - st["floor"])
+    return 1.0 - (p - st["reference"]) / st["beta"] + size, 1.0 / st["beta"] + fall
+
+
+@law_njit
+def gas_integral(st, x):
+    """Integral of the volume of free gas over pressure [Pa], apart from a constant."""
+    k, at, s = st["gas_power"], min(x, st["saturation"]), st["saturation"]
+    if k == 1.0:
+        return st["gas"] * (log(at) - at / s)
+    return st["gas"] * at ** (1.0 - k) * (1.0 / (1.0 - k) - at / s / (2.0 - k))
+
+
+@inline
+def log_density(st, floats, p):
+    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at a pressure."""
+    size, fall = relative_volume(st, p)
+    return -log(size), fall / size
+
+
+@inline
+def density(st, floats, p):
+    """rho [kg/m3] at a pressure."""
+    return st["rho"] / relative_volume(st, p)[0]
+
+
+@law_njit
+def enthalpy(st, floats, p):
+    """h = integral of dp / rho from the reference pressure [J/kg]."""
+    prevent_inlining()
+    dp, floor = p - st["reference"], st["floor"]
+    gas = gas_integral(st, p - floor) - gas_integral(st, st["reference"] - floor)
+    return (dp * (1.0 - 0.5 * dp / st["beta"]) + gas) / st["rho"]
+
+
+@law_njit
+def pressure_of_enthalpy(st, floats, h):
+    """Pressure [Pa] at which `enthalpy` is h, by Newton on p, or on ln x where a step would pass the floor."""
+    prevent_inlining()
+    floor, beta = st["floor"], st["beta"]
+    lift = h * st["rho"]
+    x = st["reference"] - floor
+    if lift > 0.0:
+        x += 2.0 * lift / (1.0 + sqrt(max(0.0, 1.0 - 2.0 * lift / beta)))
+    for _ in range(100):
+        p = x + floor
+        step = (enthalpy(st, floats, p) - h) * st["rho"] / relative_volume(st, p)[0]
+        x = x - step if step < 0.8 * x else x * exp(max(-step / x, -700.0))
+        if abs(step) <= 1e-15 * abs(p) or abs(step) <= 1e-14 * x:
+            break
+    return x + floor
+
+
+@inline
+def gas_root(st, compliance, share, slope, rest):
+    """x where share (1 - dp / beta + slope / x + rest) = 1 + compliance dp, a quadratic with one positive root [Pa]."""
+    low = st["reference"] - st["floor"]
+    a = compliance + share / st["beta"]
+    b = 1.0 - compliance * low - share * (1.0 + low / st["beta"] + rest)
+    root = sqrt(b * b + 4.0 * a * share * slope)
+    return 0.5 * (root - b) / a if b < 0.0 else 2.0 * share * slope / (b + root)
+
+
+@law_njit
+def pressure_of_mass_ratio(st, compliance, share):
+    """Pressure [Pa] of a pipe that contains `share` times rho_ref A_ref [-]; compliance 0 for a vessel.
+
+    If the gas is not isothermal, its tangent in 1 / x replaces it, and the root is iterated until it is constant. This
+    converges because the volume of gas is concave in 1 / x.
+    """
+    prevent_inlining()
+    floor, gas, saturation = st["floor"], st["gas"], st["saturation"]
+    x = gas_root(st, compliance, share, gas, -gas / saturation) if st["gas_power"] == 1.0 else saturation
+    if x >= saturation and saturation < 1e300:
+        x = gas_root(st, compliance, share, 0.0, 0.0)
+        if x >= saturation:
+            return x + floor
+    if st["gas_power"] == 1.0:
+        return x + floor
+    x = min(st["reference"] - floor, saturation)
+    for _ in range(60):
+        size, fall = free_gas(st, min(x, saturation * (1.0 - 1e-15)))
+        before, slope = x, fall * x * x
+        x = min(gas_root(st, compliance, share, slope, size - slope / x), saturation)
+        if abs(x - before) <= 1e-15 * (x + 1.0 / (share * (1.0 / st["beta"] + fall))):  # rounding
+            break
+    return x + floor
+
+
+@inline
+def pressure_of_log(st, floats, compliance, q):
+    """Pressure [Pa] at which ln(rho / rho_ref) + ln(A / A_ref) is q; A is the area of the wall."""
+    return pressure_of_mass_ratio(st, compliance, exp(q))
+
+
+@inline
+def pressure_of_mass(st, floats, pipe, m):
+    """Pressure [Pa] of a pipe that contains m [kg/m]."""
+    return pressure_of_mass_ratio(st, pipe["compliance"], m / (st["rho"] * pipe["area"]))
+
+
+@inline
+def area_ratio(st, compliance, p):
+    """A / A_ref of a pipe at a pressure."""
+    return 1.0 + compliance * (p - st["reference"])
+
+
+@inline
+def wall_area(st, floats, pipe, p):
+    """Area of a pipe at a pressure [m2]."""
+    return pipe["area"] * area_ratio(st, pipe["compliance"], p)
+
+
+@inline
+def thrust(st, floats, pipe, p):
+    """Integral of A dp from the reference pressure [N]."""
+    x = pipe["compliance"] * (p - st["reference"])
+    return pipe["area"] * (p - st["reference"]) * (1.0 + 0.5 * x)
+
+
+@law_njit
+def mass_of_pressure(st, floats, pipe, p):
+    """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
+    prevent_inlining()
+    size, fall = relative_volume(st, p)
+    stretch = area_ratio(st, pipe["compliance"], p)
+    m = st["rho"] * pipe["area"] * stretch / size
+    return m, m * (fall / size + pipe["compliance"] / stretch)
+
+
+@inline
+def force_of_mass(st, floats, pipe, m):
+    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]: momentum flux by pressure."""
+    return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
+
+
+@law_njit
+def impedance(st, floats, pipe, p):
+    """rho c = sqrt(rho / (d ln rho / dp + d ln A / dp)) of a pipe at a pressure [kg/m2/s]."""
+    prevent_inlining()
+    size, fall = relative_volume(st, p)
+    return sqrt(st["rho"] / (fall + size * pipe["compliance"] / area_ratio(st, pipe["compliance"], p)))
+
+
+# Abscissas in (0, 1) and weights of the upper four of eight Gauss points; the lower four are symmetric (Abramowitz and
+# Stegun 25.4).
+GAUSS_POINTS = (0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363)
+GAUSS_WEIGHTS = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763)
+
+
+@law_njit
+def velocity_change_panel(st, floats, pipe, p_from, p_to):
+    """Integral of dp / (rho c) [m/s] between two pressures whose gas pressures differ by a factor of two at most."""
+    middle, half, total = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from), 0.0
+    for i in range(4):
+        far = GAUSS_POINTS[i] * half
+        high, low = impedance(st, floats, pipe, middle + far), impedance(st, floats, pipe, middle - far)
+        total += GAUSS_WEIGHTS[i] * (1.0 / high + 1.0 / low)
+    return half * total
+
+
+@law_njit
+def velocity_change(st, floats, pipe, p_from, p_to):
+    """Integral of dp / (rho c) [m/s] in panels: x at most doubles in a panel, and all gas is dissolved at an end."""
+    prevent_inlining()
+    low, high = min(p_from, p_to), max(p_from, p_to)
+    sign = 1.0 if p_to >= p_from else -1.0
+    floor, total = st["floor"], 0.0
+    for _ in range(200):
+        x = low - floor
+        end = min(high, floor + 2.0 * x)
+        if x < st["saturation"]:
+            end = min(end, floor + st["saturation"])
+        else:
+            end = high
+        total += velocity_change_panel(st, floats, pipe, low, end)
+        low = end
+        if low >= high:
+            break
+    return sign * total
+
+
+@inline
+def local_speed(st, floats, pipe, p):
+    """Wave speed c of a pipe at a pressure [m/s]."""
+    return impedance(st, floats, pipe, p) * relative_volume(st, p)[0] / st["rho"]

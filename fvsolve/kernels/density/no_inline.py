@@ -1,0 +1,29 @@
+"""Prevent LLVM from inlining a density law, so that the dispatch function stays small enough to be inlined itself."""
+
+from fvsolve.jit import COMPILING, Intrinsic, njit
+
+if COMPILING:
+
+    @Intrinsic
+    def prevent_inlining(typingctx):
+        """Prevent LLVM from inlining the function that contains this call; halves its share of the compile time."""
+        from numba.core import types
+
+        def generate(context, builder, kind, args):
+            builder.function.attributes.add("noinline")
+            return context.get_dummy_value()
+
+        return types.none(), generate
+else:
+
+    def prevent_inlining():
+        """Do nothing, without numba."""
+
+
+def law_njit(function):
+    """`njit` for functions that only functions of this folder call: without wrappers for Python and C.
+
+    `forceinline` is set explicitly: numba otherwise takes it from the first caller that compiles the function, and
+    `prevent_inlining` forbids it.
+    """
+    return njit(function, forceinline=False, no_cpython_wrapper=True, no_cfunc_wrapper=True)

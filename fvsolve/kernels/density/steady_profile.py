@@ -1,0 +1,70 @@
+"""Steady profile of a pipe with friction, and its weight along the slope."""
+
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.density import density, enthalpy, mass_of_pressure, pressure_of_enthalpy
+
+
+@inline
+def rise_at(profile, pipe, x):
+    """Rise [m] of a pipe from its `from` end over a distance x along it."""
+    if pipe["rise"] < 0:
+        return pipe["slope"] * x
+    share = x / (0.5 * pipe["dx"])
+    j = min(int(share), 2 * pipe["cells"] - 1)
+    before, after = profile[pipe["rise"] + j], profile[pipe["rise"] + j + 1]
+    return before + (after - before) * (share - j)
+
+
+@njit
+def add_slope_force(st, profile, pipe, r, l, dr, dl):
+    """Add the weight along a pipe of variable slope, - m' g dz/dx, to d/dt of both waves of its cells."""
+    at, weight = pipe["rise"], st["gravity"] / (pipe["dx"] * pipe["speed"])
+    for i in range(r.size):
+        force = -weight * (profile[at + 2 * i + 2] - profile[at + 2 * i]) * (r[i] + l[i])
+        dr[i] += 0.5 * force
+        dl[i] -= 0.5 * force
+
+
+@njit
+def mass_of_bernoulli(st, floats, pipe, bernoulli, flow):
+    """Mass per length [kg/m] at which h(p) + v^2 / 2 is `bernoulli` [J/kg], v = flow / m; the subsonic solution."""
+    p = pressure_of_enthalpy(st, floats, bernoulli)
+    m, dm = mass_of_pressure(st, floats, pipe, p)
+    for _ in range(50):
+        v = flow / m
+        step = (enthalpy(st, floats, p) + 0.5 * v * v - bernoulli) / (1.0 / density(st, floats, p) - v * v * dm / m)
+        p -= step
+        m, dm = mass_of_pressure(st, floats, pipe, p)
+        if abs(step) <= 1e-15 * abs(p):
+            break
+    return m
+
+
+@njit
+def profile_along(st, floats, profile, pipe, start, z, flow, faces, centers):
+    """Steady profile of a pipe with friction: d(h + v^2/2 + g z)/dx = -drag m_ref / m^2, by RK4 over half cells.
+
+    start : h + v^2/2 + g z at the `from` end [J/kg]; z : elevation there. Writes the mass per length at faces and
+    centres [kg/m]; returns h + v^2/2 + g z at the `to` end.
+    """
+    pull = pipe["drag"] * st["rho"] * pipe["area"]
+    g, half, b = st["gravity"], 0.5 * pipe["dx"], start
+    m = mass_of_bernoulli(st, floats, pipe, b - g * z, flow)
+    faces[0] = m
+    for i in range(2 * centers.size):
+        x = i * half
+        k1 = -pull / (m * m)
+        middle = g * (z + rise_at(profile, pipe, x + 0.5 * half))
+        m = mass_of_bernoulli(st, floats, pipe, b + 0.5 * half * k1 - middle, flow)
+        k2 = -pull / (m * m)
+        m = mass_of_bernoulli(st, floats, pipe, b + 0.5 * half * k2 - middle, flow)
+        k3 = -pull / (m * m)
+        end = g * (z + rise_at(profile, pipe, x + half))
+        m = mass_of_bernoulli(st, floats, pipe, b + half * k3 - end, flow)
+        b += half * (k1 + 2.0 * k2 + 2.0 * k3 - pull / (m * m)) / 6.0
+        m = mass_of_bernoulli(st, floats, pipe, b - end, flow)
+        if i % 2 == 0:
+            centers[i // 2] = m
+        else:
+            faces[i // 2 + 1] = m
+    return b

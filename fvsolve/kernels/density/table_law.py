@@ -1,0 +1,136 @@
+"""Density law `table`: ln(rho / rho_ref) and enthalpy by cubic Hermite polynomials over pressure.
+
+ln(rho / rho_ref) is linear beyond both ends of the table.
+"""
+
+from math import exp, expm1, log
+
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.density import elastic_wall
+from fvsolve.kernels.density.no_inline import law_njit, prevent_inlining
+
+
+@njit(forceinline=True)
+def hermite(floats, values, slopes, k, s, step):
+    """Cubic polynomial through two values with two slopes, at s in [0, 1] of interval k."""
+    r = 1.0 - s
+    v0, v1 = floats[values + k], floats[values + k + 1]
+    d0, d1 = floats[slopes + k] * step, floats[slopes + k + 1] * step
+    return v0 + s * s * (3.0 - 2.0 * s) * (v1 - v0) + s * r * (r * d0 - s * d1)
+
+
+@njit
+def log_density(st, floats, p):
+    """(ln(rho / rho_ref), d ln rho / dp [1/Pa]) at a pressure."""
+    n, o, step = st["table_size"], st["table"], st["table_step"]
+    x = (p - st["table_start"]) / step
+    if x <= 0.0:
+        return floats[o] + floats[o + n] * x * step, floats[o + n]
+    if x >= n - 1.0:
+        return floats[o + n - 1] + floats[o + 2 * n - 1] * (x - (n - 1.0)) * step, floats[o + 2 * n - 1]
+    k = int(x)
+    s = x - k
+    value = hermite(floats, o, o + n, k, s, step)
+    v0, v1, d0, d1 = floats[o + k], floats[o + k + 1], floats[o + n + k], floats[o + n + k + 1]
+    slope = 6.0 * s * (1.0 - s) * (v1 - v0) / step + (1.0 - s) * (1.0 - 3.0 * s) * d0 + s * (3.0 * s - 2.0) * d1
+    return value, slope
+
+
+@inline
+def density(st, floats, p):
+    """rho [kg/m3] at a pressure."""
+    return elastic_wall.density(st, log_density(st, floats, p)[0])
+
+
+@njit
+def enthalpy(st, floats, p):
+    """h = integral of dp / rho from the reference pressure [J/kg]."""
+    n, o, step = st["table_size"], st["table"], st["table_step"]
+    x = (p - st["table_start"]) / step
+    k = 0 if x <= 0.0 else (n - 1 if x >= n - 1.0 else -1)
+    if k >= 0:
+        slope, rho = floats[o + n + k], st["rho"] * exp(floats[o + k])
+        return floats[o + 2 * n + k] - expm1(-slope * (x - k) * step) / (slope * rho)
+    k = int(x)
+    return hermite(floats, o + 2 * n, o + 3 * n, k, x - k, step)
+
+
+@law_njit
+def pressure_of_enthalpy(st, floats, h):
+    """Pressure [Pa] at which `enthalpy` is h."""
+    prevent_inlining()
+    p = st["reference"] + st["rho"] * h
+    for _ in range(30):
+        step = (enthalpy(st, floats, p) - h) * density(st, floats, p)
+        p -= step
+        if abs(step) <= 1e-15 * abs(p):
+            break
+    return p
+
+
+@law_njit
+def pressure_of_log(st, floats, compliance, q):
+    """Pressure [Pa] at which ln(rho / rho_ref) + compliance (p - p_ref) is q."""
+    prevent_inlining()
+    p = st["reference"] + q / (1.0 / st["beta"] + compliance)
+    for _ in range(30):
+        value, slope = log_density(st, floats, p)
+        step = (value + compliance * (p - st["reference"]) - q) / (slope + compliance)
+        p -= step
+        if abs(step) <= 1e-13 * (abs(p) + 1.0):
+            break
+    return p
+
+
+@inline
+def pressure_of_mass(st, floats, pipe, m):
+    """Pressure [Pa] of a pipe that contains m [kg/m]."""
+    return pressure_of_log(st, floats, pipe["compliance"], log(elastic_wall.mass_ratio(st, pipe, m)))
+
+
+@inline
+def mass_of_pressure(st, floats, pipe, p):
+    """Mass per length m = rho A [kg/m] and dm/dp of a pipe at a pressure."""
+    value, slope = log_density(st, floats, p)
+    return elastic_wall.mass(st, pipe, p, value, slope)
+
+
+@inline
+def wall_area(st, floats, pipe, p):
+    """Area of a pipe at a pressure [m2]."""
+    return elastic_wall.area(st, pipe, p)
+
+
+@inline
+def thrust(st, floats, pipe, p):
+    """Integral of A dp from the reference pressure [N]."""
+    return elastic_wall.thrust(st, pipe, p)
+
+
+@inline
+def force_of_mass(st, floats, pipe, m):
+    """`thrust` at the pressure of a pipe that contains m [kg/m] [N]: momentum flux by pressure."""
+    return thrust(st, floats, pipe, pressure_of_mass(st, floats, pipe, m))
+
+
+@inline
+def impedance(st, floats, pipe, p):
+    """rho c of a pipe at a pressure [kg/m2/s]."""
+    value, slope = log_density(st, floats, p)
+    return elastic_wall.impedance(st, pipe, value, slope)
+
+
+@njit
+def velocity_change(st, floats, pipe, p_from, p_to):
+    """Integral of dp / (rho c) [m/s] by three Gauss points."""
+    middle, half = 0.5 * (p_from + p_to), 0.5 * (p_to - p_from)
+    low, high = middle - elastic_wall.GAUSS_POINT * half, middle + elastic_wall.GAUSS_POINT * half
+    here, there = impedance(st, floats, pipe, low), impedance(st, floats, pipe, high)
+    return elastic_wall.gauss_integral(half, impedance(st, floats, pipe, middle), here, there)
+
+
+@inline
+def local_speed(st, floats, pipe, p):
+    """Wave speed c of a pipe at a pressure [m/s]."""
+    value, slope = log_density(st, floats, p)
+    return elastic_wall.speed(st, pipe, value, slope)

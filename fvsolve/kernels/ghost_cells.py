@@ -1,0 +1,166 @@
+"""Closures at pipe ends: the value of the outgoing wave there, and ghost cells beyond an end.
+
+A wave leaves through one end and enters through the other. Where it leaves, a polynomial through the last cells gives
+its value at the end. Where it enters, the value from the node is the datum of the polynomial. (A closure from cells
+alone is slightly unstable; with the datum no growing mode is known: tests/limits/test_ends.py.)
+"""
+
+from fractions import Fraction
+
+import numpy as np
+
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import LINEAR, SHORT, UPWIND, WENO5
+from fvsolve.kernels.reconstruction import value_muscl, value_weno5
+
+MAX_DEGREE = 4  # greatest degree of a polynomial
+GHOSTS = 3
+
+
+def solve_fractions(matrix, right):
+    """Rows of right * matrix^-1, computed in fractions."""
+    n = len(matrix)
+    rows = [list(row) + [Fraction(int(i == j)) for j in range(n)] for i, row in enumerate(matrix)]
+    for i in range(n):
+        pivot = next(k for k in range(i, n) if rows[k][i] != 0)
+        rows[i], rows[pivot] = rows[pivot], rows[i]
+        rows[i] = [value / rows[i][i] for value in rows[i]]
+        for k in range(n):
+            if k != i and rows[k][i] != 0:
+                rows[k] = [a - rows[k][i] * b for a, b in zip(rows[k], rows[i], strict=True)]
+    inverse = [row[n:] for row in rows]
+    return [[float(sum(a * inverse[k][j] for k, a in enumerate(row))) for j in range(n)] for row in right]
+
+
+def cell_averages(cell, degree):
+    """Averages of 1, x, x^2, ... over the unit cell [cell, cell + 1]."""
+    return [Fraction((cell + 1) ** (k + 1) - cell ** (k + 1), k + 1) for k in range(degree + 1)]
+
+
+def end_weights():
+    """Weights of the value at an end and of three ghost cells beyond it, by degree; nearest cell first."""
+    value = np.zeros((MAX_DEGREE + 1, MAX_DEGREE + 1))
+    leaving = np.zeros((MAX_DEGREE + 1, GHOSTS, MAX_DEGREE + 1))
+    entering = np.zeros((MAX_DEGREE + 1, GHOSTS, MAX_DEGREE + 1))
+    for d in range(MAX_DEGREE + 1):
+        at_end = [Fraction(int(k == 0)) for k in range(d + 1)]
+        beyond = [cell_averages(-1 - g, d) for g in range(GHOSTS)]
+        cells = [cell_averages(k, d) for k in range(d + 1)]
+        solved = solve_fractions(cells, [at_end, *beyond])
+        value[d, : d + 1] = solved[0]
+        leaving[d, :, : d + 1] = solved[1:]
+        entering[d, :, : d + 1] = solve_fractions([at_end, *cells[:d]], beyond)
+    return value, leaving, entering
+
+
+END_VALUE, END_LEAVING, END_ENTERING = end_weights()
+
+
+def difference_rows(weights, degree):
+    """Weights of a linear scheme in F[i] - F[i+1]: (inside [6], enter [3, 6], leave [2, 5]), see `dtypes.SETTINGS`.
+
+    weights : of cells i-2 .. i+2 and on, from the side that the wave comes from, in the value at face i
+    degree : of the polynomials at the ends
+    """
+    inside = np.append(weights, 0.0) - np.append(0.0, weights)
+    unit = np.eye(6)
+    beyond = np.pad(END_ENTERING[degree], ((0, 0), (0, 1)))
+    near = [*beyond[::-1], *unit[1:]]  # cells -3 .. 4 at the end where a wave enters, as sums of datum and cells 0 .. 4
+    face = [unit[0], *(sum(w * near[j + m] for m, w in enumerate(weights)) for j in range(1, 4))]
+    enter = np.array([face[j] - face[j + 1] for j in range(3)])
+    near = [*END_LEAVING[degree][::-1], *unit[:5, :5]]  # cells at the end where it leaves, as sums of five cells
+    face = [END_VALUE[degree], *(sum(w * near[j + 5 - m] for m, w in enumerate(weights)) for j in range(1, 3))]
+    leave = np.array([face[j + 1] - face[j] for j in range(2)])
+    return inside, enter, leave
+
+
+@njit
+def edge_cells(c, right, edge):
+    """Values of the five cells nearest to the left (0) or right (1) end, nearest first; the last cell is repeated."""
+    n = c.size
+    for k in range(5):
+        m = min(k, n - 1)
+        edge[k] = c[n - 1 - m] if right == 1 else c[m]
+
+
+@njit
+def end_degree(degree, n):
+    """Degree of the polynomial for n cells: below five cells fifth order would be unstable, third order is not."""
+    return min(min(degree, 2) if n < 5 else degree, n - 1)
+
+
+@njit
+def roughness(d1, d2, d3, d4, small):
+    """Smoothness indicator from 0, smooth, to 1, a jump: high undivided differences over low ones."""
+    ratio = 4.0 * (d3 * d3 + d4 * d4) / (d1 * d1 + d2 * d2 + small)
+    return ratio * ratio / (1.0 + ratio * ratio)
+
+
+@njit
+def leaving_ghosts(edge, n, family, degree, limiter, small, ghosts):
+    """Three ghost cells beyond an end where the wave leaves, nearest first, from the five `edge` cells of n."""
+    if family == UPWIND or family == LINEAR or family == SHORT:
+        d = end_degree(degree, n)
+        for g in range(3):
+            total = 0.0
+            for k in range(d + 1):
+                total += END_LEAVING[d, g, k] * edge[k]
+            ghosts[g] = total
+        return
+    a, b, e = edge[0], edge[1], edge[2]
+    low = 3.0 * a - 3.0 * b + e if n > 2 else 2.0 * a - b
+    for g in range(3):
+        ghosts[g] = low
+    if family == WENO5:
+        slope = value_muscl(limiter, b, a, low) - a
+        d3, d4 = edge[3], edge[4]
+        rough = roughness(a - b, a - 2.0 * b + e, a - 3.0 * b + 3.0 * e - d3,
+                          a - 4.0 * b + 6.0 * e - 4.0 * d3 + d4, small)  # fmt: skip
+        for g in range(3):
+            high = 0.0
+            for k in range(5):
+                high += END_LEAVING[4, g, k] * edge[k]
+            ghosts[g] = high + rough * (a + 2.0 * (g + 1.0) * slope - high)
+
+
+@njit
+def entering_ghosts(edge, n, family, degree, datum, small, ghosts):
+    """Three ghost cells beyond an end where the wave enters with the value `datum`, nearest first."""
+    if family == UPWIND or family == LINEAR or family == SHORT:
+        d = min(min(degree, 2) if n < 5 else degree, n)
+        for g in range(3):
+            total = END_ENTERING[d, g, 0] * datum
+            for k in range(d):
+                total += END_ENTERING[d, g, k + 1] * edge[k]
+            ghosts[g] = total
+        return
+    a, b, e, d3 = edge[0], edge[1], edge[2], edge[3]
+    for g in range(3):
+        ghosts[g] = 2.0 * datum - a
+    if family == WENO5:
+        bend = 5.5 * a - 3.5 * b + e - 3.0 * datum  # zero for every parabola
+        rough = roughness(2.0 * (a - datum), b - a, bend, a - 3.0 * b + 3.0 * e - d3, small)
+        for g in range(3):
+            high = END_ENTERING[4, g, 0] * datum
+            for k in range(4):
+                high += END_ENTERING[4, g, k + 1] * edge[k]
+            ghosts[g] = high + rough * (datum - high)
+
+
+@njit
+def end_value(c, right, family, degree, limiter, small, scratch):
+    """Value at the left (0) or right (1) end of the wave that leaves there."""
+    n, edge, ghosts = c.size, scratch[:5], scratch[5:8]
+    edge_cells(c, right, edge)
+    if family == UPWIND or family == LINEAR or family == SHORT:
+        d = end_degree(degree, n)
+        total = 0.0
+        for k in range(d + 1):
+            total += END_VALUE[d, k] * edge[k]
+        return total
+    if n == 1:
+        return edge[0]
+    leaving_ghosts(edge, n, family, degree, limiter, small, ghosts)
+    if family == WENO5:
+        return value_weno5(edge[2], edge[1], edge[0], ghosts[0], ghosts[1], small)
+    return value_muscl(limiter, edge[1], edge[0], ghosts[0])

@@ -1,0 +1,122 @@
+"""Isolated nodes, which only closed valves join to the rest: detection and pressure.
+
+No flow passes there, so any pressure would satisfy the balance. The pressure chosen is that at which equal small leaks
+would balance: sum of sqrt|dP| over the closed valves, each with the sign of its drop, is zero. P = p + rho g z.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import JUNCTION, NO_SOLUTION, STATUS, WHERE
+
+DEMAND_ROUNDING = 1e-9  # relative demand that an isolated node may have: rounding
+
+
+@njit(forceinline=True)
+def inner_row(nodes, i):
+    """Row of a node in its cluster, -1 if its pressure is known."""
+    return nodes[i]["row"] if nodes[i]["kind"] == JUNCTION else -1
+
+
+@njit
+def find_connected(cluster, tables, g, connected):
+    """connected[i] = 1 if open valves join node i of a cluster to a pipe or to a known pressure, else 0."""
+    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    for i in range(connected.size):
+        connected[i] = 1.0 if nodes[integers[cluster["first_node"] + i]]["admittance"] > 0.0 else 0.0
+    for _ in range(connected.size):
+        changed = False
+        for e in range(g.size):
+            if g[e] > 0.0:
+                valve = valves[integers[cluster["first_valve"] + e]]
+                i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+                from_connected = i < 0 or connected[i] > 0.0
+                to_connected = j < 0 or connected[j] > 0.0
+                if from_connected != to_connected:
+                    connected[j if from_connected else i] = 1.0
+                    changed = True
+        if not changed:
+            return
+
+
+@njit
+def total_pressure(tables, out, i):
+    """P = p + rho g z of a node [Pa]."""
+    node, settings = tables.nodes[i], tables.settings[0]
+    lift = settings["rho"] * settings["gravity"] * node["elevation"]
+    return node["pressure"] + out[tables.layout[0]["pressure"] + i] + lift
+
+
+@njit
+def leak_balance(cluster, tables, out, g, group, number, level):
+    """(sum of sqrt|dP| into a group of nodes at P = `level`, least and greatest P behind its closed valves)."""
+    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    total, low, high = 0.0, 1e300, -1e300
+    for e in range(g.size):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+        from_inside = i >= 0 and group[i] == number
+        to_inside = j >= 0 and group[j] == number
+        if g[e] == 0.0 and from_inside != to_inside:
+            other = total_pressure(tables, out, valve["to_node"] if from_inside else valve["from_node"])
+            low, high = min(low, other), max(high, other)
+            leak = sqrt(abs(other - level))
+            total += leak if other > level else -leak
+    return total, low, high
+
+
+@njit
+def group_by_open_valves(cluster, tables, g, group):
+    """Give nodes that open valves join to each other the same group number."""
+    nodes, valves, integers = tables.nodes, tables.valves, tables.integers
+    for i in range(group.size):
+        group[i] = i
+    for _ in range(group.size):
+        for e in range(g.size):
+            valve = valves[integers[cluster["first_valve"] + e]]
+            i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+            if g[e] < 0.0 and i >= 0 and j >= 0:  # open, but isolated
+                group[i] = group[j] = min(group[i], group[j])
+
+
+@njit
+def isolated_pressures(cluster, tables, out, g, connected, group):
+    """Set the pressures of isolated nodes of a cluster by bisection, group by group until no pressure changes."""
+    layout, integers = tables.layout[0], tables.integers
+    group_by_open_valves(cluster, tables, g, group)
+    for _ in range(200):
+        greatest = 0.0
+        for number in range(group.size):
+            if connected[number] > 0.0 or group[number] != number:
+                continue
+            _, low, high = leak_balance(cluster, tables, out, g, group, number, 0.0)
+            if low > high:
+                continue
+            for _ in range(100):
+                level = 0.5 * (low + high)
+                if level <= low or level >= high:
+                    break
+                if leak_balance(cluster, tables, out, g, group, number, level)[0] > 0.0:
+                    low = level
+                else:
+                    high = level
+            for i in range(group.size):
+                if group[i] == number:
+                    node = integers[cluster["first_node"] + i]
+                    change = 0.5 * (low + high) - total_pressure(tables, out, node)
+                    out[layout["pressure"] + node] += change
+                    greatest = max(greatest, abs(change) / (1e5 + abs(low)))
+        if greatest <= 1e-14:
+            return
+
+
+@njit
+def check_demand(cluster, tables, out, c, connected, group, scale):
+    """Set the status if an isolated group has a demand; c : inflow of its nodes [kg/s]."""
+    for number in range(group.size):
+        total = 0.0
+        for i in range(group.size):
+            if group[i] == number:
+                total += c[i]
+        if connected[number] == 0.0 and group[number] == number and abs(total) > DEMAND_ROUNDING * scale:
+            out[STATUS], out[WHERE] = NO_SOLUTION, tables.integers[cluster["first_node"] + number]

@@ -1,0 +1,225 @@
+"""Loop constraints (pins) by Lagrange multipliers with Baumgarte stabilisation; imported only for scenes with pins.
+
+A constraint row keeps n . rho constant: n is a direction, rho the position of `to` in the axes of the body of `from`.
+Equal and opposite forces act on both bodies at the same point. G q' is the rate of the rows, Z = L^-T G', and
+Z' Z = G M^-1 G'. lambda = -(Z' Z)^-1 (rows of the accelerations without pins + 2 pull G q' + pull^2 gap). Forces and
+positions are relative to those at the start, which are stored in the table: so a balanced start has no rounding errors.
+Layout of `scratch` after the data of `kernels.mechanism.mass_matrix`: G, Z (a row of freedoms each), Z' Z, lambda.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import PIN_VALUE, RATE
+from fvsolve.kernels.mechanism.body_layout import (
+    ACCELERATION,
+    ATTITUDE,
+    POSITION,
+    SPIN,
+    VELOCITY,
+    add_force,
+    body_row,
+    cross,
+    rotate,
+)
+from fvsolve.kernels.mechanism.body_probes import acceleration_at
+from fvsolve.kernels.mechanism.force_elements import point_at
+from fvsolve.kernels.mechanism.mass_matrix import (
+    LOAD_SIZE,
+    add_body_force,
+    body_rate_limit,
+    factor_mass_matrix,
+    fill_mass_matrix,
+    scratch_offsets,
+    solve_factor,
+    solve_mass_matrix,
+    spread_accelerations,
+    state_rates,
+)
+from fvsolve.kernels.table_handle import open_tables
+
+
+@njit(forceinline=True)
+def constraint_offset(tables):
+    """Offset of G in `scratch`."""
+    return scratch_offsets(tables)[1] + LOAD_SIZE * tables.bodies.size
+
+
+@njit(forceinline=True)
+def body_of(tables, point):
+    """Number of the body of a point; -1 for the world."""
+    return tables.points[point]["body"]
+
+
+@njit
+def pin_direction(out, tables, pin, r):
+    """Present direction r of a pin in axes of the world."""
+    i = body_of(tables, pin["from_point"])
+    if i < 0:
+        return pin["directions"][3 * r], pin["directions"][3 * r + 1], pin["directions"][3 * r + 2]
+    return rotate(out, body_row(tables, i) + ATTITUDE, pin["directions"], 3 * r)
+
+
+@njit
+def relative_motion(out, tables, pin):
+    """(gap, velocity, acceleration) of `to` relative to the body of `from`, (65), in axes of the world: 9 numbers."""
+    i, j = body_of(tables, pin["from_point"]), body_of(tables, pin["to_point"])
+    x, y, z, u, v, w = point_at(out, tables, pin["to_point"], POSITION)
+    p, q, s, _, _, _ = point_at(out, tables, pin["from_point"], POSITION)
+    a, b, c = 0.0, 0.0, 0.0
+    if j >= 0:
+        here = body_row(tables, j)
+        a, b, c = acceleration_at(
+            out, here, here + ACCELERATION, *rotate(out, here + ATTITUDE, tables.points[pin["to_point"]]["place"], 0)
+        )
+    if i >= 0:
+        here = body_row(tables, i)
+        rx, ry, rz = x - out[here + POSITION], y - out[here + POSITION + 1], z - out[here + POSITION + 2]
+        dx, dy, dz = cross(out, here + SPIN, rx, ry, rz)
+        k = here + VELOCITY
+        u, v, w = u - out[k] - dx, v - out[k + 1] - dy, w - out[k + 2] - dz
+        ex, ey, ez = acceleration_at(out, here, here + ACCELERATION, rx, ry, rz)
+        fx, fy, fz = cross(out, here + SPIN, 2.0 * u, 2.0 * v, 2.0 * w)
+        a, b, c = a - ex - fx, b - ey - fy, c - ez - fz
+    return x - p, y - q, z - s, u, v, w, a, b, c
+
+
+@njit
+def add_pin_force(out, tables, pin, r, size):
+    """Add the force `size` of row r to both bodies, at `to`: positive on its body, negative on the other."""
+    nx, ny, nz = pin_direction(out, tables, pin, r)
+    x, y, z, _, _, _ = point_at(out, tables, pin["to_point"], POSITION)
+    for end, sign in ((pin["to_point"], size), (pin["from_point"], -size)):
+        i = body_of(tables, end)
+        if i >= 0:
+            here = body_row(tables, i)
+            rx, ry, rz = x - out[here + POSITION], y - out[here + POSITION + 1], z - out[here + POSITION + 2]
+            add_force(out, here, rx, ry, rz, sign * nx, sign * ny, sign * nz)
+
+
+@njit
+def fill_constraint_rows(out, tables):
+    """Write G, Z and, in place of lambda, the right-hand side of each row; return the number of rows."""
+    pins, work, n, g = tables.pins, tables.scratch, tables.freedoms.size, constraint_offset(tables)
+    rows = 0
+    for k in range(pins.size):
+        rows += pins[k]["rows"]
+    z, last = g + rows * n, g + 2 * rows * n + rows * rows
+    row = 0
+    for k in range(pins.size):
+        pin = pins[k]
+        gx, gy, gz, u, v, w, a, b, c = relative_motion(out, tables, pin)
+        x, y0, z0, _, _, _ = point_at(out, tables, pin["to_point"], POSITION)
+        for r in range(pin["rows"]):
+            nx, ny, nz = pin_direction(out, tables, pin, r)
+            for m in range(n):
+                work[g + row * n + m] = 0.0
+            add_body_force(out, tables, body_of(tables, pin["to_point"]), x, y0, z0, nx, ny, nz, g + row * n)
+            add_body_force(out, tables, body_of(tables, pin["from_point"]), x, y0, z0, -nx, -ny, -nz, g + row * n)
+            for m in range(n):
+                work[z + row * n + m] = work[g + row * n + m]
+            solve_factor(tables, z + row * n)
+            gap = nx * gx + ny * gy + nz * gz - pin["gap"][r]
+            slip, pull = nx * u + ny * v + nz * w, pin["pull"]
+            work[last + row] = -(nx * a + ny * b + nz * c + 2.0 * pull * slip + pull * pull * gap)
+            row += 1
+    return rows
+
+
+@njit
+def multipliers(tables, rows):
+    """Solve for lambda in place, by the Cholesky factor Z' Z = C C'."""
+    work, n, z = tables.scratch, tables.freedoms.size, constraint_offset(tables) + rows * tables.freedoms.size
+    h, last = z + rows * n, z + rows * n + rows * rows
+    for i in range(rows):
+        for j in range(i + 1):
+            total = 0.0
+            for m in range(n):
+                total += work[z + i * n + m] * work[z + j * n + m]
+            for m in range(j):
+                total -= work[h + i * rows + m] * work[h + j * rows + m]
+            work[h + i * rows + j] = sqrt(total) if i == j else total / work[h + j * rows + j]
+    for i in range(rows):
+        for m in range(i):
+            work[last + i] -= work[h + i * rows + m] * work[last + m]
+        work[last + i] /= work[h + i * rows + i]
+    for i in range(rows - 1, -1, -1):
+        for m in range(i + 1, rows):
+            work[last + i] -= work[h + m * rows + i] * work[last + m]
+        work[last + i] /= work[h + i * rows + i]
+
+
+@njit
+def start_gaps(t, y, dydt, out, handle):
+    """Write the gaps at the start in place of the forces, where `model.mechanism` reads them."""
+    tables = open_tables(handle)
+    pins, at = tables.pins, tables.layout[0]["pin"]
+    for k in range(pins.size):
+        x, y0, z, _, _, _, _, _, _ = relative_motion(out, tables, pins[k])
+        for r in range(pins[k]["rows"]):
+            nx, ny, nz = pin_direction(out, tables, pins[k], r)
+            out[at + 3 * k + r] = nx * x + ny * y0 + nz * z
+
+
+@njit
+def add_start_pin_forces(t, y, dydt, out, handle):
+    """Add the forces of pins at the start, along the present directions."""
+    tables = open_tables(handle)
+    pins = tables.pins
+    for k in range(pins.size):
+        for r in range(pins[k]["rows"]):
+            add_pin_force(out, tables, pins[k], r, pins[k]["force"][r])
+
+
+@njit
+def solve_pinned_accelerations(t, y, dydt, out, handle):
+    """Solve for the accelerations of all bodies under their forces and those of pins; write rates of the states."""
+    tables = open_tables(handle)
+    pins, work, n, at = tables.pins, tables.scratch, tables.freedoms.size, tables.layout[0]["pin"]
+    add_start_pin_forces(t, y, dydt, out, handle)
+    fill_mass_matrix(y, out, tables)
+    factor_mass_matrix(tables)
+    solve_mass_matrix(tables, 6 * n)
+    spread_accelerations(out, tables)
+    rows = fill_constraint_rows(out, tables)
+    multipliers(tables, rows)
+    g = constraint_offset(tables)
+    last = g + 2 * rows * n + rows * rows
+    for m in range(n):
+        total = 0.0
+        for i in range(rows):
+            total += work[last + i] * work[g + i * n + m]
+        work[7 * n + m] = total
+    solve_mass_matrix(tables, 7 * n)
+    for m in range(n):
+        work[6 * n + m] += work[7 * n + m]
+    row, rate = 0, 0.0
+    for k in range(pins.size):
+        rate = max(rate, pins[k]["pull"])
+        for r in range(pins[k]["rows"]):
+            add_pin_force(out, tables, pins[k], r, work[last + row])
+            out[at + 3 * k + r] = pins[k]["force"][r] + work[last + row]
+            row += 1
+    spread_accelerations(out, tables)
+    out[RATE] = max(body_rate_limit(out, tables), rate)
+    state_rates(y, dydt, tables)
+
+
+@njit
+def observe_pins(t, y, out, handle, values):
+    """Write probe values of pins: magnitude of gap [m] or force [N]."""
+    tables = open_tables(handle)
+    probes, pins = tables.probes, tables.pins
+    for k in range(probes.size):
+        if probes[k]["kind"] == PIN_VALUE:
+            pin, at = pins[probes[k]["index"]], tables.layout[0]["pin"] + 3 * probes[k]["index"]
+            total = 0.0
+            if probes[k]["side"] == 0:
+                x, y0, z, _, _, _, _, _, _ = relative_motion(out, tables, pin)
+                for r in range(pin["rows"]):
+                    nx, ny, nz = pin_direction(out, tables, pin, r)
+                    total += (nx * x + ny * y0 + nz * z) ** 2
+            else:
+                for r in range(pin["rows"]):
+                    total += out[at + r] * out[at + r]
+            values[k] = sqrt(total)

@@ -1,0 +1,41 @@
+"""Inertial and gravity forces on fluid of moving bodies under the density laws log, table and mixture."""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.density import enthalpy, pressure_of_enthalpy
+from fvsolve.kernels.dtypes import TANK
+from fvsolve.kernels.mechanism.noninertial_forces import bottom_pressure_per_density, mark_weightless
+from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.tank_levels import tank_level
+
+
+@njit
+def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
+    """Write the pressures at the bottoms of tanks on bodies: h(p) = h(ambient) + weight per mass [J/kg]."""
+    tables = open_tables(handle)
+    st, nodes, floats = tables.settings[0], tables.nodes, tables.floats
+    for i in range(nodes.size):
+        node = nodes[i]
+        if node["kind"] == TANK and node["moving_segment"] >= 0:
+            segment, level = (
+                tables.rides[node["moving_segment"]],
+                tank_level(node, floats, node["density"], y[node["y"]]),
+            )
+            h = enthalpy(st, floats, st["ambient"])
+            now = pressure_of_enthalpy(st, floats, h + bottom_pressure_per_density(tables, out, segment, level))
+            out[tables.layout[0]["pressure"] + i] = now - pressure_of_enthalpy(st, floats, h + segment["rest"])
+            mark_weightless(tables, out, i, segment, level)
+
+
+@njit
+def add_cell_drives_barotropic(t, y, dydt, out, handle):
+    """Add the drive of the cells of pipes to the rates of their waves, dM/dt by m / dx of it; m : mass per length."""
+    tables = open_tables(handle)
+    pipes, profile, at = tables.pipes, tables.profile, tables.layout[0]["moving_segment"]
+    for i in range(pipes.size if dydt.size > 0 else 0):
+        pipe = pipes[i]
+        n, o, first = pipe["cells"], pipe["y"], pipe["moving_segment"]
+        for k in range(n if first >= 0 else 0):
+            m = profile[pipe["center"] + k] + (y[o + k] + y[o + n + k]) / pipe["speed"]
+            push = 0.5 * m / pipe["dx"] * out[at + first + k]
+            dydt[o + k] += push
+            dydt[o + n + k] -= push

@@ -1,0 +1,149 @@
+"""Network balances common to all density laws: net flows, rates of storage, rate limits of nodes and valves.
+
+out = [rate, status, where, -, p' of nodes, supply into nodes from outside [kg/s], net flow into nodes [kg/s], four
+wave values of each pipe (r and l at `from`, r and l at `to`), valve flows, column flows].
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import CHAMBER, FIXED, JUNCTION, MOVING, OK, PATCH, RATE, STATUS, TANK, WHERE
+from fvsolve.kernels.restrictions import conductance, head_drop, open_scheduled, restriction_slope
+from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.tank_limits import BOTTOM, EVENTS, RIM
+
+
+@njit(forceinline=True)
+def clear_outputs(out, tables):
+    """Clear the status and out[net], to which links then add their flows into nodes."""
+    net = tables.layout[0]["net"]
+    out[STATUS], out[WHERE] = OK, -1.0
+    for i in range(tables.nodes.size):
+        out[net + i] = 0.0
+
+
+@njit
+def begin_network(t, y, dydt, out, handle):
+    """Clear outputs and write the conductances of restrictions that follow schedules."""
+    tables = open_tables(handle)
+    clear_outputs(out, tables)
+    open_scheduled(t, out, tables)
+
+
+@njit
+def begin_basins(t, y, dydt, out, handle):
+    """Clear outputs of a model of basins without links: there is no flow between nodes."""
+    tables = open_tables(handle)
+    clear_outputs(out, tables)
+    out[RATE] = tables.settings[0]["rate"]
+
+
+@njit(forceinline=True)
+def net_flows(out, tables):
+    """Net flow into every node from its links [kg/s]; total, including the profile."""
+    layout, pipes, nodes = tables.layout[0], tables.pipes, tables.nodes
+    valves, columns = tables.valves, tables.columns
+    net = layout["net"]
+    for i in range(nodes.size):
+        out[net + i] = nodes[i]["inflow"]
+    for i in range(pipes.size):
+        at = layout["ends"] + 4 * i
+        out[net + pipes[i]["from_node"]] -= out[at] - out[at + 1]
+        out[net + pipes[i]["to_node"]] += out[at + 2] - out[at + 3]
+    for k in range(valves.size):
+        change = out[layout["valve"] + k] - valves[k]["flow"]
+        out[net + valves[k]["from_node"]] -= change
+        out[net + valves[k]["to_node"]] += change
+    for k in range(columns.size):
+        change = out[layout["column"] + k] - columns[k]["flow"]
+        out[net + columns[k]["from_node"]] -= change
+        out[net + columns[k]["to_node"]] += change
+    for k in range(tables.pistons.size):
+        for i in (tables.pistons[k]["a"], tables.pistons[k]["b"]):
+            out[net + i] -= out[layout["swept"] + nodes[i]["row"]]
+
+
+@njit(forceinline=True)
+def stiffness_of(nodes, layout, out, i):
+    """Present pressure per stored mass [Pa/kg] of node i, 0 without storage."""
+    kind = nodes[i]["kind"]
+    if kind >= MOVING or (kind == CHAMBER and nodes[i]["row"] >= 0):  # a chamber softened by gas
+        return out[layout["stiffness"] + nodes[i]["row"]]
+    return nodes[i]["stiffness"]
+
+
+@njit(forceinline=True)
+def stored_rates(y, dydt, out, tables):
+    """d/dt of stored masses, and supplies.
+
+    A supply is the outflow of a reservoir, the spill of a full tank (negative), or the unmet demand from a dry tank.
+    """
+    layout, nodes, armed = tables.layout[0], tables.nodes, tables.armed
+    for i in range(nodes.size):
+        kind, net = nodes[i]["kind"], out[layout["net"] + i]
+        if kind == JUNCTION or kind == PATCH:
+            continue
+        supply = 0.0
+        if kind == FIXED:
+            supply = -net
+        elif kind == TANK:
+            k = EVENTS * nodes[i]["row"]
+            if armed[k + BOTTOM] > 0.0 or armed[k + RIM] > 0.0:
+                supply = -net
+        if kind != FIXED and dydt.size > 0:
+            dydt[nodes[i]["y"]] = net + supply
+        out[layout["supply"] + i] = supply
+
+
+@njit(forceinline=True)
+def node_rate_limit(out, tables):
+    """Greatest rate of waves over cells, and of stored masses with the pipes at their nodes [1/s]."""
+    layout, nodes = tables.layout[0], tables.nodes
+    rate = tables.settings[0]["rate"]
+    for i in range(nodes.size):
+        if nodes[i]["kind"] != FIXED and nodes[i]["kind"] != JUNCTION:
+            rate = max(rate, stiffness_of(nodes, layout, out, i) * nodes[i]["admittance"])
+    return rate
+
+
+@njit
+def balance_network(t, y, dydt, out, handle):
+    """Write net flows into nodes and rates of storage; set out[RATE] to their greatest rate."""
+    tables = open_tables(handle)
+    net_flows(out, tables)
+    stored_rates(y, dydt, out, tables)
+    out[RATE] = node_rate_limit(out, tables)
+
+
+@njit
+def valve_rate_limit(t, y, dydt, out, handle):
+    """Raise out[RATE] to the greatest rate at which stored masses equalise through valves."""
+    tables = open_tables(handle)
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    rate = out[RATE]
+    for k in range(valves.size):
+        valve = valves[k]
+        i, j = valve["from_node"], valve["to_node"]
+        stiff_i, stiff_j = stiffness_of(nodes, layout, out, i), stiffness_of(nodes, layout, out, j)
+        drop = head_drop(tables, out, k)[1]
+        if nodes[i]["kind"] == PATCH and drop >= 0.0:  # without water a patch cannot respond
+            stiff_i *= out[layout["outflow_fraction"] + nodes[i]["row"]]
+        if nodes[j]["kind"] == PATCH and drop <= 0.0:
+            stiff_j *= out[layout["outflow_fraction"] + nodes[j]["row"]]
+        stiff = stiff_i + stiff_j
+        if valve["device"] >= 0 and tables.devices[valve["device"]]["row"] >= 0:
+            continue  # valve of a vessel, whose device sets its own rate
+        if stiff > 0.0:
+            g = conductance(tables, out, k)
+            slope = restriction_slope(tables, out, k, drop)
+            soft = 0.0
+            if nodes[i]["kind"] == JUNCTION and nodes[i]["admittance"] > 0.0:
+                soft += 1.0 / nodes[i]["admittance"]
+            if nodes[j]["kind"] == JUNCTION and nodes[j]["admittance"] > 0.0:
+                soft += 1.0 / nodes[j]["admittance"]
+            rate = max(rate, stiff * slope / (1.0 + soft * slope))
+            if valve["transition"] > 0.0 and g > 0.0:
+                change = stiff_i * out[layout["net"] + i]
+                change -= stiff_j * out[layout["net"] + j]
+                width = max(valve["transition"] ** 2 / g, valve["rounding_drop"])
+                if change * drop < 0.0:  # at least two steps to a drop of zero: a longer step would pass it
+                    rate = max(rate, 2.5 * abs(change) / max(abs(drop), width))
+    out[RATE] = rate

@@ -1,0 +1,314 @@
+"""Clusters of nodes without storage that several valves join: Newton on pressures and flows together, linear law.
+
+Valve: M |M| = G (dp0 + p_i' - p_j'); node: c_i - Y_i p_i' = flow that leaves it through valves (gradient method of
+Todini and Pilati 1988). The unknown flows are total flows, not deviations: far from the profile, where a valve is
+nearly closed, a deviation would lose all but its rounding. A cluster in which nothing has changed is not solved.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import NO_SOLUTION, NOT_CONVERGED, STATUS, WHERE
+from fvsolve.kernels.isolated_nodes import check_demand, find_connected, inner_row, isolated_pressures
+from fvsolve.kernels.restrictions import conductance, has_lifted_backflow, restriction_lift, restriction_step
+from fvsolve.kernels.table_handle import open_tables
+
+BAR = 1e5
+ROUNDING = 1e-15  # relative rounding of pressures; of a flow, relative to the flow at 1 Pa
+FAILED_CHANGE = 1e-5  # relative change of flow above which Newton has failed; smaller changes may be rounding
+
+
+@njit
+def solve_dense(a, b, n):
+    """b <- a^-1 b by elimination with partial pivoting; return the sign of det a, 0 if singular. Overwrites a and b.
+
+    a : float64[n * n]  row by row
+    """
+    sign = 1.0
+    for i in range(n):
+        pivot, row = i, n * i
+        for k in range(i + 1, n):
+            if abs(a[n * k + i]) > abs(a[n * pivot + i]):
+                pivot = k
+        if a[n * pivot + i] == 0.0:
+            return 0.0
+        if (pivot != i) != (a[n * pivot + i] < 0.0):
+            sign = -sign
+        if pivot != i:
+            for k in range(n):
+                a[row + k], a[n * pivot + k] = a[n * pivot + k], a[row + k]
+            b[i], b[pivot] = b[pivot], b[i]
+        for k in range(i + 1, n):
+            f = a[n * k + i] / a[row + i]
+            if f != 0.0:
+                for m in range(i, n):
+                    a[n * k + m] -= f * a[row + m]
+                b[k] -= f * b[i]
+    for i in range(n - 1, -1, -1):
+        for k in range(i + 1, n):
+            b[i] -= a[n * i + k] * b[k]
+        b[i] /= a[n * i + i]
+    return sign
+
+
+@njit(forceinline=True)
+def has_converged(change, last_change):
+    """True if the last relative change of Newton is rounding: below 1e-14, or below 1e-9 and no longer falling."""
+    return change <= 1e-14 or (change <= 1e-9 and change >= 0.5 * last_change)
+
+
+@njit
+def total_inflows(cluster, tables, out, c):
+    """c <- flow into each node of a cluster from all links but its valves, at p' = 0; True if nothing has changed."""
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    integers, unchanged = tables.integers, True
+    for i in range(c.size):
+        node = integers[cluster["first_node"] + i]
+        unchanged = unchanged and out[layout["net"] + node] == 0.0
+        c[i] = out[layout["supply"] + node]  # exact where only valves and columns join
+        if nodes[node]["admittance"] > 0.0:
+            c[i] = out[layout["net"] + node]
+    for k in range(tables.columns.size):
+        column = tables.columns[k]
+        i, j = row_in_cluster(cluster, tables, column["from_node"]), row_in_cluster(cluster, tables, column["to_node"])
+        if i >= 0 and nodes[column["from_node"]]["admittance"] == 0.0:
+            c[i] -= out[layout["column"] + k]
+        if j >= 0 and nodes[column["to_node"]]["admittance"] == 0.0:
+            c[j] += out[layout["column"] + k]
+    for e in range(cluster["valves"]):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+        if i >= 0 and nodes[valve["from_node"]]["admittance"] > 0.0:
+            c[i] += valve["flow"]
+        if j >= 0 and nodes[valve["to_node"]]["admittance"] > 0.0:
+            c[j] -= valve["flow"]
+    return unchanged
+
+
+@njit
+def row_in_cluster(cluster, tables, i):
+    """Row of node i in this cluster, -1 if it does not belong to it."""
+    row = inner_row(tables.nodes, i)
+    if row < 0 or row >= cluster["nodes"] or tables.integers[cluster["first_node"] + row] != i:
+        return -1
+    return row
+
+
+@njit
+def add_valve(i, j, m, a, s, lift, n, matrix, right):
+    """Add a valve from row i to row j (-1: known pressure) to the balances of its nodes.
+
+    lift : dM / dp_i at constant drop
+    """
+    if i >= 0:
+        right[i] -= m + a
+        matrix[n * i + i] += s + lift
+    if j >= 0:
+        right[j] += m + a
+        matrix[n * j + j] += s
+    if i >= 0 and j >= 0:
+        matrix[n * i + j] -= s
+        matrix[n * j + i] -= s + lift
+
+
+@njit
+def assemble(cluster, tables, out, g, m, c, connected, a, s, lift, matrix, right, wide):
+    """Linear system for the change of the pressures, with the changes of valve flows eliminated."""
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    integers, n = tables.integers, c.size
+    for i in range(matrix.size):
+        matrix[i] = 0.0
+    for i in range(n):
+        node = integers[cluster["first_node"] + i]
+        right[i] = c[i] - nodes[node]["admittance"] * out[layout["pressure"] + node]
+        matrix[n * i + i] = nodes[node]["admittance"]
+    for e in range(m.size):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+        a[e], s[e], lift[e] = -m[e], 0.0, 0.0
+        if g[e] > 0.0:
+            drop = out[layout["pressure"] + valve["from_node"]] - out[layout["pressure"] + valve["to_node"]]
+            k = integers[cluster["first_valve"] + e]
+            a[e], s[e] = restriction_step(tables, out, k, g[e], m[e], valve["drop"] + drop, 1.0, wide)
+            lift[e] = restriction_lift(tables, out, k, g[e], valve["drop"] + drop, 1.0, wide)
+        add_valve(i, j, m[e], a[e], s[e], lift[e], n, matrix, right)
+    add_couplings(cluster, tables, out, n, matrix, right)
+    for i in range(n):
+        if connected[i] == 0.0:
+            right[i], matrix[n * i + i] = 0.0, 1.0
+
+
+@njit
+def add_couplings(cluster, tables, out, n, matrix, right):
+    """Add the instantaneous flow between the ends of short delay lines."""
+    layout, nodes, integers = tables.layout[0], tables.nodes, tables.integers
+    for k in range(cluster["couples"]):
+        line = tables.delays[integers[cluster["first_couple"] + k]]
+        pipe, g = tables.pipes[line["pipe"]], line["couple"]
+        i, j = inner_row(nodes, pipe["from_node"]), inner_row(nodes, pipe["to_node"])
+        p, q = out[layout["pressure"] + pipe["from_node"]], out[layout["pressure"] + pipe["to_node"]]
+        add_valve(i, j, g * (p - q), 0.0, g, 0.0, n, matrix, right)
+
+
+@njit
+def apply_step(cluster, tables, out, m, a, s, lift, right):
+    """Apply a Newton step; return the greatest relative change of flows and pressures.
+
+    A change of flow by the rounding of pressures does not count. Flows are compared with at least the flow at 1 Pa.
+    """
+    layout, nodes, valves = tables.layout[0], tables.nodes, tables.valves
+    integers, scale, rounded, change, most = tables.integers, 1e-300, 0.0, 0.0, 0.0
+    for i in range(right.size):
+        node = integers[cluster["first_node"] + i]
+        out[layout["pressure"] + node] += right[i]
+        most = max(most, abs(right[i]) / (BAR + abs(nodes[node]["pressure"] + out[layout["pressure"] + node])))
+    for e in range(m.size):
+        valve = valves[integers[cluster["first_valve"] + e]]
+        i, j = inner_row(nodes, valve["from_node"]), inner_row(nodes, valve["to_node"])
+        rise = right[i] if i >= 0 else 0.0
+        step = a[e] + s[e] * (rise - (right[j] if j >= 0 else 0.0)) + lift[e] * rise
+        m[e] += step
+        scale = max(scale, abs(m[e]), sqrt(valve["conductance"]))
+        p = nodes[valve["from_node"]]["pressure"] + out[layout["pressure"] + valve["from_node"]]
+        rounding = s[e] * ROUNDING * (BAR + abs(p))
+        change, rounded = max(change, max(abs(step), abs(a[e])) - rounding), max(rounded, rounding)
+    relative = change / scale
+    if relative > FAILED_CHANGE and change <= rounded:  # perhaps rounding: no failure, but iterate further
+        relative = FAILED_CHANGE
+    return max(relative, most)
+
+
+@njit
+def prepare_cluster(cluster, tables, out, g, m):
+    """Set conductances and start flows of the valves of a cluster, and p' = 0 in its nodes.
+
+    True if no conductance, no speed and no pressure at the valves has changed.
+    """
+    layout, valves = tables.layout[0], tables.valves
+    integers, unchanged = tables.integers, True
+    for i in range(cluster["nodes"]):
+        out[layout["pressure"] + integers[cluster["first_node"] + i]] = 0.0
+    for e in range(g.size):
+        k = integers[cluster["first_valve"] + e]
+        valve = valves[k]
+        g[e], m[e] = conductance(tables, out, k), valve["flow"]
+        if valve["hooks"] < 0 and 0.0 < g[e] < valve["open"]:
+            m[e] *= sqrt(
+                g[e] / valve["open"]
+            )  # flow at the drop of the profile; the flow of the profile would need a huge drop
+        unchanged = unchanged and g[e] == valve["open"] and out[layout["drive"] + k] == valve["drive"]
+        for i in (valve["from_node"], valve["to_node"]):
+            unchanged = unchanged and out[layout["pressure"] + i] == 0.0
+    for k in range(cluster["couples"]):
+        pipe = tables.pipes[tables.delays[integers[cluster["first_couple"] + k]]["pipe"]]
+        for i in (pipe["from_node"], pipe["to_node"]):
+            unchanged = unchanged and out[layout["pressure"] + i] == 0.0
+    return unchanged
+
+
+@njit
+def solve_cluster(out, tables, index):
+    """Solve the pressures of a cluster and the flows of its valves.
+
+    The iteration starts from the profile, so the result depends on (t, y) alone.
+    """
+    integers, cluster = tables.integers, tables.clusters[index]
+    n, k, work = cluster["nodes"], cluster["valves"], tables.scratch
+    at = n * n + 4 * n
+    matrix, right, c = work[: n * n], work[n * n : n * n + n], work[n * n + n : n * n + 2 * n]
+    connected, group = work[n * n + 2 * n : n * n + 3 * n], work[n * n + 3 * n : at]
+    g, m = work[at : at + k], work[at + k : at + 2 * k]
+    a, s, lift = work[at + 2 * k : at + 3 * k], work[at + 3 * k : at + 4 * k], work[at + 4 * k : at + 5 * k]
+    unchanged = prepare_cluster(cluster, tables, out, g, m)
+    undisturbed = total_inflows(cluster, tables, out, c) and unchanged
+    find_connected(cluster, tables, g, connected)
+    zero_isolated(cluster, tables, g, m, connected)
+    change, wide = 1e300, True
+    for _ in range(100):
+        if undisturbed:
+            change = 0.0
+            break
+        assemble(cluster, tables, out, g, m, c, connected, a, s, lift, matrix, right, wide)
+        sign = solve_dense(matrix, right, n)
+        if sign <= 0.0 and not wide and close_unstable(cluster, tables, g, m):
+            continue
+        if sign == 0.0:
+            out[STATUS], out[WHERE] = NO_SOLUTION, integers[cluster["first_node"]]
+            return
+        last_change, change = change, apply_step(cluster, tables, out, m, a, s, lift, right)
+        if has_converged(change, last_change):
+            if not (wide and has_backflow(cluster, tables, m)):
+                break
+            change, wide = 1e300, False
+    write_cluster(cluster, tables, out, g, m, c, connected, group, change)
+
+
+@njit
+def has_backflow(cluster, tables, m):
+    """True if a valve that is lifted by its upstream pressure carries backflow."""
+    for e in range(m.size):
+        if has_lifted_backflow(tables, tables.integers[cluster["first_valve"] + e], m[e]):
+            return True
+    return False
+
+
+@njit
+def close_unstable(cluster, tables, g, m):
+    """Close lifted valves that carry backflow and cannot stay open; True if there are any.
+
+    Newton, which starts from wide open valves, has reached a matrix with a negative determinant: at smaller lifts the
+    imbalance would be even greater.
+    """
+    closed = False
+    for e in range(m.size):
+        if g[e] > 0.0 and has_lifted_backflow(tables, tables.integers[cluster["first_valve"] + e], m[e]):
+            g[e], closed = 0.0, True
+    return closed
+
+
+@njit
+def zero_isolated(cluster, tables, g, m, connected):
+    """Set the flow of valves at nodes that are not connected to zero; conductance -1 marks open valves."""
+    for e in range(g.size):
+        if not is_connected(cluster, tables, e, connected):
+            m[e] = 0.0
+            g[e] = -1.0 if g[e] > 0.0 else 0.0
+
+
+@njit
+def is_connected(cluster, tables, e, connected):
+    """True if valve e of a cluster lies between connected nodes or known pressures."""
+    valve = tables.valves[tables.integers[cluster["first_valve"] + e]]
+    i, j = inner_row(tables.nodes, valve["from_node"]), inner_row(tables.nodes, valve["to_node"])
+    return (i < 0 or connected[i] > 0.0) and (j < 0 or connected[j] > 0.0)
+
+
+@njit
+def write_cluster(cluster, tables, out, g, m, c, connected, group, change):
+    """Write the flows of a cluster, the pressures of isolated nodes, and the status if Newton has failed.
+
+    Flows that are rounding (dead ends) become zero: their sign does not depend on the pressures.
+    """
+    scale = 1e-300
+    for e in range(m.size):
+        k = tables.integers[cluster["first_valve"] + e]
+        if abs(m[e]) <= ROUNDING * sqrt(tables.valves[k]["conductance"]):  # of its flow at 1 Pa
+            m[e] = 0.0
+        out[tables.layout[0]["valve"] + k] = m[e]
+        scale = max(scale, abs(tables.valves[k]["flow"]), sqrt(tables.valves[k]["conductance"]))
+    if change > FAILED_CHANGE:
+        out[STATUS], out[WHERE] = NOT_CONVERGED, tables.integers[cluster["first_node"]]
+    for i in range(connected.size):
+        if connected[i] == 0.0:
+            isolated_pressures(cluster, tables, out, g, connected, group)
+            check_demand(cluster, tables, out, c, connected, group, scale)
+            return
+
+
+@njit
+def solve_clusters(t, y, dydt, out, handle):
+    """Solve pressures of the nodes of all clusters and flows of their valves."""
+    tables = open_tables(handle)
+    for k in range(tables.clusters.size):
+        if tables.clusters[k]["inverse"] < 0:
+            solve_cluster(out, tables, k)

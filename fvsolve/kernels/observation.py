@@ -1,0 +1,211 @@
+"""Observation of a state: probes, extremes, times of first occurrence, events of tanks. Changes no state."""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.calls import CLOSE, run_job
+from fvsolve.kernels.dtypes import (
+    COLUMN_FLOW,
+    LEVEL,
+    PIPE_FLOW,
+    PIPE_PRESSURE,
+    PRESSURE,
+    SPOOL_FLOW,
+    TANK,
+    VALVE_FLOW,
+    WHERE,
+)
+from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.tank_levels import tank_level
+from fvsolve.kernels.tank_limits import BOTTOM, EVENTS, RIM, is_near, limit_events, mass_per_metre
+
+HUGE = 1e100  # waves beyond it count as not finite, although their squares may be finite
+BLOCK = 64  # cells compared with the envelope at a time
+SUPPLY_ROUNDING = 1e-9  # speed of a level [m/s]: a smaller supply of a tank is rounding and is not recorded
+STOP_HERE = -2.0  # in out[WHERE]: the run must end
+
+
+@njit(forceinline=True)
+def wave_sum(probe, pipe, sign, index, y, out, tables):
+    """r + l or r - l at a probe of a pipe: at an end from the node, inside from a polynomial over cells."""
+    at = tables.layout[0]["ends"] + 4 * index
+    if probe["side"] < 0:
+        return out[at] + sign * out[at + 1]
+    if probe["side"] > 0:
+        return out[at + 2] + sign * out[at + 3]
+    total, n = 0.0, pipe["cells"]
+    for k in range(probe["count"]):
+        cell = pipe["y"] + probe["cell"] + k
+        total += tables.floats[probe["weights"] + k] * (y[cell] + sign * y[cell + n])
+    return total
+
+
+@njit
+def observe_linear(t, y, out, handle, values):
+    """values[k] = scale * quantity + offset for every probe."""
+    tables = open_tables(handle)
+    layout, probes = tables.layout[0], tables.probes
+    for k in range(probes.size):
+        probe = probes[k]
+        kind, i = probe["kind"], probe["index"]
+        value = 0.0
+        if kind == PRESSURE:
+            value = out[layout["pressure"] + i]
+        elif kind == LEVEL:
+            node = tables.nodes[i]
+            value = tank_level(node, tables.floats, tables.settings[0]["rho"], y[node["y"]])
+        elif kind == PIPE_PRESSURE:
+            pipe = tables.pipes[i]
+            value = wave_sum(probe, pipe, 1.0, i, y, out, tables)
+        elif kind == PIPE_FLOW:
+            pipe = tables.pipes[i]
+            value = pipe["flow"] + wave_sum(probe, pipe, -1.0, i, y, out, tables)
+        elif kind == VALVE_FLOW:
+            value = out[layout["valve"] + i]
+        elif kind == COLUMN_FLOW:
+            value = out[layout["column"] + i]
+        elif kind == SPOOL_FLOW:
+            for e in range(4):
+                value += tables.floats[probe["weights"] + e] * out[layout["valve"] + i + e]
+        values[k] = probe["scale"] * value + probe["offset"]
+
+
+@njit(forceinline=True)
+def update_extremes(envelope, c, t, value):
+    """Update the least and greatest value of column c, and their times, with a value."""
+    if value < envelope[0, c]:
+        envelope[0, c], envelope[1, c] = value, t
+    if value > envelope[2, c]:
+        envelope[2, c], envelope[3, c] = value, t
+
+
+@njit(forceinline=True)
+def count_new_extremes(r, l, least, greatest):
+    """Count the cells below and above their extremes so far; NaN counts as below and above."""
+    low, high = 0, 0
+    for i in range(r.size):
+        s = r[i] + l[i]
+        low += not s >= least[i]
+        high += not s <= greatest[i]
+    return low, high
+
+
+@njit
+def update_minima(t, r, l, least, t_least):
+    """Update least values and their times of many cells, without a branch; return how many are not finite."""
+    bad = 0
+    for i in range(r.size):
+        s = r[i] + l[i]
+        low = s < least[i]
+        least[i] = s if low else least[i]
+        t_least[i] = t if low else t_least[i]
+        bad += not (abs(r[i]) < HUGE and abs(l[i]) < HUGE)
+    return bad
+
+
+@njit
+def update_maxima(t, r, l, greatest, t_greatest):
+    """Update greatest values and their times, as `update_minima` does for the least."""
+    bad = 0
+    for i in range(r.size):
+        s = r[i] + l[i]
+        high = s > greatest[i]
+        greatest[i] = s if high else greatest[i]
+        t_greatest[i] = t if high else t_greatest[i]
+        bad += not (abs(r[i]) < HUGE and abs(l[i]) < HUGE)
+    return bad
+
+
+@njit
+def count_below(r, l, boiling):
+    """Number of cells below vapour pressure: r + l below `boiling`."""
+    count = 0
+    for i in range(r.size):
+        count += (r[i] + l[i]) < boiling[i]
+    return count
+
+
+@njit
+def update_envelope(t, r, l, at, low, high, index, tables):
+    """Update the envelope of r + l from cell `at` on; record the first time that pipe `index` is below vapour pressure.
+
+    low, high : numbers of cells outside their extremes. Returns 0 if all values are finite.
+    """
+    e, profile, marks = tables.envelope, tables.profile, tables.marks
+    b, bad = at + r.size, 0
+    if low > 0:
+        bad += update_minima(t, r, l, e[0, at:b], e[1, at:b])
+        if marks[index] != marks[index]:
+            if count_below(r, l, profile[at:b]) > 0:
+                marks[index] = t
+    if high > 0:
+        bad += update_maxima(t, r, l, e[2, at:b], e[3, at:b])
+    return bad
+
+
+@njit
+def record_pipe(t, r, l, pipe, index, tables):
+    """Update the envelope of r + l of a pipe; most blocks have no new extreme and are only compared."""
+    start, at, envelope = 0, pipe["cell"], tables.envelope
+    while start < r.size:
+        stop = min(start + BLOCK, r.size)
+        a, b = at + start, at + stop
+        low, high = count_new_extremes(r[start:stop], l[start:stop], envelope[0, a:b], envelope[2, a:b])
+        if low + high > 0:
+            update_envelope(t, r[start:stop], l[start:stop], a, low, high, index, tables)
+        start = stop
+
+
+@njit
+def record_pipes(t, y, out, handle, values):
+    """Update envelopes of pipes, and first times below vapour pressure, after every accepted step."""
+    tables = open_tables(handle)
+    pipes = tables.pipes
+    for i in range(pipes.size):
+        n, o = pipes[i]["cells"], pipes[i]["y"]
+        record_pipe(t, y[o : o + n], y[o + n : o + 2 * n], pipes[i], i, tables)
+
+
+@njit
+def record_nodes(t, y, out, handle, values):
+    """Update extremes of probes and first times of marks, after an accepted step and after `record_pipes`.
+
+    marks : first times of pipes below vapour pressure, nodes below it, tanks dry, tanks spilling; NaN for never
+    """
+    tables = open_tables(handle)
+    pipes, nodes, extremes = tables.pipes, tables.nodes, tables.extremes
+    marks, layout, vapor = tables.marks, tables.layout[0], tables.settings[0]["vapor"]
+    for k in range(values.size):
+        update_extremes(extremes, k, t, values[k])
+        mark = tables.probes[k]["mark"]
+        if mark >= 0 and values[k] < vapor and marks[mark] != marks[mark]:
+            marks[mark] = t
+    for i in range(nodes.size):
+        at = pipes.size + i
+        if nodes[i]["pressure"] + out[layout["pressure"] + i] < vapor and marks[at] != marks[at]:
+            marks[at] = t
+        if nodes[i]["kind"] == TANK and abs(out[layout["supply"] + i]) > SUPPLY_ROUNDING * mass_per_metre(nodes[i]):
+            at += nodes.size if out[layout["supply"] + i] > 0.0 else 2 * nodes.size
+            if marks[at] != marks[at]:
+                marks[at] = t
+    if tables.settings[0]["stop_below"] == 1:
+        for i in range(pipes.size + nodes.size):
+            if marks[i] == marks[i]:
+                out[WHERE] = STOP_HERE
+
+
+@njit
+def tank_events(t, y, out, handle, g):
+    """Event functions of tanks at bottom and rim; at a limit they need the net flow, so nodes are solved first."""
+    tables = open_tables(handle)
+    # event functions of devices have solved the nodes
+    nodes, armed, solved = tables.nodes, tables.armed, tables.devices.size > 0
+    for i in range(nodes.size):
+        if nodes[i]["kind"] == TANK:
+            node, k = nodes[i], EVENTS * nodes[i]["row"]
+            stored = node["mass"] + y[node["y"]]
+            space = node["full"] - stored
+            if not solved and (is_near(node, stored) or is_near(node, space)):
+                run_job(CLOSE, t, y, y[:0], out, handle)
+                solved = True
+            net = out[tables.layout[0]["net"] + i]
+            limit_events(node, armed, g, k + BOTTOM, stored, net)
+            limit_events(node, armed, g, k + RIM, space, -net)

@@ -1,0 +1,60 @@
+"""Forces of the fluid on pipe legs between bends and dead ends.
+
+The force is the rate of momentum loss of the fluid, - d/dt of the integral of M dx [N], which acts on ends and wall in
+addition to the force of the profile; positive from `from` to `to`.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.barotropic_pipes import rates_barotropic
+from fvsolve.kernels.cavitating_pipes import rates_cavitating
+from fvsolve.kernels.dtypes import PIPE_FORCE
+from fvsolve.kernels.linear_pipes import wave_rates
+from fvsolve.kernels.table_handle import open_tables
+from fvsolve.kernels.unsteady_friction.relaxation_terms import add_unsteady_friction
+from fvsolve.kernels.unsteady_friction.relaxation_terms_barotropic import add_unsteady_friction_barotropic
+
+
+@njit
+def read_forces(dydt, tables, values):
+    """values[k] = - sum of dM/dt dx over the cells of the pipe, for every force probe."""
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == PIPE_FORCE:
+            pipe, total = tables.pipes[probe["index"]], 0.0
+            n, o = pipe["cells"], pipe["y"]
+            for i in range(n):
+                total += dydt[o + i] - dydt[o + n + i]
+            values[k] = (0.0 - total) * pipe["dx"]
+
+
+@njit
+def observe_forces_linear(t, y, out, handle, values):
+    """Forces on pipes under the linear law."""
+    tables = open_tables(handle)
+    at = tables.layout[0]["forces"]
+    dydt = tables.work[at : at + y.size]
+    wave_rates(t, y, dydt, out, handle)
+    add_unsteady_friction(t, y, dydt, out, handle)
+    read_forces(dydt, tables, values)
+
+
+@njit
+def observe_forces_barotropic(t, y, out, handle, values):
+    """Forces on pipes under the laws log and table."""
+    tables = open_tables(handle)
+    at = tables.layout[0]["forces"]
+    dydt = tables.work[at : at + y.size]
+    rates_barotropic(t, y, dydt, out, handle)
+    add_unsteady_friction_barotropic(t, y, dydt, out, handle)
+    read_forces(dydt, tables, values)
+
+
+@njit
+def observe_forces_cavitating(t, y, out, handle, values):
+    """Forces on pipes under the law mixture, with cavities."""
+    tables = open_tables(handle)
+    at = tables.layout[0]["forces"]
+    dydt = tables.work[at : at + y.size]
+    rates_cavitating(t, y, dydt, out, handle)
+    add_unsteady_friction_barotropic(t, y, dydt, out, handle)
+    read_forces(dydt, tables, values)

@@ -1,0 +1,289 @@
+"""Assembly of the right-hand side of a model: a list of its functions, phase by phase.
+
+Each function has the arguments (t, y, dydt, out, handle) and may read what earlier phases have written. With an empty
+dydt it computes `out` alone. A band of rows is a handle whose tables are parts of these: no function depends on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from importlib import import_module
+
+from fvsolve.kernels.calls import hook_of
+
+KERNELS = "fvsolve.kernels"
+
+
+@dataclass(frozen=True)
+class RhsTerms:
+    """Functions that a component adds to a model, as `module: function`, "" for none; the phases first, in order.
+
+    home : package of the modules
+    """
+
+    exchange: str = ""  # exchange of states between bands
+    prepare: str = ""  # from (t, y) alone: conductances, speeds, pressures of vessels
+    outgoing_waves: str = ""  # outgoing waves at pipe ends
+    known_pressures: str = ""  # pressures of nodes with storage or given pressure, flows from outside
+    inflow: str = ""  # flows of rigid columns into nodes
+    solve_nodes: str = ""  # pressures of other nodes, flows of restrictions
+    column_nodes: str = ""  # pressures of nodes that only columns determine
+    incoming_waves: str = ""  # incoming waves from nodes into pipes
+    balance: str = ""  # net flows into nodes, rates of storage in nodes
+    rate_limits: str = ""  # rates that limit the step; event functions need the phases up to here
+    move: str = ""  # rates of columns, bodies, devices
+    rates: str = ""  # rates of cells, in pipes and basins
+    boundary_exchange: str = ""  # exchange between bands of flows through boundaries
+    boundary_inflow: str = ""  # flows into cells through patches
+    accelerate: str = ""  # accelerations of bodies, from all forces
+    fluid_response: str = ""  # terms that depend on the accelerations of bodies
+    outlet_values: str = ""  # values of scalars in the water that leaves pipes and cells
+    mix: str = ""  # values of scalars at nodes
+    scalar_rates: str = ""  # rates of scalars in cells
+    stretching: str = ""  # conversion of rates of scalars in stretching cells to rates of their content
+    reduce_rate: str = ""  # greatest rate of all bands
+    # jobs other than the right-hand side
+    observe: str = ""  # probe values
+    record: str = ""  # records of an accepted state
+    events: str = ""  # event functions
+    power: str = ""
+    stored: str = ""
+    derive_state: str = ""  # values that these jobs read instead of the state, written to dydt
+    damp: str = ""  # divides rates dydt of a stage by 1 + h r; step h passed as t, h r written to out
+    package: str = KERNELS
+
+
+JOBS = tuple(field.name for field in fields(RhsTerms) if field.name != "home")
+PHASES = JOBS[: JOBS.index("agree") + 1]
+CLOSING = PHASES[: PHASES.index("brake") + 1]
+
+BAROTROPIC = {
+    "store": "barotropic_nodes: known_pressures_barotropic",
+    "close": "barotropic_nodes: solve_nodes_barotropic",
+}
+NODES = {  # nodes, by the family of the density law
+    "linear": RhsTerms(
+        known_pressures="linear_nodes: known_pressures_linear", solve_nodes="linear_nodes: solve_nodes_linear"
+    ),
+    "barotropic": RhsTerms(**BAROTROPIC),
+    "cavitating": RhsTerms(**BAROTROPIC | {"close": "cavitating_nodes: solve_nodes_cavitating"}),
+}
+NETWORK = RhsTerms(prepare="network_balance: begin_network", balance="network_balance: balance_network")
+LUMPED = RhsTerms(
+    prepare="fused_lumped: begin_lumped",
+    solve_nodes="linear_nodes: solve_nodes_linear",
+    balance="network_balance: balance_network",
+)
+ALONE = RhsTerms(prepare="network_balance: begin_basins")
+PIPES = {
+    "linear": RhsTerms(outgoing_waves="linear_pipes: outgoing_waves_linear", incoming_waves="linear_pipes: incoming_waves_linear", rates="linear_pipes: wave_rates"),
+    "barotropic": RhsTerms(outgoing_waves="barotropic_nodes: outgoing_waves_barotropic", rates="barotropic_pipes: rates_barotropic"),
+    "cavitating": RhsTerms(
+        outgoing_waves="cavitating_pipes: outgoing_states_cavitating", balance="cavitating_nodes: balance_junctions",
+        rates="cavitating_pipes: rates_cavitating", record="cavitating_pipes: record_cavities",
+    ),
+}  # fmt: skip
+READ = {
+    "linear": RhsTerms(observe="observation: observe_linear", power="linear_energy: power_linear", stored="linear_energy: stored_linear"),
+    "barotropic": RhsTerms(
+        observe="barotropic_pipes: observe_barotropic",
+        power="barotropic_energy: power_barotropic", stored="barotropic_energy: stored_barotropic",
+    ),
+}  # fmt: skip
+UNSTEADY_FRICTION = {
+    "power": "unsteady_friction.relaxation_energy: add_power",
+    "stored": "unsteady_friction.relaxation_energy: add_stored",
+}
+FLUID_LOADS = {
+    "enter": "mechanism.fluid_loads: add_fluid_loads", "accelerate": "mechanism.inertial_coupling: pipe_rate_limit",
+    "follow": "mechanism.inertial_coupling: accelerate_network_flow",
+    "power": "mechanism.fluid_energy: add_power", "stored": "mechanism.fluid_energy: add_stored",
+}  # fmt: skip
+COLUMNS = {"inflow": "rigid_columns: column_inflows", "brake": "rigid_columns: column_rate_limit"}
+COMPONENTS = {
+    "pipes": RhsTerms(record="observation: record_pipes"),
+    "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
+    "bends": RhsTerms(events="restrictions: restriction_events"),
+    "closed": RhsTerms(events="calls: solve_nodes_in_turn"),
+    "clusters": RhsTerms(solve_nodes="node_clusters: solve_clusters"),
+    "columns": RhsTerms(column_nodes="rigid_columns: column_pressures", move="rigid_columns: column_rates", **COLUMNS),
+    "columns, barotropic": RhsTerms(
+        column_nodes="barotropic_columns: column_pressures_barotropic", move="barotropic_columns: column_rates_barotropic",
+        **COLUMNS,
+    ),
+    "bodies": RhsTerms(
+        prepare="mechanism.joints: kinematics",
+        observe="mechanism.body_probes: observe_bodies", power="mechanism.body_energy: power_bodies",
+        stored="mechanism.body_energy: stored_bodies",
+    ),
+    "no pins": RhsTerms(accelerate="mechanism.mass_matrix: solve_accelerations"),
+    "pins": RhsTerms(accelerate="mechanism.loop_constraints: solve_pinned_accelerations", observe="mechanism.loop_constraints: observe_pins"),
+    "bushings": RhsTerms(
+        move="mechanism.bushings: add_bushing_loads", accelerate="mechanism.bushings: bushing_rate_limit",
+        observe="mechanism.bushings: observe_bushings", power="mechanism.bushings: power_bushings",
+        stored="mechanism.bushings: stored_bushings",
+    ),
+    "stretches": RhsTerms(events="mechanism.joints: kinematics_for_events"),
+    "lines": RhsTerms(move="mechanism.force_elements: add_element_forces"),
+    "rides": RhsTerms(
+        prepare="mechanism.noninertial_forces: set_segment_drives", known_pressures="mechanism.noninertial_forces: moving_tank_pressures",
+        rates="mechanism.noninertial_forces: add_cell_drives", **FLUID_LOADS,
+    ),
+    "rides, barotropic": RhsTerms(
+        prepare="mechanism.noninertial_forces: set_segment_drives", known_pressures="mechanism.noninertial_forces_barotropic: moving_tank_pressures_barotropic",
+        rates="mechanism.noninertial_forces_barotropic: add_cell_drives_barotropic", **FLUID_LOADS,
+    ),
+    "masses": RhsTerms(
+        prepare="mass_dynamics: piston_chambers", move="mass_dynamics: mass_rates", observe="mass_dynamics: observe_masses",
+        record="mass_dynamics: record_masses", events="mass_dynamics: mass_events",
+    ),
+    "devices": RhsTerms(
+        prepare="devices: set_devices", move="devices: device_rates",
+        observe="devices: observe_devices", record="devices: record_devices",
+        events="devices: device_events",
+        power="devices: power_devices", stored="devices: stored_devices",
+    ),
+    "scalars": RhsTerms(outlet_values="scalar_transport: clear_losses", observe="scalar_transport: observe_scalars"),
+    "carried": RhsTerms(outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"),
+    "forces, linear": RhsTerms(observe="pipe_forces: observe_forces_linear"),
+    "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
+    "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),
+    "memory": RhsTerms(rates="unsteady_friction.relaxation_terms: add_unsteady_friction", **UNSTEADY_FRICTION),
+    "memory, barotropic": RhsTerms(rates="unsteady_friction.relaxation_terms_barotropic: add_unsteady_friction_barotropic", **UNSTEADY_FRICTION),
+    "creep, barotropic": RhsTerms(
+        rates="viscoelastic_wall.kelvin_voigt_barotropic: add_wall_creep_barotropic",
+        power="viscoelastic_wall.wall_energy_barotropic: add_power_barotropic",
+        stored="viscoelastic_wall.wall_energy_barotropic: add_stored_barotropic",
+    ),
+    "creep": RhsTerms(
+        rates="viscoelastic_wall.kelvin_voigt: add_wall_creep", power="viscoelastic_wall.wall_energy: add_power", stored="viscoelastic_wall.wall_energy: add_stored",
+    ),
+}  # fmt: skip
+DELAYS = RhsTerms(
+    outgoing_waves="delay_lines.line_rates: outgoing_line_waves", incoming_waves="delay_lines.line_rates: incoming_line_waves",
+    observe="delay_lines.line_interior: observe_lines", record="delay_lines.history_update: record_lines",
+)  # fmt: skip
+COUPLED = RhsTerms(solve_nodes="delay_lines.line_rates: solve_line_clusters")
+BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
+BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.basins", boundary_exchange="bands: book_together")
+MIXED = RhsTerms(mix="scalar_transport: mix_scalars")
+ALWAYS = RhsTerms(record="observation: record_nodes", events="observation: tank_events")
+
+
+@dataclass(frozen=True)
+class ModelFeatures:
+    """Features of a model, which decide on the functions of its right-hand side.
+
+    family : kernels of the density law, "linear", "barotropic" or "cavitating"
+    laws : modules of the laws of parts, in the order of the rows of `hooks`
+    basins, carried : components of basins, and of the scalars in them; see `basins.lower_pieces`
+    alone : True if there are only basins, and no link
+    bands, together : True if threads step bands of the state, and if several bands have an open boundary
+    """
+
+    family: str
+    pipes: bool
+    clusters: bool = False
+    columns: bool = False
+    masses: bool = False
+    bodies: bool = False
+    lines: bool = False
+    pins: bool = False
+    bushings: bool = False
+    moving_segments: bool = False
+    unsteady_friction: bool = False
+    viscoelastic_walls: bool = False
+    devices: bool = False
+    laws: tuple[str, ...] = ()
+    basins: tuple[RhsTerms, ...] = ()
+    carried: tuple[RhsTerms, ...] = ()
+    scalars: bool = False
+    valves: bool = False
+    delays: bool = False
+    alone: bool = False
+    bands: bool = False
+    boundary_exchange: bool = False
+    forces: bool = False
+
+    def components(self) -> Iterator[RhsTerms]:
+        """Components of the model, in the order in which functions of a phase run."""
+        if self.bands:
+            yield BANDS
+        if self.boundary_exchange:
+            yield BOUNDARY_EXCHANGE
+        linear = self.family == "linear"
+        family = self.family if linear or self.pipes else "barotropic"
+        lumped = linear and not self.pipes and not self.delays
+        yield from (ALONE,) if self.alone else (LUMPED,) if lumped else (NETWORK, NODES[family])
+        yield READ["linear" if linear else "barotropic"]
+        if self.pipes:
+            yield PIPES[family]
+        if self.delays:
+            yield DELAYS
+        if self.valves:
+            yield COMPONENTS["valves"]
+        bends = any(hook_of(law, "bends") is not None for law in self.modules())
+        if self.devices or bends:  # their event functions need solved nodes
+            yield COMPONENTS["closed"]
+        if bends:
+            yield COMPONENTS["bends"]
+        if self.clusters and linear:
+            yield COMPONENTS["clusters"]
+            if self.delays:
+                yield COUPLED
+        if self.columns:
+            yield COMPONENTS["columns" if linear else "columns, barotropic"]
+        if self.bodies:
+            yield COMPONENTS["bodies"]
+            yield COMPONENTS["pins" if self.pins else "no pins"]
+        if self.bushings:
+            yield COMPONENTS["bushings"]
+        if self.moving_segments:
+            yield COMPONENTS["rides" if linear else "rides, barotropic"]
+        if self.lines:
+            yield COMPONENTS["stretches"]
+        if self.masses:
+            yield COMPONENTS["masses"]
+        if self.lines:
+            yield COMPONENTS["lines"]
+        if self.devices:
+            yield COMPONENTS["devices"]
+        if self.unsteady_friction:
+            yield COMPONENTS["memory" if linear else "memory, barotropic"]
+        if self.viscoelastic_walls:
+            yield COMPONENTS["creep" if linear else "creep, barotropic"]
+        yield from self.basins
+        if self.scalars:  # carried by the flow from the rates of waves, which come before
+            yield COMPONENTS["scalars"]
+            if not self.alone:
+                yield MIXED
+            if self.pipes:
+                yield COMPONENTS["carried"]
+        yield from self.carried
+        if self.forces:
+            yield COMPONENTS[f"forces, {family}"]
+        if self.pipes:
+            yield COMPONENTS["pipes"]
+        yield ALWAYS
+
+    def modules(self) -> list:
+        """Modules of the laws of parts."""
+        return [import_module(name) for name in self.laws]
+
+    def packages(self) -> list[str]:
+        """Modules and packages that the model needs."""
+        return [*self.laws, *(member.package for member in self.basins)]
+
+    def functions(self, *jobs: str) -> list:
+        """Functions of jobs, job by job; modules that a model does not need are not loaded."""
+        members = dict.fromkeys(self.components())  # components that several basins need, once
+        return [
+            load_function(member.package, name) for job in jobs for member in members if (name := getattr(member, job))
+        ]
+
+
+def load_function(home: str, name: str):
+    """Load a function by package and `module: function`."""
+    module, function = name.split(": ")
+    return getattr(import_module(f"{home}.{module}"), function)

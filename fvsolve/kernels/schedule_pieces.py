@@ -1,0 +1,80 @@
+"""Values and derivatives of schedules at a time: pieces of polynomials, powers and waves."""
+
+from math import cos, sin
+
+from fvsolve.jit import njit
+
+POLYNOMIAL, POWER, WAVE, CREST = 0.0, 1.0, 2.0, 3.0  # kinds of pieces; CREST: wave cut off below zero
+
+
+@njit(forceinline=True)
+def piece_at(pieces, first, count, t, limit):
+    """Row of the piece that applies at t; from `limit` on the piece that ends there (left limit)."""
+    low, high = first, first + count
+    while high - low > 1:
+        middle = (low + high) // 2
+        start = pieces[middle, 0]
+        if start < limit and start <= t:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(forceinline=True)
+def piece_value(pieces, row, t):
+    """a + b s + c s^2 + d s^3 with s = t - origin, or v1 + (v0 - v1) (1 - s / duration)^exponent, or a wave.
+
+    A wave is mean + amplitude sin(frequency s + phase).
+    """
+    s = t - pieces[row, 2]
+    if pieces[row, 1] == POLYNOMIAL:
+        return pieces[row, 3] + s * (pieces[row, 4] + s * (pieces[row, 5] + s * pieces[row, 6]))
+    if pieces[row, 1] == POWER:
+        rest = min(max(1.0 - s / pieces[row, 5], 0.0), 1.0)
+        return pieces[row, 4] + (pieces[row, 3] - pieces[row, 4]) * rest ** pieces[row, 6]
+    value = pieces[row, 3] + pieces[row, 4] * sin(pieces[row, 5] * s + pieces[row, 6])
+    return max(value, 0.0) if pieces[row, 1] == CREST else value
+
+
+@njit(forceinline=True)
+def piece_slopes(pieces, row, t):
+    """First and second derivative of a piece, but not of a CREST."""
+    s = t - pieces[row, 2]
+    if pieces[row, 1] == POLYNOMIAL:
+        c, d = pieces[row, 5], pieces[row, 6]
+        return pieces[row, 4] + s * (2.0 * c + s * 3.0 * d), 2.0 * c + 6.0 * d * s
+    if pieces[row, 1] == POWER:
+        span, n, rest = pieces[row, 5], pieces[row, 6], 1.0 - s / pieces[row, 5]
+        fall = (pieces[row, 4] - pieces[row, 3]) * n / span
+        if rest <= 0.0:
+            return fall if n == 1.0 else 0.0, 0.0
+        return fall * rest ** (n - 1.0), -fall * (n - 1.0) / span * rest ** (n - 2.0)
+    frequency, at = pieces[row, 5], pieces[row, 5] * s + pieces[row, 6]
+    return pieces[row, 4] * frequency * cos(at), -pieces[row, 4] * frequency * frequency * sin(at)
+
+
+@njit
+def schedule_slopes(tables, index, t):
+    """First and second derivative of schedule `index` at t [per s, per s2], from the left at the end of the segment."""
+    record, limit = tables.schedules[index], tables.clock[0]["limit"]
+    if record["pieces"] == 1:
+        return piece_slopes(tables.pieces, record["first"], t)
+    row = piece_at(tables.pieces, record["first"], record["pieces"], t, limit)
+    return piece_slopes(tables.pieces, row, min(t, limit))
+
+
+@njit(forceinline=True)
+def schedule_value(tables, index, t):
+    """Value of schedule `index` at t [s]; from the end of the segment on its left limit."""
+    return value_with_limit(tables.schedules, tables.pieces, index, t, tables.clock[0]["limit"])
+
+
+@njit(forceinline=True)
+def value_with_limit(schedules, pieces, index, t, limit):
+    """Value of schedule `index` at t [s]: right-continuous, from `limit` on its left limit."""
+    record = schedules[index]
+    if record["pieces"] == 1:
+        return piece_value(pieces, record["first"], t)
+    row = piece_at(pieces, record["first"], record["pieces"], t, limit)
+    return piece_value(pieces, row, min(t, limit))

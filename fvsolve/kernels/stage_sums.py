@@ -1,0 +1,132 @@
+"""Sums of stages, computed for a block of rows together with its rates, while both lie in the cache.
+
+The function that computes the rates of a large basin also forms their stage y + h sum a_j k_j just before, and the end
+of the step just after. So each array passes through memory once for each stage. `sums` of a handle describes the sums;
+steps write there before they call for rates (`steppers.erk`). Values equal those of sums over all rows, to the bit.
+"""
+
+from fvsolve.jit import njit
+from fvsolve.kernels.band_exchange import address_of, floats_at
+
+HUGE = 1e100  # greater values count as not finite
+# Entries of `sums`, int64, empty if no sums are formed in blocks: mode; number of values that are not finite; addresses
+# of the present state, of the sum, of the rates of stages and of their weights; number of states, of earlier stages and
+# of all stages; step size, a float; address of the weights at the end of the step; numbers of runs that the step itself
+# forms: states in no such basin, cells that all bands read, rows at the edges of bands; number of basins; cells of a
+# block. From HEAD on 1 for each basin whose rows are formed in blocks, else 0; then the runs, first and last + 1.
+MODE, BAD, NOW, TO, RATES, WEIGHTS, SIZE, COUNT, STAGES, STEP, LAST, OTHERS, CHECKED, EDGES, BASINS, CELLS = range(16)
+HEAD = 16
+OFF, CHECK, STAGE, STAGE_AND_END = range(
+    4
+)  # MODE: nothing; check that all is finite; form the stage before rates; and the end after them
+
+
+@njit(forceinline=True)
+def copy(source, target):
+    """target = source, by a plain loop: slice assignment of numba checks for overlaps first."""
+    for i in range(target.size):
+        target[i] = source[i]
+
+
+@njit
+def combine(begin, end, y, h, weights, count, k, out):
+    """out = y + h sum of weights[j] k[j] over j < count, of [begin:end]; three terms in a pass where possible."""
+    first, second, copied = -1, -1, False
+    y, out = y[begin:end], out[begin:end]
+    base = y
+    for j in range(count):
+        if weights[j] == 0.0:
+            continue
+        if first < 0:
+            first = j
+        elif second < 0:
+            second = j
+        else:
+            c0, c1, c2 = h * weights[first], h * weights[second], h * weights[j]
+            k0, k1, k2 = k[first, begin:end], k[second, begin:end], k[j, begin:end]
+            for i in range(out.size):
+                out[i] = base[i] + (c0 * k0[i] + c1 * k1[i] + c2 * k2[i])
+            base, copied, first, second = out, True, -1, -1
+    if second >= 0:
+        c0, c1, k0, k1 = h * weights[first], h * weights[second], k[first, begin:end], k[second, begin:end]
+        for i in range(out.size):
+            out[i] = base[i] + (c0 * k0[i] + c1 * k1[i])
+    elif first >= 0:
+        c0, k0 = h * weights[first], k[first, begin:end]
+        for i in range(out.size):
+            out[i] = base[i] + c0 * k0[i]
+    elif not copied:
+        copy(y, out)
+
+
+@njit(forceinline=True)
+def count_not_finite(begin, end, y):
+    """Number of values of [begin:end] that are not finite or have no finite square; integers are vectorised."""
+    bad = 0
+    for i in range(begin, end):
+        bad += not abs(y[i]) < HUGE
+    return bad
+
+
+@njit
+def request_sums(sums, mode, y, h, weights, count, k, to, last):
+    """Request a sum in `to` from the function that computes the next rates: weights of `count` earlier stages.
+
+    last : weights of all stages at the end of the step
+    """
+    sums[MODE], sums[NOW], sums[TO], sums[RATES] = mode, address_of(y), address_of(to), address_of(k)
+    sums[WEIGHTS], sums[LAST] = address_of(weights), address_of(last)
+    sums[SIZE], sums[COUNT], sums[STAGES] = y.size, count, k.shape[0]
+    floats_at(address_of(sums) + 8 * STEP, 1)[0] = h
+
+
+@njit
+def sum_runs(sums, first, last, y, h, weights, count, k, to):
+    """Form the runs `first` to `last`, which no other function forms, or not in time."""
+    at = HEAD + sums[BASINS]
+    for r in range(first, last):
+        combine(sums[at + 2 * r], sums[at + 2 * r + 1], y, h, weights, count, k, to)
+
+
+@njit(forceinline=True)
+def requested_mode(tables, b):
+    """Mode of the sums of basin b."""
+    if tables.sums.size == 0 or tables.sums[HEAD + b] == 0:
+        return OFF
+    return tables.sums[MODE]
+
+
+@njit
+def form_rows(sums, behind, at, width, begin, stop, left, right):
+    """Form columns `left` to `right` of rows `begin` to `stop` of a quantity at offset `at`, rows of `width` cells.
+
+    behind : True for the end of the step instead of the stage
+    """
+    size, stages = sums[SIZE], sums[STAGES]
+    y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
+    k = floats_at(sums[RATES], stages * size).reshape((stages, size))
+    weights, count = floats_at(sums[LAST if behind else WEIGHTS], stages), stages if behind else sums[COUNT]
+    if left == 0 and right == width:
+        combine(at + width * begin, at + width * stop, y, h, weights, count, k, to)
+        return
+    for j in range(begin, stop):
+        combine(at + width * j + left, at + width * j + right, y, h, weights, count, k, to)
+
+
+@njit
+def check_rows(sums, y, at, width, begin, stop, left, right):
+    """Count the values that are not finite in such rows of y."""
+    if left == 0 and right == width:
+        sums[BAD] += count_not_finite(at + width * begin, at + width * stop, y)
+        return
+    for j in range(begin, stop):
+        sums[BAD] += count_not_finite(at + width * j + left, at + width * j + right, y)
+
+
+@njit
+def form_checked_runs(sums):
+    """Form the stage again in cells that all bands read, where the end of the step has replaced it."""
+    size, stages = sums[SIZE], sums[STAGES]
+    y, to, h = floats_at(sums[NOW], size), floats_at(sums[TO], size), floats_at(address_of(sums) + 8 * STEP, 1)[0]
+    k, weights = floats_at(sums[RATES], stages * size).reshape((stages, size)), floats_at(sums[WEIGHTS], stages)
+    sum_runs(sums, sums[OTHERS], sums[OTHERS] + sums[CHECKED], y, h, weights, sums[COUNT], k, to)

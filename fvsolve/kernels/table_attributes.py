@@ -1,0 +1,60 @@
+"""Numba type of an open handle: its attributes load the tables."""
+
+from numba.core import cgutils, types
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+from numba.extending import models, register_model
+from numba.np.arrayobj import make_array, populate_array
+
+from fvsolve.kernels.dtypes import HandleTables, table_types
+
+
+class Tables(types.Opaque):
+    """Result of `open_tables`: a bare address, whose attributes are the tables."""
+
+    def __init__(self) -> None:
+        super().__init__("Tables")
+
+
+register_model(Tables)(models.OpaqueModel)
+
+
+def handle_address(context, builder, kind, args):
+    """Address of the first word of a handle."""
+    base = make_array(kind.args[0])(context, builder, args[0]).data
+    return builder.bitcast(base, context.get_value_type(kind.return_type))
+
+
+@infer_getattr
+class TableOf(AttributeTemplate):
+    """Type of `tables.name`."""
+
+    key = Tables
+
+    def generic_resolve(self, kind, name):
+        return getattr(table_types(), name, None)
+
+
+@lower_getattr_generic(Tables)
+def load_table(context, builder, kind, value, name):
+    """Array of a table; its address, rows and columns are three words of the handle, which never change."""
+    member, word = getattr(table_types(), name), context.get_value_type(types.intp)
+    base, first = builder.bitcast(value, word.as_pointer()), 3 * HandleTables._fields.index(name)
+
+    def entry(i):
+        loaded = builder.load(cgutils.gep_inbounds(builder, base, first + i))
+        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return loaded
+
+    array = make_array(member)(context, builder)
+    size = word(context.get_abi_sizeof(context.get_data_type(member.dtype)))
+    address, rows, columns = entry(0), entry(1), entry(2)
+    populate_array(
+        array,
+        data=builder.inttoptr(address, array.data.type),
+        shape=[rows] if member.ndim == 1 else [rows, columns],
+        strides=[size] if member.ndim == 1 else [builder.mul(columns, size), size],
+        itemsize=size,
+        meminfo=None,
+    )
+    return array._getvalue()

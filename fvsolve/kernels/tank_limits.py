@@ -1,0 +1,53 @@
+"""Event functions of a tank at its bottom and its rim.
+
+A free tank fills and empties. A held tank stays as it is, and the deficit or surplus of flow is a supply. A tank that
+leaves its limit is free again, though still there. Held and left are flags, so that each rule is smooth during a step.
+"""
+
+from fvsolve.jit import njit
+
+EVENTS = 4  # events of a tank: held at its bottom, left again; held at its rim, left again
+BOTTOM, RIM = 0, 2  # offsets of these events
+NEAR = 1e-10  # distance at which a tank is at its limit [m]
+RETURN_SPEED = 1e-11  # speed of the level below which a tank does not leave its limit; above rounding [m/s]
+MIN_AREA = 1e-4  # least area [m2]
+LEAST = 1e-300
+
+
+@njit(forceinline=True)
+def mass_per_metre(node):
+    """Mass per metre of level of a tank [kg/m], for its least area."""
+    return node["density"] * max(node["area"], MIN_AREA)
+
+
+@njit(forceinline=True)
+def is_near(node, distance):
+    """True if a tank is at a limit from which it is `distance` [kg] away."""
+    return distance <= NEAR * mass_per_metre(node)
+
+
+@njit
+def limit_events(node, armed, g, k, distance, away):
+    """Write g[k], g[k + 1], events of holding a tank at a limit and of leaving it.
+
+    distance : to the limit [kg]; away : net flow away from it [kg/s]
+    """
+    if not is_near(node, distance):
+        g[k] = g[k + 1] = distance
+    elif armed[k] > 0.0:
+        over = away - RETURN_SPEED * mass_per_metre(node)
+        over = LEAST if over == 0.0 else over
+        g[k], g[k + 1] = over, -over
+    elif armed[k + 1] > 0.0 and distance <= 0.0:
+        g[k], g[k + 1] = away, -1.0
+    else:
+        g[k], g[k + 1] = distance, 1.0
+
+
+def overshoot_correction(node, armed, stored: float) -> float:
+    """Correction of the stored mass of a held tank that event location has left beyond its limit [kg]."""
+    k = EVENTS * int(node["row"])
+    if armed[k + BOTTOM] > 0.0 and stored < 0.0 and is_near(node, -stored):
+        return -stored
+    distance = float(node["full"]) - stored
+    return distance if armed[k + RIM] > 0.0 and distance < 0.0 and is_near(node, -distance) else 0.0

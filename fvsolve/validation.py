@@ -1,0 +1,97 @@
+"""Checks of the arguments of public functions by kinds: numbers, names, arrays, paths."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import math
+import os
+from collections.abc import Callable, Mapping, Sequence
+from numbers import Integral, Real
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.units import show
+
+
+class Kind(NamedTuple):
+    """Kind of an argument: a test, and the expected value in words."""
+
+    accepts: Callable[[Any], bool]
+    expected: str
+
+
+def is_number(value: Any) -> bool:
+    """True if the argument is a finite real number and not a bool."""
+    return isinstance(value, Real) and not isinstance(value, (bool, np.bool_)) and math.isfinite(value)
+
+
+def is_row(value: Any, holds: Callable[[Any], bool]) -> bool:
+    """True if the argument is a list or tuple whose items all pass the test `holds`; text does not count."""
+    return isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and all(holds(item) for item in value)
+
+
+def is_name(value: Any) -> bool:
+    return (isinstance(value, str) and value != "") or hasattr(value, "stages")  # a tableau of the caller
+
+
+def is_array(value: Any, kinds: str, least: int, most: int, finite: bool = True) -> bool:
+    """True for numbers of these numpy kinds ("f", "c", ...) in an array of `least` to `most` dimensions."""
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # rows of different lengths, objects without conversion
+        return False
+    return array.dtype.kind in kinds and least <= array.ndim <= most and bool(not finite or np.isfinite(array).all())
+
+
+def instance_of(kind: type) -> Kind:
+    """Kind of the instances of a class of fvsolve."""
+    return Kind(lambda value: isinstance(value, kind), f"a {kind.__name__}")
+
+
+TABLE = Kind(lambda value: isinstance(value, Mapping), 'a dict, for example {"links.main.cells": 400}')
+PATH = Kind(
+    lambda value: isinstance(value, (str, os.PathLike)) and str(value) != "" and "\0" not in str(value),
+    "a path",
+)
+FUNCTION = Kind(callable, "a function")
+FLAG = Kind(lambda value: isinstance(value, (bool, np.bool_)), "True or False")
+NUMBER = Kind(is_number, "a finite number")
+POSITIVE = Kind(lambda value: is_number(value) and value > 0, "a positive number")
+COUNT = Kind(lambda value: isinstance(value, Integral) and is_number(value), "a whole number")
+COUNT_FROM_ZERO = Kind(lambda value: COUNT.accepts(value) and value >= 0, "a whole number, 0 or more")
+COUNT_FROM_ONE = Kind(lambda value: COUNT.accepts(value) and value > 0, "a whole number, 1 or more")
+ROW = Kind(lambda value: is_row(value, lambda item: True), "a list")
+NUMBERS = Kind(lambda value: is_row(value, is_number), "a list of finite numbers")
+SERIES = Kind(lambda value: is_array(value, "fiu", 1, 1), "a 1-D array of finite numbers")
+MATRIX = Kind(lambda value: is_array(value, "fiu", 2, 2), "a 2-D array of finite numbers")
+POINT = Kind(lambda value: is_array(value, "fiuc", 0, 0), "a finite complex number")
+COMPLEX = Kind(lambda value: is_array(value, "fiuc", 0, 1), "a finite complex number, or a 1-D array of them")
+TEXT = Kind(lambda value: isinstance(value, str) and value != "", "a name")
+NAME = Kind(is_name, "a name")
+NAMES = Kind(lambda value: is_name(value) or is_row(value, is_name), "a name or a list of names")
+
+
+def validated(**kinds: Kind) -> Callable:
+    """Decorate a function: its arguments of these names must be of these kinds or their defaults; else FvsolveError."""
+
+    def decorate(function: Callable) -> Callable:
+        signature = inspect.signature(function)
+        order, defaults = [*signature.parameters], {name: p.default for name, p in signature.parameters.items()}
+
+        @functools.wraps(function)
+        def checked(*arguments, **keywords):
+            if len(arguments) > len(order) or not keywords.keys() <= defaults.keys():
+                signature.bind(*arguments, **keywords)  # raises a TypeError with the reason
+            for name, value in (*zip(order, arguments, strict=False), *keywords.items()):
+                kind = kinds.get(name)
+                if kind is not None and value is not defaults[name] and not kind.accepts(value):
+                    text = f"{name} = {show(value)}" + (" cannot be called" if kind is FUNCTION else "")
+                    raise FvsolveError(f"{text}; expected {kind.expected}")
+            return function(*arguments, **keywords)
+
+        return checked
+
+    return decorate
