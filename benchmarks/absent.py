@@ -13,7 +13,7 @@ import numpy as np
 from measure import agree, parser
 
 from fvsolve import build, load
-from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import integrate
 
 STEP = 1e-3  # [s]
@@ -38,7 +38,7 @@ def by_hand(t, y, dydt):
 def scene(steps: int) -> tuple[float, float]:
     """(seconds, level of the high tank at the end) of the case."""
     model = build(load(CASE, {"numerics.end": steps * STEP, "output.every": steps * STEP}))
-    loop = Loop(model)
+    loop = RunLoop(model)
     loop.begin(steps * STEP, NO_LIMIT)
     begun = time.perf_counter()
     loop.run(NO_LIMIT)

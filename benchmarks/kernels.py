@@ -22,7 +22,7 @@ from planes_pyclaw import pyclaw, riemann
 from fvsolve.case import load
 from fvsolve.model import build
 from fvsolve.solve import initial_state
-from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)  # [cells]
 TRIAD_BYTES = 24  # per element: two read, one written (the line fetched before writing is not counted)
@@ -72,7 +72,7 @@ def stepping(scheme: str, limiter: str, method: str, courant: float) -> Callable
         case["numerics"] |= {"scheme": scheme, "method": method, "courant": courant}
         case["numerics"] |= {"limiter": limiter} if limiter else {}
         model = build(load(case))
-        loop = Loop(model)
+        loop = RunLoop(model)
         loop.now[:] = initial_state(model).y
         loop.begin(case["numerics"]["end"], NO_LIMIT)
         return lambda steps: loop.run(steps)

@@ -16,7 +16,7 @@ from planes_scenes import BASINS, SIZE, of_triangles, scene, square
 from fvsolve.case import load
 from fvsolve.model import Model, build
 from fvsolve.solve import initial_state
-from fvsolve.solve.loop import NO_LIMIT, Loop
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 
 SIZES = (64, 128, 256, 512, 1024)  # cells along a side
 LARGEST = {"triangles": 256, "PyClaw": 512}
@@ -52,7 +52,7 @@ def rate(advance: Callable[[int], object], elements: int, repeats: int = 20, chu
 def rates(model: Model, repeats: int) -> tuple[int, float, float]:
     """(cells, whole steps and evaluations of the right-hand side per second and cell)."""
     cells, y, out = model.basins[0].mesh.area.size, initial_state(model).y, model.new_out()
-    dydt, loop = np.empty_like(y), Loop(model)
+    dydt, loop = np.empty_like(y), RunLoop(model)
 
     def evaluate(times: int) -> None:
         for _ in range(times):

@@ -90,7 +90,7 @@ def spent(command: list[str], cache: Path) -> tuple[float, float]:
 def memory(kind: str, cells: int, folder: Path) -> str:
     """A run's arrays and the peak of its process beyond a small run's, per cell."""
     import fvsolve
-    from fvsolve.solve.loop import Loop
+    from fvsolve.solve.run_loop import RunLoop
 
     def arrays(owner) -> int:
         return sum(one.nbytes for one in owner if hasattr(one, "nbytes"))
@@ -102,7 +102,7 @@ def memory(kind: str, cells: int, folder: Path) -> str:
     before, given = peak(), case(kind, cells, folder)
     model = fvsolve.build(fvsolve.load(given))
     n, state = model.basins[0].mesh.area.size, fvsolve.initial_state(model)
-    loop = Loop(model)
+    loop = RunLoop(model)
     fvsolve.advance(model, state, 1e-5)
     held = arrays(model.tables), arrays(loop.slate.written) + arrays(vars(loop.stepper).values())
     return f"tables {held[0] / n:.0f}, loop {held[1] / n:.0f}, peak of the process {(peak() - before) / n:.0f}"

@@ -26,7 +26,7 @@ from fvsolve.model import State, build
 from fvsolve.output.memory import MemorySink
 from fvsolve.run import ranks
 from fvsolve.solve import initial_state
-from fvsolve.solve.loop import Loop
+from fvsolve.solve.run_loop import RunLoop
 from fvsolve.solve.solve import Run
 
 STEPS, STOP = 6, 3  # in all, and where it is stopped
@@ -71,7 +71,7 @@ def part(cells: int, begin: str, end: str, *parts: str) -> None:
     comm, start = ranks.world(), perf_counter()
     if comm is not None and comm.rank > 0:
         comm.bcast(None)  # rank 0 has its model: two at a time would want more memory
-        loop = Loop(model_of(cells), comm=comm)
+        loop = RunLoop(model_of(cells), comm=comm)
         loop.team.serve(*loop.functions)
         return
     model = model_of(cells)

@@ -26,8 +26,8 @@ from fvsolve.model import build
 from fvsolve.model.slate import lined
 from fvsolve.run import ranks
 from fvsolve.solve import initial_state
-from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.solve.team import yielding
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.solve.thread_team import yield_address
 
 END = 1e6  # [s] that no run here comes to
 WATER = "free surface with bed"
@@ -43,23 +43,23 @@ def model_of(name: str, nx: int, ny: int):
     return build(load(scene(basin, END)))
 
 
-def begun(model, **team) -> Loop:
+def begun(model, **team) -> RunLoop:
     """A loop at the start of a model, warm."""
-    loop = Loop(model, **team)
+    loop = RunLoop(model, **team)
     loop.now[:] = initial_state(model).y
     loop.begin(END, NO_LIMIT)
     loop.run(2.0)
     return loop
 
 
-def steps_of(loop: Loop) -> float:
+def steps_of(loop: RunLoop) -> float:
     """Steps of a call."""
     start = perf_counter()
     loop.run(2.0)
     return max(2.0, np.ceil(2.0 * CHUNK / (perf_counter() - start)))
 
 
-def least(loops: list[Loop], rounds: int) -> list[np.ndarray]:
+def least(loops: list[RunLoop], rounds: int) -> list[np.ndarray]:
     """(wall, CPU) time of a step of each [s], in turn, the least of many calls."""
     found, steps = [np.full(2, np.inf) for _ in loops], [steps_of(loop) for loop in loops]
     for _ in range(rounds):
@@ -108,7 +108,7 @@ def waiting(times: int = 2000, rounds: int = 200) -> float:
             2,
             board.ctypes.data,
         )
-        owns[:, band_exchange.YIELD] = yielding()
+        owns[:, band_exchange.YIELD] = yield_address()
         threads = [threading.Thread(target=meet, args=(own, times)) for own in owns]
         start = perf_counter()
         for one in threads:
@@ -200,7 +200,7 @@ def rank(sizes, rounds: int) -> None:
     comm = ranks.world()
     for n in sizes:
         model = model_of(WATER, n, n)
-        loop = Loop(model, comm=comm)
+        loop = RunLoop(model, comm=comm)
         if comm.rank > 0:
             loop.team.serve(*loop.functions)
             continue

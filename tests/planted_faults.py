@@ -47,7 +47,7 @@ FAULTS = [
         "result.potential[edge.i] - result.potential[edge.j]",
         "result.potential[edge.j] - result.potential[edge.i]",
     ),
-    Fault("limits/ends.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
+    Fault("step_limits/pipe_end_growth.py", "face[:-1] - face[1:]", "1.01 * face[:-1] - face[1:]"),
     Fault("model/hydraulics.py", "reynolds * math.pi / 4.0 * diameter", "1.01 * reynolds * math.pi / 4.0 * diameter"),
     Fault("draw/plot.py", "np.argmin(values[a:b])", "np.argmax(values[a:b])"),
     Fault("mesh/measures.py", "angle=float(angle[sharpest])", "angle=float(1.01 * angle[sharpest])"),
@@ -130,7 +130,7 @@ FAULTS = [
     Fault("parts/pump/law_curve.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
     Fault("run/comparison.py", "compare.t + compare.shift", "compare.t - compare.shift"),
     Fault("epanet/words.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
-    Fault("solve/summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),
+    Fault("solve/run_summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),
     Fault("exact/laminar_line.py", "self.length - places if self.reversed", "places if self.reversed"),
 ]
 

@@ -19,10 +19,12 @@ class Tally:
         """Record each run, each stepper and each command of this process."""
         from fvsolve import cli
         from fvsolve.solve.solve import Run
-        from fvsolve.steppers.stepper import Stepper
+        from fvsolve.steppers.integrator import Integrator
 
         Run.go = self._after(Run.go, self._run)
-        Stepper.__init__ = self._after(Stepper.__init__, lambda stepper, method, *_: self._add("method", method.name))
+        Integrator.__init__ = self._after(
+            Integrator.__init__, lambda stepper, method, *_: self._add("method", method.name)
+        )
         cli._wanted = self._after(cli._wanted, lambda command: self._add("command", *command))
 
     def add(self, plain: dict[str, list[str]]) -> None:

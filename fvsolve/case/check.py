@@ -15,7 +15,7 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Chamber
 from fvsolve.parts.around import Around
 from fvsolve.parts.value import ROOT
-from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.units import show
 

@@ -37,9 +37,9 @@ from fvsolve.parts.value import (
     positive,
 )
 from fvsolve.schemes import LIMITERS, SCHEMES
-from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.steppers.structure import KINDS
-from fvsolve.steppers.tableau import OWN, method_of_file
+from fvsolve.steppers.tableau import BUILT_IN, method_of_file
 from fvsolve.units import show
 
 STARTS = ("steady", "equilibrium", "rest")
@@ -146,7 +146,7 @@ class MethodChoice(Choice):
     """Method by name, or by a file that contains its tableau as text."""
 
     def read(self, given: Any, setting: Setting) -> str:
-        if not isinstance(given, str) or given in OWN or given == AUTO:
+        if not isinstance(given, str) or given in BUILT_IN or given == AUTO:
             return super().read(given, setting)
         if not Path(given).suffix or (given in METHODS and METHODS[given].name == given):
             return super().read(given, setting)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve.parts import Pipe
-from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.built_in_methods import METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP
 
 LONGEST_NAME = 60  # letters; names are parts of file names, which may have 255 bytes

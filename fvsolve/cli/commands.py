@@ -102,14 +102,14 @@ def check(
 ) -> None:
     """Print the contents of a case as read, its initial state and its expected cost."""
     from fvsolve.cli import report
-    from fvsolve.limits.step import step_limits
     from fvsolve.run import model_of
-    from fvsolve.solve.bands import shared
+    from fvsolve.solve.partition import divisible_rows
+    from fvsolve.step_limits.step_notices import step_limits
 
     model = model_of(load_case(case, set))
     report_data = model.checks
     report_data["warnings"] += [notice.plain() for notice in step_limits(model)]
-    report_data["threads"] = shared(model)
+    report_data["threads"] = divisible_rows(model)
     if as_json:
         print_json(report_data)
     else:

@@ -8,8 +8,8 @@ from pathlib import Path
 from fvsolve.cli import terminal
 from fvsolve.cli.app import print_json
 from fvsolve.cli.studying import listed, methods_of, told, writable
-from fvsolve.limits.grid import AdvectionLimit, advection_limits
-from fvsolve.limits.symbol import WEIGHTS
+from fvsolve.step_limits.advection_limit import AdvectionLimit, advection_limits
+from fvsolve.step_limits.symbol import WEIGHTS
 from fvsolve.studies.sheet import Column, Sheet, text
 from fvsolve.studies.stability.limited import LIMITED, LimitedLimit, limited_limits
 from fvsolve.studies.stability.periodic import THRESHOLD, Measured, measured_limits

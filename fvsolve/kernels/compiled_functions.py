@@ -10,7 +10,7 @@ READER_IMPORTS = "from fvsolve.kernels.rhs_assembly import Cast, Pieces; from fv
 HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
 RHS_HOOKS, READER_HOOKS = ("set", "move", "step", "slope", "lift"), ("value", "outside", "events", "bends")
 ENERGY_HOOKS = ("power", "stored")
-COMPILE_MARCH = "from fvsolve.steppers.march import compiled; compiled()"
+COMPILE_MARCH = "from fvsolve.steppers.time_loop import compiled; compiled()"
 
 
 class Functions:

@@ -21,7 +21,7 @@ from fvsolve.kernels.schedule_pieces import POWER, WAVE
 from fvsolve.model.clusters import sort_nodes
 from fvsolve.model.past import past_size, rings_of
 from fvsolve.steppers import automatic
-from fvsolve.steppers.methods import AUTO
+from fvsolve.steppers.built_in_methods import AUTO
 from fvsolve.steppers.tableau import method_named
 
 FELT = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start to evaluate friction

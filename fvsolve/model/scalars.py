@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.case.cells import means, samples
 from fvsolve.kernels import dtypes as rec
-from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.built_in_methods import METHODS
 
 STORES = (rec.TANK, rec.CHAMBER)
 

@@ -134,7 +134,7 @@ def draw(result: Result, painter: Painter) -> None:
 def _solve(model, sink, progress, threads, comm):
     from fvsolve.model import State
     from fvsolve.solve import initial_state, solve
-    from fvsolve.solve.solve import MemoryMisfit
+    from fvsolve.solve.solve import MemoryMismatch
 
     if comm is not None:
         threads, comm = comm.size, ranks.gathered(comm, model)
@@ -145,7 +145,7 @@ def _solve(model, sink, progress, threads, comm):
         sink.among(comm, ranks.rows_of(model, comm.size))
     try:
         return solve(model, state, sink, progress, threads, comm)
-    except MemoryMisfit as error:
+    except MemoryMismatch as error:
         raise RunError(f"{sink.folder / 'restart.npz'}: {error}") from None
 
 

@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from functools import cache
 
 from fvsolve.errors import FvsolveError
-from fvsolve.solve.bands import cut, threads_of
-from fvsolve.solve.loop import Loop
-from fvsolve.solve.soundness import Soundness
+from fvsolve.solve.partition import make_partition, threads_of
+from fvsolve.solve.run_checks import RunChecks
+from fvsolve.solve.run_loop import RunLoop
 
 # environment variables by which MPI launchers state the number of processes
 SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PALS_SIZE")
@@ -70,7 +70,7 @@ def gathered(comm, model):
     """
     with leading(comm):
         count = threads_of(model, comm.size)[0]
-        Loop(model)
+        RunLoop(model)
     if count == 1:
         comm.bcast(None)
         return None
@@ -84,7 +84,7 @@ def gathered(comm, model):
 
 def rows_of(model, count: int) -> dict:
     """Basin -> first row of each rank, and number of rows, of distributed basins : name -> int64[count + 1]."""
-    partition = cut(model, count)
+    partition = make_partition(model, count)
     return {model.basins[b].name: rows for b, rows in zip(partition.basins, partition.firsts, strict=True)}
 
 
@@ -106,8 +106,8 @@ def follow(make: Callable) -> None:
     if comm.bcast(None):
         return
     try:
-        loop = Loop(model, comm=comm)
-        loop.stepper.largest = Soundness(loop.slate).watched
+        loop = RunLoop(model, comm=comm)
+        loop.stepper.largest = RunChecks(loop.slate).largest_if_needed
         loop.team.serve(*loop.functions)
     except BaseException as error:  # the other ranks wait for this rank
         print(f"fvsolve: rank {comm.rank}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)

@@ -105,15 +105,15 @@ def do(task: tuple[str, str]) -> None:
 
 def steps(_: str) -> None:
     """Time loop, and the replacement of linear algebra for methods without it."""
-    from fvsolve.steppers.march import compiled, compiled_attempt
     from fvsolve.steppers.signatures import no_algebra
+    from fvsolve.steppers.time_loop import compiled, compiled_attempt
 
     compiled(), compiled_attempt(), no_algebra()
 
 
 def attempt(kind: str) -> None:
     """Step of a kind of methods."""
-    from fvsolve.steppers.stepper import attempt_of
+    from fvsolve.steppers.integrator import attempt_of
 
     attempt_of(kind)
 

@@ -13,8 +13,8 @@ from fvsolve.errors import FvsolveError, nearest
 from fvsolve.model import Model, State
 from fvsolve.model.inputs import HEAD, Input, inputs_of
 from fvsolve.model.model import flags_of
-from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.steppers import automatic, slots
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.steppers import automatic, loop_indices
 from fvsolve.units import show
 
 
@@ -37,13 +37,13 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         raise FvsolveError(f"until = {until:g} s is before the time of the state, {state.t:g} s")
     model.given(state.t, state.y)
     held = hold(model, inputs or {})
-    loop = Loop(held, lambda: model.structure)  # the structure does not depend on the held inputs
+    loop = RunLoop(held, lambda: model.structure)  # the structure does not depend on the held inputs
     loop.now[:] = state.y
-    loop.memory[slots.T] = state.t
+    loop.loop_state[loop_indices.T] = state.t
     loop.armed[:] = flags_of(state, model)
     loop.slate.recall(state)
-    loop.on_switch = lambda: loop.stop_columns(loop.orders[slots.END])
-    adaptive = loop.orders[slots.CONTROL] == slots.TOLERANCE
+    loop.on_switch = lambda: loop.stop_columns(loop.controls[loop_indices.END])
+    adaptive = loop.controls[loop_indices.CONTROL] == loop_indices.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
         if end == loop.t:
             continue
@@ -51,14 +51,14 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         loop.stop_columns(end)
         loop.begin(end, NO_LIMIT)
         if first and adaptive and state.memory.size >= 2 + loop.armed.size:
-            loop.memory[[slots.STEP, slots.ERROR_OLD]] = state.memory[:2]
+            loop.loop_state[[loop_indices.STEP, loop_indices.ERROR_OLD]] = state.memory[:2]
         code = loop.run(NO_LIMIT)
-        while code == slots.CHUNK and automatic.wants_change(loop.stepper):
+        while code == loop_indices.BUDGET_SPENT and automatic.wants_change(loop.stepper):
             automatic.change(loop.stepper)
             code = loop.run(NO_LIMIT)
-        if code != slots.DONE:
+        if code != loop_indices.DONE:
             raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
-    memory = np.append(loop.memory[[slots.STEP, slots.ERROR_OLD]], loop.armed)
+    memory = np.append(loop.loop_state[[loop_indices.STEP, loop_indices.ERROR_OLD]], loop.armed)
     if len(model.tables.delays):
         memory = np.concatenate([memory, loop.slate.past, [float(loop.slate.past.size)]])
     return State(loop.t, loop.now.copy(), memory)

@@ -11,36 +11,38 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, State
 from fvsolve.model.past import without_past
 from fvsolve.model.scalars import scalar_ledgers
-from fvsolve.solve.bands import threads_of
-from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.solve.ranks import FAREWELL
-from fvsolve.solve.soundness import Soundness, parted
-from fvsolve.solve.summary import (
+from fvsolve.solve.mpi_ranks import CLOSE_MESSAGE
+from fvsolve.solve.partition import threads_of
+from fvsolve.solve.run_checks import RunChecks, split_step_notices
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.solve.run_summary import (
     Event,
     Summary,
-    drifts,
+    device_notices,
+    drift_notices,
     find_cavities,
     find_envelope,
     find_extremes,
     find_marks,
-    find_points,
+    find_point_envelopes,
     find_watched,
     mass_ledger,
-    run_downs,
-    spills,
+    spill_notices,
 )
-from fvsolve.solve.team import undisturbed
-from fvsolve.steppers import automatic, slots
-from fvsolve.steppers.ledger import SUMS
+from fvsolve.solve.thread_team import postponed_interrupts
+from fvsolve.steppers import automatic, loop_indices
+from fvsolve.steppers.ledger import LEDGER_ROWS
 from fvsolve.units import show
 
 CHECKPOINT_SECONDS = 1.0
 CHUNK_SECONDS = 0.1
-FEW = slots.CHECKED  # steps between two checks by `RunChecks.look` where it is needed often
+FREQUENT_CHECK_STEPS = (
+    loop_indices.GROWTH_CHECK_STEPS
+)  # steps between two checks by `RunChecks.look` where it is needed often
 PERSISTENT = ("extremes", "envelope", "marks", "armed")
 
 
-class MemoryMisfit(RunError):
+class MemoryMismatch(RunError):
     """The memory of a state does not match the run."""
 
 
@@ -76,7 +78,7 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
             raise FvsolveError(f"sink = {show(sink)} is not a sink: it has no {listing(missing)}()")
     except BaseException:
         if comm is not None:
-            comm.bcast(FAREWELL)
+            comm.bcast(CLOSE_MESSAGE)
         raise
     return run.go()
 
@@ -84,11 +86,11 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
 class Run:
     """State and actions of a run in progress."""
 
-    loop_type = Loop
+    loop_type = RunLoop
 
     def __init__(self, model: Model, state: State, sink, progress, threads: int = 1, comm=None) -> None:
         self.model, self.sink, self.progress = model, sink, progress
-        self.threads, self.told = threads_of(model, threads if comm is None else comm.size)
+        self.threads, self.notices = threads_of(model, threads if comm is None else comm.size)
         comm = comm if self.threads > 1 else None
         self.began = time.perf_counter()
         self.loop = self.loop_type(model, threads=self.threads, comm=comm)
@@ -99,31 +101,34 @@ class Run:
         jumps = {t: jump for t, jump in model.breaks if self.start <= t <= self.end}
         self.starts_with_jump, self.ends_with_jump = jumps.pop(self.start, False), jumps.pop(self.end, False)
         self.bounds = [(t, jump) for t, jump in sorted(jumps.items())] + [(self.end, True)]
-        orders = self.loop.orders
-        orders[slots.START], orders[slots.EVERY] = self.start, output.every or (self.end - self.start) / 1000
-        orders[slots.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
-        orders[slots.FIELD_COUNT] = output.fields
+        orders = self.loop.controls
+        orders[loop_indices.START], orders[loop_indices.EVERY] = (
+            self.start,
+            output.every or (self.end - self.start) / 1000,
+        )
+        orders[loop_indices.FIELD_EVERY] = (self.end - self.start) / output.fields if output.fields else 0.0
+        orders[loop_indices.FIELD_COUNT] = output.fields
         self.segment, self.fresh = 0, state.memory.size == 0
         self.changes: list[tuple[float, float, float]] = []  # changes of the method under `auto`
         self.loop.now[:] = state.y
-        self.loop.memory[slots.T] = state.t
+        self.loop.loop_state[loop_indices.T] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
         self.watches = [watch for basin in model.basins for watch in basin.watches(basin.of(model.start))]
-        self.soundness = Soundness(self.slate)
-        self.loop.stepper.largest = self.soundness.watched
-        if self.soundness.close:
-            self.budget = FEW
+        self.checks = RunChecks(self.slate)
+        self.loop.stepper.largest = self.checks.largest_if_needed
+        if self.checks.needs_frequent_checks:
+            self.budget = FREQUENT_CHECK_STEPS
         self.processor = 0.0  # CPU time of the steps of this process [s]
         self.invalid_from = np.inf  # time from which results are invalid, because states have grown [s]
         # steps left in a chunk, time of the last pause: rows, frames and new segments do not end a chunk
         self.left, self.paused = self.budget, self.saved
         if not self.fresh:
             try:
-                self.remember(state.memory)
+                self.restore(state.memory)
             except (ValueError, IndexError, OverflowError):  # damaged checkpoint, or from another solver
                 if comm is None:
                     self.loop.close()
-                raise MemoryMisfit(f"the checkpoint does not match this run (a memory of {state.memory.size} numbers); "
+                raise MemoryMismatch(f"the checkpoint does not match this run (a memory of {state.memory.size} numbers); "
                                    "start again with --force, or with a State without memory") from None  # fmt: skip
         self.setup = time.perf_counter() - self.began
 
@@ -135,16 +140,16 @@ class Run:
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
-        crowd = self.loop.crowd
+        crowd = self.loop.recent_events
         own += [float(len(switched)), *switched, float(len(crowd)), *crowd, self.loop.last_switch, self.loop.at_once]
         own += [x for watch in self.watches for x in watch.kept]
-        own += [self.soundness.rates.get(watch.name, 0.0) for watch in self.soundness.moving]
-        views = (view.ravel() for view in self.loop.stepper.memories())
-        own += self.soundness.unfelt.kept.ravel().tolist()
+        own += [self.checks.rates.get(watch.name, 0.0) for watch in self.checks.moving]
+        views = (view.ravel() for view in self.loop.stepper.restart_arrays())
+        own += self.checks.sloshing.restart_data.ravel().tolist()
         past = self.slate.past
-        return np.concatenate([own, *views, *arrays, self.soundness.halves.kept, past, [float(past.size)]])
+        return np.concatenate([own, *views, *arrays, self.checks.step_doubling.restart_data, past, [float(past.size)]])
 
-    def remember(self, memory: np.ndarray) -> None:
+    def restore(self, memory: np.ndarray) -> None:
         memory, past = without_past(memory)
         if (past.size == 0) != (self.slate.past.size == 0):
             raise ValueError("history of delay lines does not match")
@@ -159,22 +164,22 @@ class Run:
         events, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
         self.loop.switched = [(float(t), int(k)) for t, k in events.reshape(-1, 2)]
         crowd, memory = memory[1 : 1 + int(memory[0])], memory[1 + int(memory[0]) :]
-        self.loop.crowd.extend(crowd.tolist())
+        self.loop.recent_events.extend(crowd.tolist())
         self.loop.last_switch, self.loop.at_once, memory = float(memory[0]), int(memory[1]), memory[2:]
         for watch in self.watches:
             watch.kept[:], memory = memory[: watch.kept.size], memory[watch.kept.size :]
-        for basin in self.soundness.moving:
-            self.soundness.rates[basin.name], memory = float(memory[0]), memory[1:]
-        sloshing_data = self.soundness.unfelt.kept.ravel()
+        for basin in self.checks.moving:
+            self.checks.rates[basin.name], memory = float(memory[0]), memory[1:]
+        sloshing_data = self.checks.sloshing.restart_data.ravel()
         sloshing_data[:], memory = memory[: sloshing_data.size], memory[sloshing_data.size :]
-        step_doubling_data = self.soundness.halves.kept
+        step_doubling_data = self.checks.step_doubling.restart_data
         arrays = [getattr(self.slate, name) for name in PERSISTENT] + [
-            *self.loop.stepper.memories(),
+            *self.loop.stepper.restart_arrays(),
             step_doubling_data,
         ]
         if memory.size != sum(array.size for array in arrays):
             raise ValueError("wrong number of values")
-        memory = self.loop.stepper.remember(memory)
+        memory = self.loop.stepper.restore(memory)
         for name in PERSISTENT:
             array = getattr(self.slate, name).ravel()
             array[:] = memory[: array.size]
@@ -194,12 +199,12 @@ class Run:
         return out
 
     def flush(self) -> None:
-        if self.loop.flags[slots.ROWS]:
+        if self.loop.progress[loop_indices.ROWS]:
             rows = self.loop.take_rows()
             self.sink.rows(rows[:, 0], rows[:, 1 : 1 + len(self.model.probes)])
-            self.widen(rows)
+            self.update_extremes(rows)
 
-    def widen(self, rows: np.ndarray) -> None:
+    def update_extremes(self, rows: np.ndarray) -> None:
         """Update the extremes by rows between steps, which are as accurate as steps; so no row exceeds the extremes."""
         least, t_min, greatest, t_max = self.slate.extremes
         t, values = rows[:, 0], rows[:, 1:]
@@ -212,26 +217,31 @@ class Run:
         if higher.any():
             greatest[higher], t_max[higher] = extreme[higher], t[at][higher]
 
-    def look(self, t: float, y: np.ndarray) -> None:
+    def check_basins(self, t: float, y: np.ndarray) -> None:
         """Pass a state to the checks of basins."""
         for watch in self.watches:
             watch.look(t, y)
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
-        self.look(t, y)
-        with undisturbed():  # other ranks may be writing too
+        self.check_basins(t, y)
+        with postponed_interrupts():  # other ranks may be writing too
             self.sink.field(t, self.slate.fields(t, y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
         """Count the rows and frames due at a jump or at the end, which are written separately."""
-        memory, orders = self.loop.memory, self.loop.orders
+        memory, orders = self.loop.loop_state, self.loop.controls
         near = 1e-12 * max(abs(t), abs(self.end))
-        if orders[slots.EVERY] > 0:
-            while orders[slots.START] + memory[slots.NEXT_OUTPUT] * orders[slots.EVERY] <= t + near:
-                memory[slots.NEXT_OUTPUT] += 1
-        if orders[slots.FIELD_EVERY] > 0 and memory[slots.NEXT_FIELD] <= orders[slots.FIELD_COUNT]:
-            if orders[slots.START] + memory[slots.NEXT_FIELD] * orders[slots.FIELD_EVERY] <= t + near:
-                memory[slots.NEXT_FIELD] += 1
+        if orders[loop_indices.EVERY] > 0:
+            while (
+                orders[loop_indices.START] + memory[loop_indices.NEXT_OUTPUT] * orders[loop_indices.EVERY] <= t + near
+            ):
+                memory[loop_indices.NEXT_OUTPUT] += 1
+        if orders[loop_indices.FIELD_EVERY] > 0 and memory[loop_indices.NEXT_FIELD] <= orders[loop_indices.FIELD_COUNT]:
+            if (
+                orders[loop_indices.START] + memory[loop_indices.NEXT_FIELD] * orders[loop_indices.FIELD_EVERY]
+                <= t + near
+            ):
+                memory[loop_indices.NEXT_FIELD] += 1
                 self.frame(t, self.loop.now, out)
 
     # the run ------------------------------------------------------------------------------------------------
@@ -252,9 +262,9 @@ class Run:
     def open(self) -> None:
         out = self.row(self.start, self.start)
         self.loop.switched.clear()  # initial device states are not events
-        if self.loop.orders[slots.FIELD_EVERY] > 0:
+        if self.loop.controls[loop_indices.FIELD_EVERY] > 0:
             self.frame(self.start, self.loop.now, out)
-        self.loop.memory[slots.NEXT_OUTPUT] = self.loop.memory[slots.NEXT_FIELD] = 1.0
+        self.loop.loop_state[loop_indices.NEXT_OUTPUT] = self.loop.loop_state[loop_indices.NEXT_FIELD] = 1.0
         self.begin_segment(self.starts_with_jump)
 
     def stop_columns(self) -> None:
@@ -271,7 +281,7 @@ class Run:
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
         self.stop_columns()
-        self.soundness.halves.begin(self.loop.memory[slots.STEPS])
+        self.checks.step_doubling.begin(self.loop.loop_state[loop_indices.STEPS])
         if jumped:
             self.row(self.loop.t, end)
         self.loop.begin(end, end if jump else NO_LIMIT)
@@ -299,29 +309,29 @@ class Run:
     def steps(self) -> str:
         """Step to the end of the segment; returns "", or the reason where the run cannot continue."""
         while True:
-            before, steps, busy = time.perf_counter(), self.loop.memory[slots.STEPS], self.busy
-            code = self.loop.run(min(self.left, self.soundness.halves.room(steps)))
+            before, steps, busy = time.perf_counter(), self.loop.loop_state[loop_indices.STEPS], self.busy
+            code = self.loop.run(min(self.left, self.checks.step_doubling.steps_left(steps)))
             self.processor += self.busy - busy
-            self.left = max(0.0, self.left - (self.loop.memory[slots.STEPS] - steps))
+            self.left = max(0.0, self.left - (self.loop.loop_state[loop_indices.STEPS] - steps))
             self.seconds += time.perf_counter() - before
             self.flush()
-            self.soundness.halves.look(self.loop)
-            grown = self.soundness.look(self.loop.t, self.loop.now)
-            if grown and code != slots.CHATTERS:  # the message about chattering names the parts
-                self.invalid_from = self.soundness.sound
+            self.checks.step_doubling.check(self.loop)
+            grown = self.checks.check(self.loop.t, self.loop.now)
+            if grown and code != loop_indices.CHATTERING:  # the message about chattering names the parts
+                self.invalid_from = self.checks.sound
                 return grown
-            if code == slots.FIELD:
-                count = self.loop.memory[slots.NEXT_FIELD] - 1
-                due = self.start + count * self.loop.orders[slots.FIELD_EVERY]
+            if code == loop_indices.FIELD:
+                count = self.loop.loop_state[loop_indices.NEXT_FIELD] - 1
+                due = self.start + count * self.loop.controls[loop_indices.FIELD_EVERY]
                 self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
-            elif code == slots.CHUNK and automatic.wants_change(self.loop.stepper):
+            elif code == loop_indices.BUDGET_SPENT and automatic.wants_change(self.loop.stepper):
                 self.changes.append(automatic.change(self.loop.stepper))
-            elif code == slots.CHUNK and self.left <= 0.0:
+            elif code == loop_indices.BUDGET_SPENT and self.left <= 0.0:
                 self.pause()
                 self.left, self.paused = self.budget, time.perf_counter()
-            elif code == slots.DONE:
+            elif code == loop_indices.DONE:
                 return ""
-            elif code not in (slots.CHUNK, slots.ROWS_FULL):
+            elif code not in (loop_indices.BUDGET_SPENT, loop_indices.ROWS_FULL):
                 return self.failure(code)
 
     @property
@@ -333,10 +343,10 @@ class Run:
         """Between chunks: report progress, save a checkpoint, set the next chunk to about a tenth of a second."""
         spent = time.perf_counter() - self.paused
         factor = CHUNK_SECONDS / spent if spent > 0 else 4.0
-        most = FEW if self.soundness.close else 1e9
+        most = FREQUENT_CHECK_STEPS if self.checks.needs_frequent_checks else 1e9
         self.budget = float(np.clip(self.budget * np.clip(factor, 0.25, 4.0), 10, most))
         if self.progress is not None:
-            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.memory[slots.STEPS]))
+            self.progress(self.loop.t, time.perf_counter() - self.began, int(self.loop.loop_state[loop_indices.STEPS]))
         if time.perf_counter() - self.saved > CHECKPOINT_SECONDS:
             self.save()
 
@@ -346,22 +356,22 @@ class Run:
 
     def failure(self, code: int) -> str:
         """Reason for the stop of a run: failure, place, time and remedy, with the advice of the density law."""
-        numbers = code in (slots.BAD_VALUE, slots.NEWTON_STUCK, slots.TINY_STEP)
-        return self.what_failed(code) + (self.model.case.law.advice if numbers else "")
+        numbers = code in (loop_indices.BAD_VALUE, loop_indices.NEWTON_STUCK, loop_indices.TINY_STEP)
+        return self.failure_text(code) + (self.model.case.law.advice if numbers else "")
 
-    def what_failed(self, code: int) -> str:
+    def failure_text(self, code: int) -> str:
         """Failure, place, time and remedy for a code of the time loop."""
         model, loop = self.model, self.loop
         place = ""
-        if code == slots.BAD_VALUE:
-            self.invalid_from = self.soundness.sound
+        if code == loop_indices.BAD_VALUE:
+            self.invalid_from = self.checks.sound
             bad = np.flatnonzero(~np.isfinite(loop.now))
             place = f" at {model.state_names[bad[0]]}" if bad.size else ""
-        elif code == slots.BAD_STATUS and loop.out[rec.WHERE] >= 0 and loop.out[rec.STATUS] != rec.NO_WEIGHT:
+        elif code == loop_indices.BAD_STATUS and loop.out[rec.WHERE] >= 0 and loop.out[rec.STATUS] != rec.NO_WEIGHT:
             place = f" at {model.node_names[int(loop.out[rec.WHERE])]}"
         when = f"t = {model.case.amount(loop.t, 'time', 6)}"
-        if code == slots.CHATTERS:
-            first = loop.t if loop.at_once > 1 else loop.crowd[0]  # at the same time, or within a short span
+        if code == loop_indices.CHATTERING:
+            first = loop.t if loop.at_once > 1 else loop.recent_events[0]  # at the same time, or within a short span
             names = sorted({model.events[k][0] for t, k in loop.switched if t >= first})
             remedies = {
                 device.remedy: None for name, _, device in model.devices if name.removesuffix(".inside") in names
@@ -369,30 +379,30 @@ class Run:
             parts_text = listing(names) if names else "a leak, or a demand that follows the pressure,"
             remedy = ", or ".join(remedies) or "put a chamber at its place"
             return f"stopped: {parts_text} opens and shuts without end at {when}; {remedy}"
-        if code == slots.STOPPED:
+        if code == loop_indices.STOPPED:
             event = "a cavity opened" if model.cavitates else "pressure below vapour pressure"
             return f"stopped: {event} at {when}, as below_vapor requires"
-        if code in (slots.BAD_VALUE, slots.BAD_STATUS):
+        if code in (loop_indices.BAD_VALUE, loop_indices.BAD_STATUS):
             loop.step_back()
-        if code == slots.NEWTON_STUCK:
-            worst = model.state_names[int(loop.memory[slots.WORST])]
+        if code == loop_indices.NEWTON_STUCK:
+            worst = model.state_names[int(loop.loop_state[loop_indices.WORST])]
             return (f"stopped: Newton did not converge at {when}, however short the step, worst in {worst}; check the "
                     "parts there for jumps, or try an explicit method")  # fmt: skip
-        if code == slots.TINY_STEP:
+        if code == loop_indices.TINY_STEP:
             return f"stopped: the step became too small at {when}; try a larger rtol, or courant instead"
-        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
+        if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_SOLUTION:
             return f"stopped: the demand{place} cannot be supplied at {when}; all connections to it are shut"
-        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
+        if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_VOLUME:
             return f"stopped: the chamber volume{place} is zero at {when}; give the piston an end-stop"
-        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WIDTH:
+        if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WIDTH:
             return f"stopped: the wall has no space left{place} at {when}; give its mass an end-stop, or a wider zone"
-        if code == slots.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WEIGHT:
+        if code == loop_indices.BAD_STATUS and loop.out[rec.STATUS] == rec.NO_WEIGHT:
             index = int(loop.out[rec.WHERE])
             names = [*(basin.name for basin in model.basins), *model.node_names]
             name = names[index].removesuffix(".inside")
             return (f"stopped: the water in {name} has no weight left at {when}; reduce the downward acceleration of "
                     "its body")  # fmt: skip
-        if code == slots.BAD_STATUS:
+        if code == loop_indices.BAD_STATUS:
             return f"stopped: Newton did not converge{place} at {when}; try a smaller step"
         return f"stopped: a value is not finite{place} at {when}; the step is beyond the limit of the method: halve it"
 
@@ -401,26 +411,28 @@ class Run:
         name = self.model.case.numerics.method
         if name != automatic.AUTO:
             return [{"time": self.start, "method": name, "why": "given by numerics.method"}]
-        return automatic.account(self.start, self.changes, *self.loop.orders[[slots.PRICE, slots.SIZE]])
+        return automatic.method_history(
+            self.start, self.changes, *self.loop.controls[[loop_indices.PRICE, loop_indices.SIZE]]
+        )
 
     def close(self, reason: str, saved: bool = True) -> Summary:
         model, loop = self.model, self.loop
         if reason != "finished" and saved and loop.t > self.start and np.all(np.isfinite(loop.now)):
             self.save()
         if reason == "finished":
-            self.look(loop.t, loop.now)
-        ledger = loop.stepper.ledger.reshape(SUMS, -1)[:2]
+            self.check_basins(loop.t, loop.now)
+        ledger = loop.stepper.ledger.reshape(LEDGER_ROWS, -1)[:2]
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         basin_notices = [notice for entry in self.watches for notice in entry.notices()]
-        warnings = [*self.told, *basin_notices, *self.soundness.warnings(ledgers), *run_downs(self.slate),
-                    *spills(self.slate)]  # fmt: skip
-        warnings += drifts(model, loop.now)
-        warnings += parted(model.case.numerics, loop.stepper.counts())
+        warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers), *device_notices(self.slate),
+                    *spill_notices(self.slate)]  # fmt: skip
+        warnings += drift_notices(model, loop.now)
+        warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(entry.ok for entry in warnings)
         summary = Summary(
             reason, ok, loop.t, find_marks(self.slate), ledgers, find_extremes(self.slate),
-            find_envelope(self.slate), find_points(self.slate), find_watched(self.slate),
+            find_envelope(self.slate), find_point_envelopes(self.slate), find_watched(self.slate),
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
             find_cavities(self.slate), warnings, self.threads, self.invalid_from,

@@ -1,20 +1,20 @@
 """Runge-Kutta methods as data, their properties, and the compiled time loop that steps them."""
 
 from fvsolve.lazy_exports import lazy_names
-from fvsolve.steppers import methods  # noqa: F401  (declares them)
+from fvsolve.steppers import built_in_methods  # noqa: F401  (declares them)
 
 _HOMES = {
-    "Facts": "analysis.facts",
+    "Facts": "analysis.method_facts",
     "METHODS": "tableau",
     "Method": "tableau",
     "StabilityFunction": "analysis.stability_function",
-    "analyse": "analysis.facts",
-    "global_error": "analysis.scalar",
+    "analyse": "analysis.method_facts",
+    "global_error": "analysis.test_equation_errors",
     "integrate": "ode",
-    "local_error": "analysis.scalar",
+    "local_error": "analysis.test_equation_errors",
     "method_named": "tableau",
     "pade": "analysis.pade",
-    "seen_frequency": "analysis.scalar",
+    "seen_frequency": "analysis.test_equation_errors",
     "stability_function": "analysis.stability_function",
 }
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from fvsolve.steppers import slots
-from fvsolve.steppers.methods import AUTO
-from fvsolve.steppers.stepper import Stepper
+from fvsolve.steppers import loop_indices
+from fvsolve.steppers.built_in_methods import AUTO
+from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import method_named
 
-EXPLICIT, IMPLICIT, TIGHT = "dormand-prince", "rodas-5p", "radau-iia-5"
+EXPLICIT, IMPLICIT, TIGHT_IMPLICIT = "dormand-prince", "rodas-5p", "radau-iia-5"
 TIGHT_BELOW = 1e-6  # rtol below which TIGHT costs less: `benchmarks/stiff.py auto`
 # Cost of factorisation and solves of a step, in rhs calls: DENSE times the number of states squared; SPARSE in total.
-DENSE, SPARSE = 0.05, 40.0
+DENSE_COST, SPARSE_COST = 0.05, 40.0
 
 
 def first_method(name: str) -> str:
@@ -24,37 +24,41 @@ def implicit_method(rtol: float) -> str:
 
     Near zero pressure drop linearly implicit steps oscillate; Newton iterations do not.
     """
-    return IMPLICIT if rtol >= TIGHT_BELOW else TIGHT
+    return IMPLICIT if rtol >= TIGHT_BELOW else TIGHT_IMPLICIT
 
 
-def price(structure: Structure) -> float:
+def step_cost_ratio(structure: Structure) -> float:
     """Cost of an implicit step in explicit steps: Jacobian, stages, factorisation and solves, counted in rhs calls."""
     implicit, explicit = method_named(IMPLICIT), method_named(EXPLICIT)
-    algebra = DENSE * structure.n**2 if structure.kind == "dense" else SPARSE
+    algebra = DENSE_COST * structure.n**2 if structure.kind == "dense" else SPARSE_COST
     return (structure.color_count + implicit.stages + 1 + algebra) / (explicit.stages - 1)
 
 
-def watch(stepper: Stepper, structure: Structure) -> None:
+def watch(stepper: Integrator, structure: Structure) -> None:
     """Switch on the stiffness test of the time loop."""
-    stepper.orders[slots.WATCH], stepper.orders[slots.PRICE] = 1.0, price(structure)
+    stepper.controls[loop_indices.WATCH], stepper.controls[loop_indices.PRICE] = 1.0, step_cost_ratio(structure)
 
 
-def wants_change(stepper: Stepper) -> bool:
+def wants_change(stepper: Integrator) -> bool:
     """True if the loop returned because the other kind of method would be cheaper."""
-    return stepper.memory[slots.CASES] < 0.0
+    return stepper.loop_state[loop_indices.SWITCH_COUNT] < 0.0
 
 
-def change(stepper: Stepper) -> tuple[float, float, float]:
+def change(stepper: Integrator) -> tuple[float, float, float]:
     """Switch to the other method; returns time [s], spectral radius [1/s] and last step [s] at the switch."""
-    loop_state = stepper.memory
-    implicit = implicit_method(stepper.orders[slots.SIZE])
+    loop_state = stepper.loop_state
+    implicit = implicit_method(stepper.controls[loop_indices.SIZE])
     stepper.use(method_named(implicit if stepper.method.explicit else EXPLICIT))
-    loop_state[slots.SWITCHES] += 1.0
-    loop_state[slots.CASES] = 0.0
-    return float(loop_state[slots.T]), float(loop_state[slots.RADIUS]), float(loop_state[slots.LAST])
+    loop_state[loop_indices.SWITCHES] += 1.0
+    loop_state[loop_indices.SWITCH_COUNT] = 0.0
+    return (
+        float(loop_state[loop_indices.T]),
+        float(loop_state[loop_indices.RADIUS]),
+        float(loop_state[loop_indices.LAST]),
+    )
 
 
-def account(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:
+def method_history(start: float, changes: list[tuple[float, float, float]], price: float, rtol: float) -> list[dict]:
     """List the methods used: start time, method, reason."""
     entries = [{"time": start, "method": EXPLICIT, "why": "until stability limits the explicit steps"}]
     for k, (t, radius, h) in enumerate(changes):

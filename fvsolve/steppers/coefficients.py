@@ -13,8 +13,8 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import njit
+from fvsolve.steppers.newton_transform import transformed
 from fvsolve.steppers.tableau import Method
-from fvsolve.steppers.transform import transformed
 
 
 @functools.cache
@@ -41,12 +41,12 @@ def coefficients(method: Method, damped: bool = False) -> tuple[np.ndarray, np.n
                 f"{method.name} cannot be used for steps: A without its explicit first stage is singular or has no "
                 "basis of eigenvectors. Expected an invertible, diagonalisable A, or a diagonally implicit array"
             ) from None
-    flat.append(bent(method))
+    flat.append(start_slope_correction(method))
     flat.append([flat[-1].size])
     return np.concatenate(flat), np.ascontiguousarray(dense), len(b)
 
 
-def bent(method: Method) -> np.ndarray:
+def start_slope_correction(method: Method) -> np.ndarray:
     """[weights of stages in p'(0), psi] of a collocation polynomial p whose last node is the step's end; else empty.
 
     p + h psi(theta) (f - p'(0)), psi = int prod (x - c_i) / prod (-c_i), has the slope f at the start, which p does not
@@ -60,7 +60,7 @@ def bent(method: Method) -> np.ndarray:
 
 
 @njit(inline="always")
-def bend_of(coefficients, s):
+def start_slope_of(coefficients, s):
     """Read the result of `start_slope_correction` from the flat coefficients."""
     last = coefficients.size - 1
     return coefficients[last - int(coefficients[last]) : last]

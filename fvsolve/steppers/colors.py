@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.jit import njit
 
-PLAIN = 200  # number of entries below which plain Python is quicker than loading compiled code
+PYTHON_ENTRIES = 200  # number of entries below which plain Python is quicker than loading compiled code
 
 
 def colors(pattern) -> np.ndarray:
@@ -25,7 +25,7 @@ def colors(pattern) -> np.ndarray:
     degree[np.diff(pattern.indptr) == 0] = 0
     order = np.argsort(-degree, kind="stable")
     tables = (pattern.indptr, pattern.indices, by_rows.indptr, by_rows.indices, order)
-    function = greedy.py_func if pattern.nnz < PLAIN and hasattr(greedy, "py_func") else greedy
+    function = greedy.py_func if pattern.nnz < PYTHON_ENTRIES and hasattr(greedy, "py_func") else greedy
     function(*(np.asarray(table, dtype=np.int64) for table in tables), np.full(n + 1, -1, dtype=np.int64), result)
     return result
 

@@ -6,6 +6,22 @@ from math import sqrt
 
 from fvsolve.jit import inline, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
+from fvsolve.steppers.loop_indices import (
+    CALLS,
+    CONTROL,
+    DAMPED_STEP,
+    FACTORS,
+    HAS_JACOBIAN,
+    HEADER,
+    JACOBIAN_STEP,
+    KNOWN_STEPS,
+    LAST,
+    NEWTON_FAILED,
+    SHIFT,
+    SIZE,
+    STEPS,
+    TOLERANCE,
+)
 from fvsolve.steppers.newton import (
     BASE,
     CONVERGED,
@@ -17,31 +33,15 @@ from fvsolve.steppers.newton import (
     WEIGHTS,
     begin,
     book_increment,
+    convergence,
     evaluate,
     find_worst,
-    reach,
     renew,
     size_of,
     smoothed_error,
-    verdict,
+    solve_stage_from_start,
 )
-from fvsolve.steppers.slots import (
-    CALLS,
-    CONTROL,
-    DAMPED,
-    FACTORS,
-    HAS,
-    HEADER,
-    KNOWN,
-    LAST,
-    MADE,
-    NEWTON_FAILED,
-    SHIFT,
-    SIZE,
-    STEPS,
-    TOLERANCE,
-)
-from fvsolve.steppers.step import combine, error_norm
+from fvsolve.steppers.step_operations import combine, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 
@@ -82,7 +82,7 @@ def solve_stage(
         for j in range(n):
             ki[j] += shift * d[j]
         size = sqrt(size_of(d, weights) / max(n, 1))
-        done, status = verdict(turn, size, before, controls, work)
+        done, status = convergence(turn, size, before, controls, work)
         before = size
         if done:
             break
@@ -101,7 +101,7 @@ def try_stages(
     controls, loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
     """Solve all stages with the current Jacobian, with damping where it is fresh; returns CONVERGED or FAILED."""
-    s, fresh = k.shape[0], work[MADE] == loop_state[STEPS]
+    s, fresh = k.shape[0], work[JACOBIAN_STEP] == loop_state[STEPS]
     c, b, base = nodes_of(coefficients, s), weights_of(coefficients, s), vectors[s + BASE]
     for i in range(1, s):
         row = row_of(coefficients, s, i)
@@ -119,7 +119,7 @@ def try_stages(
             if factor(structure, work[HEADER:], shift, factors) != 0:
                 return FAILED
             work[SHIFT] = shift
-        if work[KNOWN] > 0.0:
+        if work[KNOWN_STEPS] > 0.0:
             predict(b, c, c[i] * h / loop_state[LAST], k[0], vectors, k[i])
         else:
             for j in range(y.size):
@@ -132,7 +132,7 @@ def try_stages(
             if controls[CONTROL] == TOLERANCE:
                 for j in range(y.size):
                     k[i, j] = shift * (y[j] - base[j])
-            status = reach(
+            status = solve_stage_from_start(
                 rhs, factor, solve, handle, structure, t + c[i] * h, h * row[i], i, k, y, y_stage, ledger_rates,
                 ledger_offset, out, scale, controls, loop_state, nnz, work, vectors, factors,
             )  # fmt: skip
@@ -154,7 +154,7 @@ def attempt(
     nnz = structure[structure[STARTS] + structure[STATES]]
     begin(k, y[now], scale, controls, loop_state, work, vectors)
     while True:
-        if work[HAS] == 0.0:
+        if work[HAS_JACOBIAN] == 0.0:
             renew(
                 rhs, handle, structure, ledger_offset, t, y[now], k[0], ledger_rates[0], scale, out, loop_state, work,
                 vectors[s + MOVED], vectors[s + RATE],
@@ -165,13 +165,13 @@ def attempt(
         )  # fmt: skip
         if status == CONVERGED:
             break
-        if work[MADE] == loop_state[STEPS]:
+        if work[JACOBIAN_STEP] == loop_state[STEPS]:
             return NEWTON_FAILED
-        work[HAS] = 0.0
+        work[HAS_JACOBIAN] = 0.0
     combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
     if controls[CONTROL] != TOLERANCE:
         return 0.0
-    if work[DAMPED] == loop_state[STEPS]:
+    if work[DAMPED_STEP] == loop_state[STEPS]:
         return smoothed_error(
             rhs, factor, solve, handle, structure, ledger_offset, t, h, y[now], y[new], k, ledger_rates,
             error_of(coefficients, s), 1.0 / (h * row_of(coefficients, s, s - 1)[s - 1]), scale, out, controls,

@@ -5,8 +5,8 @@ from math import sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.stage_sums import CHECKED, EDGES, MODE, OFF, OTHERS, STAGE, STAGE_AND_END, request_sums, sum_runs
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
-from fvsolve.steppers.slots import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
-from fvsolve.steppers.step import BEGIN, STOP, combine, error_of_bands
+from fvsolve.steppers.loop_indices import CALLS, CONTROL, FSAL, RADIUS, SIZE, TOLERANCE, WATCH
+from fvsolve.steppers.step_operations import BEGIN, STOP, combine, error_of_bands
 
 
 @njit

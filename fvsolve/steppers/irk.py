@@ -16,6 +16,28 @@ import numpy as np
 
 from fvsolve.jit import inline, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, weights_of
+from fvsolve.steppers.loop_indices import (
+    CALLS,
+    CONTROL,
+    DAMPED_STEP,
+    END,
+    FACTOR_SIZE,
+    FACTORS,
+    HAS_JACOBIAN,
+    HEADER,
+    JACOBIAN_STEP,
+    KNOWN_STEPS,
+    LAST,
+    NEWTON,
+    NEWTON_FAILED,
+    RADIUS,
+    SHIFT,
+    SIZE,
+    STAGES_STEP,
+    STEPS,
+    TOLERANCE,
+    WATCH,
+)
 from fvsolve.steppers.newton import (
     CONVERGED,
     FAILED,
@@ -27,47 +49,25 @@ from fvsolve.steppers.newton import (
     WEIGHTS,
     begin,
     book_increment,
+    convergence,
     find_worst,
     renew,
     smoothed_error,
     spectral_radius,
-    verdict,
 )
-from fvsolve.steppers.slots import (
-    CALLS,
-    CONTROL,
-    DAMPED,
-    END,
-    FACTORS,
-    HAS,
-    HEADER,
-    KNOWN,
-    LAST,
-    MADE,
-    NEWTON,
-    NEWTON_FAILED,
-    RADIUS,
-    SEEN,
-    SHIFT,
-    SIZE,
-    STEPS,
-    STORE,
-    TOLERANCE,
-    WATCH,
-)
-from fvsolve.steppers.step import combine, copy, error_norm, small
+from fvsolve.steppers.stage_sweeps import sweep
+from fvsolve.steppers.step_operations import combine, copy, error_norm, error_scale
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
-from fvsolve.steppers.sweeps import sweep
 from fvsolve.steppers.tableau import Method
 
 # Matrices q x q behind the Butcher array (`coefficients.py`), and last T^-1 A^-1 a_0 and A^-1 a_0.
-T, BACK, BLOCKS, SLOPES, AHEAD, LOWER, START = range(7)
+T, T_INVERSE, BLOCKS, SLOPES, EXTRAPOLATION, CROUT, START = range(7)
 # Rows of `vectors` for all stages, from STAGES on, q rows each: W, F, and the residuals, replaced by the solution dW.
 W, F, R = range(3)
-NEAR = (-0.1, -1e-2, -1e-3, -1e-4)  # points before a kink, in steps from it, where the defect is checked
+DEFECT_POINTS = (-0.1, -1e-2, -1e-3, -1e-4)  # points before a kink, in steps from it, where the defect is checked
 # Weight of that defect in the error: Newton residual and method error contribute less than a hundred tolerances.
-PLAIN = 1e-2
+DEFECT_WEIGHT = 1e-2
 
 
 @functools.cache
@@ -102,7 +102,7 @@ def blend(base_weight, base, m, at, q, first, vectors, target):
 def predict(coefficients, h, h_last, s, buffer, vectors):
     """W <- T^-1 of the stage increments extrapolated from the slopes of the last step; buffer : float64[q q]."""
     q, c = s - 1, nodes_of(coefficients, s)
-    back, ahead = matrix(coefficients, s, BACK), matrix(coefficients, s, AHEAD)
+    back, ahead = matrix(coefficients, s, T_INVERSE), matrix(coefficients, s, EXTRAPOLATION)
     for e in range(q * q):
         buffer[e] = 0.0
     for k in range(q):
@@ -121,7 +121,7 @@ def predict(coefficients, h, h_last, s, buffer, vectors):
 def factor_blocks(factor, factor_complex, structure, coefficients, s, h, work, factors, complex_factors, n):
     """Factor every block of L / h and store the factors one after another; returns their number, 0 if a pivot fails."""
     q, blocks, b, real, pair, count = s - 1, matrix(coefficients, s, BLOCKS), 0, 0, n, 0
-    jacobian, size = work[HEADER:], int(work[STORE])
+    jacobian, size = work[HEADER:], int(work[FACTOR_SIZE])
     while b < q:
         shift = blocks[b * q + b] / h
         if b + 1 < q and blocks[(b + 1) * q + b] != 0.0:
@@ -166,7 +166,11 @@ def iterate(
     """Newton iterations for W; returns CONVERGED or FAILED."""
     s, n = ledger_rates.shape[0], y.size
     q, c, weights = s - 1, nodes_of(coefficients, s), vectors[s + WEIGHTS]
-    t_matrix, back, blocks = matrix(coefficients, s, T), matrix(coefficients, s, BACK), matrix(coefficients, s, BLOCKS)
+    t_matrix, back, blocks = (
+        matrix(coefficients, s, T),
+        matrix(coefficients, s, T_INVERSE),
+        matrix(coefficients, s, BLOCKS),
+    )
     start = matrix(coefficients, s, START)
     w_at, f_at, r_at = s + STAGES + W * q, s + STAGES + F * q, s + STAGES + R * q
     before, status = 0.0, FAILED
@@ -190,7 +194,7 @@ def iterate(
             for e in range(n):
                 r[e] += own * wi[e] + other * wj[e]
         solve_blocks(
-            solve, solve_complex, structure, coefficients, s, int(work[STORE]), factors, complex_factors, vectors
+            solve, solve_complex, structure, coefficients, s, int(work[FACTOR_SIZE]), factors, complex_factors, vectors
         )
         total = 0.0
         for e in range(n):
@@ -201,7 +205,7 @@ def iterate(
                 part += r * r
             total += per * per * part
         size = sqrt(total / max(q * n, 1))
-        done, status = verdict(turn, size, before, controls, work)
+        done, status = convergence(turn, size, before, controls, work)
         before = size
         if done:
             break
@@ -269,7 +273,7 @@ def filtered_error(
         solve(structure, factors, d)
         norm = 0.0
         for e in range(n):
-            w = d[e] / (controls[SIZE] * small(scale[e], max(abs(y[now, e]), abs(y[new, e]))))
+            w = d[e] / (controls[SIZE] * error_scale(scale[e], max(abs(y[now, e]), abs(y[new, e]))))
             norm += w * w
         norm = sqrt(norm / max(n, 1))
         if norm < 1.0 or turn == 1 or not retry:
@@ -282,7 +286,7 @@ def filtered_error(
 
 
 @inline
-def unseen(
+def defect_before_end(
     rhs,
     solve,
     handle,
@@ -307,9 +311,9 @@ def unseen(
     d = (I - h g J)^-1 h g (p' - f(p)). e is as small as d where J is valid there, else it is the full defect.
     """
     s, n = k.shape
-    q, ahead, buffer = s - 1, matrix(coefficients, s, AHEAD), work[work.size - (s - 1) * (s - 1) :]
+    q, ahead, buffer = s - 1, matrix(coefficients, s, EXTRAPOLATION), work[work.size - (s - 1) * (s - 1) :]
     d, f, step, greatest = vectors[s + INCREMENT], vectors[s + RATE], h / matrix(coefficients, s, BLOCKS)[0], 0.0
-    for x in NEAR:
+    for x in DEFECT_POINTS:
         for j in range(q):
             buffer[j], buffer[q + j] = 0.0, 0.0
             for m in range(q - 1, -1, -1):
@@ -327,7 +331,7 @@ def unseen(
                 d[e] = -f[e]
                 for j in range(q):
                     d[e] += buffer[q + j] * k[j + 1, e]
-                w = step * d[e] / (controls[SIZE] * small(scale[e], abs(y[new, e])))
+                w = step * d[e] / (controls[SIZE] * error_scale(scale[e], abs(y[new, e])))
                 total = total + w * w if turn == 1 else 0.0
             if turn == 0:
                 solve(structure, factors, d)
@@ -349,10 +353,12 @@ def attempt(
     s, n = k.shape
     nnz = structure[structure[STARTS] + structure[STATES]]
     q, error = s - 1, error_of(coefficients, s)
-    retry = work[SEEN] == loop_state[STEPS] or work[SEEN] < 0.0  # a repeated step, or the first after a kink
+    retry = (
+        work[STAGES_STEP] == loop_state[STEPS] or work[STAGES_STEP] < 0.0
+    )  # a repeated step, or the first after a kink
     begin(k, y[now], scale, controls, loop_state, work, vectors)
     while True:
-        if work[HAS] == 0.0:
+        if work[HAS_JACOBIAN] == 0.0:
             renew(
                 rhs, handle, structure, ledger_offset, t, y[now], k[0], ledger_rates[0], scale, out, loop_state, work,
                 vectors[s + MOVED], vectors[s + RATE],
@@ -370,7 +376,7 @@ def attempt(
                 work[SHIFT] = 1.0 / h
         if work[SHIFT] != 0.0:
             # high powers of h / h_last extrapolate badly
-            if work[KNOWN] > 0.0 and (q < 5 or h <= 2.0 * loop_state[LAST]):
+            if work[KNOWN_STEPS] > 0.0 and (q < 5 or h <= 2.0 * loop_state[LAST]):
                 predict(coefficients, h, loop_state[LAST], s, work[work.size - q * q :], vectors)
             else:
                 for i in range(q):
@@ -383,8 +389,8 @@ def attempt(
         if status == CONVERGED:
             finish(coefficients, structure, nnz, h, k, ledger_rates, work, vectors)
             break
-        if work[MADE] == loop_state[STEPS]:
-            low, first_row = matrix(coefficients, s, LOWER), s + STAGES + W * q
+        if work[JACOBIAN_STEP] == loop_state[STEPS]:
+            low, first_row = matrix(coefficients, s, CROUT), s + STAGES + W * q
             status = sweep(
                 rhs, factor, solve, handle, coefficients, low, structure, t, h, y[now], y[3], k, ledger_rates,
                 ledger_offset, out, scale, controls, loop_state, nnz, first_row, work, vectors, factors,
@@ -393,12 +399,12 @@ def attempt(
             if status == FAILED:
                 return NEWTON_FAILED
             break
-        work[HAS] = 0.0
+        work[HAS_JACOBIAN] = 0.0
     combine(0, y[now].size, y[now], h, weights_of(coefficients, s), s, k, y[new])
     if controls[CONTROL] != TOLERANCE:
         return 0.0
     collocates = error[0] != 0.0 and matrix(coefficients, s, START)[0] == 0.0
-    if work[DAMPED] == loop_state[STEPS]:
+    if work[DAMPED_STEP] == loop_state[STEPS]:
         error_size = smoothed_error(
             rhs, factor, solve, handle, structure, ledger_offset, t, h, y[now], y[new], k, ledger_rates, error,
             matrix(coefficients, s, BLOCKS)[0] / h, scale, out, controls, loop_state, work, vectors, factors,
@@ -411,7 +417,7 @@ def attempt(
     else:
         error_size = error_norm(h, error, k, y[now], y[new], scale, controls[SIZE])
     if collocates and 0.0 <= error_size <= 1.0 and h >= (controls[END] - t) * (1.0 - 1e-9):
-        error_size = max(error_size, PLAIN * unseen(
+        error_size = max(error_size, DEFECT_WEIGHT * defect_before_end(
             rhs, solve, handle, structure, coefficients, t, h, y, new, k, out, scale, controls, loop_state, work,
             vectors, factors,
         ))  # fmt: skip

@@ -7,14 +7,14 @@ the state's own dense output gives it.
 """
 
 from fvsolve.jit import njit
-from fvsolve.steppers.step import add_up
+from fvsolve.steppers.step_operations import add_up
 
-SUMS = 5
+LEDGER_ROWS = 5
 # The smaller of the two sides of a step counts as rounding below this fraction of the gross amount so far.
 NOISE = 1e-12
 # Likewise below this fraction of the sum of the larger side, where the rates at both ends have the same sign: a
 # negative weight or the Newton residual causes it.
-STRAY = 1e-6
+WRONG_SIGN = 1e-6
 NEAR = 1e-5  # tolerance of the time of zero rate, in steps; the error of the amount goes with its square
 TURNS = 40
 # Fraction of the step's tolerance, relative to all amounts so far: then the sum over all steps is within tolerance.
@@ -32,7 +32,7 @@ def weight(theta, dense, j):
 
 
 @njit
-def brought(theta, total, r0, r1, m, ledger_rates, dense):
+def amount_and_rate(theta, total, r0, r1, m, ledger_rates, dense):
     """(amount of rate m up to theta, rate at theta) over h: the method's polynomial, else the cubic through both ends.
 
     total : amount of the step over h; r0, r1 : rates at its ends
@@ -50,18 +50,18 @@ def brought(theta, total, r0, r1, m, ledger_rates, dense):
 
 
 @njit
-def lesser(total, r0, r1, m, ledger_rates, dense):
+def smaller_side(total, r0, r1, m, ledger_rates, dense):
     """Size, over h, of the smaller of the positive and negative parts of a step; its rate m changes sign, r0 to r1."""
     low, high = 0.0, 1.0
     at_low, at_high = (
-        brought(0.0, total, r0, r1, m, ledger_rates, dense)[1],
-        brought(1.0, total, r0, r1, m, ledger_rates, dense)[1],
+        amount_and_rate(0.0, total, r0, r1, m, ledger_rates, dense)[1],
+        amount_and_rate(1.0, total, r0, r1, m, ledger_rates, dense)[1],
     )
     if at_low * at_high >= 0.0:
         return 0.0
     for _ in range(TURNS):
         middle = high - at_high * (high - low) / (at_high - at_low)
-        rate, before = brought(middle, total, r0, r1, m, ledger_rates, dense)[1], high
+        rate, before = amount_and_rate(middle, total, r0, r1, m, ledger_rates, dense)[1], high
         if rate * at_high < 0.0:
             low, at_low = high, at_high
         else:
@@ -69,7 +69,7 @@ def lesser(total, r0, r1, m, ledger_rates, dense):
         high, at_high = middle, rate
         if abs(high - before) <= NEAR or abs(high - low) <= NEAR:
             break
-    first = brought(high, total, r0, r1, m, ledger_rates, dense)[0]
+    first = amount_and_rate(high, total, r0, r1, m, ledger_rates, dense)[0]
     return max(0.0, min(abs(first), abs(total - first)))
 
 
@@ -106,7 +106,7 @@ def combined(weights, rates, m):
 @njit(forceinline=True)
 def add(ledger, m, at, part):
     """Add `part` to sum `at` (0 positive, 1 negative) of rate m with compensated rounding."""
-    count = ledger.size // SUMS
+    count = ledger.size // LEDGER_ROWS
     ledger[at * count + m], ledger[(2 + at) * count + m] = add_up(ledger[at * count + m], part,
                                                                   ledger[(2 + at) * count + m])  # fmt: skip
 
@@ -128,12 +128,12 @@ def book(h, b, ledger_rates, dense, use_stage_rates, known, end, ledger):
             direction = ledger[m] + ledger[count + m]
         if r0 * r1 >= 0.0 and direction != 0.0:
             side = 0 if direction > 0.0 else 1
-            threshold = max(threshold, STRAY * abs(ledger[side * count + m]))
+            threshold = max(threshold, WRONG_SIGN * abs(ledger[side * count + m]))
         if use_stage_rates:
             r0, r1 = ledger[4 * count + m] if known else r0, ledger_rates[s - 1, m]
         ledger[4 * count + m] = ledger_rates[s - 1, m]
         if r0 * r1 < 0.0:
-            part = lesser(total, r0, r1, m, ledger_rates, dense)
+            part = smaller_side(total, r0, r1, m, ledger_rates, dense)
         up, down = part + max(total, 0.0), part - min(total, 0.0)
         if h * (down if side == 0 else up) <= threshold:
             add(ledger, m, side, h * total)

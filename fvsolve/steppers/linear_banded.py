@@ -9,14 +9,14 @@ import numpy as np
 
 from fvsolve.jit import njit
 from fvsolve.steppers.pivots import LEAST, bad_row, reciprocal, size_of
-from fvsolve.steppers.structure import OWN, SIZE, STARTS
+from fvsolve.steppers.structure import SIZE, SOLVER_DATA, STARTS
 
 # Data of this solver in the structure: bandwidths and row length, then the state of each reordered row, then the place
 # of every entry.
 BELOW, ABOVE, WIDTH, ORDER = 0, 1, 2, 3
 CHUNK = 4  # columns processed at once
 # The diagonal entry is the pivot from this fraction of the greatest entry on: without row exchange it is quicker.
-STAYS = 0.1
+DIAGONAL_PIVOT = 0.1
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
@@ -66,7 +66,7 @@ def subtract(factor, x, y, chunks):
 
 def factor(structure, jacobian, shift, factors):
     """factors <- L U of shift I - J, with row exchanges; returns 0, or 1 + the state without a pivot."""
-    n, own = structure[SIZE], structure[structure[OWN] :]
+    n, own = structure[SIZE], structure[structure[SOLVER_DATA] :]
     below, above, width, order = own[BELOW], own[ABOVE], own[WIDTH], own[ORDER:]
     place, lower = order[n:], factors[n * width :]
     pivots = lower[n * below :]
@@ -88,7 +88,7 @@ def factor(structure, jacobian, shift, factors):
             size = size_of(factors[at + d * (width - 1)])
             if size > best:
                 best, pivot = size, d
-        if here >= STAYS * best:
+        if here >= DIAGONAL_PIVOT * best:
             pivot, best = 0, here
         if not LEAST < best < 1.0 / LEAST:
             return order[k] + 1
@@ -112,7 +112,7 @@ def factor(structure, jacobian, shift, factors):
 
 def solve(structure, factors, x):
     """x <- (shift I - J)^-1 x."""
-    n, own = structure[SIZE], structure[structure[OWN] :]
+    n, own = structure[SIZE], structure[structure[SOLVER_DATA] :]
     below, width, order = own[BELOW], own[WIDTH], own[ORDER:]
     lower = factors[n * width :]
     pivots = lower[n * below :]

@@ -8,15 +8,17 @@ block is four numbers, row by row.
 import numpy as np
 
 from fvsolve.jit import njit
-from fvsolve.steppers.pairs import pairs
 from fvsolve.steppers.pivots import LEAST, bad_row, size_of
-from fvsolve.steppers.structure import OWN
+from fvsolve.steppers.state_pairs import pairs
+from fvsolve.steppers.structure import SOLVER_DATA
 
 # Data of this solver in the structure: number of blocks, then offsets from its start to these lists: the two states of
 # each reordered row; L and U by rows; the entries of J by rows: their places in the work row, and in the Jacobian.
 BLOCKS, ORDER, L_STARTS, L_COLUMNS, U_STARTS, U_COLUMNS, J_STARTS, J_PLACES, J_ENTRIES = range(9)
 PARTS = 9
-LOST = 1e-13  # least determinant of a diagonal block, relative to its value before elimination and to its two terms
+LEAST_DETERMINANT = (
+    1e-13  # least determinant of a diagonal block, relative to its value before elimination and to its two terms
+)
 
 
 def prepare(pattern) -> tuple[np.ndarray, int]:
@@ -128,7 +130,7 @@ def eliminate(starts, columns, l_starts, l_columns, u_starts, u_columns, chain):
 @njit(forceinline=True)
 def place(structure, index):
     """Offset of a list of this solver in the structure."""
-    return structure[OWN] + structure[structure[OWN] + index]
+    return structure[SOLVER_DATA] + structure[structure[SOLVER_DATA] + index]
 
 
 @njit(forceinline=True)
@@ -143,7 +145,7 @@ def factor(structure, jacobian, shift, factors):
     The pivot of a diagonal block is good if its determinant is at least 1e-13 of its value before elimination and of
     its two terms: a measure that does not depend on the units of states.
     """
-    count, order = structure[structure[OWN]], structure[place(structure, ORDER) :]
+    count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
     l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
     u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
     starts, places = structure[place(structure, J_STARTS) :], structure[place(structure, J_PLACES) :]
@@ -179,7 +181,10 @@ def factor(structure, jacobian, shift, factors):
         diagonal, cross = a * d, b * c
         det = diagonal - cross
         remaining = size_of(det)
-        if not (LEAST < remaining < 1.0 / LEAST and remaining > LOST * max(first, size_of(diagonal) + size_of(cross))):
+        if not (
+            LEAST < remaining < 1.0 / LEAST
+            and remaining > LEAST_DETERMINANT * max(first, size_of(diagonal) + size_of(cross))
+        ):
             return order[2 * i] + 1
         per = det.conjugate() / (det.real * det.real + det.imag * det.imag)
         y = inverse[4 * i : 4 * i + 4]
@@ -193,7 +198,7 @@ def factor(structure, jacobian, shift, factors):
 
 def solve(structure, factors, x):
     """x <- (shift I - J)^-1 x."""
-    count, order = structure[structure[OWN]], structure[place(structure, ORDER) :]
+    count, order = structure[structure[SOLVER_DATA]], structure[place(structure, ORDER) :]
     l_starts, l_columns = structure[place(structure, L_STARTS) :], structure[place(structure, L_COLUMNS) :]
     u_starts, u_columns = structure[place(structure, U_STARTS) :], structure[place(structure, U_COLUMNS) :]
     lower, upper = factors, factors[4 * l_starts[count] :]

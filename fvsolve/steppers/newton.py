@@ -17,71 +17,71 @@ import numpy as np
 
 from fvsolve.jit import inline
 from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.slots import (
+from fvsolve.steppers.loop_indices import (
     CALLS,
     CONTROL,
-    DAMPED,
+    CONVERGENCE_FACTOR,
+    DAMPED_STEP,
+    FACTOR_SIZE,
     FACTORS,
-    HAS,
+    HAS_JACOBIAN,
     HEADER,
+    INCREMENT_RATIO,
+    JACOBIAN_STEP,
     JACOBIANS,
-    KNOWN,
+    KNOWN_STEPS,
     LAST,
-    MADE,
     NEWTON,
     NEWTON_FAILED,
-    RATIO,
-    SEEN,
     SHIFT,
     SIZE,
+    STAGES_STEP,
     STEPS,
-    STORE,
-    SURE,
     TOLERANCE,
     WORST,
 )
-from fvsolve.steppers.step import copy, small
+from fvsolve.steppers.step_operations import copy, error_scale
 
 # Rows of `vectors` after the s stages of the last step: f at its start, an increment, weights, two rows for
 # differences, base of a stage (Rosenbrock: df/dt), fallback slope; then, for fully implicit methods, transformed
 # increments, f and residuals of all stages.
-FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, REACHED, STAGES = range(8)
+FIRST, INCREMENT, WEIGHTS, MOVED, RATE, BASE, FALLBACK, STAGES = range(8)
 
 MOST = 10  # greatest number of iterations
 # For given steps, relative: target accuracy, error that counts as rounding, and greatest error accepted.
 FIXED, ROUNDED, FLOOR = 1e-13, 1e-10, 1e-7
-ENOUGH = 0.05  # fraction of the tolerance at which Newton stops
+STOP_FRACTION = 0.05  # fraction of the tolerance at which Newton stops
 STALE = 0.03  # ratio of successive increments above which the Jacobian is renewed for the next step
 CONVERGED, FAILED = 0, 1
 MOST_DAMPED, LEAST_PART = 40, 1e-4  # greatest number of damped iterations, least damping factor
-LEAST_WAY = 1 / 64  # least fraction of a step over which `solve_stage_from_start` continues a stage
+LEAST_STAGE_PART = 1 / 64  # least fraction of a step over which `solve_stage_from_start` continues a stage
 
 
-def forget(work: np.ndarray) -> None:
+def reset(work: np.ndarray) -> None:
     """Discard the Jacobian and the earlier stages at a kink."""
-    work[:STORE] = 0.0
-    work[SEEN] = work[DAMPED] = -1.0
-    work[SURE] = 1.0
+    work[:FACTOR_SIZE] = 0.0
+    work[STAGES_STEP] = work[DAMPED_STEP] = -1.0
+    work[CONVERGENCE_FACTOR] = 1.0
 
 
 @inline
 def begin(k, y, scale, controls, loop_state, work, vectors):
     """Prepare the first attempt of a step: store the last stages for prediction, discard a slow Jacobian."""
     s, n = k.shape
-    if work[SEEN] == loop_state[STEPS]:
+    if work[STAGES_STEP] == loop_state[STEPS]:
         return
     tolerance = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
     weights, first, last = vectors[s + WEIGHTS], vectors[s + FIRST], vectors[0]
     for i in range(n):
-        weights[i] = 1.0 / (tolerance * small(scale[i], y[i]))
+        weights[i] = 1.0 / (tolerance * error_scale(scale[i], y[i]))
         last[i], first[i] = first[i], k[0, i]
     for j in range(1, s):
         copy(k[j], vectors[j])
-    follows = work[SEEN] == loop_state[STEPS] - 1.0 and loop_state[LAST] > 0.0
-    work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if follows else 0.0
-    if work[RATIO] > STALE:
-        work[HAS] = 0.0
-    work[SEEN], work[RATIO] = loop_state[STEPS], 0.0
+    follows = work[STAGES_STEP] == loop_state[STEPS] - 1.0 and loop_state[LAST] > 0.0
+    work[KNOWN_STEPS] = min(work[KNOWN_STEPS] + 1.0, 2.0) if follows else 0.0
+    if work[INCREMENT_RATIO] > STALE:
+        work[HAS_JACOBIAN] = 0.0
+    work[STAGES_STEP], work[INCREMENT_RATIO] = loop_state[STEPS], 0.0
 
 
 @inline
@@ -92,7 +92,7 @@ def renew(rhs, handle, structure, ledger_offset, t, y, f, ledger_rates, scale, o
     )
     loop_state[CALLS] += calls
     loop_state[JACOBIANS] += 1.0
-    work[HAS], work[MADE], work[SHIFT], work[RATIO] = 1.0, loop_state[STEPS], 0.0, 0.0
+    work[HAS_JACOBIAN], work[JACOBIAN_STEP], work[SHIFT], work[INCREMENT_RATIO] = 1.0, loop_state[STEPS], 0.0, 0.0
 
 
 @inline
@@ -122,7 +122,7 @@ def size_of(d, weights):
 
 
 @inline
-def along(d, other, weights):
+def next_increment(d, other, weights):
     """(<d, other> / <d, d>, |other|^2 / |d|^2): component along d and squared length of the next increment."""
     square = dot = size = 0.0
     for i in range(weights.size):
@@ -134,7 +134,7 @@ def along(d, other, weights):
 
 
 @inline
-def shortened(part, ahead, size):
+def damping_factor(part, ahead, size):
     """Damping factor of an increment after a trial with `part`; `part` itself if the trial is accepted.
 
     ahead, size : component along the increment and squared length of the next increment with the same factors, relative
@@ -151,22 +151,22 @@ def shortened(part, ahead, size):
 
 
 @inline
-def goal(controls):
+def stop_limits(controls):
     """(increment at which Newton may stop, increment that counts as rounding), in units of the tolerance."""
     if controls[CONTROL] == TOLERANCE:
-        enough = max(1e-15 / controls[SIZE], ENOUGH)
+        enough = max(1e-15 / controls[SIZE], STOP_FRACTION)
         return enough, enough
     return 1.0, ROUNDED / FIXED
 
 
 @inline
-def tight(controls):
+def damped_limits(controls):
     """(increment to stop at, increment that counts as rounding, greatest increment accepted) of damped Newton.
 
     In units of the tolerance. The accuracy is that of given steps, because f amplifies the Newton residual.
     """
     unit = controls[SIZE] if controls[CONTROL] == TOLERANCE else FIXED
-    floor = goal(controls)[1] if controls[CONTROL] == TOLERANCE else FLOOR / unit
+    floor = stop_limits(controls)[1] if controls[CONTROL] == TOLERANCE else FLOOR / unit
     return FIXED / unit, min(ROUNDED / unit, floor), floor
 
 
@@ -181,26 +181,26 @@ def find_worst(d, f, weights, loop_state):
 
 
 @inline
-def verdict(turn, size, before, controls, work):
+def convergence(turn, size, before, controls, work):
     """(True to stop, CONVERGED or FAILED) after iteration `turn`; size, before : norms of this and last increment."""
-    enough, rounded = goal(controls)
+    enough, rounded = stop_limits(controls)
     if not size < np.inf:
         return True, FAILED
     if turn > 0:
         ratio = size / before if before > 0.0 else 0.0
-        work[RATIO] = max(work[RATIO], ratio)
+        work[INCREMENT_RATIO] = max(work[INCREMENT_RATIO], ratio)
         if ratio >= 0.3 and size <= rounded:
             return True, CONVERGED
         if ratio >= 0.99:
             return True, FAILED
-        work[SURE] = ratio / (1.0 - ratio)
-        if work[SURE] * size * ratio ** (MOST - 1 - turn) > rounded:
+        work[CONVERGENCE_FACTOR] = ratio / (1.0 - ratio)
+        if work[CONVERGENCE_FACTOR] * size * ratio ** (MOST - 1 - turn) > rounded:
             return True, FAILED
     else:
-        work[SURE] = max(work[SURE], 1e-4) ** 0.8
-    if work[SURE] * size <= enough:
+        work[CONVERGENCE_FACTOR] = max(work[CONVERGENCE_FACTOR], 1e-4) ** 0.8
+    if work[CONVERGENCE_FACTOR] * size <= enough:
         return True, CONVERGED
-    return turn == MOST - 1, CONVERGED if turn > 0 and work[SURE] * size <= rounded else FAILED
+    return turn == MOST - 1, CONVERGED if turn > 0 and work[CONVERGENCE_FACTOR] * size <= rounded else FAILED
 
 
 @inline
@@ -225,7 +225,7 @@ def evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, res
 
 
 @inline
-def damp(
+def damped_newton(
     rhs, factor, solve, handle, structure, t, h_gamma, i, k, y_stage, ledger_rates, ledger_offset, out, scale, controls,
     loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
@@ -236,7 +236,7 @@ def damp(
     s, n = k.shape
     base, d, f, weights = vectors[s + BASE], vectors[s + INCREMENT], vectors[s + RATE], vectors[s + WEIGHTS]
     other, shift, ki = vectors[s + MOVED], 1.0 / h_gamma, k[i]
-    enough, rounded, floor = tight(controls)
+    enough, rounded, floor = damped_limits(controls)
     before = np.inf
     evaluate(rhs, handle, t, h_gamma, base, ki, y_stage, f, out, loop_state, d)
     for turn in range(MOST_DAMPED):
@@ -276,25 +276,25 @@ def damp(
                 tried = part
                 break
             solve(structure, factors, other)
-            ahead, length = along(d, other, weights)
-            tried, part = part, shortened(part, ahead, length)
+            ahead, length = next_increment(d, other, weights)
+            tried, part = part, damping_factor(part, ahead, length)
         if part != tried and size <= floor and length < np.inf:  # rounding, or a kink between the iterates
             done = True
         if done:
             for j in range(n):
                 ki[j] += shift * (1.0 - tried) * d[j]
             book_increment(structure, nnz, d, ledger_rates, i, work)
-            work[DAMPED], work[RATIO], work[SURE] = loop_state[STEPS], 1.0, 1.0
+            work[DAMPED_STEP], work[INCREMENT_RATIO], work[CONVERGENCE_FACTOR] = loop_state[STEPS], 1.0, 1.0
             return CONVERGED
         if part != tried or not size < np.inf:
             break
     find_worst(d, f, weights, loop_state)
-    work[HAS] = 0.0
+    work[HAS_JACOBIAN] = 0.0
     return FAILED
 
 
 @inline
-def reach(
+def solve_stage_from_start(
     rhs, factor, solve, handle, structure, t, h_gamma, i, k, y, y_stage, ledger_rates, ledger_offset, out, scale,
     controls, loop_state, nnz, work, vectors, factors,
 ):  # fmt: skip
@@ -303,15 +303,15 @@ def reach(
     Where the first try of a given step fails, the iteration starts from the state y, and then by continuation in
     h gamma from a step of zero length. Under error control a shorter step is cheaper.
     """
-    base, reached, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + REACHED], k[i]
+    base, reached, ki = vectors[k.shape[0] + BASE], vectors[k.shape[0] + FALLBACK], k[i]
     done, part, turn, worst = 0.0, 1.0, 0, loop_state[WORST]  # WORST keeps the result of simplified Newton
-    while part >= LEAST_WAY:
+    while part >= LEAST_STAGE_PART:
         if turn == 1:
             for j in range(ki.size):
                 ki[j] = (y[j] - base[j]) / h_gamma
         elif turn > 1:
             copy(reached, ki)
-        status = damp(
+        status = damped_newton(
             rhs, factor, solve, handle, structure, t, h_gamma * (done + part), i, k, y_stage, ledger_rates,
             ledger_offset, out, scale, controls, loop_state, nnz, work, vectors, factors,
         )  # fmt: skip
@@ -361,7 +361,7 @@ def smoothed_error(
         f,
     )
     loop_state[FACTORS] += 1.0
-    work[RATIO] = 1.0
+    work[INCREMENT_RATIO] = 1.0
     if factor(structure, work[HEADER:], shift, factors) != 0:
         return NEWTON_FAILED
     for i in range(n):

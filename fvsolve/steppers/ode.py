@@ -14,10 +14,10 @@ from numba import objmode
 
 from fvsolve.errors import FvsolveError
 from fvsolve.jit import COMPILING, DeclaredFunction, code_of, compile_once
-from fvsolve.steppers import automatic, slots
-from fvsolve.steppers.methods import AUTO
-from fvsolve.steppers.signatures import EVENTS, LEAP, OBSERVE, RHS, kinds_of
-from fvsolve.steppers.stepper import Stepper
+from fvsolve.steppers import automatic, loop_indices
+from fvsolve.steppers.built_in_methods import AUTO
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.signatures import EVENTS, FUSED_STEP, OBSERVE, RHS, argument_types
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, Method, method_named
 from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
@@ -57,51 +57,51 @@ def integrate(
     _check(method, t, rtol, step)
     size = step if step is not None else (1e-6 if rtol is None else rtol)
     scale = np.ones(y0.size) if atol is None or step is not None else _scale(atol, size, y0.size)
-    stepper = Stepper(method, y0.size, 0, lambda: _full(y0.size), scale)
-    controls, loop_state = stepper.orders, stepper.memory
-    stepper.y[0], loop_state[slots.T] = y0, t[0]
-    controls[slots.CONTROL] = slots.FIXED_STEP if step is not None else slots.TOLERANCE
-    controls[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
+    stepper = Integrator(method, y0.size, 0, lambda: _full(y0.size), scale)
+    controls, loop_state = stepper.controls, stepper.loop_state
+    stepper.y[0], loop_state[loop_indices.T] = y0, t[0]
+    controls[loop_indices.CONTROL] = loop_indices.FIXED_STEP if step is not None else loop_indices.TOLERANCE
+    controls[[loop_indices.SIZE, loop_indices.STEP_MAX, loop_indices.STOP_AT]] = size, NO_LIMIT, NO_LIMIT
     if automatic_choice:
         automatic.watch(stepper, _full(y0.size))
     key = next(_KEYS)
-    functions, _PYTHON[key] = _prepared(f, t[0], y0)
+    functions, _PYTHON[key] = _prepare(f, t[0], y0)
     try:
-        states = _stepped(stepper, functions, key, t, y0)
+        states = _solve_steps(stepper, functions, key, t, y0)
     finally:
-        _PYTHON.pop(key), _RAISED.pop(key, None)
+        _PYTHON.pop(key), _EXCEPTIONS.pop(key, None)
     if counts is not None:
         counts |= stepper.counts()
     return states
 
 
-def _stepped(stepper: Stepper, functions: tuple, key: int, t, y0) -> np.ndarray:
+def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.ndarray:
     """States at t : float64[len(t), n]."""
-    controls, loop_state, progress = stepper.orders, stepper.memory, stepper.flags
+    controls, loop_state, progress = stepper.controls, stepper.loop_state, stepper.progress
     stepper.times, stepper.rows = np.ascontiguousarray(t[1:]), np.zeros((t.size, y0.size + 1))
     states = np.empty((t.size, y0.size))
     states[0] = y0
-    controls[slots.END] = t[-1]
-    progress[slots.PHASE], progress[slots.BEHIND] = slots.FRESH, 0
-    code = slots.CHUNK
-    while code == slots.CHUNK:
+    controls[loop_indices.END] = t[-1]
+    progress[loop_indices.PHASE], progress[loop_indices.HAS_LAST_STEP] = loop_indices.FRESH, 0
+    code = loop_indices.BUDGET_SPENT
+    while code == loop_indices.BUDGET_SPENT:
         if automatic.wants_change(stepper):
             automatic.change(stepper)
-        controls[slots.BUDGET] = NO_LIMIT
-        code = stepper.call(*functions, np.array([key]), WHERE, stepper.none)
-    if code != slots.DONE:
-        raise FvsolveError(_failure(stepper.method, code, loop_state)) from _RAISED.get(key)
-    states[1:-1], states[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[progress[slots.NOW]]
+        controls[loop_indices.BUDGET] = NO_LIMIT
+        code = stepper.call(*functions, np.array([key]), WHERE, stepper.no_floats)
+    if code != loop_indices.DONE:
+        raise FvsolveError(_failure(stepper.method, code, loop_state)) from _EXCEPTIONS.get(key)
+    states[1:-1], states[-1] = stepper.rows[: t.size - 2, 1:], stepper.y[progress[loop_indices.NOW]]
     return states
 
 
-def _prepared(f, t0, y0) -> tuple:
+def _prepare(f, t0, y0) -> tuple:
     """(functions of the time loop for f, f(t, y, dydt) as Python function), cached if f is a compiled function.
 
     A plain function is not cached: its global variables may change between two calls, unseen by compiled code.
     """
     if f not in _COMPILED:
-        _try_out(f, t0, y0)
+        _check_rates(f, t0, y0)
         functions = _functions(f, t0, y0), f if in_place(f) else lambda t, y, dydt: np.copyto(dydt, f(t, y))
         if not hasattr(f, "py_func"):
             return functions
@@ -115,9 +115,12 @@ def _full(n):
 
 
 def _failure(method, code, loop_state) -> str:
-    when = f"{method.name} stopped at t = {loop_state[slots.T]:.6g}: "
-    if code == slots.NEWTON_STUCK:
-        return when + f"Newton did not converge, worst in y[{int(loop_state[slots.WORST])}]; try another rtol or method"
+    when = f"{method.name} stopped at t = {loop_state[loop_indices.T]:.6g}: "
+    if code == loop_indices.NEWTON_STUCK:
+        return (
+            when
+            + f"Newton did not converge, worst in y[{int(loop_state[loop_indices.WORST])}]; try another rtol or method"
+        )
     return when + "the solution is not finite or the step became too small; try a smaller step or a larger rtol"
 
 
@@ -138,7 +141,7 @@ def _scale(atol, rtol: float, n: int) -> np.ndarray:
     return np.broadcast_to(atol / rtol, n).copy()
 
 
-def _try_out(f, t, y0) -> None:
+def _check_rates(f, t, y0) -> None:
     """Call f once and check the number of its values, because compiled code does not check it."""
     if not in_place(f):
         given = f(t, y0.copy())
@@ -168,7 +171,7 @@ def _check(method, t, rtol, step) -> None:
 _COMPILED: dict[Callable, tuple] = {}  # results of `_prepare` for functions that are already compiled
 _KEYS = itertools.count()  # keys of the next two dicts, one for each call: threads may integrate at the same time
 _PYTHON: dict[int, Callable] = {}  # Python functions, by the number in their handle
-_RAISED: dict[int, BaseException] = {}  # exceptions that they raised
+_EXCEPTIONS: dict[int, BaseException] = {}  # exceptions that they raised
 WHERE = 3  # ledger offset in `out`: no ledger follows
 
 
@@ -184,7 +187,7 @@ def _python(t, y, dydt, key):
     try:
         _PYTHON[key](t, y, dydt)
     except BaseException as error:
-        _RAISED[key] = error
+        _EXCEPTIONS[key] = error
         dydt[:] = np.nan
 
 
@@ -221,21 +224,21 @@ def _functions(f, t0, y0):
                 _python(t, y, dydt, int(handle[0]))
 
         return _no_leap, _row, _nothing, _no_events, plain
-    return *watchers(), _taken(numba.njit(_rhs(f, t0, y0)), RHS)
+    return *observers(), _compile(numba.njit(_rhs(f, t0, y0)), RHS)
 
 
-def _taken(function, letters: str) -> DeclaredFunction:
+def _compile(function, letters: str) -> DeclaredFunction:
     """Compile a numba function for arguments of these types, in the form that the loop calls."""
-    kinds = kinds_of(letters)
+    kinds = argument_types(letters)
     function.compile(kinds)
     return DeclaredFunction(function, letters, code_of(function.overloads[kinds]))
 
 
 @compile_once
-def watchers() -> tuple:
+def observers() -> tuple:
     """(fused step, observe, record, events) of a system without events, whose rows are its states."""
-    functions = (_no_leap, LEAP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
-    return tuple(_taken(numba.njit(function), letters) for function, letters in functions)
+    functions = (_no_leap, FUSED_STEP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
+    return tuple(_compile(numba.njit(function), letters) for function, letters in functions)
 
 
 def _rhs(f, t0, y0):

@@ -9,26 +9,26 @@ from __future__ import annotations
 from fvsolve.jit import inline, njit
 from fvsolve.steppers.coefficients import error_of, nodes_of, row_of, weights_of
 from fvsolve.steppers.differences import multiply
-from fvsolve.steppers.newton import BASE, INCREMENT, MOVED, RATE, renew, spectral_radius
-from fvsolve.steppers.slots import (
+from fvsolve.steppers.loop_indices import (
     CALLS,
     CONTROL,
     FACTORS,
-    HAS,
+    HAS_JACOBIAN,
     HEADER,
-    KNOWN,
+    KNOWN_STEPS,
     LAST,
     NEWTON_FAILED,
     RADIUS,
-    SEEN,
     SHIFT,
     SIZE,
+    STAGES_STEP,
     STEPS,
     TOLERANCE,
     WATCH,
     WORST,
 )
-from fvsolve.steppers.step import combine, copy, error_norm
+from fvsolve.steppers.newton import BASE, INCREMENT, MOVED, RATE, renew, spectral_radius
+from fvsolve.steppers.step_operations import combine, copy, error_norm
 from fvsolve.steppers.structure import SIZE as STATES
 from fvsolve.steppers.structure import STARTS
 
@@ -79,16 +79,16 @@ def attempt(
     ledgers, nnz = ledger_rates.shape[1], structure[structure[STARTS] + structure[STATES]]
     c, extra = nodes_of(coefficients, s), coefficients[s * s + 3 * s :]  # C, d, g
     gamma, slope, d, f = extra[s * s + s], vectors[s + SLOPE], vectors[s + INCREMENT], vectors[s + RATE]
-    if work[HAS] == 0.0 or work[SEEN] != loop_state[STEPS]:
+    if work[HAS_JACOBIAN] == 0.0 or work[STAGES_STEP] != loop_state[STEPS]:
         renew(
             rhs, handle, structure, ledger_offset, t, y[now], k[0], ledger_rates[0], scale, out, loop_state, work,
             vectors[s + MOVED], vectors[s + RATE],
         )  # fmt: skip
         slope_in_time(rhs, handle, t, h, y[now], k, ledger_rates, ledger_offset, out, loop_state, work, vectors)
-        if work[SEEN] != loop_state[STEPS]:
-            follows = work[SEEN] == loop_state[STEPS] - 1.0 and loop_state[LAST] > 0.0
-            work[KNOWN] = min(work[KNOWN] + 1.0, 2.0) if follows else 0.0
-        work[SEEN] = loop_state[STEPS]
+        if work[STAGES_STEP] != loop_state[STEPS]:
+            follows = work[STAGES_STEP] == loop_state[STEPS] - 1.0 and loop_state[LAST] > 0.0
+            work[KNOWN_STEPS] = min(work[KNOWN_STEPS] + 1.0, 2.0) if follows else 0.0
+        work[STAGES_STEP] = loop_state[STEPS]
         if controls[WATCH] != 0.0:
             loop_state[RADIUS] = spectral_radius(structure, work, nnz, scale, vectors[s + INCREMENT])
     shift = 1.0 / (h * gamma)

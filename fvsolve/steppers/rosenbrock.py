@@ -13,7 +13,7 @@ from fractions import Fraction
 import numpy as np
 
 from fvsolve.steppers.analysis.trees import Conditions
-from fvsolve.steppers.tableau import METHODS, OWN, Array, Method
+from fvsolve.steppers.tableau import BUILT_IN, METHODS, Array, Method
 
 DIGITS = 14  # accurate digits of the printed numbers after the inversion of Gamma
 
@@ -132,7 +132,7 @@ def _product(x, y):
 
 
 def declare(name: str, text: str, source: str, gamma: str) -> None:
-    OWN.add(name)
+    BUILT_IN.add(name)
     METHODS[name] = Rosenbrock(name, source, text, given_digits=DIGITS, gamma=gamma)
 
 

@@ -9,12 +9,12 @@ state does not change, so steady states are those of f + G y for any h. R >= r m
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import damp_in_turn
 from fvsolve.steppers.coefficients import nodes_of, row_of, weights_of
-from fvsolve.steppers.slots import CALLS
-from fvsolve.steppers.step import BEGIN, STOP, combine, copy
+from fvsolve.steppers.loop_indices import CALLS
+from fvsolve.steppers.step_operations import BEGIN, STOP, combine, copy
 
 
 @njit
-def settle(begin, end, b, damping, k):
+def second_order_correction(begin, end, b, damping, k):
     """Correct k of the last stage so that y + h sum b_j k_j, for states [begin:end], is second order in h.
 
     The correction is an Euler step of length h (h R) from there, implicit in G, with f + G y of the stage at the end,
@@ -55,7 +55,7 @@ def attempt(
         damp_in_turn(h, y[3], k[i], factors[:n] if i == 2 else factors[n:], handle)
     for m in range(row_blocks.shape[0]):
         if s > 2:
-            settle(row_blocks[m, BEGIN], row_blocks[m, STOP], b, factors[:n], k)
+            second_order_correction(row_blocks[m, BEGIN], row_blocks[m, STOP], b, factors[:n], k)
         combine(row_blocks[m, BEGIN], row_blocks[m, STOP], y[now], h, b, s, k, y[new])
     loop_state[CALLS] += s - 2.0
     return 0.0

@@ -13,7 +13,7 @@ from fvsolve.jit import COMPILING, Intrinsic, declare_function, njit, plain_kind
 
 FACTOR, SOLVE, FACTOR_COMPLEX, SOLVE_COMPLEX = "hvtv", "hvv", "hvcz", "hzz"
 ATTEMPT = "hvhsvttwiiwwivvvvvwvz"  # arguments of a step, after its functions
-LEAP, OBSERVE, EVENTS, RHS, JOIN = "ttvvvhv", "tvvhv", "tvhv", "tvvvh", "vsh"
+FUSED_STEP, OBSERVE, EVENTS, RHS, JOIN = "ttvvvhv", "tvvhv", "tvhv", "tvvvh", "vsh"
 
 
 @functools.cache
@@ -22,17 +22,17 @@ def function_types():
     from numba import types
 
     def of(letters, returned=types.void):
-        return types.FunctionType(returned(*kinds_of(letters)))
+        return types.FunctionType(returned(*argument_types(letters)))
 
     algebra = (
         of(FACTOR, types.int64), of(SOLVE),
         of(FACTOR_COMPLEX, types.int64), of(SOLVE_COMPLEX),
     )  # fmt: skip
-    attempt = types.FunctionType(types.float64(of(RHS), *algebra, of(JOIN), *kinds_of(ATTEMPT)))
-    return attempt, of(LEAP), of(OBSERVE), of(OBSERVE), of(EVENTS), of(RHS), *algebra, of(JOIN)
+    attempt = types.FunctionType(types.float64(of(RHS), *algebra, of(JOIN), *argument_types(ATTEMPT)))
+    return attempt, of(FUSED_STEP), of(OBSERVE), of(OBSERVE), of(EVENTS), of(RHS), *algebra, of(JOIN)
 
 
-def kinds_of(letters: str) -> tuple:
+def argument_types(letters: str) -> tuple:
     """Numba types of the arguments; F stands for the functions that a step takes."""
     kinds = plain_kinds()
     return tuple(kind for letter in letters for kind in (function_types()[5:] if letter == "F" else (kinds[letter],)))
@@ -40,7 +40,7 @@ def kinds_of(letters: str) -> tuple:
 
 if COMPILING:
 
-    def taken(index: int):
+    def function_from_address(index: int):
         """Intrinsic that turns an address into a callable of type `index` in `function_types`."""
 
         @Intrinsic
@@ -59,8 +59,8 @@ if COMPILING:
 
         return function_at
 
-    attempt_at, leap_at, observe_at, record_at, events_at, rhs_at = map(taken, range(6))
-    factor_at, solve_at, factor_complex_at, solve_complex_at, join_at = map(taken, range(6, 11))
+    attempt_at, fused_step_at, observe_at, record_at, events_at, rhs_at = map(function_from_address, range(6))
+    factor_at, solve_at, factor_complex_at, solve_complex_at, join_at = map(function_from_address, range(6, 11))
 
 
 def addresses(functions: tuple):
@@ -84,19 +84,19 @@ def no_algebra():
     return tuple(compiled_as(njit(f), kinds) for f, kinds in zip((no_factor, no_solve) * 2, letters, strict=True))
 
 
-def alone(sums, row_blocks, handle):
+def single_band(sums, row_blocks, handle):
     """Do nothing, in place of an exchange between bands, for a single band."""
 
 
 @functools.cache
-def no_joint():
+def no_exchange():
     """Compiled exchange for a single band."""
-    return compiled_as(njit(alone), JOIN)
+    return compiled_as(njit(single_band), JOIN)
 
 
 def compiled_as(function, letters: str):
     """Compile a function for arguments of these types only, in the form that the loop calls."""
-    return declare_function(function, letters, kinds_of)
+    return declare_function(function, letters, argument_types)
 
 
 def compiled_step(attempt):

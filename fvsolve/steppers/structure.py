@@ -20,12 +20,12 @@ from fvsolve.steppers.signatures import FACTOR, FACTOR_COMPLEX, SOLVE, SOLVE_COM
 # The header: lengths, then offsets into the same array.
 SIZE, LEDGERS, COLORS = 0, 1, 2  # states n, ledger rows m, colours
 STARTS, ROWS, COLOR_STARTS, COLOR_COLUMNS = 3, 4, 5, 6  # pattern by columns; columns by colour
-FINE, OWN = 7, 8  # 1 for columns with a fine increment; data of the kind of factorisation
+FINE, SOLVER_DATA = 7, 8  # 1 for columns with a fine increment; data of the kind of factorisation
 HEADER = 9
 
 KINDS = ("dense", "banded", "sparse")
 SMALL = 16  # number of states up to which dense factors are as quick as others (0.2 to 0.6 us), without setup
-CROWDED = 0.2  # fraction of non-zero entries from which factors fill up, so that dense factors are quicker
+DENSE_SHARE = 0.2  # fraction of non-zero entries from which factors fill up, so that dense factors are quicker
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ def choose(pattern) -> str:
     factors find no pivot.
     """
     n = pattern.shape[1]
-    return "dense" if n <= SMALL or pattern[:n].nnz >= CROWDED * n * n else "sparse"
+    return "dense" if n <= SMALL or pattern[:n].nnz >= DENSE_SHARE * n * n else "sparse"
 
 
 def kind_module(kind: str):

@@ -14,14 +14,14 @@ import numpy as np
 from fvsolve.errors import FvsolveError, nearest
 from fvsolve.steppers.analysis.trees import Conditions, stage_order
 from fvsolve.steppers.collocation import collocation, extrapolated
-from fvsolve.steppers.numbers.algebraic import MIXED, Algebraic
+from fvsolve.steppers.numbers.algebraic import MIXED_ROOTS, Algebraic
 from fvsolve.steppers.numbers.expression import digits, root, value_of
 from fvsolve.units import show
 from fvsolve.validation import COUNT, ROW, TABLE, TEXT, validated
 
 METHODS: dict[str, Method] = {}  # some methods have two names: `gauss-2` is `implicit-midpoint`
 LARGEST = 10**30  # greatest size of an entry
-OWN: set[str] = set()  # names of built-in methods, not available for user methods
+BUILT_IN: set[str] = set()  # names of built-in methods, not available for user methods
 EXACT_DECIMALS = 6  # decimals with at most this many digits are exact
 
 
@@ -182,7 +182,7 @@ def tableau(
     digits : significant digits of the entries; default: decimals of more than six digits are rounded, others exact
     Raises FvsolveError with all faults: rows of wrong length, rows that do not add up to c, invalid entries.
     """
-    if name in OWN or name == "auto" or not name.strip() or name != name.strip():
+    if name in BUILT_IN or name == "auto" or not name.strip() or name != name.strip():
         raise FvsolveError(f'method name "{name}" is not free: it is empty, has blanks at an end or names a built-in '
                            "method. Choose another name")  # fmt: skip
     if b is not None:
@@ -208,7 +208,7 @@ def method_of_file(path: Path) -> Method:
     except (OSError, UnicodeDecodeError) as error:
         raise FvsolveError(f"{path} cannot be read as a tableau: {error}") from None
     source, existing = str(path.resolve()), METHODS.get(path.stem)
-    if existing is not None and path.stem not in OWN and existing.source != source and existing.text != text:
+    if existing is not None and path.stem not in BUILT_IN and existing.source != source and existing.text != text:
         raise FvsolveError(f'{path}: "{path.stem}" is another method already, from {existing.source}; rename the file')
     try:
         return tableau(path.stem, text, source=source)
@@ -248,10 +248,10 @@ def declare(
 ) -> Method:  # fmt: skip
     """Declare a built-in method, whose text is read on first use; `also` is its second name, within a family."""
     method = METHODS[name] = Method(name, source, text, numbers or {}, dense, start_weight, digits)
-    OWN.add(name)
+    BUILT_IN.add(name)
     if also:
         METHODS[also] = method
-        OWN.add(also)
+        BUILT_IN.add(also)
     return method
 
 
@@ -277,14 +277,14 @@ def _exact(method: Method) -> Array:
         except ValueError as error:
             faults.append(f"{name}: {error}")
     if faults:
-        raise FvsolveError(_said(method.name, faults))
+        raise FvsolveError(_message(method.name, faults))
     head, weights = _rows(method.text, numbers, faults)
     if not faults:
-        faults += _mixed([*head, *weights]) or _faults(head, weights, method.rounding)
+        faults += _mixed_roots([*head, *weights]) or _faults(head, weights, method.rounding)
     if not faults and method.start_weight is not None and len(weights) == 2:
         faults.append("a second row of weights and start_weight both define the embedded solution; keep one of them")
     if faults:
-        raise FvsolveError(_said(method.name, faults))
+        raise FvsolveError(_message(method.name, faults))
     s = len(head)
     c, b = tuple(row[0] for row in head), tuple(weights[0])
     a = tuple(tuple(row[1:] + [Fraction(0)] * (s - len(row) + 1)) for row in head)
@@ -321,9 +321,9 @@ def _rows(text: str, numbers: Mapping, faults: list[str]) -> tuple[list, list]:
     return head, weights
 
 
-def _mixed(rows: list) -> list[str]:
+def _mixed_roots(rows: list) -> list[str]:
     fields = {x.field.name for row in rows for x in row if isinstance(x, Algebraic)}
-    return [MIXED.format(" and ".join(sorted(fields)))] if len(fields) > 1 else []
+    return [MIXED_ROOTS.format(" and ".join(sorted(fields)))] if len(fields) > 1 else []
 
 
 def _faults(head: list, weights: list, rounding: Fraction) -> list[str]:
@@ -357,7 +357,7 @@ def _show(value) -> str:
     return text if len(text) <= 24 else f"{float(value):.17g}"
 
 
-def _said(name: str, faults: list[str]) -> str:
+def _message(name: str, faults: list[str]) -> str:
     return f"{name}: {faults[0]}" if len(faults) == 1 else "\n  ".join([f"{name}: {len(faults)} faults", *faults])
 
 

@@ -15,7 +15,7 @@ from fvsolve.errors import RunError
 from fvsolve.output.lock import let_go, locked
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import plain
-from fvsolve.steppers.tableau import METHODS, OWN
+from fvsolve.steppers.tableau import BUILT_IN, METHODS
 from fvsolve.validation import PATH, Kind
 
 
@@ -122,7 +122,7 @@ def hashed(who: dict) -> str:
     """Hash of everything that a point depends on, with the sources of fvsolve, plugins and user-defined methods."""
     who = who | {"package": package_hash(), "outside": sorted(jit.EXTRA_FOLDERS.values())}
     text = json.dumps(who, sort_keys=True, default=str)
-    arrays = [method.text for name, method in METHODS.items() if name not in OWN and f'"{name}"' in text]
+    arrays = [method.text for name, method in METHODS.items() if name not in BUILT_IN and f'"{name}"' in text]
     return hashlib.sha256("\n".join([text, *arrays]).encode()).hexdigest()[:24]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from fvsolve.case import Case
 from fvsolve.case.load import named
 from fvsolve.case.raw import Raw, read_raw
-from fvsolve.steppers.tableau import METHODS, OWN
+from fvsolve.steppers.tableau import BUILT_IN, METHODS
 
 
 class Sent:
@@ -21,7 +21,7 @@ class Sent:
         if isinstance(raw, Case):
             raw = Raw(raw.raw, raw.name, raw.path, raw.folder)
         source = raw if isinstance(raw, Raw) else read_raw(named(raw))
-        return {"source": source, "methods": {name: method for name, method in METHODS.items() if name not in OWN}}
+        return {"source": source, "methods": {name: method for name, method in METHODS.items() if name not in BUILT_IN}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         METHODS.update(state["methods"])

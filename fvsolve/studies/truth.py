@@ -15,7 +15,7 @@ import numpy as np
 
 from fvsolve import exact as room
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.built_in_methods import METHODS
 from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, in_cells, keys, scaled, total
 from fvsolve.studies.accuracy.plane import contents, lowered
 from fvsolve.studies.accuracy.timing import finished, lasting, tasted

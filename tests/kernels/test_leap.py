@@ -14,7 +14,7 @@ from fvsolve.case import load
 from fvsolve.model import build
 from fvsolve.steppers.tableau import method_named
 
-LOOP, SOLVE = import_module("fvsolve.solve.loop"), import_module("fvsolve.solve.solve")
+LOOP, SOLVE = import_module("fvsolve.solve.run_loop"), import_module("fvsolve.solve.solve")
 RUBBED = {"friction": {"model": "steady", "factor": 0.018}}
 CLOCK = ("ended", "seconds", "seconds_setup", "seconds_total", "cost")
 
@@ -36,7 +36,7 @@ def fork(end=4.0, every=0.05, fields=3, **numerics) -> dict:
 
 
 def step_by_step(monkeypatch) -> None:
-    monkeypatch.setattr(LOOP, "leap_allowed", lambda model, method: False)
+    monkeypatch.setattr(LOOP, "fused_step_allowed", lambda model, method: False)
 
 
 def assert_same(one, other) -> None:
@@ -102,7 +102,7 @@ def test_a_run_interrupted_and_resumed_is_the_unbroken_one_of_the_general_path(t
 )
 def test_only_upwind_and_euler_leap_and_only_pipes(case, allowed):
     model = build(load(case))
-    assert LOOP.leap_allowed(model, method_named(model.case.numerics.method)) is allowed
+    assert LOOP.fused_step_allowed(model, method_named(model.case.numerics.method)) is allowed
 
 
 def test_scenes_with_events_are_stepped_one_by_one_and_end():
@@ -111,4 +111,4 @@ def test_scenes_with_events_are_stepped_one_by_one_and_end():
     case = CASES / "relief-on-closed-main.toml"
     result = fvsolve.run(case, set=plain)
     assert result.ok and result.summary["events"]
-    assert not LOOP.leap_allowed(build(load(case, plain)), method_named("euler"))
+    assert not LOOP.fused_step_allowed(build(load(case, plain)), method_named("euler"))

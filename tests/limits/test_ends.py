@@ -9,11 +9,11 @@ import pytest
 from reference.scenes import NO_FRICTION, junction, lake, pipe, scene
 
 import fvsolve
-from fvsolve.limits.ends import pipe_limit
-from fvsolve.limits.grid import advection_limit
-from fvsolve.limits.step import step_limits
-from fvsolve.limits.symbol import WEIGHTS
 from fvsolve.schemes import SCHEMES, end_rate_factor
+from fvsolve.step_limits.advection_limit import advection_limit
+from fvsolve.step_limits.pipe_end_growth import pipe_limit
+from fvsolve.step_limits.step_notices import step_limits
+from fvsolve.step_limits.symbol import WEIGHTS
 
 STAGES = {"ssp-rk3": 3, "rk4": 4}
 LENGTH, SPEED = 100.0, 1000.0

@@ -16,9 +16,9 @@ from reference import folders
 
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
-from fvsolve.limits.boxes import negative_point, value
-from fvsolve.limits.grid import advection_limit, advection_limits, growth_of, limit_of
-from fvsolve.limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
+from fvsolve.step_limits.advection_limit import advection_limit, advection_limits, growth_of, limit_of
+from fvsolve.step_limits.polynomial_sign import negative_point, polynomial_value
+from fvsolve.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
 from fvsolve.steppers import METHODS, analyse, method_named
 from fvsolve.steppers.tableau import tableau
 
@@ -236,7 +236,7 @@ def test_a_point_that_is_found_is_negative_and_where_none_is_there_is_none(g, li
     g[0][0] += lift
     found = negative_point(g, Fraction(0), Fraction(2))
     if isinstance(found, tuple):
-        assert value(g, *found) < 0
+        assert polynomial_value(g, *found) < 0
     elif found is None:
         x, y = np.meshgrid(np.linspace(0, 2, 81), np.linspace(0, 1, 81), indexing="ij")
         assert np.polynomial.polynomial.polyval2d(x, y, np.array(g, float)).min() > -1e-9

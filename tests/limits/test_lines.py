@@ -7,16 +7,16 @@ import pytest
 from model.test_delay_lines import vessel
 
 import fvsolve
-from fvsolve.limits.lines import ANGLES, given_back, read
 from fvsolve.output.memory import MemorySink
 from fvsolve.solve.solve import Run
+from fvsolve.step_limits.delay_line_growth import ANGLES, interpolation_factor, reflection_factor
 from fvsolve.steppers.tableau import method_named
 
 
 def test_the_trapezoidal_rule_gives_back_what_comes():
     """By hand: S = (a cos(theta / 2) - 2 i sin(theta / 2)) / (a cos(theta / 2) + 2 i sin(theta / 2))."""
     for a in (0.1, 1.0, 7.0):
-        found = given_back(method_named("trapezoid"), a, 5.0) / read(5.0)
+        found = reflection_factor(method_named("trapezoid"), a, 5.0) / interpolation_factor(5.0)
         c, s = a * np.cos(0.5 * ANGLES), 2j * np.sin(0.5 * ANGLES)
         assert found == pytest.approx((c - s) / (c + s), abs=1e-12)
 
@@ -26,13 +26,13 @@ def test_euler_gives_back_more_at_every_angle():
     for a in (0.1, 0.7):
         z = np.exp(1j * ANGLES) - 1.0
         right = np.abs((a - z) / (a + z))
-        assert np.abs(given_back(method_named("euler"), a, 4.0)) == pytest.approx(right, rel=1e-12)
+        assert np.abs(reflection_factor(method_named("euler"), a, 4.0)) == pytest.approx(right, rel=1e-12)
         assert (right > 1.0).all()
 
 
 def test_reading_between_steps_magnifies_nothing():
     for steps in (1.2, 1.5, 2.5, 2.9, 3.1, 7.5):
-        assert np.abs(read(steps)).max() <= 1.0 + 1e-12
+        assert np.abs(interpolation_factor(steps)).max() <= 1.0 + 1e-12
 
 
 def energy(case: dict) -> tuple[float, list]:

@@ -14,9 +14,9 @@ from reference.scenes import AMBIENT, WATER, chamber, junction, lake, pipe, ramp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.limits.lumped import lumped_modes
-from fvsolve.limits.step import step_limits
 from fvsolve.run import model_of
+from fvsolve.step_limits.lumped_modes import lumped_modes
+from fvsolve.step_limits.step_notices import step_limits
 from fvsolve.steppers.analysis.stability_function import stability_function
 from fvsolve.steppers.tableau import method_named
 
@@ -275,7 +275,7 @@ def test_growth_that_a_run_is_too_short_to_show_is_no_growth():
     assert not lumped_modes(model_of(case), "euler", 1e-4) and fvsolve.run(case).ok
     case["numerics"]["end"] = 1e6 * 1e-4
     (mode,) = lumped_modes(model_of(case), "euler", 1e-4)
-    assert math.log(mode.grows) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2) and mode.own and mode.followed
+    assert math.log(mode.growth) == pytest.approx(1e6 * 0.01**2 / 2, rel=1e-2) and mode.outside_cells and mode.resolved
 
 
 @pytest.mark.parametrize("implicit", [False, True])

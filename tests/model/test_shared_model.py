@@ -12,8 +12,8 @@ from reference.folders import CASES
 
 import fvsolve
 from fvsolve.model import Model, Slate
-from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.steppers import slots
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.steppers import loop_indices
 from fvsolve.studies.outcome import outcome
 
 SCENES = {  # waves in pipes; flags and marks of devices; cells of a basin, and what it works in; scalars in one; Newton
@@ -100,17 +100,17 @@ def test_runs_of_one_model_step_by_step_in_turn_are_the_runs_alone(scene):
     for loops in ([begun(model, model.start)], [begun(model, moved)], [begun(model, y) for y in (model.start, moved)]):
         for _ in range(60):
             for loop in loops:
-                assert loop.run(1.0) == slots.CHUNK
+                assert loop.run(1.0) == loop_indices.BUDGET_SPENT
         states += [loop.now.copy() for loop in loops]
     assert np.array_equal(states[0], states[2]) and np.array_equal(states[1], states[3])
     assert not np.array_equal(states[0], states[1])
 
 
-def begun(model: Model, y: np.ndarray) -> Loop:
+def begun(model: Model, y: np.ndarray) -> RunLoop:
     """A run from a state at the start, before its first step."""
-    loop = Loop(model)
+    loop = RunLoop(model)
     loop.now[:] = y
-    loop.memory[slots.T] = model.case.numerics.start
+    loop.loop_state[loop_indices.T] = model.case.numerics.start
     loop.begin(model.case.numerics.end, NO_LIMIT)
     return loop
 

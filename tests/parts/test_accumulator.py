@@ -271,7 +271,7 @@ def test_events_that_crowd_are_counted_on_in_a_run_that_is_resumed():
 
     def late(t, seconds, steps):
         run.budget = 2.0  # steps until it is called again
-        if len(run.loop.crowd) > 10:
+        if len(run.loop.recent_events) > 10:
             raise KeyboardInterrupt
 
     run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)

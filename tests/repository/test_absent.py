@@ -15,8 +15,8 @@ from fvsolve.jit import COMPILING
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import PHASES
 from fvsolve.model import Slate
-from fvsolve.solve.loop import Loop
-from fvsolve.steppers import slots
+from fvsolve.solve.run_loop import RunLoop
+from fvsolve.steppers import loop_indices
 
 PIPES = {"pipes", "ends", "reconstruction", "limiters", "leap"}
 MASSES = {"masses"}
@@ -44,8 +44,8 @@ def compiled_with(*functions) -> set[str]:
 
 
 def files(model) -> set[str]:
-    loop, own = Loop(model), model.functions.cast.functions(*JOBS)
-    return compiled_with(*own, loop.stepper.attempt, loop.stepper.march, *loop.stepper.algebra)
+    loop, own = RunLoop(model), model.functions.cast.functions(*JOBS)
+    return compiled_with(*own, loop.stepper.attempt, loop.stepper.run_steps, *loop.stepper.algebra)
 
 
 def tanks(**numerics) -> dict:
@@ -164,7 +164,7 @@ def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
 
 
 def test_the_rates_are_called_no_more_often_than_the_steps_ask_for():
-    loop = Loop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
+    loop = RunLoop(fvsolve.build(fvsolve.load(tanks(method="rk4", step=0.1))))
     loop.begin(10.0, 1e308)
     loop.run(1e308)
-    assert loop.memory[slots.STEPS] == 100 and loop.memory[slots.CALLS] <= 4 * 100 + 1
+    assert loop.loop_state[loop_indices.STEPS] == 100 and loop.loop_state[loop_indices.CALLS] <= 4 * 100 + 1

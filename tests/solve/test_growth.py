@@ -9,21 +9,21 @@ from solve.test_soundness import closing, said
 from solve.test_threads import liquid
 
 import fvsolve
-from fvsolve.solve.loop import Loop
-from fvsolve.solve.soundness import MOST
-from fvsolve.steppers.slots import CHECKED
+from fvsolve.solve.run_checks import GROWTH_LIMIT
+from fvsolve.solve.run_loop import RunLoop
+from fvsolve.steppers.loop_indices import GROWTH_CHECK_STEPS
 
 
 @pytest.fixture
 def returns(monkeypatch):
     """How often the time loop comes back to Python."""
-    count, steps = Counter(), Loop.steps
+    count, steps = Counter(), RunLoop.steps
 
     def counted(loop, budget):
         count["returns"] += 1
         return steps(loop, budget)
 
-    monkeypatch.setattr(Loop, "steps", counted)
+    monkeypatch.setattr(RunLoop, "steps", counted)
     return count
 
 
@@ -33,9 +33,9 @@ def test_growth_is_seen_within_sixteen_steps():
     case["numerics"]["end"] = 100.0
     result = fvsolve.run(case)
     (grown,) = said(result, "growth")
-    assert result.summary["steps"] % CHECKED == 0
-    assert 1.0 < grown.value / grown.limit <= 1.04**CHECKED
-    assert f"{MOST * grown.value / grown.limit:.3g}" in grown.text
+    assert result.summary["steps"] % GROWTH_CHECK_STEPS == 0
+    assert 1.0 < grown.value / grown.limit <= 1.04**GROWTH_CHECK_STEPS
+    assert f"{GROWTH_LIMIT * grown.value / grown.limit:.3g}" in grown.text
 
 
 def test_a_run_beyond_a_limit_that_does_not_grow_stays_in_the_loop(returns):
@@ -43,7 +43,7 @@ def test_a_run_beyond_a_limit_that_does_not_grow_stays_in_the_loop(returns):
     case["numerics"]["end"] = 100.0
     result = fvsolve.run(case)
     assert said(result, "step-limit") and not said(result, "growth")
-    assert returns["returns"] < result.summary["steps"] / (4 * CHECKED)
+    assert returns["returns"] < result.summary["steps"] / (4 * GROWTH_CHECK_STEPS)
 
 
 def test_threads_stop_at_the_same_step(returns):
@@ -51,5 +51,5 @@ def test_threads_stop_at_the_same_step(returns):
     case["numerics"] |= {"courant": 2.0, "end": 1.0}
     one, three = (fvsolve.run(case, threads=many) for many in (1, 3))
     assert [one.summary["threads"], three.summary["threads"]] == [1, 3] and returns["returns"] < 10
-    assert one.summary["steps"] % CHECKED == 0 and one.summary["steps"] == three.summary["steps"]
+    assert one.summary["steps"] % GROWTH_CHECK_STEPS == 0 and one.summary["steps"] == three.summary["steps"]
     assert said(one, "growth") == said(three, "growth") != []

@@ -195,9 +195,9 @@ def test_what_was_seen_of_a_basin_before_is_known_after(tmp_path):
 
     run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
     run.left = 5.0
-    assert run.go().reason.startswith("interrupted") and run.soundness.rates and run.watches[0].kept[0] >= 0.0
+    assert run.go().reason.startswith("interrupted") and run.checks.rates and run.watches[0].kept[0] >= 0.0
     again = Run(model, run.state(), MemorySink(model), None)
-    assert again.soundness.rates == run.soundness.rates
+    assert again.checks.rates == run.checks.rates
     assert [one.kept.tolist() for one in again.watches] == [one.kept.tolist() for one in run.watches]
 
 

@@ -13,14 +13,14 @@ import pytest
 from reference.scenes import chamber, lake, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.limits.grid import advection_limit
-from fvsolve.limits.plane import plane_limit
-from fvsolve.limits.step import step_limits
 from fvsolve.model import Slate
 from fvsolve.run import model_of
-from fvsolve.solve.loop import MOST_IN_A_SPAN, SPAN, Loop
-from fvsolve.solve.soundness import OPEN, Soundness, unclosed
-from fvsolve.steppers import slots
+from fvsolve.solve.run_checks import LEDGER_TOLERANCE, RunChecks, ledger_notices
+from fvsolve.solve.run_loop import MOST_EVENTS_IN_SPAN, SPAN, RunLoop
+from fvsolve.step_limits.advection_limit import advection_limit
+from fvsolve.step_limits.plane_limit import plane_limit
+from fvsolve.step_limits.step_notices import step_limits
+from fvsolve.steppers import loop_indices
 from fvsolve.studies import sweep
 
 MAIN = "cases/valve-closure.toml"
@@ -187,9 +187,11 @@ def stepped(model, y, h, stages):
 
 def test_a_planted_leak_is_not_ok():
     ledger = {"initial": 1.0, "final": 1.0, "remainder": 1e-7, "relative": 1e-7}
-    (one,) = unclosed("mass", ledger)
-    assert not one.ok and one.kind == "ledger" and one.limit == OPEN
-    assert unclosed("mass", ledger | {"relative": float("nan")}) and not unclosed("mass", ledger | {"relative": 1e-9})
+    (one,) = ledger_notices("mass", ledger)
+    assert not one.ok and one.kind == "ledger" and one.limit == LEDGER_TOLERANCE
+    assert ledger_notices("mass", ledger | {"relative": float("nan")}) and not ledger_notices(
+        "mass", ledger | {"relative": 1e-9}
+    )
 
 
 def test_relative_is_over_what_came_in_where_a_scene_starts_empty():
@@ -212,9 +214,9 @@ def test_rows_of_a_sweep_hold_the_warnings(tmp_path):
 
 def test_what_must_not_be_exceeded_follows_the_start_and_what_is_given():
     """1 l/s of 1000 kg/m3: no wave below a million times 1 kg/s is growth, and none beyond it is anything else."""
-    watch = Soundness(Slate(model_of(closing(scheme="upwind", method="euler", courant=1.0))))
+    watch = RunChecks(Slate(model_of(closing(scheme="upwind", method="euler", courant=1.0))))
     assert watch.largest == pytest.approx(np.full(watch.largest.size, watch.largest[0])) and watch.largest[0] >= 1e6
-    assert not watch.look(0.0, 0.99 * watch.largest) and watch.look(0.0, 1.01 * watch.largest).startswith("stopped: ")
+    assert not watch.check(0.0, 0.99 * watch.largest) and watch.check(0.0, 1.01 * watch.largest).startswith("stopped: ")
 
 
 def test_what_grows_without_pipes_is_stopped_too():
@@ -252,7 +254,7 @@ def test_events_that_crowd_within_one_step_are_bounded_where_nothing_grows():
     model = model_of(chattering(1.0))
     assert "check opens and shuts without end" in result.reason and not result.ok and not said(result, "growth")
     times = [event["time"] for event in result.summary["events"]]
-    assert len(times) == MOST_IN_A_SPAN + 4 * model.shapes.armed and times[-1] - times[0] < 1.0
+    assert len(times) == MOST_EVENTS_IN_SPAN + 4 * model.shapes.armed and times[-1] - times[0] < 1.0
     finer = fvsolve.run(chattering(0.1))
     assert finer.ok and len(finer.summary["events"]) == 3000
 
@@ -261,11 +263,11 @@ def test_events_that_crowd_within_a_millionth_of_a_run_are_bounded_under_error_c
     case = chattering(1.0)
     case["numerics"] = {"end": 3.0, "method": "rodas-5p", "rtol": 1e-4}
     for apart, crowds in ((0.9, True), (1.1, False)):
-        loop = Loop(model_of(case))
-        count = loop.crowd.maxlen
+        loop = RunLoop(model_of(case))
+        count = loop.recent_events.maxlen
         for k in range(count):
-            loop.memory[slots.T] = 1.0 + apart * SPAN * 3.0 * k / (count - 1)
-            goes_on = loop.switch(loop.armed.copy())
+            loop.loop_state[loop_indices.T] = 1.0 + apart * SPAN * 3.0 * k / (count - 1)
+            goes_on = loop.handle_events(loop.armed.copy())
             assert goes_on or k == count - 1
         assert goes_on is not crowds
 

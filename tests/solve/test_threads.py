@@ -16,8 +16,8 @@ from fvsolve.errors import FvsolveError
 from fvsolve.kernels import band_exchange
 from fvsolve.output.memory import MemorySink
 from fvsolve.solve import initial_state
-from fvsolve.solve.bands import alone, shared
-from fvsolve.solve.loop import Loop
+from fvsolve.solve.partition import divisible_rows, single_thread_reason
+from fvsolve.solve.run_loop import RunLoop
 from fvsolve.solve.solve import Run
 
 VALVE = {"type": "valve", "from": "pool.near", "to": "river", "area": 0.05}
@@ -102,7 +102,7 @@ def told(case, threads: int, state=None):
     loop = run.loop
     cells = [np.asarray(array) for frame in sink.frames for name in ("pool", "sheet") if name in frame
              for array in frame[name].values()]  # fmt: skip
-    kept = [loop.now, *loop.stepper.memories(), run.slate.marks, run.slate.extremes, sink.table(), *cells]
+    kept = [loop.now, *loop.stepper.restart_arrays(), run.slate.marks, run.slate.extremes, sink.table(), *cells]
     return [np.array(one).tobytes() for one in kept], summary
 
 
@@ -136,7 +136,7 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_any_number_of_threads_gives_the_bits_of_one(name):
     case = SCENES[name]
-    assert not alone(fvsolve.build(fvsolve.load(case)))
+    assert not single_thread_reason(fvsolve.build(fvsolve.load(case)))
     bits, one = told(case, 1)
     for threads in (2, 3, 4):
         found, summary = told(case, threads)
@@ -154,11 +154,11 @@ FORMED = ("muscl, ssp-rk2", "muscl, a limiter of its own, rk4", "upwind5, ssp-rk
 def test_stages_formed_beside_rates_have_the_bits_of_those_formed_after_all(name, cells, monkeypatch):
     """In blocks of a row, of two, and of all; by one thread and by three."""
     bits, _ = told(SCENES[name], 1)
-    here = importlib.import_module("fvsolve.solve.formed")
-    monkeypatch.setattr(here, "FEWEST", 0)
+    here = importlib.import_module("fvsolve.solve.blocked_stages")
+    monkeypatch.setattr(here, "LEAST_STATES", 0)
     monkeypatch.setattr(here, "BLOCK", cells)
     model = fvsolve.build(fvsolve.load(SCENES[name]))
-    assert Loop(model).stepper.shape.size > 0
+    assert RunLoop(model).stepper.shape.size > 0
     assert told(SCENES[name], 1)[0] == bits
     assert told(SCENES[name], 3)[0] == bits
 
@@ -186,7 +186,7 @@ def test_two_basins_and_one_that_each_steps_whole():
 def stepped(case, threads: int, spoil=lambda team: None) -> bytes:
     """The state at the end, where something may have been spoilt."""
     model = fvsolve.build(fvsolve.load(case))
-    loop = Loop(model, threads=threads)
+    loop = RunLoop(model, threads=threads)
     loop.now[:] = model.start
     if loop.team is not None:
         spoil(loop.team)
@@ -277,7 +277,7 @@ ALONE = {
 def test_what_one_thread_steps_is_said(name):
     case, why = ALONE[name]
     model = fvsolve.build(fvsolve.load(case))
-    assert why in alone(model) and shared(model)["most"] == 1
+    assert why in single_thread_reason(model) and divisible_rows(model)["most"] == 1
     run = fvsolve.run(model, threads=2)
     (said,) = [one for one in run.summary["warnings"] if one["kind"] == "threads"]
     assert run.summary["threads"] == 1 and "threads = 2, but one thread is used" in said["text"] and why in said["text"]

@@ -8,7 +8,7 @@ from scipy.sparse import csc_array
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.differences import differences, multiply
-from fvsolve.steppers.pairs import pairs
+from fvsolve.steppers.state_pairs import pairs
 from fvsolve.steppers.structure import Structure
 
 KINDS = ("dense", "banded", "sparse")

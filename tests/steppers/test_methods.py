@@ -10,7 +10,7 @@ from numba import njit
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.built_in_methods import METHODS
 from fvsolve.steppers.ode import integrate
 
 

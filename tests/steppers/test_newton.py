@@ -12,8 +12,8 @@ from reference.scenes import WATER, chamber, scene, valve
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.solve.loop import Loop
-from fvsolve.steppers import METHODS, integrate, slots
+from fvsolve.solve.run_loop import RunLoop
+from fvsolve.steppers import METHODS, integrate, loop_indices
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 IMPLICIT = [name for name in NAMES if not METHODS[name].explicit]
@@ -188,15 +188,17 @@ def test_a_summary_counts_what_newton_did():
 def test_what_is_remembered_twice_has_no_factors_either(name):
     """A resumed run may be stored again before it has taken a step."""
     model = fvsolve.build(fvsolve.load(CASES / "cylinder-servo.toml", set={"numerics.method": name}))
-    loop = Loop(model)
+    loop = RunLoop(model)
     loop.begin(0.01, 1e308)
-    assert loop.run(30) == slots.CHUNK
+    assert loop.run(30) == loop_indices.BUDGET_SPENT
     memory, states = flat(loop), []
     for _ in range(2):  # stored and taken back
-        again = Loop(model)
-        again.stepper.remember(memory)
+        again = RunLoop(model)
+        again.stepper.restore(memory)
         memory = flat(again)
-    assert again.stepper.work[slots.SHIFT] == -loop.stepper.work[slots.SHIFT] < 0.0  # the sign of factors to be made
+    assert (
+        again.stepper.work[loop_indices.SHIFT] == -loop.stepper.work[loop_indices.SHIFT] < 0.0
+    )  # the sign of factors to be made
     again.now[:], again.armed[:] = loop.now, loop.armed
     for one in (loop, again):
         one.resume(0.01, 1e308)
@@ -206,4 +208,4 @@ def test_what_is_remembered_twice_has_no_factors_either(name):
 
 
 def flat(loop) -> np.ndarray:
-    return np.concatenate([view.ravel() for view in loop.stepper.memories()])
+    return np.concatenate([view.ravel() for view in loop.stepper.restart_arrays()])

@@ -10,8 +10,8 @@ from reference.scenes import GRAVITY, area, chamber, reservoir, scene, tank, val
 
 import fvsolve
 from fvsolve.jit import njit
-from fvsolve.steppers import METHODS, ode, slots
-from fvsolve.steppers.stepper import Stepper
+from fvsolve.steppers import METHODS, loop_indices, ode
+from fvsolve.steppers.integrator import Integrator
 
 END, EVERY = 10.0, 0.0137  # which no step divides [s]
 WORSE = 10.0  # times the error at ends of steps, that rows may have
@@ -36,22 +36,22 @@ def stiff(t, y, dydt):
 
 def tables(f, begin, method, control, size):
     """(rows, ends of steps), each [t, y], as a run has them: rows due at any time, steps by their own rule."""
-    stepper = Stepper(METHODS[method], 3, 0, lambda: ode._full(3), np.ones(3))
-    orders, memory, flags = stepper.orders, stepper.memory, stepper.flags
+    stepper = Integrator(METHODS[method], 3, 0, lambda: ode._full(3), np.ones(3))
+    orders, memory, flags = stepper.controls, stepper.loop_state, stepper.progress
     stepper.y[0] = begin
-    orders[slots.CONTROL] = control
-    orders[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT, slots.END]] = size, 1e308, 1e308, END
-    orders[slots.EVERY] = EVERY
+    orders[loop_indices.CONTROL] = control
+    orders[[loop_indices.SIZE, loop_indices.STEP_MAX, loop_indices.STOP_AT, loop_indices.END]] = size, 1e308, 1e308, END
+    orders[loop_indices.EVERY] = EVERY
     stepper.rows = np.zeros((round(END / EVERY) + 2, 4))
-    functions = ode._prepared(f, 0.0, stepper.y[0])[0]
-    ends, code, memory[slots.NEXT_OUTPUT] = [], slots.CHUNK, 1.0
-    while code == slots.CHUNK:
-        orders[slots.BUDGET] = 1.0
-        code = stepper.call(*functions, np.array([-1]), ode.WHERE, stepper.none)
-        ends.append([memory[slots.T], *stepper.y[flags[slots.NOW]]])
-    assert code == slots.DONE
-    assert flags[slots.ROWS] == int(END / EVERY)
-    return stepper.rows[: flags[slots.ROWS]], np.array(ends)
+    functions = ode._prepare(f, 0.0, stepper.y[0])[0]
+    ends, code, memory[loop_indices.NEXT_OUTPUT] = [], loop_indices.BUDGET_SPENT, 1.0
+    while code == loop_indices.BUDGET_SPENT:
+        orders[loop_indices.BUDGET] = 1.0
+        code = stepper.call(*functions, np.array([-1]), ode.WHERE, stepper.no_floats)
+        ends.append([memory[loop_indices.T], *stepper.y[flags[loop_indices.NOW]]])
+    assert code == loop_indices.DONE
+    assert flags[loop_indices.ROWS] == int(END / EVERY)
+    return stepper.rows[: flags[loop_indices.ROWS]], np.array(ends)
 
 
 def errors(method, control, size):
@@ -63,9 +63,9 @@ def errors(method, control, size):
 @pytest.mark.parametrize("method", METHODS)
 def test_rows_are_as_good_as_ends_of_steps(method):
     """At given steps, and by error control; `verner-7` was 1e6 times worse, `gauss-6` 2e3, `esdirk-5` 120 times."""
-    settings = [(slots.FIXED_STEP, h) for h in (0.2, 0.05)]
+    settings = [(loop_indices.FIXED_STEP, h) for h in (0.2, 0.05)]
     if METHODS[method].adaptive:
-        settings += [(slots.TOLERANCE, rtol) for rtol in (1e-4, 1e-7, 1e-10)]
+        settings += [(loop_indices.TOLERANCE, rtol) for rtol in (1e-4, 1e-7, 1e-10)]
     for control, size in settings:
         rows, ends = errors(method, control, size)
         assert rows <= WORSE * ends + ROUNDING, (control, size, rows, ends)
@@ -77,7 +77,7 @@ IMPLICIT = [name for name, method in METHODS.items() if not method.explicit]
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_rows_of_a_stiff_start_do_not_overshoot(method):
     """0.2 s steps over a start that is gone after 1 us; rows of most methods were 1e4 times the solution off."""
-    rows, ends = tables(stiff, np.zeros(3), method, slots.FIXED_STEP, 0.2)
+    rows, ends = tables(stiff, np.zeros(3), method, loop_indices.FIXED_STEP, 0.2)
     most = max(1.0, np.abs(ends[:, 1]).max())  # a method that is not L-stable rings at its ends too
     assert np.abs(rows[:, 1]).max() <= 1.01 * most
     assert np.abs(rows[:, 2]).max() <= 1.01 * np.abs(ends[:, 2]).max()

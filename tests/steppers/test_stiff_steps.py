@@ -12,7 +12,7 @@ from reference import folders
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, analyse, integrate
-from fvsolve.steppers.coefficients import bent, coefficients
+from fvsolve.steppers.coefficients import coefficients, start_slope_correction
 
 NAMES = [name for name, method in METHODS.items() if name == method.name]
 EXPLICIT = [name for name in NAMES if METHODS[name].explicit]
@@ -142,7 +142,7 @@ def truth() -> np.ndarray:
 def order_between(name) -> int:
     """Power of the step in the error of rows between steps: of a cubic, of a polynomial, of one bent at its start."""
     dense = coefficients(METHODS[name])[1]
-    return (dense.shape[1] if dense.size else 3) + (bent(METHODS[name]).size > 0) + 1
+    return (dense.shape[1] if dense.size else 3) + (start_slope_correction(METHODS[name]).size > 0) + 1
 
 
 @pytest.mark.parametrize("name", IMPLICIT)

@@ -9,7 +9,7 @@ import pytest
 
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.analysis.trees import Conditions, density, trees
-from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.built_in_methods import METHODS
 from fvsolve.steppers.tableau import method_named, tableau
 
 # stages, order, order of the embedded solution, stage order; from the sources

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from fvsolve.kernels.limiters import limited
-from fvsolve.limits.grid import advection_limit
-from fvsolve.limits.symbol import WEIGHTS, weights_of
 from fvsolve.model.schemes import CODES
 from fvsolve.schemes import LIMITERS, branches
+from fvsolve.step_limits.advection_limit import advection_limit
+from fvsolve.step_limits.symbol import WEIGHTS, weights_of
 from fvsolve.steppers import METHODS
 from fvsolve.studies.stability.limited import limited_limit, measured, monotone_limit, starts
 from fvsolve.studies.stability.periodic import Circle, measured_limit, measured_limits

@@ -19,8 +19,8 @@ from fvsolve.case.riding import free_joints
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
-from fvsolve.steppers.analysis.monotone import in_euler_steps
-from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.analysis.absolute_monotonicity import in_euler_steps
+from fvsolve.steppers.built_in_methods import AUTO, METHODS
 
 HOME = __package__
 WATER = RhsTerms(

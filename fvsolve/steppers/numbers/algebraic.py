@@ -9,7 +9,9 @@ from math import isqrt
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 from fvsolve.steppers.numbers.sturm import count_roots
 
-MIXED = "{} are used in one tableau. Expected a single root, or decimals of 20 digits or more in place of all roots"
+MIXED_ROOTS = (
+    "{} are used in one tableau. Expected a single root, or decimals of 20 digits or more in place of all roots"
+)
 BITS = 160  # precision of the first bracket of a root: enough for most signs and every float
 
 
@@ -65,7 +67,7 @@ class Algebraic:
     def _other(self, other) -> tuple | None:
         if isinstance(other, Algebraic):
             if other.field is not self.field:
-                raise ValueError(MIXED.format(f"{self.field.name} and {other.field.name}"))
+                raise ValueError(MIXED_ROOTS.format(f"{self.field.name} and {other.field.name}"))
             return other.parts
         return (Fraction(other),) if isinstance(other, (int, Fraction)) else None
 

@@ -13,8 +13,8 @@ from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_CELLS, DEFAULT_RTOL
 from fvsolve.display import Displayable
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.steppers.methods import AUTO, METHODS
-from fvsolve.steppers.tableau import OWN
+from fvsolve.steppers.built_in_methods import AUTO, METHODS
+from fvsolve.steppers.tableau import BUILT_IN
 from fvsolve.studies.accuracy.cells import from_files
 from fvsolve.studies.accuracy.front import FrontRow, Point, cheapest, coarser, curves, errors_of, row, setting_between
 from fvsolve.studies.accuracy.pareto import targets
@@ -360,7 +360,7 @@ def _aim(target: float, point: Point, case: Case) -> Aim:
 
 def _written(method: str, case: Case) -> str:
     """Method as in a case file: for a tableau in a file its path, relative to the case if it is below its folder."""
-    path = Path(METHODS[method].source) if method in METHODS and method not in OWN else None
+    path = Path(METHODS[method].source) if method in METHODS and method not in BUILT_IN else None
     if path is None or not path.is_file():
         return method
     folder = None if case.path is None else case.path.resolve().parent

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.steppers.methods import METHODS
+from fvsolve.steppers.built_in_methods import METHODS
 from fvsolve.studies.accuracy.cells import basins, counts, greatest_rate, order_varies, space_order, starts_with_jump
 from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
 from fvsolve.studies.accuracy.picture import differences_in

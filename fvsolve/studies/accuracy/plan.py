@@ -11,7 +11,7 @@ from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHO
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
 from fvsolve.model.checks import rhs_seconds
 from fvsolve.schemes import SCHEMES
-from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import counts, greatest_rate, pipes, total
 from fvsolve.studies.accuracy.setting import (
     MethodSetting,

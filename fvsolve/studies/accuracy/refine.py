@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.case.defaults import link_said
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import (
     Counts,
     basins,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from fvsolve.case.case import Case
 from fvsolve.case.defaults import link_said
 from fvsolve.case.sections import DEFAULT_COURANT, steps_by_error
-from fvsolve.steppers.methods import AUTO, METHODS
+from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import basins, counts, in_cells, keys, scaled
 
 TOLERANCE = 1e-4  # rtol of implicit methods with cells: their steps follow the solution, not the cell size

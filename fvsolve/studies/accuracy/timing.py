@@ -8,7 +8,7 @@ import numpy as np
 
 from fvsolve.errors import CaseError
 from fvsolve.solve.solve import Run
-from fvsolve.steppers import slots
+from fvsolve.steppers import loop_indices
 from fvsolve.studies.outcome import Outcome, outcome, prepared, refusal
 
 MOST = 5  # greatest number of runs, of which the fastest counts
@@ -31,7 +31,7 @@ class Capped(Run):
 
     def check(self) -> None:
         """Raise GivenUp if the cost exceeds its limits."""
-        if self.processor > self.most_seconds or self.loop.memory[slots.STEPS] > self.most_steps:
+        if self.processor > self.most_seconds or self.loop.loop_state[loop_indices.STEPS] > self.most_steps:
             raise GivenUp
 
     def segments(self) -> str:

@@ -7,23 +7,23 @@ import numpy as np
 from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
 from fvsolve.model.energy_ledger import Accounts
 from fvsolve.model.past import times_of_jumps
-from fvsolve.solve.loop import Loop
+from fvsolve.solve.run_loop import RunLoop
 from fvsolve.solve.solve import Run
-from fvsolve.steppers import automatic, slots
+from fvsolve.steppers import automatic, loop_indices
 
 ROWS = 1000  # approximate number of rows of the table
 SHARE = 1e-3  # allowed quadrature error of the dissipated energy in a step with error control, relative to its total
 LEAST, MOST = 0.1, 8.0  # limits of the factor on the step for that tolerance
 SOUND = (
-    slots.CHUNK,
-    slots.DONE,
-    slots.ROWS_FULL,
-    slots.FIELD,
-    slots.STOPPED,
+    loop_indices.BUDGET_SPENT,
+    loop_indices.DONE,
+    loop_indices.ROWS_FULL,
+    loop_indices.FIELD,
+    loop_indices.STOPPED,
 )  # status codes of the loop after an accepted step
 
 
-class Booked(Loop):
+class Booked(RunLoop):
     """Loop that adds up the energy of every accepted step from stage powers, with the weights of the method."""
 
     def watch(self, accounts: Accounts, on_step) -> None:
@@ -31,19 +31,19 @@ class Booked(Loop):
         self.accounts, self.on_step = accounts, on_step
         self.total, self.carry = np.zeros((2, len(accounts.accounts) + 1))  # ledger lines, then the Newton residual
         self.supplied, self.rates, self.lost = (accounts.of(kind) for kind in ("supplied", "rate", "dissipated"))
-        self.longest = float(self.orders[slots.STEP_MAX])
+        self.longest = float(self.controls[loop_indices.STEP_MAX])
         self.dydt, self.beside = np.zeros(self.model.y_size), self.model.new_out()
-        self.orders[slots.LEAPS] = 0.0  # fused steps store no stages
+        self.controls[loop_indices.ALLOW_FUSED] = 0.0  # fused steps store no stages
 
     def run(self, budget: float) -> int:
         """`Loop.run`, one step at a time."""
         code, left, armed = super().run(0.0), budget, self.armed
-        while code == slots.CHUNK and left > 0.0 and not automatic.wants_change(self.stepper):
+        while code == loop_indices.BUDGET_SPENT and left > 0.0 and not automatic.wants_change(self.stepper):
             t, y, rules = self.t, self.now.copy(), armed.copy()
-            first_values = self.stepper.k[0].copy(), self.stepper.supply[0].copy()
-            steps = self.memory[slots.STEPS]
+            first_values = self.stepper.k[0].copy(), self.stepper.ledger_rates[0].copy()
+            steps = self.loop_state[loop_indices.STEPS]
             code, left = super().run(1.0), left - 1.0
-            if self.memory[slots.STEPS] > steps and code in SOUND:
+            if self.loop_state[loop_indices.STEPS] > steps and code in SOUND:
                 after = armed.copy()
                 armed[:] = rules  # the flags of the right-hand side of this step
                 self.add(self.released(t, y, self.booked(t, y, *first_values)) + self.jumped(t, y))
@@ -66,15 +66,17 @@ class Booked(Loop):
 
         first, supply : slope and supplied powers at (t, y)
         """
-        stepper, h = self.stepper, float(self.memory[slots.LAST])
+        stepper, h = self.stepper, float(self.loop_state[loop_indices.LAST])
         (a, b, c), total = self.tableau(), np.zeros_like(self.total)
-        k, supplies = np.vstack([first, stepper.k[1:]]), np.vstack([supply, stepper.supply[1:]])
+        k, supplies = np.vstack([first, stepper.k[1:]]), np.vstack([supply, stepper.ledger_rates[1:]])
         if stepper.method.kind == "linear":
             total[:-1] = b @ self.linearly_implicit(t, y, h, a, c, k)
             return h * total
         s = b.size
         error = stepper.coefficients[s * s + 2 * s : s * s + 3 * s]  # weights of the error estimate
-        error = error * (self.orders[slots.CONTROL] == slots.TOLERANCE and stepper.method.kind != "full")
+        error = error * (
+            self.controls[loop_indices.CONTROL] == loop_indices.TOLERANCE and stepper.method.kind != "full"
+        )
         quadrature_error = np.zeros_like(total)
         for i in np.flatnonzero((b != 0.0) | (error != 0.0)):
             power = self.stage(t + c[i] * h, y + h * (a[i] @ k), k[i], supplies[i])
@@ -91,8 +93,8 @@ class Booked(Loop):
         off : quadrature error in this step [J]; lost : dissipated energy so far [J]. The error control of states does
         not cover it: for states that are parabolas in time, methods of order two are exact, but not for powers.
         """
-        grow = min(MOST, 0.9 * (SHARE * lost / off) ** (1.0 / self.orders[slots.ORDER])) if off > 0.0 else MOST
-        self.orders[slots.STEP_MAX] = min(self.longest, h * max(LEAST, grow))
+        grow = min(MOST, 0.9 * (SHARE * lost / off) ** (1.0 / self.controls[loop_indices.ORDER])) if off > 0.0 else MOST
+        self.controls[loop_indices.STEP_MAX] = min(self.longest, h * max(LEAST, grow))
 
     def jumped(self, t: float, y: np.ndarray) -> np.ndarray:
         """Correction of the energies of the step from (t, y) for jumps in delay lines within the step [J].

@@ -18,7 +18,7 @@ import numpy as np
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.output.summary import plain
 from fvsolve.schemes import SCHEMES
-from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT, TIGHT_BELOW
+from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.studies.outcome import names
 from fvsolve.validation import FUNCTION, NAMES, validated
 
@@ -120,7 +120,7 @@ def checked(given, known: list[str], kind: str) -> list[str]:
             if name == AUTO:
                 raise FvsolveError(
                     f'method "{AUTO}" is not a single method: it changes between {EXPLICIT} and {IMPLICIT}, '
-                    f"below rtol {TIGHT_BELOW:g} {TIGHT}; name these methods instead"
+                    f"below rtol {TIGHT_BELOW:g} {TIGHT_IMPLICIT}; name these methods instead"
                 )
             raise FvsolveError(f'no {kind} named "{name}"{did_you_mean(name, known)}. Expected {", ".join(known)}')
     return given or list(known)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from fvsolve.limits.lines import stores, wave_growth
+from fvsolve.step_limits.delay_line_growth import storing_nodes, wave_growth
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.failure.eigen_limit import GROWTH
 from fvsolve.studies.outcome import prepared
@@ -39,7 +39,7 @@ class LinesLimit:
 
         None if it is not known, for Rosenbrock methods with delay lines at storing nodes.
         """
-        if method_named(method).kind == "linear" and any(stores(self.model(self.steps[0]), 1.0)):
+        if method_named(method).kind == "linear" and any(storing_nodes(self.model(self.steps[0]), 1.0)):
             return None
         last = 0.0
         for h in self.steps:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fvsolve.steppers import slots
+from fvsolve.steppers import loop_indices
 from fvsolve.studies.accuracy.timing import Capped
 from fvsolve.studies.outcome import Outcome, outcome
 
@@ -31,7 +31,7 @@ class Watched(Capped):
         """Record the probes, and in a long run skip the steps between two windows. Raises GivenUp at the CPU limit."""
         self.check()
         self.bursts[-1].append(self.slate.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
-        apart = int(self.loop.memory[slots.STEPS]) // SPARSE
+        apart = int(self.loop.loop_state[loop_indices.STEPS]) // SPARSE
         self.budget = 1.0
         if apart > WINDOW and len(self.bursts[-1]) >= WINDOW:
             self.bursts.append([])

@@ -10,9 +10,9 @@ from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
 from fvsolve.kernels.schedule_pieces import POLYNOMIAL, piece_at, piece_slopes, value_with_limit
-from fvsolve.limits.symbol import symbol
 from fvsolve.model.delay import followed
 from fvsolve.schemes import LIMITED, SCHEMES
+from fvsolve.step_limits.symbol import symbol
 from fvsolve.studies.outcome import outcome, prepared
 
 NEAR = 0.01  # relative error of a wave in cells that replace a delay line, for the frequency in the note

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.limits.lines import LITTLE, lines_at, stores
 from fvsolve.schemes import LIMITED
+from fvsolve.step_limits.delay_line_growth import REFLECTION_BOUND, lines_at, storing_nodes
 from fvsolve.studies.linear.frozen import stopped
 from fvsolve.studies.outcome import prepared
 from fvsolve.studies.stability.bracket import Limit, halved, limit
@@ -38,9 +38,9 @@ class DelayedLimits:
         rates = self.system(self.first).a
         if rates.size:
             self.first = min(self.first, SLOW / max(1e-300, float(np.linalg.norm(rates, 2))))
-        for _, i, rate in stores(self.own, 1.0):
+        for _, i, rate in storing_nodes(self.own, 1.0):
             travel = min(float(line["tau"] * line["stretches"]) for line in lines_at(self.own, i))
-            self.first = min(self.first, float(np.sqrt(2.0 * travel / (LITTLE * rate * steps))))
+            self.first = min(self.first, float(np.sqrt(2.0 * travel / (REFLECTION_BOUND * rate * steps))))
 
     def model(self, h: float | None):
         """Model at the start with held schedules, lines divided for steps of h [s]; for None for those of the case."""
@@ -76,7 +76,7 @@ class DelayedLimits:
 
     def delays(self, rough: Limit) -> list[float]:
         """Longest delays of lines at stores [s]; waves grow most with steps that divide such a delay."""
-        at_stores = [line for _, i, _ in stores(self.own, 1.0) for line in lines_at(self.own, i)]
+        at_stores = [line for _, i, _ in storing_nodes(self.own, 1.0) for line in lines_at(self.own, i)]
         delays = {float(line["tau"] * line["stretches"]) for line in at_stores} if 0.0 < rough.step < np.inf else set()
         return sorted(delays, reverse=True)[:LINES]
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from fvsolve.kernels.delay_lines import wave_history as at
-from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.steppers import slots
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.steppers import loop_indices
 from fvsolve.studies.stability.bracket import RISE, Limit, halved, limit
 from fvsolve.studies.stability.delayed import BAR, Delayed
 from fvsolve.studies.stability.growth import looked_at
@@ -33,15 +33,15 @@ class DelayedRuns(Runs):
         self.strides = np.diff([0, *self.looks]).astype(float)
         self.latest = time.monotonic() + LONGEST
 
-    def begun(self, system: Delayed, x: np.ndarray, history: np.ndarray) -> Loop:
+    def begun(self, system: Delayed, x: np.ndarray, history: np.ndarray) -> RunLoop:
         """Run from the start plus x, with entries `history` in its lines."""
         model, t = system.model, float(system.model.case.numerics.start)
         changes = {"method": system.method.name, "step": system.h, "courant": None, "rtol": None}
         numerics = model.case.numerics.model_copy(update=changes)
-        loop = Loop(replace(model, case=replace(model.case, numerics=numerics)), lambda: model.structure)
+        loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), lambda: model.structure)
         loop.now[:] = model.start
         loop.now[system.kept] += x
-        loop.memory[slots.T] = t
+        loop.loop_state[loop_indices.T] = t
         remember(loop.slate.past, model.tables.delays, t, system.h, history)
         loop.begin(t + 2.0 * self.steps * system.h, NO_LIMIT)
         return loop
@@ -67,7 +67,7 @@ class DelayedRuns(Runs):
         for n, budget in zip(self.looks, self.strides, strict=True):
             if time.monotonic() > self.latest:
                 raise TimeoutError
-            if any(run.run(budget) != slots.CHUNK for run in runs):
+            if any(run.run(budget) != loop_indices.BUDGET_SPENT for run in runs):
                 return np.inf, n
             moved, base = ((run.now[system.kept], entries(run.slate.past, system)) for run in runs)
             growth = float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small

@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.limits.grid import AdvectionLimit, limit_of
 from fvsolve.schemes import LIMITED, LIMITERS, branches
-from fvsolve.steppers.analysis.facts import analyse
+from fvsolve.step_limits.advection_limit import AdvectionLimit, limit_of
+from fvsolve.steppers.analysis.method_facts import analyse
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.outcome import Progress, names
 from fvsolve.studies.sheet import Plain

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from fvsolve.model.energy import EnergyForm
-from fvsolve.solve.loop import NO_LIMIT, Loop
-from fvsolve.steppers import slots
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.steppers import loop_indices
 from fvsolve.studies.linear.frozen import Frozen
 from fvsolve.studies.stability.bracket import RISE, Limit, halved
 from fvsolve.studies.stability.growth import STEPS, THRESHOLD, looked_at
@@ -71,14 +71,14 @@ class Runs:
 
         return float(min(SMALL, key=lambda width: max(nonlinearity(y, width), nonlinearity(grown, reach * width))))
 
-    def loop(self, y: np.ndarray, h: float) -> Loop:
+    def loop(self, y: np.ndarray, h: float) -> RunLoop:
         """Run from the state y with fixed steps of h [s]."""
         model = self.at.model
         changes = {"method": self.method, "step": h, "courant": None, "rtol": None}
         numerics = model.case.numerics.model_copy(update=changes)
-        loop = Loop(replace(model, case=replace(model.case, numerics=numerics)), lambda: self.structure)
+        loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), lambda: self.structure)
         loop.now[:], loop.armed[:] = y, self.at.armed
-        loop.memory[slots.T] = self.at.t
+        loop.loop_state[loop_indices.T] = self.at.t
         loop.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
         return loop
 
@@ -109,7 +109,9 @@ class Runs:
 
         def state(k: int) -> np.ndarray | None:
             while run and len(states) <= k:
-                states.append(run.now.copy() if run.run(self.strides[len(states)]) == slots.CHUNK else None)
+                states.append(
+                    run.now.copy() if run.run(self.strides[len(states)]) == loop_indices.BUDGET_SPENT else None
+                )
             return states[k] if run else self.at.y
 
         return state
@@ -122,7 +124,7 @@ class Runs:
             if time.monotonic() > self.latest:
                 raise TimeoutError
             base = base_at(k)
-            if base is None or run.run(self.strides[k]) != slots.CHUNK:
+            if base is None or run.run(self.strides[k]) != loop_indices.BUDGET_SPENT:
                 return (size, after) if self.end_of_state(h) <= n * h else (np.inf, n)
             growth = float(np.linalg.norm(self.form.forth @ (run.now - base))) / first
             if not growth <= self.threshold:
@@ -139,9 +141,9 @@ class Runs:
         ends = [self.broken_off(self.loop(self.at.y, step), self.steps * h / step) for step in (h, 0.5 * h)]
         return min(ends) if abs(ends[0] - ends[1]) <= SAME_END * h else np.inf
 
-    def broken_off(self, run: Loop, steps: float) -> float:
+    def broken_off(self, run: RunLoop, steps: float) -> float:
         """Time [s] after which a run stops within a number of steps; inf if it does not."""
-        return np.inf if run.run(steps) in (slots.CHUNK, slots.DONE) else run.t - self.at.t
+        return np.inf if run.run(steps) in (loop_indices.BUDGET_SPENT, loop_indices.DONE) else run.t - self.at.t
 
     def fails(self, h: float) -> bool:
         """True if the growth of a run exceeds the threshold."""

@@ -16,12 +16,12 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.table_handle import make_handle
-from fvsolve.limits.symbol import WEIGHTS, symbol, weights_of
 from fvsolve.model.schemes import scheme_settings
-from fvsolve.steppers import slots
-from fvsolve.steppers.analysis.facts import analyse
-from fvsolve.steppers.ode import watchers
-from fvsolve.steppers.stepper import Stepper
+from fvsolve.step_limits.symbol import WEIGHTS, symbol, weights_of
+from fvsolve.steppers import loop_indices
+from fvsolve.steppers.analysis.method_facts import analyse
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.ode import observers
 from fvsolve.steppers.structure import Structure
 from fvsolve.steppers.tableau import METHODS, method_named
 from fvsolve.studies.outcome import Progress, names
@@ -60,21 +60,21 @@ class Circle:
 
     def __init__(self, scheme: str, method: str, cells: int, limiter: str = "minmod") -> None:
         self.tables = _tables(scheme, limiter, cells)
-        self.stepper = Stepper(method_named(method), cells, 0, lambda: Structure.full(cells), np.ones(cells))
-        self.handle, self.functions = make_handle(self.tables), (*watchers(), _rhs())
+        self.stepper = Integrator(method_named(method), cells, 0, lambda: Structure.full(cells), np.ones(cells))
+        self.handle, self.functions = make_handle(self.tables), (*observers(), _rhs())
 
     def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
         """Cell values after `steps` at a Courant number; None if they do not remain finite."""
         stepper = self.stepper
-        stepper.memory[:], stepper.orders[slots.CONTROL] = 0.0, slots.FIXED_STEP
-        stepper.orders[[slots.SIZE, slots.STEP_MAX, slots.STOP_AT]] = courant, NO_END, NO_END
-        stepper.orders[[slots.END, slots.BUDGET]] = 2.0 * courant * (steps + 1), steps
-        stepper.flags[[slots.PHASE, slots.BEHIND]] = slots.FRESH, 0
-        stepper.y[stepper.flags[slots.NOW]] = start
-        code = stepper.call(*self.functions, self.handle, slots.WHERE + 1, stepper.none)
-        if code != slots.CHUNK:
+        stepper.loop_state[:], stepper.controls[loop_indices.CONTROL] = 0.0, loop_indices.FIXED_STEP
+        stepper.controls[[loop_indices.SIZE, loop_indices.STEP_MAX, loop_indices.STOP_AT]] = courant, NO_END, NO_END
+        stepper.controls[[loop_indices.END, loop_indices.BUDGET]] = 2.0 * courant * (steps + 1), steps
+        stepper.progress[[loop_indices.PHASE, loop_indices.HAS_LAST_STEP]] = loop_indices.FRESH, 0
+        stepper.y[stepper.progress[loop_indices.NOW]] = start
+        code = stepper.call(*self.functions, self.handle, loop_indices.PLACE + 1, stepper.no_floats)
+        if code != loop_indices.BUDGET_SPENT:
             return None
-        return stepper.y[stepper.flags[slots.NOW]].copy()
+        return stepper.y[stepper.progress[loop_indices.NOW]].copy()
 
 
 @validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)

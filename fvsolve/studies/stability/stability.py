@@ -19,7 +19,7 @@ from fvsolve.errors import FvsolveError, RunError
 from fvsolve.model.energy import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
-from fvsolve.steppers.methods import AUTO
+from fvsolve.steppers.built_in_methods import AUTO
 from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter, reweighted
 from fvsolve.studies.linear.linearise import Linear, linearised
 from fvsolve.studies.linear.spectrum import Spectrum, spectrum
@@ -40,7 +40,7 @@ from fvsolve.validation import COUNT, FLAG, FUNCTION, NAMES, NUMBER, PATH, TABLE
 
 AUTOMATIC = (
     f"auto starts with {automatic.EXPLICIT}, for which its row holds; a run continues with {automatic.IMPLICIT} or "
-    f"{automatic.TIGHT} if that is cheaper, which is not in its row"
+    f"{automatic.TIGHT_IMPLICIT} if that is cheaper, which is not in its row"
 )
 VISIBLE = 1e-3  # of the small deviation: start for limited schemes, above the round-off level of WENO
 LONGER = 10  # factor of the number of steps in longer runs of Euler with a limiter
@@ -293,7 +293,7 @@ class Maker:
 
 def on_a_long_pipe(scheme: str, method) -> float:
     """Von Neumann's limit of the Courant number."""
-    from fvsolve.limits.grid import advection_limit
+    from fvsolve.step_limits.advection_limit import advection_limit
 
     return advection_limit(scheme, method.name).limit
 

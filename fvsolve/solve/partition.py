@@ -1,0 +1,177 @@
+"""Partition of the state of a model into bands of rows, a band for each thread, and the data that bands exchange.
+
+A band steps its own rows of every basin that can be divided. All other states are stepped by every band. Values of
+neighbouring rows come from the band that owns them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fvsolve.basins.bands import REACH
+from fvsolve.errors import FvsolveError, Notice, listing
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model import Model
+from fvsolve.steppers import automatic
+from fvsolve.steppers.tableau import method_named
+
+
+@dataclass(frozen=True)
+class Partition:
+    """Basins of a model divided into `many` bands.
+
+    basins : numbers of the divided basins
+    firsts : int64[basins, many + 1]  first row of each band, then the number of rows
+    """
+
+    model: Model
+    count: int
+    basins: tuple[int, ...]
+    firsts: np.ndarray
+
+    @property
+    def sum_count(self) -> int:
+        """Number of partial sums of all bands together."""
+        rows = self.model.tables.basins["ny"][[*self.basins]] * [quantities(self.model, b) for b in self.basins]
+        return len(self.common_states()) + int(sum(rows))
+
+    def common_states(self) -> list[tuple[int, int]]:
+        """(first, one beyond the last) of each run of states that all bands step."""
+        runs, start = [], 0
+        for b in sorted(self.basins, key=lambda b: self.model.tables.basins[b]["y"]):
+            row = self.model.tables.basins[b]
+            runs.append((start, int(row["y"])))
+            start = int(row["y"] + quantities(self.model, b) * row["n"])
+        runs.append((start, self.model.y_size))
+        return [run for run in runs if run[1] > run[0]] or [(0, 0)]
+
+    def row_blocks(self, k: int) -> np.ndarray:
+        """Table `row_blocks` of `steppers.step` for band k, states that all bands step first : int64[q, 4]."""
+        alike = self.common_states()
+        blocks, first = [(*run, m, 1) for m, run in enumerate(alike)], len(alike)
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            basin = self.model.tables.basins[b]
+            n, nx, ny, y = (int(basin[key]) for key in ("n", "nx", "ny", "y"))
+            for q in range(quantities(self.model, b)):
+                begin, stop = (y + q * n + nx * int(row) for row in rows[k : k + 2])
+                blocks.append((begin, stop, first + int(rows[k]), int(rows[k + 1] - rows[k])))
+                first += ny
+        return np.array(blocks, dtype=np.int64)
+
+    def bands(self, k: int) -> np.ndarray:
+        """(first, one beyond the last) row of every basin in band k, flat : int64[2 basins]."""
+        table = self.model.tables.basins
+        rows_of = np.zeros((len(table), 2), dtype=np.int64)
+        rows_of[:, 1] = np.where(table["nx"] > 0, table["ny"], table["n"])
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            rows_of[b] = rows[k : k + 2]
+        return rows_of.ravel()
+
+    def states(self, k: int) -> np.ndarray:
+        """Runs of states that band k reads from other bands, (owner, first, one beyond the last) : int64[r, 3]."""
+        parts = []
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            basin = self.model.tables.basins[b]
+            nx, ny = int(basin["nx"]), int(basin["ny"])
+            near = np.arange(max(rows[k] - REACH, 0), min(rows[k + 1] + REACH, ny))
+            cells = [(nx * near[:, None] + np.arange(nx)).ravel(), *common_cells(self.model, b)]
+            for q in range(quantities(self.model, b)):
+                parts.append(runs(np.concatenate(cells), nx, rows, k, int(basin["y"] + q * basin["n"])))
+        return np.concatenate(parts)
+
+    def flows(self, k: int) -> np.ndarray:
+        """Runs of flows through open boundaries, in `work`, that band k reads from other bands : int64[r, 3]."""
+        parts = [np.zeros((0, 3), dtype=np.int64)]
+        for rows, b in zip(self.firsts, self.basins, strict=True):
+            basin = self.model.tables.basins[b]
+            nx, ny, at = int(basin["nx"]), int(basin["ny"]), int(basin["through"])
+            if at < 0:
+                continue
+            row = np.concatenate([np.arange(ny), np.arange(ny), np.zeros(nx, int), np.full(nx, ny - 1)])
+            owner = np.searchsorted(rows, row, "right") - 1
+            parts.append(merged_runs(np.arange(row.size), owner, k, at))
+        return np.concatenate(parts)
+
+    @property
+    def exchanges_flows(self) -> bool:
+        """True if a divided basin has an open boundary."""
+        return bool((self.model.tables.basins["through"][[*self.basins]] >= 0).any())
+
+
+def quantities(model: Model, b: int) -> int:
+    """Number of states of a cell of a basin."""
+    return len(model.basins[b].quantities) + len(model.basins[b].scalars)
+
+
+def common_cells(model: Model, b: int):
+    """Cells of a basin that all bands read: behind its patches, and at probes."""
+    integers = model.tables.integers
+    for patch in model.tables.patches[model.tables.patches["basin"] == b]:
+        yield integers[patch["first"] : patch["first"] + patch["count"]]
+    probes = model.tables.probes
+    for probe in probes[np.isin(probes["kind"], (rec.CELL_FIELD, rec.CELL_SCALAR)) & (probes["index"] == b)]:
+        yield integers[probe["cell"] : probe["cell"] + probe["count"]]
+
+
+def runs(cells: np.ndarray, nx: int, rows: np.ndarray, k: int, at: int) -> np.ndarray:
+    """Runs of cells outside band k, with their owners, as `joined`; at : state of cell 0."""
+    cells = np.unique(cells)
+    return merged_runs(cells, np.searchsorted(rows, cells // nx, "right") - 1, k, at)
+
+
+def merged_runs(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.ndarray:
+    """Runs of adjacent places of the same owner, except owner k : int64[r, 3] (owner, first, one beyond the last)."""
+    places, owner = places[owner != k], owner[owner != k]
+    if not places.size:
+        return np.zeros((0, 3), dtype=np.int64)
+    new = np.flatnonzero((np.diff(places) != 1) | (np.diff(owner) != 0)) + 1
+    first, last = places[np.append(0, new)], places[np.append(new - 1, places.size - 1)]
+    return np.column_stack([owner[np.append(0, new)], at + first, at + last + 1]).astype(np.int64)
+
+
+def make_partition(model: Model, count: int) -> Partition:
+    """Partition of the divisible basins of a model into `count` bands of about equal numbers of rows."""
+    basins = tuple(b for b, basin in enumerate(model.basins) if not basin.whole)
+    rows = model.tables.basins["ny"][[*basins]] if basins else np.zeros(0, dtype=np.int64)
+    return Partition(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
+
+
+def single_thread_reason(model: Model) -> str:
+    """Reason why a model is stepped by a single thread; "" if several threads are possible."""
+    method = model.case.numerics.method
+    if method == automatic.AUTO or not method_named(automatic.first_method(method)).explicit:
+        return f"{method} solves for all states at once; only explicit methods can be distributed over threads"
+    if not model.basins:
+        return "there is no basin; only rows of basins are distributed over threads"
+    return "" if not all(basin.whole for basin in model.basins) else undivided_basins(model)
+
+
+def undivided_basins(model: Model) -> str:
+    """Basins that every thread steps completely, with the reasons."""
+    return "; ".join(f"{basin.name}: {basin.whole}" for basin in model.basins if basin.whole)
+
+
+def divisible_rows(model: Model) -> dict:
+    """Divisible rows of basins, undivided basins with reasons, greatest number of threads; for `check`."""
+    reason = single_thread_reason(model)
+    rows = {} if reason else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.whole}
+    undivided = {basin.name: basin.whole for basin in model.basins if basin.whole}
+    return {"rows": rows, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
+
+
+def threads_of(model: Model, threads: int) -> tuple[int, list[Notice]]:
+    """(number of threads that step a model, notices); raises FvsolveError for more threads than rows."""
+    if threads == 1:
+        return 1, []
+    divisible = divisible_rows(model)
+    if reason := divisible["why"]:
+        return 1, [Notice("threads", "numerics", f"threads = {threads}, but one thread is used: {reason}", "threads")]
+    few = [f"{name} has {rows} rows" for name, rows in divisible["rows"].items() if rows < threads]
+    if few:
+        raise FvsolveError(
+            f"threads = {threads}: {listing(few)}, and each thread needs a row. Expected {divisible['most']} at most"
+        )
+    text = f"each thread computes the whole of {undivided_basins(model)}"
+    return threads, [Notice("threads", "numerics", text, "threads")] if divisible["whole"] else []

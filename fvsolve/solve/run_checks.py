@@ -1,0 +1,104 @@
+"""Checks of a run: steps beyond their limit, growth of states, ledgers that do not close."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.model.past import crowded
+from fvsolve.solve.sloshing_validity import SloshingCheck
+from fvsolve.solve.step_doubling import StepDoubling
+from fvsolve.step_limits.forcing_ranges import forcing_sizes
+from fvsolve.step_limits.step_notices import step_limits
+
+GROWTH_LIMIT = 1e6  # largest state, in units of its forcing range: beyond it the state has grown by instability
+NO_GROWTH = 10.0  # in the same units: waves that add up may reach it, so a smaller state is no sign of growth
+LEDGER_TOLERANCE = 1e-8  # greatest remainder of a ledger, relative to its largest term
+
+
+class RunChecks:
+    """Checks during a run: wave rates of basins, size of the states, height of sloshing modes.
+
+    largest : float64[n]  largest allowed states: MOST times the largest of the range of initial values, the range of
+    the schedules, and the Joukowsky jump of stopping the initial flows
+    sound : time of the last checked state without growth [s]
+    """
+
+    def __init__(self, run_data) -> None:
+        self.slate, self.model = run_data, run_data.model
+        model = self.model
+        self.moving = model.basins if model.case.numerics.step is not None else []
+        self.rates: dict[str, float] = {}
+        self.predicted = step_limits(model, run_data=run_data)
+        self.step_doubling = StepDoubling(run_data)
+        self.sloshing = SloshingCheck(model)
+        self.largest = GROWTH_LIMIT * forcing_sizes(model)
+        self.grown: Notice | None = None
+        self.sound = model.case.numerics.start
+
+    @property
+    def needs_frequent_checks(self) -> bool:
+        """True if `look` must be called every few steps: for more than growth, which the time loop checks itself."""
+        return bool(self.sloshing.tanks or (self.predicted and self.moving))
+
+    @property
+    def largest_if_needed(self) -> np.ndarray:
+        """`largest` for the time loop if a step limit is exceeded; else an empty array."""
+        return np.array(np.broadcast_to(self.largest, self.model.y_size)) if self.predicted else np.zeros(0)
+
+    def check(self, t: float, y: np.ndarray) -> str:
+        """Check a state and update the wave rates of basins; returns the reason to stop the run, or ""."""
+        for basin in self.moving:
+            self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.pace(y)[0])
+        if stops := self.sloshing.check(t, y):
+            return stops
+        ratio = np.abs(y) / self.largest
+        if np.all(ratio <= NO_GROWTH / GROWTH_LIMIT):
+            self.sound = t
+        if not np.any(ratio > 1.0):
+            return ""
+        worst = int(np.argmax(ratio))
+        name, times = self.model.state_names[worst], GROWTH_LIMIT * float(ratio[worst])
+        text = (f"{name} has grown to {times:.3g} times the range of its forcing at t = "
+                f"{self.model.case.amount(t, 'time', 6)}; the step is beyond the limit of the method: "
+                "halve it")  # fmt: skip
+        self.grown = Notice(
+            "growth", name.partition("[")[0], text, None, float(abs(y[worst])), float(self.largest[worst]), False
+        )
+        return f"stopped: {text}"
+
+    def warnings(self, ledgers: dict) -> list[Notice]:
+        """All notices of a finished run."""
+        notices = list(self.predicted)
+        # repeat the prediction with the wave rates and step errors of the run
+        if self.model.case.numerics.step is not None and (notices or self.moving):
+            notices = step_limits(self.model, self.rates, np.inf if self.grown else self.step_doubling.worst()[1])
+        step_error = self.step_doubling.notice()
+        notices += [] if step_error is None else [step_error]
+        notices += crowded(self.slate.past)
+        notices += self.sloshing.notices()
+        notices += [] if self.grown is None else [self.grown]
+        return notices + [notice for name, ledger in ledgers.items() for notice in ledger_notices(name, ledger)]
+
+
+def split_step_notices(numerics, counts: dict[str, int]) -> list[Notice]:
+    """Notice if steps of the given length were taken in parts."""
+    if not counts.get("parted"):
+        return []
+    key = "step" if numerics.step is not None else "courant"
+    text = (f"{counts['parted']} of {counts['steps']} steps were too long, for Newton or for a disc that shuts on a "
+            "rigid column, and were taken in parts, which end where the full step would have ended; give a smaller "
+            f"numerics.{key}, or rtol instead")  # fmt: skip
+    return [Notice("step-limit", "numerics", text, key, float(counts["parted"]), 0.0, True)]
+
+
+def ledger_notices(name: str, ledger: dict) -> list[Notice]:
+    """Notice if the remainder of a ledger is larger than rounding."""
+    relative = ledger.get("relative", 0.0)
+    if relative <= LEDGER_TOLERANCE:  # False for NaN: such a ledger does not close
+        return []
+    text = (
+        f"{name} ledger: the remainder is {ledger['remainder']:.6g}, {relative:.3g} of its largest term; expected "
+        f"{LEDGER_TOLERANCE:g} at most"
+    )
+    return [Notice("ledger", name, text, "remainder", float(relative), LEDGER_TOLERANCE, False)]

@@ -1,0 +1,284 @@
+"""Time loop of a run of a model: its functions, its ledgers, its step settings, its events."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels import tank_limits
+from fvsolve.kernels.compiled_functions import fused_step_function
+from fvsolve.model import Model, Slate
+from fvsolve.model.scalars import amounts
+from fvsolve.model.within import within
+from fvsolve.solve.blocked_stages import blocked_sums
+from fvsolve.solve.column_impact import separate, shut_places
+from fvsolve.solve.partition import make_partition
+from fvsolve.steppers import automatic, loop_indices
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.ledger import LEDGER_ROWS
+from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.tableau import Method, method_named
+
+ROW_CAPACITY = 512
+NO_LIMIT = 1e308
+MOST_EVENTS_AT_ONCE = 20  # events at the same time; more is chattering
+MOST_EVENTS_IN_SPAN, SPAN = (
+    2000,
+    1e-6,
+)  # events within this fraction of the run, or within a given step; more is chattering
+
+
+class RunLoop:
+    """Arrays of a run of a model; `run` steps until an output, an event or the end needs attention.
+
+    structure() : structure of the Jacobian, default that of the model
+    threads : number of threads; comm : MPI communicator of all ranks, in place of threads
+    """
+
+    def __init__(self, model: Model, structure: Callable[[], Structure] | None = None, threads=1, comm=None) -> None:
+        numerics = model.case.numerics
+        self.model, self.slate = model, Slate(model)
+        method = method_named(automatic.first_method(numerics.method))
+        self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
+        self.at_once, self.last_switch = 0, np.nan
+        self.recent_events: deque[float] = deque(
+            maxlen=MOST_EVENTS_IN_SPAN + 4 * self.armed.size
+        )  # times of the last events
+        self.span = SPAN * (numerics.end - numerics.start)
+        self.on_switch: Callable[[], None] = lambda: None  # called after every event, before the next step
+        call = model.functions
+        self.rhs, self.observe, self.record, self.events = call.rhs, call.observe, call.record, call.events
+        fused_allowed = fused_step_allowed(model, method)
+        self.fused_step = fused_step_function(fused_allowed)
+        ledgers, structure = model.ledgers, structure or (lambda: model.structure)
+        self.stepper = stepper = Integrator(method, model.y_size, ledgers, structure, model.scale.copy(), model.damped)
+        sums = [
+            *model.tables.nodes["y"],
+            *model.tables.masses["y"],
+            *amounts(model),
+        ]  # travel is stored too
+        stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
+        stepper.carry = np.zeros(len(stepper.stored))
+        stepper.bounds = within(model)
+        stepper.out, stepper.out_row, stepper.values = (
+            model.new_out(),
+            model.new_out(),
+            np.zeros(len(model.tables.probes)),
+        )
+        self.tanks = np.flatnonzero(model.tables.nodes["kind"] == rec.TANK)
+        events = self.armed.size
+        stepper.g, stepper.g_new = np.zeros(events), np.zeros(events)
+        stepper.rows = np.zeros((ROW_CAPACITY, 1 + len(model.tables.probes)))
+        self.loop_state, self.controls, self.progress, self.out = (
+            stepper.loop_state,
+            stepper.controls,
+            stepper.progress,
+            stepper.out,
+        )
+        self.controls[loop_indices.STEP_MAX] = (
+            min(model.step_max, longest_step(model)) if numerics.rtol is not None else NO_LIMIT
+        )
+        self.controls[loop_indices.STOP_AT], self.controls[loop_indices.ALLOW_FUSED] = NO_LIMIT, fused_allowed
+        for control, key in (
+            (loop_indices.COURANT, "courant"),
+            (loop_indices.FIXED_STEP, "step"),
+            (loop_indices.TOLERANCE, "rtol"),
+        ):
+            if getattr(numerics, key) is not None:
+                self.controls[loop_indices.CONTROL], self.controls[loop_indices.SIZE] = control, getattr(numerics, key)
+        if numerics.method == automatic.AUTO:
+            automatic.watch(stepper, structure())
+        if (
+            numerics.courant is not None and not method.explicit
+        ):  # of waves only: implicit steps are stable for the rest
+            self.controls[loop_indices.CONTROL] = loop_indices.FIXED_STEP
+            self.controls[loop_indices.SIZE] = numerics.courant / model.wave_rate
+        given = self.controls[loop_indices.CONTROL] == loop_indices.FIXED_STEP
+        self.slate.clock["step"] = self.controls[loop_indices.SIZE] if given else 0.0
+        self.team, single_band = None, make_partition(model, 1)
+        if method.explicit and numerics.method != automatic.AUTO:
+            stepper.shape = blocked_sums(single_band, 0)
+            self.slate.written = self.slate.written._replace(sums=stepper.shape)
+        if numerics.rtol is not None:  # errors are summed by rows
+            stepper.row_blocks, stepper.sums = single_band.row_blocks(0), np.zeros(single_band.sum_count)
+        if comm is not None:
+            from fvsolve.solve.mpi_ranks import MpiRanks
+
+            self.team = MpiRanks(self, make_partition(model, comm.size), comm)
+        elif threads > 1:
+            from fvsolve.solve.thread_team import ThreadTeam
+
+            self.team = ThreadTeam(self, make_partition(model, threads))
+
+    @property
+    def now(self) -> np.ndarray:
+        """Present state y (a view)."""
+        return self.stepper.y[self.progress[loop_indices.NOW]]
+
+    @property
+    def before(self) -> np.ndarray:
+        """State before the last step (a view)."""
+        if self.team is not None:
+            self.team.gather_states(self.progress[loop_indices.OLD])
+        return self.stepper.y[self.progress[loop_indices.OLD]]
+
+    @property
+    def t(self) -> float:
+        """Present time [s]."""
+        return float(self.loop_state[loop_indices.T])
+
+    def begin(self, end: float, stop_at: float) -> None:
+        """Start a segment that ends at `end` [s]; the step history before the kink is discarded."""
+        self.stepper.discard_history()
+        self.resume(end, stop_at)
+
+    def resume(self, end: float, stop_at: float) -> None:
+        """Continue a segment that ends at `end` [s]; rows due from `stop_at` on are not written by the loop."""
+        self.controls[loop_indices.END], self.controls[loop_indices.STOP_AT] = end, stop_at
+        self.progress[loop_indices.PHASE], self.progress[loop_indices.HAS_LAST_STEP] = loop_indices.FRESH, 0
+        self.apply_events()
+        self.slate.clock["limit"] = end
+
+    def run(self, budget: float) -> int:
+        """Take at most `budget` steps; returns a code of `steppers.slots`, from DONE to CHATTERS."""
+        while (capacity := self.slate.room()) < budget:
+            code = self.steps(capacity)
+            left, budget = self.controls[loop_indices.BUDGET], budget - capacity
+            if code != loop_indices.BUDGET_SPENT or left != 0.0 or automatic.wants_change(self.stepper):
+                return code
+        return self.steps(budget)
+
+    def steps(self, budget: float) -> int:
+        """`run` for as many steps as the history of delay lines has space for."""
+        self.controls[loop_indices.BUDGET] = budget
+        code = loop_indices.SWITCHED
+        while code == loop_indices.SWITCHED:
+            before = self.armed.copy()
+            functions, where = self.functions
+            if self.team is None:
+                code = self.stepper.call(*functions, self.slate.handle, where, self.armed)
+            else:
+                code = self.team.call(functions, where)
+            if code == loop_indices.SWITCHED:
+                code = loop_indices.SWITCHED if self.handle_events(before) else loop_indices.CHATTERING
+                self.on_switch()
+        return code
+
+    @property
+    def functions(self) -> tuple:
+        """(functions that the time loop calls, offset of the ledger rates in `out`)."""
+        return (self.fused_step, self.observe, self.record, self.events, self.rhs), int(self.model.layout["supply"])
+
+    def close(self) -> None:
+        """End the threads or ranks."""
+        if self.team is not None:
+            self.team.close()
+
+    @property
+    def armed(self) -> np.ndarray:
+        """Flags of the events that have occurred and still hold (a view)."""
+        return self.slate.armed
+
+    def record_events(self, before: np.ndarray) -> None:
+        """Record the events since the flags were `before`, and apply their immediate effects."""
+        first, count = tank_limits.EVENTS * self.tanks.size, len(self.model.events)
+        now = self.armed[first : first + count] > before[first : first + count]
+        self.switched += [(self.t, int(k)) for k in np.flatnonzero(now) if self.model.events[k][1]]
+        self.apply_events()
+
+    def apply_events(self) -> None:
+        """Apply the immediate effects of events on tanks and devices."""
+        for i in self.tanks:
+            node, sums = self.model.tables.nodes[i], self.stepper.ledger.reshape(LEDGER_ROWS, -1)
+            part = tank_limits.overshoot_correction(node, self.armed, float(node["mass"] + self.now[node["y"]]))
+            self.now[node["y"]] += part
+            sums[0 if part > 0.0 else 1, i] += part
+        for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
+            device.settle(self.slate, row, self.t, self.now, self.stepper.scale)
+
+    def handle_events(self, before: np.ndarray) -> bool:
+        """Record the last events; returns False where they chatter: too many at the same time or in a short span."""
+        self.record_events(before)
+        self.at_once = self.at_once + 1 if self.t == self.last_switch else 1
+        self.last_switch = self.t
+        self.recent_events.append(self.t)
+        step = (
+            self.controls[loop_indices.SIZE] if self.controls[loop_indices.CONTROL] == loop_indices.FIXED_STEP else 0.0
+        )
+        crowded = len(self.recent_events) == self.recent_events.maxlen and self.t - self.recent_events[0] <= max(
+            self.span, step
+        )
+        return self.at_once <= MOST_EVENTS_AT_ONCE + 4 * self.armed.size and not crowded
+
+    def evaluate(self, limit: float) -> np.ndarray:
+        """Evaluate `out` now, with left limits of schedules from `limit` on; records events that a jump has caused."""
+        before = self.armed.copy()
+        out = self.slate.evaluate(self.t, self.now, limit)[1]
+        self.record_events(before)
+        return out
+
+    def stop_columns(self, limit: float) -> list[tuple[int, float]]:
+        """Set the flows of rigid columns that stop, or collide at a node without other flow.
+
+        Returns (number of the column, lost flow [kg/s]) of the columns whose flow changes.
+        """
+        if not len(self.model.tables.columns) and not self.armed.size:  # no columns and no events to record
+            return []
+        stopped, out, layout = [], self.evaluate(limit), self.model.layout
+        while (event := separate(self.slate, self.t, self.now, out)) is not None:
+            before = self.armed.copy()
+            self.armed[event], self.armed[event + 1] = 1.0, 0.0
+            self.record_events(before)
+            out = self.evaluate(limit)
+        places = shut_places(self.model, out)
+        for k, row in enumerate(self.model.tables.columns):
+            flow, new = float(row["flow"] + self.now[row["y"]]), float(out[layout["column"] + k])
+            collides = out[layout["valve_controlled"] + k] == 0.0 and (
+                row["from_node"] in places or row["to_node"] in places
+            )
+            if flow != new and (collides or new == 0.0):
+                self.now[row["y"]] = new - row["flow"]
+                stopped.append((k, flow - new))
+        return stopped
+
+    def take_rows(self) -> np.ndarray:
+        """Copy of the rows written since the last call."""
+        count = int(self.progress[loop_indices.ROWS])
+        self.progress[loop_indices.ROWS] = 0
+        return self.stepper.rows[:count].copy()
+
+    def step_back(self) -> None:
+        """Return to the state before the last step, unless the ledgers include it: then its end state was valid."""
+        if self.progress[loop_indices.HAS_LAST_STEP] == 1 and self.loop_state[loop_indices.UNBOOKED] > 0.0:
+            self.before  # noqa: B018  (copies that state from the other threads or ranks)
+            self.loop_state[loop_indices.T] -= self.loop_state[loop_indices.LAST]
+            self.loop_state[loop_indices.UNBOOKED] = 0.0
+            self.progress[loop_indices.NOW], self.progress[loop_indices.OLD] = (
+                self.progress[loop_indices.OLD],
+                self.progress[loop_indices.NOW],
+            )
+            self.progress[loop_indices.HAS_LAST_STEP] = 0
+
+
+def longest_step(model: Model) -> float:
+    """Greatest step for which delay lines are divided [s]; infinity without delay lines."""
+    delay_lines = model.tables.pipes["delay"] >= 0
+    return float(1.0 / model.wave_rates[delay_lines].max()) if delay_lines.any() else np.inf
+
+
+def fused_step_allowed(model: Model, method: Method) -> bool:
+    """True if fused steps are possible: upwind and Euler, only pipes, no events, no friction or a constant factor.
+
+    Pipes on moving bodies are excluded: the body accelerates their cells in addition to the waves.
+    """
+    settings, numerics = model.tables.settings[0], model.case.numerics
+    laws = model.tables.pipes["friction"]
+    return bool(
+        model.case.law.linear and settings["scheme"] == rec.UPWIND
+        and method.explicit and method.stages == 1 and numerics.rtol is None
+        and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.rides)
+        and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
+    )  # fmt: skip

@@ -1,0 +1,267 @@
+"""Summary of a run: reason of its end, marks, ledgers, extremes, envelopes, counts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model import Model, Slate
+
+DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
+
+
+@dataclass(frozen=True)
+class Mark:
+    """First occurrence [s] of a condition outside the model's validity; later results are not to be trusted."""
+
+    what: str
+    place: str
+    time: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Cavity:
+    """First column separation of a pipe: place, time [s], distance [m]; greatest total volume of its cavities [m3]."""
+
+    place: str
+    time: float
+    distance: float  # from the pipe's `from` end
+    volume: float
+    t_volume: float
+    text: str
+
+
+@dataclass(frozen=True)
+class Event:
+    """Event of a device: time [s], name of the device, kind of event."""
+
+    time: float
+    name: str
+    what: str
+
+
+@dataclass
+class Summary:
+    """Results of a run except rows and frames; SI, absolute pressures."""
+
+    reason: str
+    ok: bool
+    t: float
+    marks: list[Mark] = field(default_factory=list)
+    ledgers: dict[str, dict[str, Any]] = field(default_factory=dict)
+    extremes: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)
+    envelope: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)
+    points: dict[str, dict[str, np.ndarray]] = field(default_factory=dict)  # envelope at points between cells of pipes
+    watched: dict[str, tuple[float, float, float, float]] = field(default_factory=dict)  # extremes without a probe
+    counts: dict[str, int] = field(default_factory=dict)  # steps, rejections, rhs calls, Newton iterations, ...
+    methods: list[dict[str, Any]] = field(default_factory=list)  # methods with start time and reason
+    cells: int = 0
+    seconds: float = 0.0
+    processor: float = 0.0  # CPU time of the steps
+    seconds_setup: float = 0.0
+    events: list[Event] = field(default_factory=list)
+    cavities: list[Cavity] = field(default_factory=list)  # computed by the law `mixture`
+    warnings: list[Notice] = field(default_factory=list)  # notices of the run, without those of the model
+    threads: int = 1
+    invalid_from: float = np.inf  # time from which results are invalid, because states have grown [s]
+
+    @property
+    def finished(self) -> bool:
+        """True if the run reached its end time, even with wrong numbers; studies use it with their own checks."""
+        return self.reason == "finished"
+
+    @property
+    def steps(self) -> int:
+        """Number of accepted steps."""
+        return self.counts.get("steps", 0)
+
+    @property
+    def cost(self) -> float:
+        """CPU time of the steps per cell (or state, without cells) and step [ns]."""
+        return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
+
+
+def find_marks(run_data: Slate) -> list[Mark]:
+    """First time and place of each condition outside the model's validity.
+
+    Cavities are not marked under a law that models them; nor is overflow of tanks, which is in the ledger.
+    """
+    model, marks = run_data.model, run_data.marks
+    if np.isnan(marks).all():
+        return []
+    pipes, nodes = model.pipes, model.node_names
+    kinds = [("below vapor pressure", f"links.{pipe.name}") for pipe in pipes]
+    kinds += [(kind, f"nodes.{name}") for kind in ("below vapor pressure", "dry", "spilling") for name in nodes]
+    kinds = [(kind, place.removesuffix(".inside")) for kind, place in kinds]
+    kinds += [("stopped dead", f"links.{name}") for name in model.column_names]
+    kinds += [("beyond its stroke", f"links.{name}") for name in model.piston_names]
+    kinds += [("outside its curve", f"links.{name}") for name, *_ in model.devices]
+    texts = {
+        "stopped dead": (
+            "its last outlet shut during flow, or it hit another column; a rigid column has no pressure surge: "
+            "use a pipe"
+        ),
+        "outside its curve": (
+            "the pump works in reverse or beyond the last flow of its curve; give rated_speed to extend the curve by "
+            "the Suter table of its specific speed, or suter = { rated_flow, rated_head, table } in place of the curve"
+        ),
+        "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would stop it",
+        "below vapor pressure": (
+            "pressure falls below vapour pressure; the liquid column would separate; to model this, set "
+            f"{model.case.law.to_cavitate}cavitation = true in [fluid]"
+        ),
+        "dry": "no water is left for the outflow; the missing water is added and booked as made_up",
+    }
+    return [
+        Mark(kind, place, float(time), f"{place.split('.', 1)[1]}: {texts[kind]}")
+        for (kind, place), time in zip(kinds, marks[: len(kinds)], strict=True)
+        if np.isfinite(time) and kind in texts and not (kind == "below vapor pressure" and model.cavitates)
+    ]
+
+
+def spill_notices(run_data: Slate) -> list[Notice]:
+    """Notices for tanks that overflow, with the time of the first overflow."""
+    model, notices = run_data.model, []
+    first = len(model.pipes) + 2 * len(model.node_names)
+    for node, time in zip(model.node_names, run_data.marks[first:], strict=False):
+        if np.isfinite(time):
+            name = node.removesuffix(".inside")
+            when = model.case.amount(float(time), "time", 6)
+            text = f"{name}: full to its height, it spills from {when} on; the mass ledger contains the lost water"
+            notices.append(Notice("spilling", f"nodes.{name}", text, "height", float(time)))
+    return notices
+
+
+def device_notices(run_data: Slate) -> list[Notice]:
+    """Notices of devices outside their laws that are not marks: pumps that ran down, or with an extended curve."""
+    model, marks = run_data.model, run_data.marks
+    first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
+    times = marks[first + len(model.devices) :]
+    return [
+        device.passing(model, name, part, float(time))
+        for (name, part, device), time in zip(model.devices, times, strict=False)
+        if np.isfinite(time)
+    ]
+
+
+def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
+    """Notices for bodies whose Euler parameters no longer have length 1, which measures the error of the steps."""
+    notices = []
+    for name, row in zip(model.body_names, model.tables.bodies, strict=True):
+        if row["joint"] not in (rec.BALL, rec.FREE):
+            continue
+        first = 3 if row["joint"] == rec.FREE else 0
+        at = int(row["y"]) + first
+        length = float(np.linalg.norm(row["start"][first : first + 4] + y[at : at + 4]))
+        if abs(length - 1.0) > DRIFT:
+            text = (f"{name}: its Euler parameters have drifted from length 1 to {length:.9g} and are divided by it; "
+                    "the error of its attitude is about as large; gauss-4 conserves the length")  # fmt: skip
+            notices.append(Notice("drift", f"nodes.{name}", text, None, length - 1.0, DRIFT))
+    return notices
+
+
+def find_cavities(run_data: Slate) -> list[Cavity]:
+    """Cavity of every pipe whose pressure fell below twice the vapour pressure: more vapour than gas in the bubbles."""
+    model, marks, cavities = run_data.model, run_data.marks, []
+    for k, pipe in enumerate(model.pipes if model.cavitates else ()):
+        share, volume, t_volume = (float(x) for x in marks[marks.size - 3 * (len(model.pipes) - k) :][:3])
+        if np.isfinite(share):
+            time, distance = float(marks[k]), share * pipe.length
+            amount = model.case.amount
+            text = (f"{pipe.name}: a cavity opened {amount(distance, 'length')} from {pipe.from_} at "
+                    f"{amount(time, 'time', 6)}; at most {amount(volume, 'volume', silent='l')} at "
+                    f"{amount(t_volume, 'time', 6)}")  # fmt: skip
+            cavities.append(Cavity(f"links.{pipe.name}", time, distance, volume, t_volume, text))
+    return cavities
+
+
+def find_extremes(run_data: Slate) -> dict[str, tuple[float, float, float, float]]:
+    """Extremes of the probes over all accepted steps and rows: probe -> (least, its time, greatest, its time)."""
+    table = run_data.extremes
+    return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(run_data.model.probes)}
+
+
+def find_watched(run_data: Slate) -> dict[str, tuple[float, float, float, float]]:
+    """Extremes, as `find_extremes`, of the watched quantities that are not probes."""
+    table, probe_count = run_data.extremes, len(run_data.model.probes)
+    return {probe.text: tuple(map(float, table[:, probe_count + k])) for k, probe in enumerate(run_data.model.watched)}
+
+
+def find_point_envelopes(run_data: Slate) -> dict[str, dict[str, np.ndarray]]:
+    """Envelopes, as `find_envelope`, and initial pressure at watched points of pipes: ends and points of profiles."""
+    model, probe_count, points = run_data.model, len(run_data.model.probes), {}
+    rows: dict[str, list[int]] = {}
+    for k in np.flatnonzero(np.isfinite(model.watched_start)):
+        rows.setdefault(model.watched[k].name, []).append(int(k))
+    for pipe in model.pipes:
+        if not (own := rows.get(pipe.name)):
+            continue
+        distance = np.array([model.watched[k].fraction * pipe.length for k in own])
+        low, t_low, high, t_high = run_data.extremes[:, probe_count + np.array(own)]
+        points[pipe.name] = pressure_envelope(model, pipe, distance, pipe.height(distance), (low, t_low, high, t_high))
+        points[pipe.name]["initial_pressure"] = model.watched_start[own]
+    return points
+
+
+def find_envelope(run_data: Slate) -> dict[str, dict[str, np.ndarray]]:
+    """Envelopes: pipe -> distance, elevation [m], least and greatest pressure [Pa] and head [m] with times [s]."""
+    model, envelope, result = run_data.model, run_data.envelope, {}
+    for k, pipe in enumerate(model.pipes):
+        cells = model.tables.pipes[k]["cell"] + np.arange(pipe.cells)
+        least, greatest = (model.cell_pressure(k, envelope[row, cells]) for row in (0, 2))
+        extremes = least, envelope[1, cells], greatest, envelope[3, cells]
+        result[pipe.name] = pressure_envelope(model, pipe, pipe.x, pipe.elevation, extremes)
+    return result
+
+
+def pressure_envelope(model: Model, pipe, distance, elevation, extremes) -> dict[str, np.ndarray]:
+    """Envelope of a pipe from (least, times, greatest, times) of its pressures."""
+    least, t_min, greatest, t_max = extremes
+    return {
+        "distance": distance, "elevation": elevation, "min_pressure": least, "t_min": t_min,
+        "max_pressure": greatest, "t_max": t_max,
+        "min_head": model.head(least, elevation), "max_head": model.head(greatest, elevation),
+    }  # fmt: skip
+
+
+def relative(remainder: float, largest: float) -> float:
+    """Remainder over the largest term of a ledger; 0 if both are 0."""
+    return abs(remainder) / largest if largest > 0.0 else float(remainder != 0.0)
+
+
+def mass_ledger(model: Model, y: np.ndarray, ledger: np.ndarray) -> dict[str, Any]:
+    """Mass ledger: stored mass, inflow, outflow, remainder [kg]; `relative` is the remainder over the largest term.
+
+    ledger : float64[2, nodes]  inflow at each node, and outflow as negative numbers
+    """
+    kinds = model.tables.nodes["kind"]
+    initial, change = model.contents(y)
+    passes = {int(row["node"]) for row in model.tables.patches if row["open"]}
+    own = [
+        kind in (rec.TANK, rec.PATCH) and i not in passes for i, kind in enumerate(kinds)
+    ]  # nodes with `made_up` and `spilled`
+    words = [("made_up", "spilled") if in_cells else ("inflow", "outflow") for in_cells in own]
+    rows = zip(model.node_names, words, ledger[0], ledger[1], strict=True)
+    nodes = {
+        name: {inflow_word: float(x), outflow_word: float(0.0 - y)}
+        for name, (inflow_word, outflow_word), x, y in rows
+        if x != 0.0 or y != 0.0
+    }
+    total = {word: sum(row.get(word, 0.0) for row in nodes.values()) for pair in set(words) for word in pair}
+    remainder = change - float(np.sum(ledger))
+    terms = {word: total.get(word, 0.0) for word in ("inflow", "outflow", "spilled", "made_up")}
+    largest = max(initial, initial + change, *terms.values())
+    return {
+        "initial": initial,
+        "final": initial + change,
+        **terms,
+        "by_node": {name: row["inflow"] - row["outflow"] for name, row in nodes.items() if "inflow" in row},
+        "nodes": nodes,
+        "remainder": remainder,
+        "relative": relative(remainder, largest),
+    }

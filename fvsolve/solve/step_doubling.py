@@ -1,0 +1,158 @@
+"""Step doubling: occasional repetition of a given step as two half steps, to estimate the error of the run.
+
+A step that is too long need not be unstable: the nonlinear law of a valve bounds the growth, so that vessels oscillate
+between two wrong pressures, and implicit methods are stable at any step. The end of such a step differs from that of
+two half steps by e. The sum of the errors of n steps depends on the fraction r of an error that a step leaves,
+e (1 - r^n) / (1 - r). For a draining vessel r is near 1 and all errors remain; with a small r only the last remain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.kernels.delay_lines.wave_history import CORRECTED_TIME
+from fvsolve.step_limits.forcing_ranges import state_ranges, states_outside_cells
+from fvsolve.step_limits.step_notices import DOUBTFUL, WRONG
+from fvsolve.steppers import automatic, loop_indices
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.tableau import method_named
+
+EXPLICIT_CHECKS, IMPLICIT_CHECKS = 32, 16  # number of checks in a run of explicit steps, of implicit steps
+# Least number of explicit steps between two checks, which costs a twentieth; least number of checks in short runs.
+STEPS_BETWEEN_CHECKS, FEWEST_CHECKS = 50.0, 8
+LEAST_RANGE = 0.1  # least range of a state, in units of its small deviation
+FULL_STEP = 0.99  # fraction of a full step: steps that an event or a kink has shortened are not checked
+ROUNDING = 1e-10  # relative to ranges: a smaller error is too small to measure r
+
+
+class StepDoubling:
+    """Error check of a run of given steps: of all states for implicit methods, of states outside cells for explicit.
+
+    It is switched off without such states or without a given step. For cells the Courant limit bounds explicit steps.
+
+    kept : float64[4 + 5 k]  data of a resumed run: number of checks, step count of the next check, step count of the
+    last check, r; for each state the error of the last checked step, the accumulated error, the sum of that over the
+    checks, its least and its greatest value
+    """
+
+    def __init__(self, run_data) -> None:
+        model, self.step = run_data.model, float(run_data.clock["step"])
+        numerics = model.case.numerics
+        method = method_named(automatic.first_method(numerics.method))
+        lines = model.tables.pipes["y"][model.tables.pipes["delay"] >= 0]  # their states do not affect other states
+        states = states_outside_cells(model) if method.explicit else np.setdiff1d(np.arange(model.y_size), lines)
+        self.model, self.states = model, states[: None if self.step > 0.0 else 0]
+        self.restart_data = np.zeros(4 + 5 * self.states.size)
+        self.error, self.accumulated_error, self.sums, self.least, self.greatest = self.restart_data[4:].reshape(5, -1)
+        self.least[:] = self.greatest[:] = model.start[self.states]
+        self.restart_data[3], self.stepper, self.implicit = 1.0, None, not method.explicit
+        if self.states.size:
+            steps = (numerics.end - numerics.start) / self.step
+            self.interval = max(1.0, steps // IMPLICIT_CHECKS)
+            if method.explicit:
+                self.interval = max(1.0, steps // EXPLICIT_CHECKS, min(STEPS_BETWEEN_CHECKS, steps // FEWEST_CHECKS))
+            self.restart_data[1], self.small = self.interval, state_ranges(model, LEAST_RANGE)[self.states]
+
+    def begin(self, steps: float) -> None:
+        """Check the first step of a segment under implicit methods, which stay stable even if a store fills in it."""
+        if self.states.size and self.implicit:
+            self.restart_data[1] = steps + 1.0
+
+    def steps_left(self, steps: float) -> float:
+        """Number of steps that may be taken before the next check."""
+        return max(1.0, self.restart_data[1] - steps) if self.states.size else np.inf
+
+    def check(self, loop) -> None:
+        """Repeat the last step as two half steps if a check is due; called at an accepted state."""
+        memory = loop.loop_state
+        steps, h = memory[loop_indices.STEPS], memory[loop_indices.LAST]
+        if not self.states.size or steps < self.restart_data[1]:
+            return
+        self.restart_data[1] = steps + 1.0  # check the next step if this step cannot be checked
+        end = loop.controls[loop_indices.END]
+        full_step = self.step if loop.t < end else min(self.step, end - memory[loop_indices.T_MARK])
+        if h < FULL_STEP * full_step or corrected_store(loop):
+            return
+        before, now = loop.before[self.states], loop.now[self.states]
+        t = loop.t - h
+        middle = self.single_step(loop, t, loop.before, 0.5 * h, first=True)
+        half_steps = self.single_step(loop, t + 0.5 * h, middle, 0.5 * h)
+        if not np.all(np.isfinite(half_steps)):  # the half steps cannot be computed
+            return
+        for state in (before, now):
+            np.fmin(self.least, state, out=self.least)
+            np.fmax(self.greatest, state, out=self.greatest)
+        with np.errstate(over="ignore", invalid="ignore"):  # states that grow may overflow
+            self.accumulate(loop, h, steps - self.restart_data[2], half_steps - loop.now)
+        self.restart_data[:3] = self.restart_data[0] + 1.0, steps + self.interval, steps
+
+    def accumulate(self, loop, h: float, steps: float, error: np.ndarray) -> None:
+        """Add the errors of `steps` steps: `error` for the last; for the others at most that of the previous check."""
+        widths, own = self.widths(), np.abs(error[self.states])
+        size = float(np.linalg.norm(own / widths))
+        if size > ROUNDING:
+            moved = self.single_step(loop, loop.t - h, loop.before + error, h) - loop.now
+            remaining = float(np.linalg.norm(moved[self.states] / widths)) / size
+            self.restart_data[3] = remaining if remaining < 1.0 else 1.0
+        remaining = self.restart_data[3]
+        power = remaining ** (steps - 1.0)
+        sum_of_powers = steps - 1.0 if remaining > 1.0 - ROUNDING else (1.0 - power) / (1.0 - remaining)
+        self.accumulated_error[:] = (
+            remaining * (power * self.accumulated_error + sum_of_powers * np.fmin(own, self.error)) + own
+        )
+        self.error[:] = own
+        self.sums += self.accumulated_error
+
+    def single_step(self, loop, t: float, y: np.ndarray, h: float, first=False) -> np.ndarray:
+        """State after a single step of the run's method, with the present device states.
+
+        first : discard the stored Jacobian, for the first step from a new state
+        """
+        if self.stepper is None:
+            model = self.model
+            self.stepper = Integrator(
+                loop.stepper.method,
+                model.y_size,
+                model.ledgers,
+                lambda: model.structure,
+                model.scale.copy(),
+                model.damped,
+            )
+            self.stepper.out = model.new_out()
+        if first:
+            self.stepper.discard_history()
+        self.stepper.controls[:] = loop.controls
+        return self.stepper.single_step(loop.rhs, loop.slate.handle, int(self.model.layout["supply"]), t, h, y)
+
+    def widths(self) -> np.ndarray:
+        """Ranges of the states so far, at least the small range of each state."""
+        return np.maximum(self.greatest - self.least, self.small)
+
+    def worst(self) -> tuple[str, float]:
+        """(place, mean error as a fraction of the range) of the state with the greatest error."""
+        if not self.restart_data[0]:
+            return "", 0.0
+        share = self.sums / self.restart_data[0] / self.widths()
+        share[np.isnan(share)] = np.inf
+        at = int(np.argmax(share))
+        return self.model.state_names[self.states[at]].partition("[")[0], float(share[at])
+
+    def notice(self) -> Notice | None:
+        """Notice of a finished run, if the error is too large."""
+        place, share = self.worst()
+        if not DOUBTFUL <= share < np.inf:  # a state that is not finite has stopped the run
+            return None
+        ok = share < WRONG
+        verdict = "it may be wrong" if ok else "the numbers are not to be trusted"
+        steps = self.model.case.step_amount(self.step)
+        text = (f"{place}: steps of {steps} give a mean error of about {100 * share:.2g} % of its range, by "
+                f"comparison with two half steps; {verdict}; halve the step")  # fmt: skip
+        key = "step" if self.model.case.numerics.step is not None else "courant"
+        return Notice("step-error", place, text, key, share, WRONG, ok)
+
+
+def corrected_store(loop) -> bool:
+    """True if a delay line corrected a store for a jump within the last step; half steps have no such correction."""
+    past = loop.slate.past
+    return past.size > 0 and past[CORRECTED_TIME] == loop.t

@@ -1,0 +1,213 @@
+"""Threads that step bands of a state in parallel, all by the same compiled loop.
+
+Every worker has its own arrays, of full size, and uses only the parts that its band reads. Python works on the arrays
+of the loop, which are those of the first worker. Before the workers continue, they copy from there what Python may have
+changed; afterwards each copies its rows back.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import threading
+import time
+from contextlib import contextmanager
+from dataclasses import replace
+from queue import SimpleQueue
+
+import numpy as np
+
+from fvsolve.kernels import band_exchange
+from fvsolve.kernels.compiled_functions import functions
+from fvsolve.model import Slate
+from fvsolve.model.slate import lined
+from fvsolve.solve.blocked_stages import blocked_sums
+from fvsolve.solve.partition import Partition
+from fvsolve.steppers import loop_indices
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.signatures import JOIN, compiled_as
+
+COPIED = ("memory", "orders", "flags", "ledger", "carry", "g", "g_new", "out", "out_row", "values", "supply")
+WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past")
+
+
+def yield_address() -> int:
+    """Address of the system function that lets other threads run."""
+    name = "SwitchToThread" if os.name == "nt" else "sched_yield"
+    library = ctypes.windll.kernel32 if os.name == "nt" else ctypes.CDLL(None)
+    return ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+
+
+class Worker:
+    """Worker of a band: its arrays, and the handle through which compiled code reads them.
+
+    team : a `ThreadTeam` or `MpiRanks`, with the addresses and arrays for the exchange in `kernels.joint`
+    """
+
+    def __init__(self, team, k: int, run_data: Slate, stepper: Integrator) -> None:
+        cut, loop = team.cut, team.loop
+        self.loop, self.number, self.slate, self.stepper = loop, k, run_data, stepper
+        self.stepper.join, self.stepper.row_blocks = team.join, cut.row_blocks(k)
+        self.stepper.sums = np.zeros(cut.sum_count)
+        self.own = [
+            slice(begin, stop) for begin, stop, *_ in self.stepper.row_blocks[len(cut.common_states()) :].tolist()
+        ]
+        states, flows = cut.states(k), cut.flows(k)
+        own = np.zeros(band_exchange.HEAD + 3 * (len(states) + len(flows)), dtype=np.int64)
+        (
+            own[band_exchange.BAND],
+            own[band_exchange.BAND_COUNT],
+            own[band_exchange.YIELD],
+            own[band_exchange.PROCESS_CALL],
+        ) = k, cut.count, team.yield_address, team.callback
+        own[band_exchange.BOARD], own[band_exchange.SUM_BUFFER] = team.board.ctypes.data, team.buffer.ctypes.data
+        own[band_exchange.COMMON_SPANS], own[band_exchange.STATES], own[band_exchange.FLOWS] = (
+            len(cut.common_states()),
+            len(states),
+            len(flows),
+        )
+        own[band_exchange.HEAD :] = np.concatenate([states, flows]).ravel()
+        self.stepper.shape = blocked_sums(cut, k)
+        self.own_arrays = {"bands": cut.bands(k), "joint": own, "sums": self.stepper.shape}
+        self.call_tables = team.functions.calls, team.functions.hooks
+        self.open()
+        at, bounds = loop.stepper.bounds
+        own_states = np.zeros(loop.model.y_size, dtype=bool)
+        for begin, stop, *_ in self.stepper.row_blocks.tolist():
+            own_states[begin:stop] = True
+        owned = own_states[at[::3]]
+        self.bounds = np.ascontiguousarray(at.reshape(-1, 3)[owned]).ravel(), bounds[owned]
+
+    def open(self) -> None:
+        """Collect the written arrays and make their handle; repeated when the history of delay lines has grown."""
+        self.written = self.slate.written._replace(**self.own_arrays)
+        self.handle = self.slate.linked(self.written, self.call_tables)
+
+    def store(self, name: str, values: np.ndarray) -> None:
+        """Copy values into an array of `WRITTEN`."""
+        if name == "past" and values.size != self.slate.past.size:
+            self.slate.past = values.copy()
+        getattr(self.slate.written, name)[...] = values
+
+    def copy_from_loop(self, states: list[slice]) -> None:
+        """Copy from the loop the arrays that Python may have changed, and these states."""
+        if self.number == 0:
+            return
+        for name in COPIED:
+            getattr(self.stepper, name)[...] = getattr(self.loop.stepper, name)
+        for name in WRITTEN:
+            self.store(name, getattr(self.loop.slate.written, name))
+        self.stepper.times, self.stepper.largest = self.loop.stepper.times, self.loop.stepper.largest
+        now = self.loop.progress[loop_indices.NOW]
+        for rows in states:
+            self.stepper.y[now, rows] = self.loop.stepper.y[now, rows]
+
+    def run_steps(self, functions: tuple, where: int) -> int:
+        """Run the time loop on this band; returns its code."""
+        stepper = self.stepper
+        if self.slate.past is not self.written.past:
+            self.open()
+        within, stepper.bounds = stepper.bounds, self.bounds
+        code = stepper.call(*functions, self.handle, where, self.slate.armed)
+        stepper.bounds = within
+        return code
+
+    def copy_to_loop(self, name: str, at) -> None:
+        """Copy the rows of this band to the arrays of the loop."""
+        if self.number > 0:
+            source, target = getattr(self.stepper, name)[at], getattr(self.loop.stepper, name)[at]
+            for rows in self.own:
+                target[rows] = source[rows]
+
+
+def copy_integrator(stepper: Integrator) -> Integrator:
+    """Copy of an integrator, with its own arrays except those that steps only read."""
+    copy = Integrator(stepper.method, stepper.scale.size, stepper.ledger_rates.shape[1], stepper.structure, stepper.scale,
+                    stepper.damped)  # fmt: skip
+    copy.stored, copy.carry, copy.bounds = stepper.stored, stepper.carry.copy(), stepper.bounds
+    for name in ("out", "out_row", "values", "g", "g_new", "rows"):
+        setattr(copy, name, getattr(stepper, name).copy())
+    return copy
+
+
+def band_functions(cut: Partition) -> tuple:
+    """(functions of a model with exchange between bands, compiled function that combines partial sums)."""
+    features = replace(cut.model.functions.cast, bands=True, together=cut.exchanges_flows)
+    return functions(features), compiled_as(band_exchange.gather_sums, JOIN)
+
+
+class ThreadTeam:
+    """Workers of a loop, each in its own thread; the calling thread waits for them."""
+
+    def __init__(self, loop, cut: Partition) -> None:
+        self.loop, self.cut, self.yield_address, self.callback, self.seconds = loop, cut, yield_address(), 0, 0.0
+        self.functions, self.join = band_functions(cut)
+        self.board = lined(band_exchange.LINE * cut.count)
+        self.buffer = lined(2 * cut.sum_count)
+        self.members = [Worker(self, 0, loop.slate, loop.stepper)]
+        self.members += [Worker(self, k, Slate(loop.model), copy_integrator(loop.stepper)) for k in range(1, cut.count)]
+        self.stale = True  # True where the workers do not have the present rows of the loop
+        self.requests = [SimpleQueue() for _ in self.members]
+        self.answers: SimpleQueue = SimpleQueue()
+        tasks = zip(self.members, self.requests, strict=True)
+        self.threads = [threading.Thread(target=self.serve, args=task, daemon=True, name="band") for task in tasks]
+        for thread in self.threads:
+            thread.start()
+
+    def serve(self, member: Worker, requests: SimpleQueue) -> None:
+        """Serve the requests of a thread: run the time loop for each, until the request is None."""
+        while (task := requests.get()) is not None:
+            start = time.thread_time()
+            try:
+                answer = member.run_steps(*task)
+                member.copy_to_loop("y", member.stepper.progress[loop_indices.NOW])
+                if answer == loop_indices.FIELD:
+                    member.copy_to_loop("y_out", ...)
+            except BaseException as error:  # raised again in the calling thread
+                answer = error
+            self.answers.put((answer, time.thread_time() - start))
+
+    def call(self, functions: tuple, where: int) -> int:
+        """Run the time loop on all bands; returns a code of `steppers.slots`."""
+        for member in self.members:
+            alike = [slice(*block) for block in self.cut.common_states()]
+            member.copy_from_loop(alike + (member.own if self.stale else []))
+        self.stale = False
+        with postponed_interrupts():
+            for requests in self.requests:
+                requests.put((functions, where))
+            answers = [self.answers.get() for _ in self.members]
+        self.seconds += sum(seconds for _, seconds in answers)
+        for answer, _ in answers:
+            if isinstance(answer, BaseException):
+                raise answer
+        return answers[0][0]
+
+    def gather_states(self, at: int) -> None:
+        """Copy row `at` of the states of all workers to the loop."""
+        for member in self.members:
+            member.copy_to_loop("y", at)
+
+    def close(self) -> None:
+        """End the threads."""
+        for requests in self.requests:
+            requests.put(None)
+        for thread in self.threads:
+            thread.join()
+
+
+@contextmanager
+def postponed_interrupts():
+    """Postpone Ctrl-C until all workers have returned, because they wait for each other."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signals, before = [], signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, lambda *arguments: signals.append(arguments))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if signals and callable(before):
+        before(*signals[0])

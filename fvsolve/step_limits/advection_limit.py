@@ -1,0 +1,430 @@
+"""Exact Courant limit of linear advection on a uniform periodic grid (von Neumann).
+
+A wave of phase theta per cell is multiplied by R(nu z(theta)) in a step, with the stability function R of the method,
+the symbol z of the scheme and the Courant number nu. With R = N / D and t = sin^2(theta / 2), E(nu, t) = |D|^2 - |N|^2
+is a polynomial with rational coefficients; a Courant number is stable if E >= 0 for all t. Factors nu^a and t^p are
+divided out, so that slowly growing waves of any length are decided as well; the quotient at t = 0 decides the longest
+waves.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from numbers import Rational
+
+import numpy as np
+
+from fvsolve.step_limits.polynomial_sign import negative_point, polynomial_value
+from fvsolve.step_limits.symbol import WEIGHTS, real_part, square, symbol, weights_of
+from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
+from fvsolve.steppers.analysis.stability_properties import a_stable
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.sturm import count_roots, odd_part
+from fvsolve.steppers.tableau import METHODS, Method, method_named
+from fvsolve.validation import NAME, NAMES, POSITIVE, TEXT, Kind, is_row, validated
+
+RAYS = 240  # number of waves whose roots are computed first
+ZOOMS, ZOOM_RAYS = 9, 17
+MARGIN = Fraction(1, 10**9)  # relative margin on both sides of the limit in the proof
+TURNS = 8  # greatest number of searches, each after a failed proof
+ALGEBRAIC_DIGITS = 30  # digits to which algebraic numbers are rounded
+# Courant number at which growth is reported: relative to the limit; absolute if the limit is 0.
+GROWTH_MARGIN, DEFAULT_COURANT = 1.01, 0.5
+THOUSANDFOLD = 1e3
+LEAST_FLOAT_GROWTH = 1e-8  # |R| - 1 above which floating point gives seven digits
+SLOW_WAVES, SLOW_ZOOMS = 24, 6
+EVERY, LONGEST, SHORTEST, BETWEEN, GROWS = "all", "longest", "shortest", "between", "grows"
+
+
+@dataclass(frozen=True)
+class RangeEnd:
+    """End of a stable range: Courant number, and wave that determines it, as t = sin^2(theta / 2) and in words."""
+
+    courant: float
+    t: Fraction = Fraction(0)
+    wave: str = ""
+
+    @property
+    def theta(self) -> float:
+        """Phase per cell [rad]."""
+        return 2 * math.asin(math.sqrt(self.t))
+
+
+ALL_STABLE = [(RangeEnd(0.0), RangeEnd(math.inf))]
+
+
+@dataclass(frozen=True)
+class AdvectionLimit:
+    """Stable Courant numbers of a scheme and a method on a uniform periodic grid.
+
+    limit : greatest Courant number below which all are stable; 0 if there is none, inf without an upper end
+    theta, wave : phase [rad per cell] and name of the waves that determine the limit, None for an infinite limit
+    stable : ranges (low, high) of stable Courant numbers; more than one range if stability returns
+    proved : True if each range is proved in exact numbers to 1 part in 10^9
+    digits : significant digits of a published tableau, None where its numbers are exact
+    courant : given Courant number, else 1 % above the limit (0.5 if the limit is 0)
+    growth : greatest |R| - 1 at `courant`, 0 where it is stable; steps : number of steps to growth by a factor of 1000
+    """
+
+    scheme: str
+    method: str
+    limit: float
+    theta: float | None
+    wave: str | None
+    stable: tuple[tuple[float, float], ...]
+    proved: bool
+    digits: int | None
+    courant: float | None
+    growth: float | None
+    steps: float | None
+
+    def plain(self) -> dict:
+        """Return the values for JSON: None for infinity."""
+        values = asdict(self)
+        values["limit"] = _finite(self.limit)
+        values["stable"] = [[low, _finite(high)] for low, high in self.stable]
+        return values
+
+
+@validated(scheme=NAME, method=NAME, courant=POSITIVE)
+def advection_limit(scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
+    """Exact Courant limit of a linear scheme and a method, and the growth at `courant`.
+
+    Raises FvsolveError for unknown names, and for schemes that are not linear.
+    """
+    return limit_of(weights_of(scheme), scheme, method, courant)
+
+
+@validated(schemes=NAMES, methods=NAMES, courant=POSITIVE)
+def advection_limits(
+    schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, courant: float | None = None
+) -> list[AdvectionLimit]:
+    """Courant limits of all pairs, method by method; None for all schemes or all methods."""
+    schemes, methods = ([x] if isinstance(x, str) else x for x in (schemes, methods))
+    schemes = list(dict.fromkeys(schemes or WEIGHTS))
+    for name in schemes:
+        weights_of(name)
+    named = [method_named(name).name for name in methods] if methods else [m.name for m in METHODS.values()]
+    return [advection_limit(scheme, name, courant) for name in dict.fromkeys(named) for scheme in schemes]
+
+
+FACE_WEIGHTS = Kind(
+    lambda given: is_row(given, lambda x: isinstance(x, Rational)) and len(given) == 5 and sum(given) == 1,
+    "five integers or fractions with sum 1",
+)
+
+
+@validated(weights=FACE_WEIGHTS, scheme=TEXT, method=NAME, courant=POSITIVE)
+def limit_of(weights: Sequence[Fraction], scheme: str, method: str, courant: float | None = None) -> AdvectionLimit:
+    """Exact Courant limit for any face weights of cells u-2 .. u+2 with sum 1, and the growth at `courant`."""
+    tableau = method_named(method)
+    gaps, proved = _stable_ranges(tuple(weights), *_rational(method), _is_a_stable(tableau))
+    edge = gaps[0][1] if gaps and gaps[0][0].courant == 0 else None
+    limit = edge.courant if edge else 0.0
+    stable = tuple((low.courant, high.courant) for low, high in gaps)
+    if courant is None and math.isfinite(limit):
+        courant = limit * GROWTH_MARGIN or DEFAULT_COURANT
+    growth = steps = None
+    if courant is not None:
+        stable_there = any(low <= courant <= high for low, high in stable)
+        growth, fastest = (0.0, 0.0) if stable_there else growth_of(weights, method, courant)
+        steps = math.log(THOUSANDFOLD) / math.log1p(growth) if growth > 0 else None
+    theta, wave = (None, None) if math.isinf(limit) else (edge.theta, edge.wave) if edge else (fastest, GROWS)
+    return AdvectionLimit(
+        scheme, tableau.name, limit, theta, wave, stable, proved, tableau.digits, courant, growth, steps
+    )
+
+
+def growth_of(weights: Sequence[Fraction], method: str, courant: float) -> tuple[float, float]:
+    """(greatest |R(nu z(theta))| - 1, its theta) at a Courant number nu; in fractions if too small for floats."""
+    r = _function(method)
+    theta = np.linspace(0.0, np.pi, 4001)
+    for _ in range(6):
+        size = np.abs(r(courant * symbol(weights, theta)))
+        at = int(np.argmax(size))
+        best, most = float(theta[at]), float(size[at]) - 1
+        theta = np.linspace(theta[max(at - 1, 0)], theta[min(at + 1, theta.size - 1)], 201)
+    return (most, best) if most > LEAST_FLOAT_GROWTH else _slow_growth(weights, method, Fraction(courant))
+
+
+def _slow_growth(weights: Sequence[Fraction], method: str, courant: Fraction) -> tuple[float, float]:
+    """`growth_of` in fractions, |R| - 1 = (|N|^2 - |D|^2) / (|D|^2 (1 + |R|)), on few waves, by repeated refinement."""
+    (r, _), a, q = _rational(method), real_part(weights), square(weights)
+    theta = [k * math.pi / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
+    for _ in range(SLOW_ZOOMS):
+        growths = []
+        for x in theta:
+            t = _dyadic(math.sin(x / 2) ** 2, 60)
+            up, down = (_modulus(p, courant * a(t), courant**2 * q(t)) for p in (r.numerator, r.denominator))
+            growths.append(float((up - down) / down))
+        at = int(np.argmax(growths))
+        low, high = theta[max(at - 1, 0)], theta[min(at + 1, len(theta) - 1)]
+        best, most = theta[at], growths[at]
+        theta = [low + (high - low) * k / SLOW_WAVES for k in range(SLOW_WAVES + 1)]
+    return most / (1 + math.sqrt(1 + most)), best
+
+
+def _modulus(p: Polynomial, real: Fraction, size: Fraction) -> Fraction:
+    """|p(s)|^2 for s with this real part and |s|^2 = `size`: sum_jk p_j p_k |s|^2k Re(s^(j-k))."""
+    cosines = [Fraction(1), real]
+    while len(cosines) <= p.degree:
+        cosines.append(2 * real * cosines[-1] - size * cosines[-2])
+    terms = (
+        (1 if j == k else 2) * p.coefficients[j] * p.coefficients[k] * size**k * cosines[j - k]
+        for j in range(p.degree + 1)
+        for k in range(j + 1)
+    )
+    return sum(terms, Fraction(0))
+
+
+# ---- the polynomial E
+
+
+def _function(method: str) -> StabilityFunction:
+    return _stability_function(method_named(method))
+
+
+@functools.cache
+def _stability_function(method: Method) -> StabilityFunction:
+    return stability_function(method)
+
+
+@functools.cache
+def _is_a_stable(method: Method) -> bool:
+    return a_stable(_stability_function(method))
+
+
+def _rational(method: str) -> tuple[StabilityFunction, Fraction]:
+    """(R with rational coefficients, relative size below which a coefficient of E is rounding)."""
+    tableau, r = method_named(method), _function(method)
+    parts = (*r.numerator.coefficients, *r.denominator.coefficients)
+    exact = all(isinstance(x, Fraction) for x in parts)
+    digits = tableau.digits - 2 if tableau.digits else ALGEBRAIC_DIGITS
+    tolerance = Fraction(0) if exact and not tableau.digits else Fraction(1, 10**digits)
+    if exact:
+        return r, tolerance
+    up, down = (Polynomial(_fraction(x) for x in p.coefficients) for p in (r.numerator, r.denominator))
+    return StabilityFunction(up, down), tolerance
+
+
+def _fraction(x) -> Fraction:
+    if isinstance(x, Fraction):
+        return x
+    low, high = x.bracket()
+    return (low + high) / 2
+
+
+def _e_polynomial(weights: Sequence[Fraction], r: StabilityFunction, tolerance: Fraction) -> list[list[int]]:
+    """Integer coefficients of nu^m t^i of a positive multiple of E, without the common factors of its terms.
+
+    E = sum_jk (d_j d_k - n_j n_k) nu^(j+k) Re(z^j conj(z)^k);
+    Re(z^j conj(z)^k) = |z|^2k c_j-k, c_0 = 1, c_1 = Re z, c_m+1 = 2 Re z c_m - |z|^2 c_m-1.
+    """
+    size = max(r.numerator.degree, r.denominator.degree)
+    pairs = (r.denominator, 1), (r.numerator, -1)
+    a, q = real_part(weights), square(weights)
+    c, powers = [Polynomial([1]), a], [Polynomial([1])]
+    for _ in range(2 * size):
+        c.append(2 * a * c[-1] - q * c[-2])
+        powers.append(powers[-1] * q)
+    rows = []
+    for m in range(2 * size + 1):
+        row, doubt = Polynomial([]), Polynomial([])
+        for k in range(max(0, m - size), m // 2 + 1):
+            factor = powers[k] * c[m - 2 * k]
+            parts = [s * _coefficient(p, k) * _coefficient(p, m - k) * (1 if 2 * k == m else 2) for p, s in pairs]
+            row = row + sum(parts) * factor
+            doubt = doubt + sum(map(abs, parts)) * Polynomial(map(abs, factor.coefficients)) if tolerance else doubt
+        rows.append(_without_rounding(row, doubt, tolerance))
+    return _reduced(rows)
+
+
+def _coefficient(p: Polynomial, k: int) -> Fraction:
+    return p.coefficients[k] if k <= p.degree else Fraction(0)
+
+
+def _without_rounding(p: Polynomial, doubt: Polynomial, tolerance: Fraction) -> Polynomial:
+    return Polynomial(
+        x if abs(x) > tolerance * _coefficient(doubt, i) else Fraction(0) for i, x in enumerate(p.coefficients)
+    )
+
+
+def _reduced(rows: list[Polynomial]) -> list[list[int]]:
+    """Integer coefficients without nu^a and the common factor in t; empty for the zero polynomial.
+
+    The common factor is zero where z is zero: at t = 0, and at t = 1 for central differences. If it changes its sign
+    in between, E is negative somewhere at every nu, and [[-1]] is returned.
+    """
+    while rows and rows[0].degree < 0:
+        rows = rows[1:]
+    while rows and rows[-1].degree < 0:
+        rows = rows[:-1]
+    if not rows:
+        return []
+    common = Polynomial([])
+    for p in sorted((p for p in rows if p.degree >= 0), key=lambda p: p.degree):
+        common = common.gcd(p)
+    if _signs(common) == {-1, 1}:
+        return [[-1]]
+    common = common if 1 in _signs(common) else -common
+    rows = [p // common for p in rows]
+    wide = max(p.degree for p in rows) + 1
+    denominator = math.lcm(*(x.denominator for p in rows for x in p.coefficients))
+    return [[int(_coefficient(p, i) * denominator) for i in range(wide)] for p in rows]
+
+
+def _signs(p: Polynomial) -> set[int]:
+    """Signs of p on 0 < t < 1, without its zeros, in exact arithmetic."""
+    changes = odd_part(p) if p.degree > 0 else p
+    for end in (0, 1):
+        while changes.degree > 0 and changes(Fraction(end)) == 0:
+            changes = changes // Polynomial([-end, 1])
+    if changes.degree > 0 and count_roots(changes, Fraction(0), Fraction(1)):
+        return {-1, 1}
+    return {sign(p(t)) for t in (Fraction(k, 64) for k in range(1, 64))} - {0}
+
+
+# ---- where it is negative
+
+
+def _stable_ranges(weights: tuple, r: StabilityFunction, tolerance: Fraction, left_half_plane: bool):
+    """(stable ranges as pairs of edges, whether they are proved)."""
+    if left_half_plane and 1 not in _signs(real_part(weights)):
+        return ALL_STABLE, True
+    return _cached_stable_ranges(weights, r.numerator.coefficients, r.denominator.coefficients, tolerance)
+
+
+@functools.cache
+def _cached_stable_ranges(weights: tuple, numerator: tuple, denominator: tuple, tolerance: Fraction):
+    g = _e_polynomial(weights, StabilityFunction(Polynomial(numerator), Polynomial(denominator)), tolerance)
+    if not g:
+        return ALL_STABLE, True
+    rays = {_dyadic(math.sin(k * math.pi / (2 * RAYS)) ** 2, 24) for k in range(RAYS + 1)}
+    gaps: list = []
+    for _ in range(TURNS):
+        gaps = _candidates(g, sorted(rays))
+        counterexamples = [_counterexample(g, low.courant, high.courant) for low, high in gaps]
+        points = [point for point in counterexamples if isinstance(point, tuple)]
+        if not points:
+            return gaps, not any(counterexamples) and _fails_outside(g, gaps, rays)
+        for _, t in points:
+            rays |= {t, *(min(t * Fraction(k, 8), Fraction(1)) for k in (4, 6, 7, 9, 10, 16))}
+    return [gap for gap, point in zip(gaps, counterexamples, strict=True) if not isinstance(point, tuple)], False
+
+
+def _counterexample(g, low: float, high: float):
+    """Result of `negative_point` for the range, reduced by a margin at its finite ends."""
+    start = Fraction(low) * (1 + MARGIN)
+    if math.isfinite(high):
+        return negative_point(g, start, Fraction(high) * (1 - MARGIN))
+    middle = max(start, Fraction(1))
+    below = negative_point(g, start, middle) if start < middle else None
+    above = negative_point(g[::-1], Fraction(0), 1 / middle) if below is None else below
+    return (1 / above[0], above[1]) if isinstance(above, tuple) and below is None and above[0] else above
+
+
+def _fails_outside(g, gaps, rays) -> bool:
+    """True if a wave grows just outside each end, and at all small nu if no range starts at 0, in exact arithmetic."""
+    if (not gaps or gaps[0][0].courant > 0) and not any(_negative_at_small_nu(g, t) for t in rays):
+        return False
+    ends = [(low, 1 - MARGIN) for low, _ in gaps if low.courant > 0]
+    ends += [(high, 1 + MARGIN) for _, high in gaps if math.isfinite(high.courant)]
+    return all(polynomial_value(g, Fraction(edge.courant) * factor, edge.t) < 0 for edge, factor in ends)
+
+
+def _negative_at_small_nu(g, t: Fraction) -> bool:
+    """True if the polynomial at t is negative for all small nu > 0."""
+    return next((x < 0 for x in _coefficients_at(g, t) if x), False)
+
+
+def _candidates(g, rays: list[Fraction]):
+    """Stable ranges on the rays, with ends refined between the rays."""
+    unstable = sorted(range_ for t in rays for range_ in _negative(_coefficients_at(g, t)))
+    gaps, at = [], 0.0
+    for low, high in [*unstable, (math.inf, math.inf)]:
+        if low > at * (1 + 1e-9):
+            gaps.append((at, low))
+        at = max(at, high)
+    return [range_ for low, high in gaps if (range_ := _sharpened(g, rays, low, high))]
+
+
+def _sharpened(g, rays, low: float, high: float):
+    """Range with refined ends; None if it becomes empty."""
+    inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
+    start = _edge(g, rays, inside, -1) if low > 0 else RangeEnd(0.0)
+    end = _edge(g, rays, inside, 1) if math.isfinite(high) else RangeEnd(math.inf)
+    return (start, end) if start.courant < end.courant else None
+
+
+def _edge(g, rays: list[Fraction], inside: float, side: int) -> RangeEnd:
+    """End of the stable range around `inside`: the nearest change of sign over all t, by successive refinement."""
+
+    def reach(t: Fraction) -> float:
+        ranges = _negative(_coefficients_at(g, t))
+        if side > 0:
+            return min((max(low, inside) for low, high in ranges if high > inside), default=math.inf)
+        return -max((min(high, inside) for low, high in ranges if low < inside), default=0.0)
+
+    ends = reach(Fraction(0)), reach(Fraction(1))
+    all_of = [reach(t) for t in rays]
+    at = int(np.argmin(all_of))
+    best, best_t = float(all_of[at]), rays[at]
+    low, high = rays[max(at - 1, 0)], rays[min(at + 1, len(rays) - 1)]
+    for _ in range(ZOOMS):
+        points = [low + (high - low) * Fraction(k, ZOOM_RAYS - 1) for k in range(ZOOM_RAYS)]
+        reaches = [reach(t) for t in points]
+        k = int(np.argmin(reaches))
+        if reaches[k] < best:
+            best, best_t = float(reaches[k]), points[k]
+        low, high = points[max(k - 1, 0)], points[min(k + 1, ZOOM_RAYS - 1)]
+        low, high = _dyadic(low, 60), _dyadic(high, 60)
+    close = [abs(reached - best) <= 1e-11 * abs(best) for reached in (*ends, *all_of)]
+    if all(close):
+        return RangeEnd(abs(best), Fraction(1), EVERY)
+    for is_close, t, wave in ((close[0], Fraction(0), LONGEST), (close[1], Fraction(1), SHORTEST)):
+        if is_close:
+            return RangeEnd(abs(best), t, wave)
+    return RangeEnd(abs(best), best_t, BETWEEN)
+
+
+def _dyadic(x, bits: int) -> Fraction:
+    return Fraction(round(x * (1 << bits)), 1 << bits)
+
+
+def _coefficients_at(g, t: Fraction) -> np.ndarray:
+    """Coefficients in nu at t, each the nearest float to the exact one, up to a positive factor."""
+    powers = [1]  # of the denominator of t, so that all numbers are integers
+    for _ in range(len(g[0]) - 1):
+        powers.append(powers[-1] * t.denominator)
+    coefficients = []
+    for row in g:
+        total = 0
+        for entry, power in zip(reversed(row), powers, strict=True):
+            total = total * t.numerator + entry * power
+        coefficients.append(total)
+    largest = max(map(abs, coefficients))
+    return np.array([x / largest for x in coefficients]) if largest else np.zeros(1)
+
+
+def _negative(p: np.ndarray) -> list[tuple[float, float]]:
+    """Ranges of nu > 0 where the polynomial is negative."""
+    if not p.any():
+        return []
+    roots = np.roots(p[::-1])
+    real = np.sort(roots.real[(np.abs(roots.imag) <= 1e-7 * np.abs(roots)) & (roots.real > 1e-13)])
+    ends = [0.0, *map(float, real), math.inf]
+    ranges = []
+    for low, high in zip(ends, ends[1:], strict=False):
+        inside = (low + high) / 2 if math.isfinite(high) else 2 * low + 1
+        if high > low and np.polyval(p[::-1], inside) < 0:
+            joined = ranges and ranges[-1][1] == low
+            ranges[-1:] = [(ranges[-1][0], high)] if joined else [*ranges[-1:], (low, high)]
+    return ranges
+
+
+def _finite(x: float) -> float | None:
+    return None if math.isinf(x) else x

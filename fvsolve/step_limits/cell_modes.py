@@ -1,0 +1,105 @@
+"""Eigenvalues of cells at the start: friction, unsteady friction, wall creep, decay and diffusion of scalars.
+
+Friction of slope g = d drag / d M couples the two waves of a pipe: with the symbol q z of a wave that crosses q cells a
+second, s = q Re z - g / 2 +- sqrt(g^2 / 4 - (q Im z)^2).
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from fvsolve.kernels.steady_friction import drag_slope
+from fvsolve.model.creep import elements
+from fvsolve.schemes import SCHEMES
+from fvsolve.step_limits.symbol import symbol
+
+PHASES = np.linspace(0.0, np.pi, 65)
+LEAST_CELLS = 3  # least number of cells of a basin for diffusion modes
+DIFFUSION = 1.0 - np.cos(PHASES)  # diffusion rate of a wave, relative to 2 D / dx^2
+
+Modes = list[tuple[str, np.ndarray]]  # places and eigenvalues there [1/s]
+
+
+def cell_modes(model) -> Modes:
+    """All modes of cells."""
+    return [*friction_modes(model), *memory_modes(model), *pipe_scalar_modes(model), *basin_scalar_modes(model)]
+
+
+def friction_modes(model) -> Modes:
+    """Modes of waves in pipes with friction, at the initial flow."""
+    scheme, modes = model.case.numerics.scheme, []
+    weights = SCHEMES[scheme].smooth.weights
+    symbols = {n: pipe_symbol(tuple(weights), n) for n in {mesh.cells for mesh in model.pipes}}
+    for mesh, row, q in zip(model.pipes, model.tables.pipes, model.wave_rates, strict=True):
+        g = friction_slope(row)
+        if g > 0.0 and row["delay"] < 0:
+            z = symbols[mesh.cells]  # waves between two ends are longer than two cells
+            root = np.sqrt(0.25 * g * g - (q * z.imag) ** 2 + 0j)
+            modes.append((mesh.name, np.concatenate([q * z.real - 0.5 * g + root, q * z.real - 0.5 * g - root])))
+    return modes
+
+
+@functools.lru_cache(maxsize=256)
+def pipe_symbol(weights: tuple, n: int) -> np.ndarray:
+    """Symbol of waves between the ends of n cells."""
+    values = symbol(weights, PHASES * (1.0 - 0.5 / n))
+    values.flags.writeable = False
+    return values
+
+
+def memory_modes(model) -> Modes:
+    """Modes of unsteady friction and creeping walls: fastest term, with the gain of all terms and the friction."""
+    modes, floats = [], model.tables.floats
+    for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
+        if row["terms"] > 0:
+            gain, rate = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2).T
+            modes.append((f"{mesh.name}.memory", np.array([-rate.max() - gain.sum() - friction_slope(row)])))
+        if row["elements"] > 0:
+            gain, rate = elements(floats, row).T
+            modes.append((f"{mesh.name}.creep", np.array([-rate.max() - gain.sum()])))
+    return modes
+
+
+def friction_slope(row) -> float:
+    """Slope d drag / d M of a pipe at the initial flow [1/s]."""
+    return float(drag_slope(*(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))))
+
+
+def pipe_scalar_modes(model) -> Modes:
+    """Modes of scalars in pipes, at the initial flow."""
+    modes, rho = [], model.case.properties.density
+    for name, scalar in model.case.scalars.items():
+        for mesh, row in zip(model.pipes, model.tables.pipes, strict=True):
+            q = abs(float(row["flow"])) / (rho * row["area"] * row["dx"])
+            s = -q * (1.0 - np.exp(-1j * PHASES)) - 2.0 * scalar.diffusivity / row["dx"] ** 2 * DIFFUSION - scalar.decay
+            modes.append((f"{mesh.name}.{name}", s))
+    return modes
+
+
+def basin_scalar_modes(model) -> Modes:
+    """Modes of scalars in basins, with diffusion at its shortest wave."""
+    return [
+        (f"{basin.name}.{name}", np.array([-scalar.decay - scalar.diffusivity * greatest_diffusion_rate(basin.mesh)]))
+        for name, scalar in model.case.scalars.items()
+        for basin in model.basins
+        if scalar.decay > 0.0 or scalar.diffusivity > 0.0
+    ]
+
+
+def greatest_diffusion_rate(mesh) -> float:
+    """Greatest eigenvalue of diffusion on a mesh, without flux through its boundary [1/m2]."""
+    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse.linalg import eigsh
+
+    n, left, right = mesh.area.size, mesh.left[: mesh.inner], mesh.right[: mesh.inner]
+    if n < LEAST_CELLS:
+        return 0.0
+    near = mesh.length[: mesh.inner] / np.linalg.norm(mesh.centre[right] - mesh.centre[left], axis=1)
+    through = coo_array((near, (left, right)), shape=(n, n))
+    sides = np.bincount(left, near, n) + np.bincount(right, near, n)
+    root = diags_array(1.0 / np.sqrt(mesh.area))
+    operator = root @ (diags_array(sides) - through - through.T) @ root
+    start = np.random.default_rng(1).standard_normal(n)
+    return float(eigsh(operator.tocsr(), k=1, which="LM", tol=1e-3, v0=start, return_eigenvectors=False)[0])

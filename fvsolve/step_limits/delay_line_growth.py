@@ -1,0 +1,95 @@
+"""Growth of waves between a store and the far end of a delay line: reflection factor of a method.
+
+A store whose pressure follows its inflow, p' = k (2 w - Y p) with an arriving wave w, reflects Y p - w. Under a method
+with R(z), b, A, c and a = h k Y this is S w, S = 2 a b (I + a A)^-1 exp(i theta c) / (exp(i theta) - R(-a)) - 1, for a
+wave with phase theta per step, where exp(i theta c) is the line read at the stages. |S| <= 1 under the trapezoidal rule
+at any step, but not under Euler, nor under the implicit midpoint rule, which has no stage at the end of the step: such
+waves grow, unless interpolation of the line between steps or friction damps them as much.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
+from fvsolve.kernels.delay_lines.wave_history import lagrange_four, lagrange_six, lagrange_three
+from fvsolve.step_limits.lumped_modes import LEAST_GROWTH, growth_factor
+from fvsolve.steppers.tableau import Method
+
+REFLECTION_BOUND = 4.0  # times a: upper bound of what a method adds to a wave in a single reflection
+RK4_BOUND = 1.5  # value of a up to which rk4 does not amplify reflected waves
+ANGLES = np.pi * (np.arange(720) + 1.0) / 720.0  # phases theta per step
+
+
+def wave_growth(model, method: Method, h: float, span: float) -> tuple[float, str, float]:
+    """(growth factor of waves of a line in a run, store with the greatest growth, h k Y).
+
+    Far ends reflect fully. The factor is 0 without such stores, and for Rosenbrock methods, where it is not computed.
+    """
+    candidates = []
+    if method.kind == "linear":  # Rosenbrock: stages use the time slope of arriving waves
+        return 0.0, "", 0.0
+    for name, row, a in storing_nodes(model, h):
+        for line in lines_at(model, row):
+            pipe, steps = model.tables.pipes[line["pipe"]], line["hold"] / h
+            round_trip = 2.0 * line["stretches"] * line["hold"]
+            if REFLECTION_BOUND * a * span / round_trip < 1.0:
+                continue
+            damping = line["tau"] * line["stretches"] * float(drag_and_slope(pipe, float(pipe["flow"]))[1])
+            once = np.max(np.abs(reflection_factor(method, a, steps)) * np.abs(interpolation_factor(steps))) * np.exp(
+                -damping
+            )
+            candidates.append((growth_factor(float(once) - 1.0, span / round_trip), name, a))
+    return max(candidates, default=(0.0, "", 0.0))
+
+
+def line_growth_notices(model, method: Method, h: float, span: float) -> list[Notice]:
+    """Notice for the store where waves of a delay line grow most, if they grow."""
+    grows, name, a = wave_growth(model, method, h, span)
+    if grows < LEAST_GROWTH:
+        return []
+    wrong, other = grows >= LEAST_GROWTH**2, '"rk4" or "trapezoid"' if a < RK4_BOUND else '"trapezoid"'
+    text = (f"{name}: waves between it and the delay lines grow {grows:.3g} times in the run (an estimate), with "
+            f"{method.name} and steps of {model.case.step_amount(h)}, {a:.3g} times its filling time; "
+            f"{'the numbers are not to be trusted' if wrong else 'it may be wrong'}; give method = {other}, "
+            "or shorter steps")  # fmt: skip
+    return [Notice("step-limit", name, text, "method", a, None, not wrong)]
+
+
+def storing_nodes(model, h: float):
+    """(name, number, h k Y) of storing nodes connected to delay lines."""
+    nodes, out = model.tables.nodes, None
+    for i, (name, node) in enumerate(zip(model.case.places, nodes, strict=True)):
+        if node["line_count"] == 0 or node["kind"] in (rec.FIXED, rec.JUNCTION, rec.PATCH):
+            continue
+        out = model.evaluate(model.case.numerics.start, model.start)[1] if out is None else out
+        moving = node["kind"] >= rec.MOVING or (node["kind"] == rec.CHAMBER and node["row"] >= 0)
+        stiffness = out[model.layout["stiffness"] + node["row"]] if moving else node["stiffness"]
+        yield f"nodes.{name}", i, float(h * stiffness * node["admittance"])
+
+
+def lines_at(model, i: int):
+    """Rows of the delay lines connected to node i."""
+    node = model.tables.nodes[i]
+    ends = model.tables.integers[node["lines"] : node["lines"] + node["line_count"]]
+    return [model.tables.delays[end // 2] for end in ends]
+
+
+def reflection_factor(method: Method, a: float, steps: float) -> np.ndarray:
+    """Reflection factor S of waves with phases ANGLES per step, read `steps` steps after they were sent."""
+    solved = np.linalg.solve((np.eye(method.stages) + a * method.a).T, method.b)
+    seen = np.array([interpolation_factor(steps - c) for c in method.c])
+    return 2.0 * a * (solved @ seen) / (np.exp(1j * ANGLES) - (1.0 - a * solved.sum())) - interpolation_factor(steps)
+
+
+def interpolation_factor(steps: float) -> np.ndarray:
+    """Interpolated value of waves with phases ANGLES per step, read `steps` steps after they were sent."""
+    steps_up = int(np.ceil(steps - 1e-9))
+    x = max(0.0, steps_up - steps)
+    weights = lagrange_six(x) if steps_up >= 3 else lagrange_four(x) if steps_up >= 2 else lagrange_three(x)
+    if x < 1e-9:
+        weights = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    places = np.arange(-2, 4) - steps_up
+    return np.exp(1j * np.outer(ANGLES, places)) @ np.array(weights)

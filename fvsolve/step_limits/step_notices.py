@@ -1,0 +1,279 @@
+"""Notices for the pipes, basins and modes of a model whose step exceeds the limit of scheme and method.
+
+For linear schemes and waves that do not depend on the state the limit is proved: von Neumann's limit. Limited schemes
+count as their linear scheme in smooth flow, and waves that depend on the state by the fastest wave: these limits are
+estimates. So is the limit of a pipe of few cells, which its ends reduce; there the growth in the run decides, computed
+with the reflections of its own ends.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError, Notice
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model.slate import Slate
+from fvsolve.schemes import LEAST_CELLS, SCHEMES
+from fvsolve.step_limits.advection_limit import advection_limit, growth_of
+from fvsolve.step_limits.delay_line_growth import line_growth_notices
+from fvsolve.step_limits.lumped_modes import LEAST_GROWTH, Mode, growth_factor, lumped_modes
+from fvsolve.step_limits.pipe_end_growth import LONG, pipe_growth, pipe_limit
+from fvsolve.step_limits.plane_limit import is_stable_with_margin, plane_limit
+from fvsolve.step_limits.symbol import weights_of
+from fvsolve.step_limits.undamped_modes import undamped_notices
+from fvsolve.steppers import automatic
+from fvsolve.steppers.tableau import method_named
+
+SLACK = 1e-9  # relative excess over the limit that rounding may cause
+EXCESS = 0.05  # relative excess over an estimated limit up to which a step is doubtful, and above which it is wrong
+SMOOTH_GROWTH = (
+    1e6  # growth of cells from which numbers are wrong if no schedule jumps: then deviations are small at first
+)
+# Mean error of a state outside cells, relative to its range: no error, doubtful, wrong.
+NO_ERROR, DOUBTFUL, WRONG = 1e-9, 0.005, 0.05
+LIMITED_EXCESS = (
+    0.3  # SHARE for limiters between few cells, which are stable up to this excess (tests/limits/test_ends.py)
+)
+
+
+class CourantCheck(NamedTuple):
+    """Courant number of a pipe or a basin and its limit, both defined as `numerics.courant`."""
+
+    place: str
+    courant: float
+    limit: float
+    scheme: str  # scheme of the limit
+    proved: bool
+    location: str
+    allowed_excess: float = EXCESS  # relative excess over an estimate above which the numbers are wrong
+    growth: float = math.inf  # growth factor in the run, where growth decides
+
+
+def step_limits(
+    model, rates: dict[str, float] | None = None, step_error: float | None = None, run_data: Slate | None = None
+) -> list[Notice]:
+    """Notices for the worst pipe, for basins, and for modes other than waves, whose step exceeds its limit.
+
+    rates : greatest wave rate of each basin in the run so far, by name [1/s]; default the initial rates
+    step_error : greatest mean error of a state in the run, relative to its range (`solve.halves`); None before a run
+    run_data : data of a run to evaluate with, reset afterwards
+    Returns no notices under error control.
+    """
+    numerics = model.case.numerics
+    method = method_named(automatic.first_method(numerics.method))
+    if numerics.rtol is not None:
+        return []
+    lines = line_growth_notices(model, method, given_step(model), span(model)) if len(model.tables.delays) else []
+    if not method.explicit:
+        return lines
+    try:
+        checks = [*pipe_checks(model, method.name), *basin_checks(model, method.name, rates or {})]
+        h = first_step(model, run_data)
+        modes = lumped_modes(model, method.name, h) if h > 0.0 else []
+        growing = undamped_notices(model, method.name, h, span(model)) if h > 0.0 else []
+    except FvsolveError:  # a method without a stability function
+        return lines
+    notices = [
+        courant_notice(model, check, method.name) for check in checks if check.courant > check.limit * (1.0 + SLACK)
+    ]
+    jumps = any(jump for _, jump in model.breaks)
+    modes = [
+        mode for mode in modes if mode.outside_cells or not notices
+    ]  # modes of cells that come with waves have a notice already
+    return (
+        notices + [mode_notice(model.case, h, mode, method.name, step_error, jumps) for mode in modes] + growing + lines
+    )
+
+
+def first_step(model, run_data: Slate | None = None) -> float:
+    """Step of a run, under a Courant number its first step; 0 where it is unknown [s]."""
+    numerics = model.case.numerics
+    if numerics.step is not None:
+        return numerics.step
+    if run_data is None or model.basins:  # basins change more of the run data than flags
+        rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
+    else:
+        rate = float(run_data.evaluate(numerics.start, model.start, math.inf)[1][rec.RATE])
+        run_data.blank()
+    return numerics.courant / rate if rate > 0.0 else 0.0
+
+
+def given_step(model) -> float:
+    """Step used for delay lines [s]."""
+    numerics = model.case.numerics
+    return numerics.step if numerics.step is not None else numerics.courant / model.wave_rate
+
+
+def mode_notice(case, h: float, mode: Mode, method: str, step_error: float | None, jumps: bool) -> Notice:
+    """Notice for a growing mode; after a run, with the measured error of its steps."""
+    numerics = case.numerics
+    seen = (
+        step_error is None or not mode.outside_cells or step_error >= WRONG or (mode.resolved and step_error > NO_ERROR)
+    )
+    enough = (
+        (LEAST_GROWTH if mode.resolved else LEAST_GROWTH**2)
+        if mode.outside_cells
+        else LEAST_GROWTH**2
+        if jumps
+        else SMOOTH_GROWTH
+    )
+    wrong = seen and mode.growth >= enough
+    doubt = "it may be wrong" if seen or step_error >= DOUBTFUL else "this run shows no growth"
+    ends = "the numbers are not to be trusted" if wrong else doubt
+    key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
+    size = rounded_down(getattr(numerics, key) * mode.limit / h)
+    text = (f"{mode.place}: deviations grow {mode.growth:.3g} times in the run with {method} and steps of "
+            f"{case.step_amount(h)}; the limit is {case.step_amount(mode.limit)} (estimated at the start); "
+            f"{ends}; give numerics.{key} = {size:.4g}{unit} or less")  # fmt: skip
+    return Notice("step-limit", mode.place, text, key, h, mode.limit, not wrong)
+
+
+def pipe_checks(model, method: str) -> list[CourantCheck]:
+    """Check of the pipe that is farthest beyond its limit; empty without such a pipe."""
+    own = model.tables.pipes["delay"] < 0  # pipes divided into cells
+    if not own.any():
+        return []
+    numerics, waves = model.case.numerics, model.wave_rates
+    if numerics.step is not None:
+        courant = numerics.step * waves
+    else:
+        courant = numerics.courant * waves / (waves * model.tables.pipes["rate_factor"]).max()
+    cells, scheme = np.array([pipe.cells for pipe in model.pipes]), SCHEMES[numerics.scheme]
+    long = cells >= (
+        LEAST_CELLS if scheme.limited and scheme.shorter else LONG
+    )  # at the ends of short pipes the order of limited schemes is lower
+    short = np.flatnonzero(own & ~long)
+    checks = [check for k in short if (check := short_pipe(model, method, int(k), float(courant[k])))]
+    inner = own & (cells >= LEAST_CELLS if proved(model) else long)  # waves of a long pipe grow in few cells, too
+    if inner.any():
+        k = int(np.argmax(np.where(inner, courant, -1.0)))
+        checks += long_pipe(model, method, k, float(courant[k]))
+    return sorted(checks, key=lambda check: (not only_doubtful(check), check.courant / max(check.limit, 1e-300)))[-1:]
+
+
+def long_pipe(model, method: str, k: int, courant: float) -> list[CourantCheck]:
+    """Check of pipe k as a grid without ends, if a wave grows on it."""
+    scheme = smooth_scheme(model.case.numerics.scheme)[0]
+    if is_stable_with_margin(scheme, method, courant):
+        return []
+    result = advection_limit(scheme, method)
+    grows = math.inf if result.limit > 0.0 else growth(scheme, method, courant, span(model) * model.wave_rates[k])
+    sure = result.proved and proved(model)
+    check = CourantCheck(
+        f"links.{model.pipes[k].name}", courant, result.limit, scheme, sure, "on a long pipe", growth=grows
+    )
+    return [check] if grows >= LEAST_GROWTH else []
+
+
+def proved(model) -> bool:
+    """True if von Neumann's limit is exact for the pipes: linear scheme, wave speed independent of the state."""
+    return not smooth_scheme(model.case.numerics.scheme)[1] and model.case.law.linear
+
+
+def short_pipe(model, method: str, k: int, courant: float) -> CourantCheck | None:
+    """Check of pipe k of few cells, if its waves grow within the run with reflections at its ends."""
+    cells, own_scheme = model.pipes[k].cells, SCHEMES[model.case.numerics.scheme]
+    scheme, limited = smooth_scheme(
+        own_scheme.shorter if own_scheme.limited and own_scheme.shorter else own_scheme.name
+    )
+    steps = span(model) * model.wave_rates[k] / courant
+    grows = growth_factor(pipe_growth(scheme, method, cells, courant), steps)
+    if grows < LEAST_GROWTH:
+        return None
+    if not limited:
+        grows = growth_factor(pipe_growth(scheme, method, cells, courant, reflection_products(model, k)), steps)
+    where = f"between the ends of {cells} cell{'s' if cells > 1 else ''}"
+    limit, share = pipe_limit(scheme, method, cells), LIMITED_EXCESS if limited else 0.0
+    return CourantCheck(f"links.{model.pipes[k].name}", courant, limit, scheme, False, where, share, grows)
+
+
+def reflection_products(model, k: int) -> tuple[float, ...]:
+    """Products of the pressure reflection factors of both ends of pipe k.
+
+    An end with other parts than pipes has two possible factors.
+    """
+    row, nodes, valves = model.tables.pipes[k], model.tables.nodes, model.tables.valves
+    ends = []
+    for i in (row["from_node"], row["to_node"]):
+        plain = nodes[i]["kind"] == rec.JUNCTION
+        alone = plain and not np.any((valves["from_node"] == i) | (valves["to_node"] == i))
+        of_pipes = 2.0 * row["admittance"] / nodes[i]["admittance"] - 1.0 if plain else -1.0
+        ends.append({round(float(of_pipes), 3)} | (set() if alone else {-1.0}))
+    return tuple(sorted({p * q for p in ends[0] for q in ends[1]}))
+
+
+def basin_checks(model, method: str, rates: dict[str, float]) -> list[CourantCheck]:
+    """Checks of all basins whose waves grow; Courant numbers are those of the parts of a cell that its steps use."""
+    numerics, checks = model.case.numerics, []
+    for basin, row in zip(model.basins, model.tables.basins, strict=True):
+        rate, share = basin.pace(model.start)
+        parts = float(row["unsplit"]) or 1.0
+        rate = max(rate, rates.get(basin.name, 0.0))
+        if numerics.step is not None:
+            courant = numerics.step * rate * parts
+        else:
+            courant = numerics.courant
+        scheme, limited = smooth_scheme(basin.scheme)
+        share = round(share, 2) if basin.is_grid else 1.0
+        if is_stable_with_margin(scheme, method, courant / parts, share, basin.is_grid and basin.waving):
+            continue
+        if basin.is_grid:
+            limit = plane_limit(scheme, method, share, basin.waving)
+        else:
+            limit = advection_limit(scheme, method).limit
+        fixed = basin.is_grid and basin.even_paced
+        grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, span(model) * rate)
+        if grows >= LEAST_GROWTH:
+            checks.append(CourantCheck(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,
+                              "in a wide basin", growth=grows))  # fmt: skip
+    return checks
+
+
+def span(model) -> float:
+    """Duration of the run [s]."""
+    return model.case.numerics.end - model.case.numerics.start
+
+
+def smooth_scheme(scheme: str) -> tuple[str, bool]:
+    """(linear scheme equal to a scheme in smooth flow, True if the scheme is limited)."""
+    return SCHEMES[scheme].smooth.name, SCHEMES[scheme].limited
+
+
+def only_doubtful(check: CourantCheck) -> bool:
+    """True if a check beyond its limit is only doubtful: small excess over an estimate, or small growth."""
+    return not check.proved and (
+        check.courant <= check.limit * (1.0 + check.allowed_excess) or check.growth < LEAST_GROWTH**2
+    )
+
+
+def courant_notice(model, check: CourantCheck, method: str) -> Notice:
+    """Notice for a pipe or a basin beyond its limit."""
+    numerics = model.case.numerics
+    scheme = model.case.numerics.scheme
+    about = f", which there equals {check.scheme}," if check.scheme != scheme else ""
+    known = "proved" if check.proved else "an estimate"
+    size = numerics.step if numerics.step is not None else numerics.courant
+    key, unit = ("step", " s") if numerics.step is not None else ("courant", "")
+    if check.limit > 0.0:
+        limit = f"the limit is {check.limit:.6g} {check.location} ({known})"
+        remedy = f"give numerics.{key} = {rounded_down(size * check.limit / check.courant):.4g}{unit} or less"
+    else:
+        limit = f"waves grow at every Courant number {check.location} ({known})"
+        remedy = f"{check.scheme} needs another method, for example ssp-rk3"
+    text = (f"{check.place}: Courant number {check.courant:.6g}: with {scheme}{about} and {method} {limit}; "
+            f"{'it may be wrong' if only_doubtful(check) else 'the numbers are not to be trusted'}; {remedy}")  # fmt: skip
+    return Notice("step-limit", check.place, text, key, check.courant, check.limit, only_doubtful(check))
+
+
+def growth(scheme: str, method: str, courant: float, crossed: float) -> float:
+    """Growth factor of the fastest growing wave of a uniform grid while waves cross `crossed` cells."""
+    return growth_factor(growth_of(weights_of(scheme), method, courant)[0], crossed / courant)
+
+
+def rounded_down(x: float) -> float:
+    """Round a number down to four digits."""
+    scale = 10.0 ** (3 - math.floor(math.log10(x)))
+    return math.floor(x * scale * (1.0 + 1e-12)) / scale

@@ -1,0 +1,86 @@
+"""Properties of a Runge-Kutta method, all computed from its tableau."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, fields
+
+from fvsolve.steppers.analysis import stability_properties
+from fvsolve.steppers.analysis.absolute_monotonicity import ssp_radius
+from fvsolve.steppers.analysis.stability_function import StabilityFunction, stability_function
+from fvsolve.steppers.tableau import Method, method_named
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Properties of a method: order, cost, stability.
+
+    error_order : order of the embedded solution, 0 without one
+    digits : significant digits of the source, None where its numbers are exact
+    kind : explicit, diagonal, full or linear (Rosenbrock)
+    angle : alpha of A(alpha) stability [degrees], None where no ray is stable
+    real_interval, imaginary_interval, ssp_radius : inf where they are unbounded
+    pade : degrees (k, m) where R is that entry of the Pade table of e^s, else None
+    error_constant : coefficient of the lowest power of s in R(s) - e^s
+    """
+
+    name: str
+    source: str
+    order: int
+    error_order: int
+    stage_order: int
+    stages: int
+    digits: int | None
+    kind: str
+    explicit: bool
+    diagonally_implicit: bool
+    adaptive: bool
+    stiffly_accurate: bool
+    first_same_as_last: bool
+    a_stable: bool
+    l_stable: bool
+    i_stable: bool
+    angle: float | None
+    real_interval: float
+    imaginary_interval: float
+    ssp_radius: float
+    pade: tuple[int, int] | None
+    error_constant: float
+    stability_function: StabilityFunction
+
+    def plain(self) -> dict:
+        """Return the properties for JSON: None for infinity, numerator and denominator of R lowest power first."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)[:-1]}
+        r = self.stability_function
+        values["numerator"], values["denominator"] = (
+            [float(x) for x in p.coefficients] for p in (r.numerator, r.denominator)
+        )
+        return {name: None if value == math.inf else value for name, value in values.items()}
+
+
+def analyse(method: str | Method) -> Facts:
+    """Compute the properties of a method in exact arithmetic from its tableau, from the numbers as published.
+
+    Raises FvsolveError for an unknown method name.
+    """
+    return _facts(method_named(method))
+
+
+@functools.cache
+def _facts(m: Method) -> Facts:
+    r = stability_function(m)
+    given = {field.name: getattr(m, field.name) for field in fields(Facts) if hasattr(m, field.name)}
+    return Facts(
+        **given,
+        a_stable=stability_properties.a_stable(r),
+        l_stable=stability_properties.l_stable(r),
+        i_stable=stability_properties.i_stable(r),
+        angle=stability_properties.angle(r),
+        real_interval=stability_properties.real_interval(r),
+        imaginary_interval=stability_properties.imaginary_interval(r),
+        ssp_radius=ssp_radius(m),
+        pade=r.pade,
+        error_constant=float(r.error_constant[1]),
+        stability_function=r,
+    )

@@ -1,0 +1,111 @@
+"""Stability region |R(s)| <= 1 of a method, decided in exact arithmetic (13)."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+from fvsolve.steppers.analysis.stability_function import StabilityFunction, chopped
+from fvsolve.steppers.numbers.polynomial import Polynomial, sign
+from fvsolve.steppers.numbers.sturm import first_sign_change, nowhere_negative, roots_right
+
+ANGLE_BITS = 36  # precision of the cosine of alpha in A(alpha)
+
+
+def e_polynomial(r: StabilityFunction) -> Polynomial:
+    """E(x) = |D(iy)|^2 - |N(iy)|^2 with x = y^2 (Norsett 1975): |R(iy)| <= 1 where E >= 0."""
+    uncertainty = Polynomial(_square_doubt(r).coefficients[0::2])
+    return chopped(_modulus(r.denominator) - _modulus(r.numerator), uncertainty)
+
+
+def i_stable(r: StabilityFunction) -> bool:
+    """True if |R(iy)| <= 1 for all y."""
+    return nowhere_negative(e_polynomial(r))
+
+
+def a_stable(r: StabilityFunction) -> bool:
+    """True if |R(s)| <= 1 for all Re s <= 0: I-stable, and all poles in the right half plane (5.8)."""
+    return i_stable(r) and roots_right(r.denominator)
+
+
+def l_stable(r: StabilityFunction) -> bool:
+    """True if the method is A-stable and R(s) -> 0 as s -> infinity."""
+    return r.numerator.degree < r.denominator.degree and a_stable(r)
+
+
+def real_interval(r: StabilityFunction) -> float:
+    """Greatest x with |R| <= 1 on [-x, 0]; inf if unbounded, 0 if no interval is stable."""
+    down, up = (
+        Polynomial(-x if k % 2 else x for k, x in enumerate(p.coefficients)) for p in (r.denominator, r.numerator)
+    )
+    edges = [chopped(p, r.doubts[0] + r.doubts[1]) for p in (down - up, down + up)]
+    if any(_negative_near_zero(p) for p in edges):
+        return 0.0
+    return min((x for p in edges if (x := first_sign_change(p)) is not None), default=math.inf)
+
+
+def imaginary_interval(r: StabilityFunction) -> float:
+    """Greatest y with |R| <= 1 on [-iy, iy]; inf if unbounded, 0 if |R(iy)| > 1 for all small y > 0."""
+    e = e_polynomial(r)
+    if _negative_near_zero(e):
+        return 0.0
+    end = first_sign_change(e)
+    return math.inf if end is None else math.sqrt(end)
+
+
+def angle(r: StabilityFunction) -> float | None:
+    """Greatest alpha [degrees] with |R(s)| <= 1 for all |arg(-s)| <= alpha; None if no ray is stable.
+
+    Found by bisection over rays of rational cosine; the sector must contain no pole.
+    """
+    if a_stable(r):
+        return 90.0
+    if not _stable_ray(r, Fraction(1)):
+        return None
+    steep, flat = Fraction(0), Fraction(1)
+    for _ in range(ANGLE_BITS):
+        middle = (steep + flat) / 2
+        if _stable_ray(r, middle):
+            flat = middle
+        else:
+            steep = middle
+    return math.degrees(math.acos(float(flat)))
+
+
+def _stable_ray(r: StabilityFunction, cosine: Fraction) -> bool:
+    """True if |R| <= 1 along s = -x exp(i phi), x >= 0, with no pole between this ray and the negative axis."""
+    if nowhere_negative(chopped(_along(r.denominator, cosine) - _along(r.numerator, cosine), _square_doubt(r))):
+        poles = np.roots([float(x) for x in r.denominator.coefficients][::-1])
+        return not np.any(-poles.real > float(cosine) * np.abs(poles) * (1 + 1e-9))
+    return False
+
+
+def _along(p: Polynomial, cosine: Fraction) -> Polynomial:
+    """|p(-x exp(i phi))|^2 as a polynomial in x: sum_jk p_j p_k (-x)^(j+k) cos((j - k) phi)."""
+    cosines = [Fraction(1), cosine]
+    while len(cosines) <= p.degree:
+        cosines.append(2 * cosine * cosines[-1] - cosines[-2])
+    coefficients = [Fraction(0)] * (2 * p.degree + 1)
+    for j, x in enumerate(p.coefficients):
+        for k, y in enumerate(p.coefficients):
+            coefficients[j + k] = coefficients[j + k] + (-1) ** (j + k) * cosines[abs(j - k)] * x * y
+    return Polynomial(coefficients)
+
+
+def _square_doubt(r: StabilityFunction) -> Polynomial:
+    """Uncertainty of the sums over j + k = n of N_j N_k and D_j D_k."""
+    pairs = zip((r.numerator, r.denominator), r.doubts, strict=True)
+    return sum((2 * Polynomial(map(abs, p.coefficients)) * uncertainty for p, uncertainty in pairs), Polynomial([]))
+
+
+def _modulus(p: Polynomial) -> Polynomial:
+    """|p(iy)|^2 as a polynomial in x = y^2."""
+    even, odd = (Polynomial(x if k % 2 == 0 else -x for k, x in enumerate(p.coefficients[i::2])) for i in (0, 1))
+    return even * even + Polynomial([0, 1]) * odd * odd
+
+
+def _negative_near_zero(p: Polynomial) -> bool:
+    """True if p(x) < 0 for small x > 0."""
+    return next((sign(x) < 0 for x in p.coefficients if x != 0), False)

@@ -1,0 +1,92 @@
+"""Event functions that fall through zero, and the search for the step that ends at an event."""
+
+from fvsolve.jit import njit
+from fvsolve.steppers.loop_indices import CONTROL, KIND, NEWTON_FAILED, NEWTON_SOLVED, STEP, TOLERANCE, T
+
+EVENT_TOLERANCE = 1e-13
+JUMP = 1e-6  # fraction of an event function, and of a given step; smaller changes do not count as a jump
+
+
+@njit(forceinline=True)
+def set_flags(g, armed):
+    """Set the flag of every event function at or below zero, where the rhs is in its switched state.
+
+    Only accepted states set flags, so the rhs does not switch within a step, not even in stages beyond an event.
+    """
+    for i in range(g.size):
+        armed[i] = 1.0 if g[i] <= 0.0 else 0.0
+
+
+@njit(forceinline=True)
+def has_switched(g, armed):
+    """True if an event function has crossed zero since its flag was set."""
+    for i in range(g.size):
+        if (g[i] <= 0.0) != (armed[i] > 0.0):
+            return True
+    return False
+
+
+@njit(forceinline=True)
+def crossed(g, g_new):
+    """True if an event function went from above zero to zero or below."""
+    for i in range(g.size):
+        if g[i] > 0.0 and g_new[i] <= 0.0:
+            return True
+    return False
+
+
+@njit(forceinline=True)
+def event_ratio(g, g_new):
+    """Least ratio of new to old value of the event functions: 1 at the start of the step, 0 at an event."""
+    share = 1.0
+    for i in range(g.size):
+        if g[i] > 0.0:
+            share = min(share, g_new[i] / g[i])
+    return share
+
+
+@njit
+def locate(
+    attempt, rhs, factor, solve, factor_complex, solve_complex, events, join, handle, coefficients, structure,
+    row_blocks, sums, h, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
+    factors, complex_factors, g, g_new, e,
+):  # fmt: skip
+    """(length, error) of the step that ends just past the first event, by the Illinois rule; y[new] is its end.
+
+    h, e : length and error of the step that passes the event
+    The error is NEWTON_FAILED where a stage could not be solved, or where a given step jumps across the event: then its
+    stages have several solutions, those of a shorter step only one.
+    """
+    t, low, high, at_low, past = loop_state[T], 0.0, h, 1.0, event_ratio(g, g_new)
+    guess, at_high, side = h, past, 0
+    for turn in range(101):
+        done = turn == 100 or past >= -EVENT_TOLERANCE or high - low <= 4e-16 * max(abs(t), high)
+        if done and guess == high:
+            break
+        guess = high - at_high * (high - low) / (at_high - at_low)
+        guess += 1e-3 * EVENT_TOLERANCE * h
+        if not low < guess < high:
+            guess = 0.5 * (low + high)
+        if done:
+            guess = high
+        e = attempt(
+            rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums,
+            t, guess, y, now, new, k, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, vectors,
+            factors, complex_factors,
+        )  # fmt: skip
+        if e == NEWTON_FAILED:
+            break
+        events(t + guess, y[new], handle, g_new)
+        if done:
+            break
+        here = event_ratio(g, g_new)
+        if here <= 0.0:
+            high, at_high, past = guess, here, here
+            at_low, side = 0.5 * at_low if side > 0 else at_low, 1
+        else:
+            low, at_low = guess, here
+            at_high, side = 0.5 * at_high if side < 0 else at_high, -1
+    fixed = controls[KIND] == NEWTON_SOLVED and controls[CONTROL] != TOLERANCE
+    if fixed and past < -JUMP and high > JUMP * loop_state[STEP]:
+        e = NEWTON_FAILED
+    return high, e

@@ -1,0 +1,178 @@
+"""Output rows and fields: time of the next one, and their values from dense output or separate steps."""
+
+from fvsolve.jit import njit
+from fvsolve.steppers.loop_indices import (
+    ALWAYS_SEPARATE,
+    CALLS,
+    CONTROL,
+    CONVERGENCE_FACTOR,
+    DAMPED_STEP,
+    DONE,
+    EVERY,
+    FACTOR_SIZE,
+    FIELD,
+    FIELD_COUNT,
+    FIELD_EVERY,
+    HAS_JACOBIAN,
+    KNOWN_STEPS,
+    NEVER_SEPARATE,
+    NEWTON_FAILED,
+    NEXT_FIELD,
+    NEXT_OUTPUT,
+    RADIUS,
+    ROWS,
+    ROWS_FULL,
+    SEPARATE_ROWS,
+    STAGES_STEP,
+    START,
+    STOP_AT,
+    TOLERANCE,
+    WORST,
+    T,
+)
+from fvsolve.steppers.step_operations import BEGIN, HUGE, STOP, copy, interpolate
+
+BASE, GAIN, LEAST, MOST = range(4)
+AT_END = 1e-9  # in steps: a row closer to the step's end takes the state there
+NEGLIGIBLE = 1e-9  # reference amount below which shares of it are not computed
+
+
+@njit(forceinline=True)
+def output_due(controls, loop_state, count_at, every, limit):
+    """Time of the next row or field: START + count * every, or infinity."""
+    if every <= 0.0 or loop_state[count_at] > limit:
+        return 1e308
+    return controls[START] + loop_state[count_at] * every
+
+
+@njit(forceinline=True)
+def row_due(controls, loop_state, times):
+    """Time of the next row, from `times` if it is not empty [s]."""
+    if times.size == 0:
+        return output_due(controls, loop_state, NEXT_OUTPUT, controls[EVERY], 1e300)
+    count = int(loop_state[NEXT_OUTPUT])
+    return times[count] if count < times.size else 1e308
+
+
+@njit(forceinline=True)
+def next_due(controls, loop_state, times):
+    """Time of the next row or field, whichever comes first [s]."""
+    row = row_due(controls, loop_state, times)
+    return min(row, output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT]))
+
+
+@njit(forceinline=True)
+def reference_amount(states, bounds, y):
+    """Amount of which a state is a share: base + gain (y[j] + y[k]), without the terms whose index is negative."""
+    amount = bounds[BASE]
+    if states[1] >= 0:
+        amount += bounds[GAIN] * (y[states[1]] + (y[states[2]] if states[2] >= 0 else 0.0))
+    return amount
+
+
+@njit
+def limit_to_bounds(states, bounds, y_old, y, out):
+    """Limit interpolated states to their bounds, because a polynomial between two valid states may leave them.
+
+    states : int64[3 q]  a state, and up to two states that give the amount it is a share of, else -1
+    bounds : float64[q, 4]  BASE, GAIN (see `reference_amount`), LEAST and MOST share; shares at the ends widen them
+    """
+    for r in range(bounds.shape[0]):
+        row_states, low, high = states[3 * r : 3 * r + 3], bounds[r, LEAST], bounds[r, MOST]
+        for y_end in (y_old, y):
+            total = reference_amount(row_states, bounds[r], y_end)
+            if total > NEGLIGIBLE:
+                share = y_end[row_states[0]] / total
+                low, high = min(low, share), max(high, share)
+        total = max(reference_amount(row_states, bounds[r], out), 0.0)
+        value = max(out[row_states[0]], low * total)
+        out[row_states[0]] = min(value, high * total) if high < HUGE else value
+
+
+@njit(forceinline=True)
+def needs_separate_step(controls, work):
+    """True if rows within the last step come from separate steps, see `SEPARATE_ROWS`."""
+    if controls[CONTROL] == TOLERANCE or controls[SEPARATE_ROWS] == NEVER_SEPARATE:
+        return False
+    return controls[SEPARATE_ROWS] == ALWAYS_SEPARATE or work[KNOWN_STEPS] < 2.0
+
+
+@njit
+def separate_step(
+    attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums,
+    t, h, y, old, new, ledger_rates, ledger_offset, out, scale, controls, loop_state, work, spare, spare_flat,
+    spare_complex,
+):  # fmt: skip
+    """Compute y[new] at t + h by a step from y[old], as from a start; returns True if its stages could be solved.
+
+    It uses separate arrays, so that neither the steps of a run nor the stages that `energy` reads depend on the rows.
+    Its cost is counted.
+    ledger_rates : float64[s, ledgers]; spare : float64[s + vectors, n]; spare_flat : float64[work + factors]
+    """
+    s, worst, radius = ledger_rates.shape[0], loop_state[WORST], loop_state[RADIUS]
+    if work.size > 0:  # no Jacobian and no earlier stages
+        spare_flat[:FACTOR_SIZE] = 0.0
+        spare_flat[HAS_JACOBIAN], spare_flat[STAGES_STEP], spare_flat[DAMPED_STEP], spare_flat[CONVERGENCE_FACTOR] = (
+            0.0,
+            -1.0,
+            -1.0,
+            1.0,
+        )
+        spare_flat[FACTOR_SIZE] = work[FACTOR_SIZE]
+    rhs(t, y[old], spare[0], out, handle)
+    loop_state[CALLS] += 1.0
+    for m in range(ledger_rates.shape[1]):
+        ledger_rates[0, m] = out[ledger_offset + m]
+    e = attempt(
+        rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure, row_blocks, sums, t,
+        h, y, old, new, spare[:s], ledger_rates, ledger_offset, out, scale, controls, loop_state,
+        spare_flat[: work.size], spare[s:], spare_flat[work.size :], spare_complex,
+    )  # fmt: skip
+    loop_state[WORST], loop_state[RADIUS] = worst, radius
+    return e != NEWTON_FAILED
+
+
+@njit
+def emit(
+    attempt, rhs, observe, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure,
+    row_blocks, sums, controls, loop_state, times, progress, t_old, y, now, old, f_old, f, k, ledger_offset, dense,
+    start_slope, scale, out, y_out, rows, bounded_states, bounds, work, spare, spare_ledger_rates, spare_flat,
+    spare_complex,
+):  # fmt: skip
+    """Write the rows due up to the present time; returns early at a due field, held in y_out, or with full rows."""
+    t, h, separate = loop_state[T], loop_state[T] - t_old, needs_separate_step(controls, work)
+    while True:
+        row = row_due(controls, loop_state, times)
+        field = output_due(controls, loop_state, NEXT_FIELD, controls[FIELD_EVERY], controls[FIELD_COUNT])
+        due = min(row, field)
+        if due > t or (due >= controls[STOP_AT]):
+            return DONE
+        if row <= due and progress[ROWS] == rows.shape[0]:
+            return ROWS_FULL
+        solved, new = False, 3 - now - old
+        if separate and due < t - AT_END * h:
+            solved = separate_step(
+                attempt, rhs, factor, solve, factor_complex, solve_complex, join, handle, coefficients, structure,
+                row_blocks, sums, t_old, due - t_old, y, old, new, spare_ledger_rates, ledger_offset, out, scale,
+                controls, loop_state, work, spare, spare_flat, spare_complex,
+            )  # fmt: skip
+        for m in range(row_blocks.shape[0]):
+            begin, end = row_blocks[m, BEGIN], row_blocks[m, STOP]
+            if solved:
+                copy(y[new, begin:end], y_out[begin:end])
+            elif separate:
+                theta = (due - t_old) / h
+                for i in range(begin, end):
+                    y_out[i] = y[old, i] + theta * (y[now, i] - y[old, i])
+            else:
+                interpolate(begin, end, (due - t_old) / h, h, y[old], f_old, y[now], f, k, dense, start_slope, y_out)
+        limit_to_bounds(bounded_states, bounds, y[old], y[now], y_out)
+        rhs(due, y_out, y_out[:0], out, handle)
+        if row <= due:
+            rows[progress[ROWS], 0] = due
+            observe(due, y_out, out, handle, rows[progress[ROWS], 1:])
+            progress[ROWS] += 1
+            loop_state[NEXT_OUTPUT] += 1.0
+        if field <= due:
+            loop_state[NEXT_FIELD] += 1.0
+            return FIELD

@@ -1,0 +1,112 @@
+"""Stages of a fully implicit step solved one by one in sweeps, for slopes of f that differ by orders between stages.
+
+With A = C U, C lower triangular and U with unit diagonal, K <- F(y + h (a_0 k_0 + C K + (A - C) K_before)) is a
+diagonally implicit step, which `newton.damped_newton` solves. Stiff components converge in q sweeps, as I - U is
+nilpotent; the error of other components falls by a factor of 4 or more in each (van der Houwen and de Swart 1997).
+Limiters and the weights of weno can reduce that factor or make sweeps oscillate: then K is extrapolated to where the
+last two changes cancel (Anderson 1965, depth one).
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from fvsolve.jit import inline
+from fvsolve.steppers.coefficients import nodes_of, row_of
+from fvsolve.steppers.loop_indices import CONTROL, TOLERANCE
+from fvsolve.steppers.newton import BASE, CONVERGED, FAILED, WEIGHTS, damped_limits, solve_stage_from_start
+from fvsolve.steppers.step_operations import copy
+
+MOST = 40
+# Ratio of successive changes above which K is extrapolated; greatest extrapolation, in changes.
+SLOW, GREATEST_EXTRAPOLATION = 0.4, 10.0
+
+
+@inline
+def sweep(
+    rhs, factor, solve, handle, coefficients, low, structure, t, h, y, y_stage, k, ledger_rates, ledger_offset, out,
+    scale, controls, loop_state, nnz, first_row, work, vectors, factors,
+):  # fmt: skip
+    """Compute the slopes k of the stages and their ledger rates; returns CONVERGED or FAILED.
+
+    low : float64[q q]  C, flat
+    first_row : first of 3 q rows of `vectors`, for slopes at the start of a sweep, their changes, and the results
+    """
+    s, n = k.shape
+    q, c, base, weights = s - 1, nodes_of(coefficients, s), vectors[s + BASE], vectors[s + WEIGHTS]
+    enough, rounded, floor = damped_limits(controls)
+    settled = floor if controls[CONTROL] == TOLERANCE else rounded
+    before = 0.0
+    for i in range(1, s):
+        if low[(i - 1) * s] == 0.0:
+            return FAILED
+        copy(k[0], k[i])
+    for turn in range(MOST):
+        total = 0.0
+        for i in range(1, s):
+            copy(k[i], vectors[first_row + i - 1])
+        for i in range(1, s):
+            row, own, first = row_of(coefficients, s, i), h * low[(i - 1) * s], (i - 1) * q
+            for e in range(n):
+                base[e] = y[e] + h * row[0] * k[0, e]
+            for j in range(1, s):
+                c_ij, last = low[first + j - 1], vectors[first_row + j - 1]
+                lead, lag = h * c_ij if j < i else 0.0, h * (row[j] - c_ij)
+                for e in range(n):
+                    base[e] += lead * k[j, e] + lag * last[e]
+            if turn == 0:
+                for e in range(n):
+                    k[i, e] = (y[e] - base[e]) / own
+            if solve_stage_from_start(
+                rhs, factor, solve, handle, structure, t + c[i] * h, own, i, k, y, y_stage, ledger_rates, ledger_offset,
+                out, scale, controls, loop_state, nnz, work, vectors, factors,
+            ) == FAILED:  # fmt: skip
+                return FAILED
+            last = vectors[first_row + i - 1]
+            for e in range(n):
+                change = h * (k[i, e] - last[e]) * weights[e]
+                total += change * change
+        size = sqrt(total / max(q * n, 1))
+        if (
+            size <= enough
+            or size <= settled
+            and turn >= q
+            and size >= 0.5 * before
+            or size <= floor
+            and turn == MOST - 1
+        ):
+            return CONVERGED
+        extrapolate(q, k, first_row, weights, vectors, 1.0 if turn >= q and size > SLOW * before else 0.0)
+        before = size
+    return FAILED
+
+
+@inline
+def extrapolate(q, k, first_row, weights, vectors, weight):
+    """K <- K - weight g (K - K_before), g = <d, d - d_before> / |d - d_before|^2 with the changes d.
+
+    Stores the change and the result of this sweep. weight : 0 to store them only, else 1
+    """
+    dot, square = 0.0, 0.0
+    for i in range(q):
+        ki, last, change = k[i + 1], vectors[first_row + i], vectors[first_row + q + i]
+        for e in range(weights.size):
+            d = (ki[e] - last[e]) * weights[e]
+            difference = d - change[e] * weights[e]
+            dot += d * difference
+            square += difference * difference
+    g = weight * max(dot / square, -GREATEST_EXTRAPOLATION) if square > 0.0 and square < np.inf else 0.0
+    for i in range(q):
+        ki, last, change, swept = (
+            k[i + 1],
+            vectors[first_row + i],
+            vectors[first_row + q + i],
+            vectors[first_row + 2 * q + i],
+        )
+        for e in range(weights.size):
+            new = ki[e]
+            change[e] = new - last[e]
+            ki[e] = new - g * (new - swept[e])
+            swept[e] = new
