@@ -12,7 +12,7 @@ from scipy.sparse import csc_array, hstack
 from scipy.sparse.linalg import expm_multiply
 
 from fvsolve.case import load
-from fvsolve.model import Slate, State, build
+from fvsolve.model import RunData, State, build
 from fvsolve.steppers.signatures import addresses, rhs_at
 
 LENGTH = SPEED = 1000.0  # [m, m/s]
@@ -82,7 +82,7 @@ class Acoustics:
 
     def _rhs(self):
         """fvsolve's own compiled rhs as f(t, y, dydt); its tables and `out` by their addresses."""
-        at, slate, out = int(addresses((self.model.functions.rhs,))[0]), Slate(self.model), self.model.new_out()
+        at, slate, out = int(addresses((self.model.functions.rhs,))[0]), RunData(self.model), self.model.new_out()
         self._kept, handle = (slate, out), slate.handle
         handle_at, handle_size, out_at, out_size = handle.ctypes.data, handle.size, out.ctypes.data, out.size
 

@@ -68,7 +68,7 @@ def rates(bodies: dict):
 
     model = fvsolve.build(fvsolve.load(scene_of(bodies, 1.0)))
     y, dydt, out = model.start.copy(), np.zeros(model.y_size), model.new_out()
-    with model.slate() as slate:
+    with model.run_data() as slate:
         slate.evaluate(0.0, y, np.inf)
         handle, rhs = slate.handle, model.functions.rhs
     at = int(addresses((rhs,))[0])

@@ -24,7 +24,7 @@ from planes_scenes import SIZE, scene, square
 from fvsolve.case import load
 from fvsolve.model import State, build
 from fvsolve.output.memory import MemorySink
-from fvsolve.run import ranks
+from fvsolve.run import mpi_run
 from fvsolve.solve import initial_state
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.solve.solve import Run
@@ -68,7 +68,7 @@ def stepped(model, state: State, parts: list[int], comm) -> list[State]:
 
 def part(cells: int, begin: str, end: str, *parts: str) -> None:
     """Step a checkpoint, or the start, as one process or as a rank; rank 0 keeps what the first part makes."""
-    comm, start = ranks.world(), perf_counter()
+    comm, start = mpi_run.world(), perf_counter()
     if comm is not None and comm.rank > 0:
         comm.bcast(None)  # rank 0 has its model: two at a time would want more memory
         loop = RunLoop(model_of(cells), comm=comm)

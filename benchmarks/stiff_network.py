@@ -13,8 +13,8 @@ from scipy.sparse.linalg import splu
 import fvsolve
 from fvsolve.case import load
 from fvsolve.jit import njit
-from fvsolve.model import Slate, build
-from fvsolve.model.dependence import sparsity
+from fvsolve.model import RunData, build
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.steppers.differences import differences
 from fvsolve.steppers.signatures import addresses, rhs_at
 from fvsolve.steppers.structure import Structure
@@ -85,9 +85,9 @@ def network_table(quick: bool) -> None:
 
 def parts(model) -> tuple[Structure, Costs, csc_array]:
     """The model's structure, what its parts cost at the start, and the matrix that is factored there."""
-    structure, rhs = Structure(sparsity(model)), model.functions.rhs
+    structure, rhs = Structure(jacobian_pattern(model)), model.functions.rhs
     factor, solve = structure.functions()
-    slate = Slate(model)
+    slate = RunData(model)
     shape, n, m, handle = structure.shape, structure.n, structure.m, slate.handle
     where, out, y = int(model.layout["supply"]), model.new_out(), np.zeros(n)
     jacobian, store = np.zeros(structure.nnz), np.zeros(structure.store_size)

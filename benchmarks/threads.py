@@ -23,8 +23,8 @@ from fvsolve.case import load
 from fvsolve.jit import njit
 from fvsolve.kernels import band_exchange
 from fvsolve.model import build
-from fvsolve.model.slate import lined
-from fvsolve.run import ranks
+from fvsolve.model.run_data import aligned_zeros
+from fvsolve.run import mpi_run
 from fvsolve.solve import initial_state
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.solve.thread_team import yield_address
@@ -102,7 +102,7 @@ def waiting(times: int = 2000, rounds: int = 200) -> float:
     """Wall time [s] in which two threads find that both are there, the least."""
     best = np.inf
     for _ in range(rounds):
-        board, owns = lined(2 * band_exchange.LINE), np.zeros((2, band_exchange.HEAD), dtype=np.int64)
+        board, owns = aligned_zeros(2 * band_exchange.LINE), np.zeros((2, band_exchange.HEAD), dtype=np.int64)
         owns[:, band_exchange.BAND], owns[:, band_exchange.BAND_COUNT], owns[:, band_exchange.BOARD] = (
             (0, 1),
             2,
@@ -197,7 +197,7 @@ def sixteen(size: int, wait: float, many: int = 16, stages: int = 2) -> None:
 
 def rank(sizes, rounds: int) -> None:
     """What one rank of MPI does: rank 0 prints its wall times of steps."""
-    comm = ranks.world()
+    comm = mpi_run.world()
     for n in sizes:
         model = model_of(WATER, n, n)
         loop = RunLoop(model, comm=comm)

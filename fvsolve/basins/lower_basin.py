@@ -19,7 +19,7 @@ from fvsolve.case.cells import is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.schemes import CODES, family
+from fvsolve.model.scheme_codes import CODES, family
 from fvsolve.model.state_names import Numbered
 from fvsolve.schemes import LIMITERS, SCHEMES
 from fvsolve.steppers.analysis.absolute_monotonicity import ssp_radius

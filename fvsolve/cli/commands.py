@@ -37,17 +37,17 @@ def run(
     results = []
     with Painter(beside=not no_pictures) as painter:  # its process starts before other modules are imported
         from fvsolve.cli import report
-        from fvsolve.run import model_of, ranks
+        from fvsolve.run import model_of, mpi_run
 
-        if ranks.follows():
+        if mpi_run.is_other_rank():
             painter.end()
             for name in dict.fromkeys(cases):
-                ranks.follow(lambda name=name: model_of(load_case(name, set)))
+                mpi_run.serve_rank(lambda name=name: model_of(load_case(name, set)))
             sys.exit(0)
-        with ranks.leading(ranks.world()):
+        with mpi_run.rank_zero_first(mpi_run.world()):
             places = _places(cases, out)
         for name, place in places.items():
-            with ranks.leading(ranks.world()):
+            with mpi_run.rank_zero_first(mpi_run.world()):
                 model = model_of(load_case(name, set))
             results.append(
                 _run(model, place, force, resume, threads, None if no_pictures else painter, as_json, estimate_error)
@@ -65,9 +65,9 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
     from fvsolve.cli import report
     from fvsolve.cli.progress import watched
     from fvsolve.run import draw, sink_of, solved
-    from fvsolve.run.expected import expected
+    from fvsolve.run.cost_estimate import cost_text
 
-    if text := expected(model):
+    if text := cost_text(model):
         print(visible(text), file=sys.stderr, flush=True)
     with closing(sink_of(model, place, force, resume, threads)) as sink:
         with watched(model.case) as progress:

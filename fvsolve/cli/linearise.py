@@ -49,7 +49,7 @@ def linearise(
     as_json: Json = False,
 ) -> None:
     """Linearise a case about a state: matrices A, B, C, D and poles."""
-    from fvsolve.model.energy import energy_form
+    from fvsolve.model.energy_norm import energy_form
     from fvsolve.studies.linear.linearise import linearise as ask
     from fvsolve.studies.linear.spectrum import POLES, poles_of
 

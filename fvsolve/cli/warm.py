@@ -24,7 +24,7 @@ def precompile(
     from fvsolve.case import load, shipped
     from fvsolve.cli import terminal
     from fvsolve.cli.progress import counted
-    from fvsolve.run.warming import warm as warmed
+    from fvsolve.run.precompilation import warm as warmed
 
     paths = [shipped.find(name) for name in cases or shipped.names()]
     for path in paths:  # report faults of a case before compiling

@@ -2,7 +2,7 @@
 
 from fvsolve.model.build import build
 from fvsolve.model.model import Model, PipeMesh, State
-from fvsolve.model.slate import Slate
+from fvsolve.model.run_data import RunData
 from fvsolve.model.vary import vary
 
-__all__ = ["Model", "PipeMesh", "Slate", "State", "build", "vary"]
+__all__ = ["Model", "PipeMesh", "RunData", "State", "build", "vary"]

@@ -5,21 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.statics import ACCELERATE, GAPS, HOLD, MOTION, PINNED, Statics
+from fvsolve.model.static_forces import ACCELERATE, GAPS, HOLD, MOTION, PINNED, StaticForces
 
-ALIKE = 1e-8  # a row of pins is redundant if its independent part is below this share of the largest row
-LOOSE = 1e-6  # greatest rate at which a pin may open at the start [m/s]
-SNAP = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
-CLOSE = 1e-9  # likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
+RANK_TOLERANCE = 1e-8  # a row of pins is redundant if its independent part is below this share of the largest row
+PIN_RATE_TOLERANCE = 1e-6  # greatest rate at which a pin may open at the start [m/s]
+ROUNDING_SHARE = 1e-12  # a sum of forces of a joint below this share of their magnitudes is rounding
+EQUILIBRIUM_SHARE = (
+    1e-9  # likewise in a computed equilibrium: stiff springs amplify the rounding of a length by this much
+)
 
 
-def refuse_weightless(draft, at: Statics) -> None:
+def refuse_massless(draft, at: StaticForces) -> None:
     """Faults of bodies with a free joint coordinate but no inertia, of their own or of bodies attached to them."""
     at.run(MOTION, ACCELERATE)
     n = len(draft.freedom_table)
     for name, row in reversed(list(zip(draft.body_names, draft.body_table, strict=True))):
         own = np.linalg.norm(row["inertia"]) + row["mass"] * float(row["centre"] @ row["centre"])
-        least = ALIKE**2 * (own if row["joint"] in (rec.REVOLUTE, rec.BALL) else 0.0)
+        least = RANK_TOLERANCE**2 * (own if row["joint"] in (rec.REVOLUTE, rec.BALL) else 0.0)
         for freedom in draft.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
             left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** -2.0
             if np.isnan(left) and len(draft.ride_table):
@@ -37,7 +39,7 @@ def start_bodies(draft, start) -> list[str]:
     """Set lengths of lines and balanced forces of joints at the start; return texts of motions."""
     if not len(draft.body_table):
         return []
-    at = Statics(draft, start.t)
+    at = StaticForces(draft, start.t)
     tables = (draft.brace_table, draft.stop_table, draft.piston_table)
     pushes = np.array([row["force"] for table in tables for row in table])
     travel, first = int(at.layout["travel"]), int(at.layout["push"])
@@ -46,7 +48,7 @@ def start_bodies(draft, start) -> list[str]:
         line["length"] = at.out[travel + 2 * line["push"]] if line["acts"] == rec.ALONG else 0.0
         if "speed" in rows[line["push"]].dtype.names:
             rows[line["push"]]["speed"] = at.out[travel + 2 * line["push"] + 1]
-    refuse_weightless(draft, at)
+    refuse_massless(draft, at)
     draft.check()
     at.out[first : first + pushes.size] = pushes
     at.run(*at.pushes)
@@ -56,15 +58,15 @@ def start_bodies(draft, start) -> list[str]:
     size = at.sizes(pushes)
     draft.freedom_table["balance"] = np.where(np.abs(left) <= rounding(draft) * size, left, 0.0)
     at.run(*at.pushes, accelerate)
-    return moves(draft, at.accelerations())
+    return motion_at_start(draft, at.accelerations())
 
 
 def rounding(draft) -> float:
     """Share of forces below which their sum counts as rounding."""
-    return CLOSE if draft.case.numerics.initial == "equilibrium" else SNAP
+    return EQUILIBRIUM_SHARE if draft.case.numerics.initial == "equilibrium" else ROUNDING_SHARE
 
 
-def pin_rows(draft, at: Statics) -> np.ndarray:
+def pin_rows(draft, at: StaticForces) -> np.ndarray:
     """Rows G of all pins at the start : float64[rows, freedoms]."""
     n, count = len(draft.freedom_table), int(draft.pin_table["rows"].sum())
     if count:
@@ -73,7 +75,7 @@ def pin_rows(draft, at: Statics) -> np.ndarray:
     return at.written.scratch[first : first + count * n].reshape(count, n).copy()
 
 
-def start_pins(draft, at: Statics) -> np.ndarray:
+def start_pins(draft, at: StaticForces) -> np.ndarray:
     """Set gaps and forces of pins at the start; return the remaining forces of freedoms. Adds faults."""
     at.run(*at.pushes, GAPS)
     first = int(at.layout["pin"])
@@ -81,12 +83,12 @@ def start_pins(draft, at: Statics) -> np.ndarray:
         row["gap"][: row["rows"]] = at.out[first + 3 * k :][: row["rows"]]
     rows = pin_rows(draft, at)
     names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
-    for name in dict.fromkeys(redundant(rows, names)):
+    for name in dict.fromkeys(redundant_pins(rows, names)):
         text = "it is redundant: in some direction joints or other pins already prevent its opening"
         draft.fault(f"links.{name}", f"{text}. For a loop in a plane give its axis, else remove one pin")
     slips = dict(zip(names, rows @ at.rates(), strict=True))
     for name, slip in slips.items():
-        if abs(slip) > LOOSE:
+        if abs(slip) > PIN_RATE_TOLERANCE:
             rate = draft.case.amount(abs(slip), "velocity")
             draft.fault(
                 f"links.{name}",
@@ -100,21 +102,21 @@ def start_pins(draft, at: Statics) -> np.ndarray:
     return at.forces()
 
 
-def redundant(rows: np.ndarray, names: list[str]) -> list[str]:
+def redundant_pins(rows: np.ndarray, names: list[str]) -> list[str]:
     """Names of pins with rows that are zero or linearly dependent on earlier rows."""
     dependent, basis = [], np.zeros((0, rows.shape[1]))
     size = np.linalg.norm(rows, axis=1).max()
     for name, row in zip(names, rows, strict=True):
         remainder = row - basis.T @ (basis @ row)
         remainder -= basis.T @ (basis @ remainder)
-        if np.linalg.norm(remainder) <= ALIKE * size:
+        if np.linalg.norm(remainder) <= RANK_TOLERANCE * size:
             dependent.append(name)
         else:
             basis = np.vstack([basis, remainder / np.linalg.norm(remainder)])
     return dependent
 
 
-def moves(draft, accelerations: np.ndarray) -> list[str]:
+def motion_at_start(draft, accelerations: np.ndarray) -> list[str]:
     """Texts of velocities and accelerations at the start."""
     texts, amount = [], draft.case.amount
     for name, row in zip(draft.body_names, draft.body_table, strict=True):

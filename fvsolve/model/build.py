@@ -13,26 +13,32 @@ from fvsolve.case.case import Case
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tank_limits
+from fvsolve.model.body_tables import lower_bodies, lower_lines
 from fvsolve.model.cavities import coarse_for_cavities
-from fvsolve.model.clusters import sort_nodes
-from fvsolve.model.delay import at_ends, cut_lines, followed, lower_delays, tables_for_jumps
-from fvsolve.model.device import lower_devices
-from fvsolve.model.draft import Draft
+from fvsolve.model.cluster_tables import classify_nodes
+from fvsolve.model.delay_history import history_size
+from fvsolve.model.delay_line_selection import (
+    divide_lines,
+    end_admittance_ratio,
+    jump_tables,
+    line_methods,
+    lower_delays,
+)
+from fvsolve.model.device_lowering import lower_devices
+from fvsolve.model.equilibrium_search import with_equilibrium
+from fvsolve.model.flow_notices import flow_notices
 from fvsolve.model.lowering import lowering_of
-from fvsolve.model.masses import lower_masses
-from fvsolve.model.mechanism import lower_bodies, lower_lines
+from fvsolve.model.mass_tables import lower_masses
 from fvsolve.model.model import Model
-from fvsolve.model.past import past_size
-from fvsolve.model.probes import lower_probes
-from fvsolve.model.profile import start_profile
-from fvsolve.model.ranges import flow_notices
-from fvsolve.model.resized import resized
+from fvsolve.model.model_draft import ModelDraft
+from fvsolve.model.moving_networks import lower_rides
+from fvsolve.model.probe_tables import lower_probes
 from fvsolve.model.resolution import too_few_cells
-from fvsolve.model.rides import lower_rides
-from fvsolve.model.scalars import lower_scalars, settle_scalars, start_amounts
-from fvsolve.model.schemes import scheme_settings
-from fvsolve.model.settling import settled
-from fvsolve.model.unsteady import MOST_TERMS
+from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
+from fvsolve.model.scheme_codes import scheme_settings
+from fvsolve.model.start_tables import start_profile
+from fvsolve.model.unsteady_terms import MAX_TERMS
+from fvsolve.model.update_tables import with_new_sizes
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 
@@ -45,19 +51,19 @@ def build(case) -> Model:
     """
     if not isinstance(case, Case):
         raise FvsolveError(f"build takes a Case, not {type(case).__name__}; expected the result of load()")
-    return built(case)
+    return build_like(case)
 
 
-def built(case: Case, like: Model | None = None) -> Model:
+def build_like(case: Case, like: Model | None = None) -> Model:
     """Build a model; like : model of a case that differs in few numbers, of which unchanged tables are reused."""
     notices = []
     if case.settles:
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
-        case, notices = settled(case, drafted(steady))
-    if like is not None and not like.packed:
-        like.packed.append(packed(like.case))
-    reused = None if like is None else resized(like.packed[0], case)
-    draft = drafted(case, reused)
+        case, notices = with_equilibrium(case, tables_with_start(steady))
+    if like is not None and not like.tables_before_start:
+        like.tables_before_start.append(tables_before_start(like.case))
+    reused = None if like is None else with_new_sizes(like.tables_before_start[0], case)
+    draft = tables_with_start(case, reused)
     draft.warnings += notices
     model = model_of(draft)
     if draft is reused and model.unsteady == like.unsteady:
@@ -65,24 +71,24 @@ def built(case: Case, like: Model | None = None) -> Model:
     return model
 
 
-def drafted(case: Case, draft: Draft | None = None, unfit: Collection[str] = ()) -> Draft:
+def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collection[str] = ()) -> ModelDraft:
     """Tables of a case with its profile; draft : tables before the start; unfit : pipes that cannot be delay lines."""
-    draft = draft or packed(case, unfit)
+    draft = draft or tables_before_start(case, unfit)
     draft.check()
     draft.steady = start_profile(draft)
-    settle_scalars(draft)
-    worse = cut_lines(draft)
+    scale_scalars(draft)
+    worse = divide_lines(draft)
     draft.check()
-    return drafted(case, None, {*unfit, *worse}) if worse else draft
+    return tables_with_start(case, None, {*unfit, *worse}) if worse else draft
 
 
-def packed(case: Case, unfit: Collection[str] = ()) -> Draft:
+def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
     """Tables of a case before its start is known."""
-    draft = Draft(case)
-    draft.followed = followed(case, unfit)
-    fill_places(draft)
+    draft = ModelDraft(case)
+    draft.followed = line_methods(case, unfit)
+    fill_nodes(draft)
     fill_links(draft)
-    sort_nodes(draft)
+    classify_nodes(draft)
     lower_basins(draft)
     lower_scalars(draft)
     draft.check()
@@ -91,7 +97,7 @@ def packed(case: Case, unfit: Collection[str] = ()) -> Draft:
     return draft
 
 
-def fill_places(draft: Draft) -> None:
+def fill_nodes(draft: ModelDraft) -> None:
     """Fill a row for every node of the fluid."""
     table = draft.node_table = np.zeros(len(draft.case.places), rec.NODE)
     table["y"] = table["shape"] = table["schedule"] = table["row"] = table["moving_segment"] = -1
@@ -101,7 +107,7 @@ def fill_places(draft: Draft) -> None:
         lowering_of(type(node)).place(draft, name, node, row)
 
 
-def fill_links(draft: Draft) -> None:
+def fill_links(draft: ModelDraft) -> None:
     """Fill rows of links, devices, bodies and masses."""
     draft.pipe_names, draft.pipe_table = draft.fill("pipe", rec.PIPE)
     lower_delays(draft)
@@ -110,14 +116,14 @@ def fill_links(draft: Draft) -> None:
     lower_devices(draft)
     for row in draft.pipe_table:
         for end in ("from_node", "to_node"):
-            draft.node_table["admittance"][row[end]] += row["admittance"] * at_ends(draft, row)
+            draft.node_table["admittance"][row[end]] += row["admittance"] * end_admittance_ratio(draft, row)
     lower_bodies(draft)
     lower_rides(draft)
     lower_masses(draft)
     lower_lines(draft)
 
 
-def profile_size(draft: Draft) -> int:
+def profile_size(draft: ModelDraft) -> int:
     """Size of all profiles; sets the offsets of each pipe.
 
     A profile has a threshold for each cell. Under laws other than `linear`, masses, fluxes and, for pipes that are not
@@ -136,7 +142,7 @@ def profile_size(draft: Draft) -> int:
     return int(at)
 
 
-def fill_rises(draft: Draft) -> None:
+def fill_rises(draft: ModelDraft) -> None:
     """Set the rise of pipes with a profile from their `from` end, at faces and centres [m]."""
     for row, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
         if row["rise"] >= 0:
@@ -146,7 +152,7 @@ def fill_rises(draft: Draft) -> None:
             draft.tables.profile[row["rise"] :][: heights.size] = heights - low
 
 
-def pack(draft: Draft, profile: np.ndarray) -> None:
+def pack(draft: ModelDraft, profile: np.ndarray) -> None:
     """Make the tuple of tables and the shapes of run arrays. Records stay the same arrays: later changes reach them."""
     settings = settings_of(draft)
     draft.probe_table = lower_probes(draft)
@@ -164,15 +170,15 @@ def pack(draft: Draft, profile: np.ndarray) -> None:
         np.array(draft.integers, dtype=np.int64), np.array(draft.floats, dtype=float), profile, draft.plane(), pieces,
     )  # fmt: skip
     draft.shapes = rec.RunArrays(
-        clock=1, work=draft.work_size, marks=marks_of(draft),
+        clock=1, work=draft.work_size, marks=mark_count(draft),
         armed=tank_limits.EVENTS * draft.tanks + len(draft.events) + 2 * len(draft.stop_table),
-        scratch=scratch_of(draft), spare=spare_of(draft), seen=draft.size if len(draft.wall_table) else 0,
+        scratch=scratch_size(draft), spare=spare_size(draft), seen=draft.size if len(draft.wall_table) else 0,
         bands=2 * len(draft.basin_table), joint=0, sums=0, sharp=int(len(draft.delay_table) > 0),
-        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=past_size(draft.delay_table),
+        envelope=(4, draft.cells), extremes=(4, len(draft.probe_table)), past=history_size(draft.delay_table),
     )  # fmt: skip
 
 
-def settings_of(draft: Draft) -> np.ndarray:
+def settings_of(draft: ModelDraft) -> np.ndarray:
     """Settings of a model : SETTINGS[1]."""
     case, pipes, table = draft.case, draft.pipe_table, np.zeros(1, rec.SETTINGS)
     s = table[0]
@@ -191,7 +197,7 @@ def settings_of(draft: Draft) -> np.ndarray:
     return table
 
 
-def column_rates(draft: Draft):
+def column_rates(draft: ModelDraft):
     """Angular frequencies of rigid columns between nodes that store [1/s]."""
     stiff = draft.node_table["stiffness"]
     for row in draft.column_table:
@@ -199,7 +205,7 @@ def column_rates(draft: Draft):
         yield math.sqrt(k * row["area"] / row["length"])
 
 
-def layout_of(draft: Draft) -> np.ndarray:
+def layout_of(draft: ModelDraft) -> np.ndarray:
     """Offsets in `out`, which the right-hand side writes in addition to dydt : LAYOUT[1]."""
     nodes, pipes, valves, columns = map(
         len, (draft.node_table, draft.pipe_table, draft.valve_table, draft.column_table)
@@ -224,26 +230,26 @@ def layout_of(draft: Draft) -> np.ndarray:
     return layout
 
 
-def most_states(draft: Draft) -> int:
+def most_states(draft: ModelDraft) -> int:
     """Upper bound of the number of states after the start has chosen terms of unsteady friction."""
     unsteady = [mesh.cells for mesh in draft.meshes if draft.case.links[mesh.name].friction.model == "unsteady"]
-    return draft.size + MOST_TERMS * sum(unsteady)
+    return draft.size + MAX_TERMS * sum(unsteady)
 
 
-def marks_of(draft: Draft) -> int:
+def mark_count(draft: ModelDraft) -> int:
     """Number of marks of a run; for cavities three for each pipe: first place, greatest volume and its time."""
     parts = len(draft.pipe_table) + 3 * len(draft.node_table) + len(draft.column_table)
     own = 2 * len(draft.device_table) + len(draft.piston_table)
     return parts + own + (3 * len(draft.pipe_table) if draft.case.law.cavitates else 0)
 
 
-def spare_of(draft: Draft) -> int:
+def spare_size(draft: ModelDraft) -> int:
     """Size of the spare array: nodes without storage at events; with delay lines `out` of two states and values."""
     size, values = int(draft.tables.layout["size"][0]), len(draft.probe_table) + len(draft.node_table)
     return size if not len(draft.delay_table) else 2 * size + 3 * values
 
 
-def scratch_of(draft: Draft) -> int:
+def scratch_size(draft: ModelDraft) -> int:
     """Largest size of scratch data of the right-hand side."""
     scalars, nodes = len(draft.scalar_table), len(draft.node_table)
     most = max([0, *draft.pipe_table["cells"], *draft.delay_table["places"]])
@@ -258,7 +264,7 @@ def scratch_of(draft: Draft) -> int:
     return int(max(spatial, (5 if scalars else 4) * most + 64, system, 2 * len(draft.mass_table), 4 * scalars * nodes))
 
 
-def model_of(draft: Draft) -> Model:
+def model_of(draft: ModelDraft) -> Model:
     """Model of a draft. Its start deviates from the profile in basins only, and by amounts of scalars."""
     case, start = draft.case, at_start(draft.basins, draft.size)
     start_amounts(draft, start)
@@ -273,5 +279,5 @@ def model_of(draft: Draft) -> Model:
         draft.mass_names, draft.body_names, draft.bushing_names,
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
-        draft.basins, case.watched, draft.watched_start, tables_for_jumps(draft),
+        draft.basins, case.watched, draft.watched_start, jump_tables(draft),
     )  # fmt: skip

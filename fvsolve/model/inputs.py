@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from fvsolve.model.model import Model
 
 
-class Sort(NamedTuple):
+class InputKind(NamedTuple):
     """Kind of an input: unit, expected value (text), range, and size of a small change [SI]."""
 
     unit: str
-    wanted: str
+    expected: str
     least: float = -math.inf
     greatest: float = math.inf
     small: float = 1.0
@@ -25,23 +25,23 @@ class Sort(NamedTuple):
         return self.least > -math.inf or self.greatest < math.inf
 
 
-OPENING = Sort("-", "a number from 0, shut, to 1, open", 0.0, 1.0)
-POSITION = Sort("-", "a number from -1 to 1", -1.0, 1.0)
-SPEED = Sort("-", "a relative speed of at least 0", 0.0)
-TURNING = Sort("rad/s", "a finite number [rad/s]")
-PRESSURE = Sort("Pa", "an absolute pressure above 0 [Pa]", small=1e5)
-HEAD = Sort("m", "a head whose pressure is above 0 Pa absolute [m]", small=1e5)  # [Pa]
-SET_PRESSURE = Sort("Pa", "an absolute pressure [Pa]")
-FLOW = Sort("m3/s", "a finite number [m3/s]", small=1e-3)
-FORCE = Sort("N", "a finite number [N]", small=1e3)
-TORQUE = Sort("N m", "a finite number [N m]")
-VALUE = Sort("-", "a finite number")
+OPENING = InputKind("-", "a number from 0, shut, to 1, open", 0.0, 1.0)
+POSITION = InputKind("-", "a number from -1 to 1", -1.0, 1.0)
+SPEED = InputKind("-", "a relative speed of at least 0", 0.0)
+ANGULAR_SPEED = InputKind("rad/s", "a finite number [rad/s]")
+PRESSURE = InputKind("Pa", "an absolute pressure above 0 [Pa]", small=1e5)
+HEAD = InputKind("m", "a head whose pressure is above 0 Pa absolute [m]", small=1e5)  # [Pa]
+SET_PRESSURE = InputKind("Pa", "an absolute pressure [Pa]")
+FLOW = InputKind("m3/s", "a finite number [m3/s]", small=1e-3)
+FORCE = InputKind("N", "a finite number [N]", small=1e3)
+TORQUE = InputKind("N m", "a finite number [N m]")
+VALUE = InputKind("-", "a finite number")
 
 
 class Input(NamedTuple):
     """Schedule that can be held; kernels read scale * value + offset."""
 
-    sort: Sort
+    sort: InputKind
     schedule: int
     scale: float = 1.0
     offset: float = 0.0
@@ -62,12 +62,12 @@ def inputs_of(model: Model) -> dict[str, Input]:
     return inputs
 
 
-def opening(model: Model, name: str) -> dict[str, Input]:
+def opening_input(model: Model, name: str) -> dict[str, Input]:
     """Opening of a restriction, by its schedule."""
     return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
 
 
-def values_in(model: Model, name: str) -> dict[str, Input]:
+def scalar_inputs(model: Model, name: str) -> dict[str, Input]:
     """Values of scalars that flow in from a node, by their names."""
     i, inputs = model.node_names.index(name), {}
     for q, (scalar, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):

@@ -19,7 +19,7 @@ from fvsolve.steady import Edge
 if TYPE_CHECKING:
     from fvsolve.model.inputs import Input
 
-SCALE = 1e5  # a typical pressure drop [Pa]
+TYPICAL_DROP = 1e5  # a typical pressure drop [Pa]
 
 
 class Lowering:
@@ -40,8 +40,8 @@ class Lowering:
     rank: ClassVar[int] = 0
     law: ClassVar[ModuleType | None] = None
     events: ClassVar[tuple[str, ...]] = ()
-    acts: ClassVar[bool] = False
-    books: ClassVar[str] = ""
+    is_device: ClassVar[bool] = False
+    ledger_name: ClassVar[str] = ""
 
     def __init_subclass__(cls, kind: str = "") -> None:
         if kind:
@@ -76,7 +76,7 @@ class Lowering:
         """Pressure [Pa] that a node holds in the steady problem, None if flows determine it."""
         return None
 
-    def moves(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
+    def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
         """Text of the change that a net inflow [kg/s], [m3/s] causes at the start; "" for none.
 
         amount : as `Case.amount`, numbers in the units of `[output]`
@@ -109,7 +109,7 @@ class Restriction(Lowering):
             row["schedule"] = draft.schedules.add(constant(1.0))
         if self.law is None:
             return
-        if not self.acts:
+        if not self.is_device:
             row["data"], row["event"] = len(draft.floats), draft.flags(name, self.events)
             draft.floats += self.numbers(draft, name, link)
 
@@ -129,20 +129,20 @@ class Restriction(Lowering):
         """Edge in the steady problem of VALVE row k; None for the root law, open as in `start.shut_valves`."""
         if not self.steps:
             return None
-        row, (density_ratio, drive_ratio) = start.valves[k], start.dense_of.get(k, (1.0, 1.0))
+        row, (density_ratio, drive_ratio) = start.valves[k], start.density_ratios.get(k, (1.0, 1.0))
         row["open"] = g = start.conductance(k)
         i, j = int(row["from_node"]), int(row["to_node"])
         if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
         if start.rest:
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
-        per, step = math.sqrt(SCALE / (g * density_ratio)), self.stepper(start, k, g, density_ratio)
+        per, step = math.sqrt(TYPICAL_DROP / (g * density_ratio)), self.stepper(start, k, g, density_ratio)
 
         def newton(flow, present):
             a, s = step(flow, present * drive_ratio)
             return per, per * s * drive_ratio, per * a
 
-        return Edge(i, j, newton, math.sqrt(g * density_ratio * SCALE))
+        return Edge(i, j, newton, math.sqrt(g * density_ratio * TYPICAL_DROP))
 
     def stepper(self, start, k: int, g: float, density_ratio: float):
         """Function (flow [kg/s], drop [Pa]) -> a, s of its law's `step`, before any event."""
@@ -151,7 +151,7 @@ class Restriction(Lowering):
 
     def follow(self, start, k: int) -> None:
         """Set the profile's drop to that of its flow; if they do not agree, the restriction counts as not open."""
-        row, (drop, density_ratio) = start.valves[k], start.drive_of(k)
+        row, (drop, density_ratio) = start.valves[k], start.valve_drive(k)
         if row["open"] <= 0.0:
             return
         flow, step = float(row["flow"]), self.stepper(start, k, float(row["open"]), density_ratio)
@@ -159,7 +159,7 @@ class Restriction(Lowering):
         if abs(a) > 1e-6 * (start.flow_scale * 1e-6 + abs(flow)):
             row["open"] = 0.0
         elif start.case.law.linear:
-            for _ in range(ROUNDS):
+            for _ in range(NEWTON_STEPS):
                 if s <= 0.0 or a == 0.0:
                     break
                 drop -= a / s
@@ -167,7 +167,7 @@ class Restriction(Lowering):
             row["drop"] = drop
 
 
-ROUNDS = 5  # Newton steps from a drop that is accurate to 1e-6
+NEWTON_STEPS = 5  # Newton steps from a drop that is accurate to 1e-6
 
 
 @functools.cache
@@ -176,13 +176,13 @@ def lowering_of(part: type) -> Lowering:
     package = part.__module__.rpartition(".")[0]
     if find_spec(f"{package}.lower") is not None:
         import_module(f"{package}.lower")
-    return Lowering.kinds.get(part.kind, PLAIN)
+    return Lowering.kinds.get(part.kind, NO_ROWS)
 
 
-PLAIN = Lowering()  # for parts without rows
+NO_ROWS = Lowering()  # for parts without rows
 
 
-def lowered(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
+def links_by_table(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
     """Table -> (name, link, lowering) of the links with rows in it, in the order of rows."""
     tables: dict[str, list[tuple[str, Any, Lowering]]] = {}
     for name, link in case.conduits.items():
@@ -193,4 +193,4 @@ def lowered(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
 
 def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
     """Links of one table : (name, link, lowering)."""
-    return lowered(case).get(table, [])
+    return links_by_table(case).get(table, [])

@@ -14,10 +14,10 @@ import numpy as np
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.creep import held_by_wall
-from fvsolve.model.past import without_past
-from fvsolve.model.scalars import node_values, pipe_values
-from fvsolve.model.slate import Slate
+from fvsolve.model.delay_history import split_memory
+from fvsolve.model.run_data import RunData
+from fvsolve.model.scalar_tables import node_values, pipe_values
+from fvsolve.model.wall_creep import mass_in_creep
 from fvsolve.units import show
 
 if TYPE_CHECKING:
@@ -63,8 +63,8 @@ class State(Displayable):
     picture = "fvsolve.draw.objects:state_figure"
 
     def __post_init__(self) -> None:
-        self.t = given_time(self.t)
-        self.y, self.memory = given_numbers("y", self.y), given_numbers("memory", self.memory)
+        self.t = as_time(self.t)
+        self.y, self.memory = as_numbers("y", self.y), as_numbers("memory", self.memory)
         for name, array in (("y", self.y), ("memory", self.memory)):
             if array.ndim != 1:
                 raise FvsolveError(f"{name} has shape {array.shape}; expected a one-dimensional array of numbers")
@@ -80,11 +80,11 @@ def flags_of(state: State, model: Model) -> np.ndarray | float:
     """Event flags of devices in a state that `advance` returned; 0 for any other state."""
     memory = state.memory
     if len(model.tables.delays) and memory.size:
-        memory = without_past(memory)[0]
+        memory = split_memory(memory)[0]
     return memory[2:] if memory.size == 2 + model.shapes.armed else 0.0
 
 
-def given_numbers(name: str, values: Any) -> np.ndarray:
+def as_numbers(name: str, values: Any) -> np.ndarray:
     """Convert to a writable float64[...] array, without a copy where possible.
 
     Raises FvsolveError if the values are not real numbers.
@@ -104,17 +104,17 @@ def given_numbers(name: str, values: Any) -> np.ndarray:
         ) from None
 
 
-def given_limit(limit: Any) -> float:
+def as_limit(limit: Any) -> float:
     """End of a segment [s], or infinity. Raises FvsolveError if it is not a time."""
-    value = given_numbers("limit", limit)
+    value = as_numbers("limit", limit)
     if value.ndim or np.isnan(value):
         raise FvsolveError(f"limit = {show(value)} is not a time; expected a number of seconds, or infinity")
     return float(value)
 
 
-def given_time(t: Any) -> float:
+def as_time(t: Any) -> float:
     """A time [s]. Raises FvsolveError if it is not a finite number."""
-    value = given_numbers("t", t)
+    value = as_numbers("t", t)
     if value.ndim or not np.isfinite(value):
         raise FvsolveError(f"t = {show(t)} is not a time; expected a finite number of seconds")
     return float(value)
@@ -158,8 +158,12 @@ class Model(Displayable):
     watched: list[Probe]  # read in addition to the probes, for their extremes only
     watched_start: np.ndarray  # pressures of `watched` along pipes in the profile [Pa], nan of other quantities
     sharp: dict[str, np.ndarray]  # tables that replace these while a jump is solved, see `model.delay_line_selection`
-    slates: deque[Slate] = field(default_factory=deque, init=False)  # idle run data for evaluating single states
-    packed: list = field(default_factory=list, init=False)  # tables before the start is solved, reused by `vary`
+    idle_run_data: deque[RunData] = field(
+        default_factory=deque, init=False
+    )  # idle run data for evaluating single states
+    tables_before_start: list = field(
+        default_factory=list, init=False
+    )  # tables before the start is solved, reused by `vary`
 
     picture = "fvsolve.draw.objects:model_figure"
 
@@ -259,10 +263,10 @@ class Model(Displayable):
     @cached_property
     def structure(self):
         """Pattern of the Jacobian, and the linear algebra that suits it or that `numerics.linear_algebra` names."""
-        from fvsolve.model.dependence import lumped, sparsity
+        from fvsolve.model.jacobian_pattern import jacobian_pattern, lumped_states
         from fvsolve.steppers.structure import Structure
 
-        return Structure(sparsity(self), self.case.numerics.linear_algebra, lumped(self))
+        return Structure(jacobian_pattern(self), self.case.numerics.linear_algebra, lumped_states(self))
 
     def new_out(self) -> np.ndarray:
         """New array for the values that the right-hand side writes in addition to dydt."""
@@ -270,20 +274,20 @@ class Model(Displayable):
         out[rec.ARRIVES] = rec.NEVER
         return out
 
-    def given(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
+    def checked(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
         """A time and a state as kernels read them.
 
         Raises FvsolveError if the state does not fit this model or is not finite.
         """
-        state = self.sized(y)
+        state = self.checked_size(y)
         if not np.isfinite(state).all():
             k = int(np.argmax(~np.isfinite(state)))
             raise FvsolveError(f"y[{k}] = {state[k]}, {self.state_names[k]}; expected a finite number for every state")
-        return given_time(t), state
+        return as_time(t), state
 
-    def sized(self, y: Any) -> np.ndarray:
+    def checked_size(self, y: Any) -> np.ndarray:
         """A state as float64[n]. Raises FvsolveError if it does not fit this model."""
-        state = given_numbers("y", y)
+        state = as_numbers("y", y)
         if state.shape != (self.y_size,):
             raise FvsolveError(f"y has shape {state.shape}; expected a number for each of the {self.y_size} states "
                                "that Model.state_names lists")  # fmt: skip
@@ -296,13 +300,13 @@ class Model(Displayable):
         With delay lines the argument must be a `State`, whose memory holds their history; otherwise FvsolveError.
         """
         if isinstance(t, State) and y is None:
-            with self.slate() as run_data:
-                run_data.recall(t)
+            with self.run_data() as run_data:
+                run_data.restore_history(t)
                 return run_data.evaluate(t.t, t.y, np.inf)[0]
-        self.refuse_lines("rhs")
+        self.refuse_delay_lines("rhs")
         return self.evaluate(t, y)[0]
 
-    def refuse_lines(self, function: str) -> None:
+    def refuse_delay_lines(self, function: str) -> None:
         """Raise FvsolveError if the model has delay lines: their history is not part of y."""
         if len(self.tables.delays):
             raise FvsolveError(f"{function}(t, y) is not defined for a model with delay lines: waves sent into them "
@@ -313,32 +317,32 @@ class Model(Displayable):
 
         From `limit` [s] on, schedules take their left limit there.
         """
-        limit = given_limit(limit)
-        with self.slate() as run_data:
+        limit = as_limit(limit)
+        with self.run_data() as run_data:
             return run_data.evaluate(t, y, limit)
 
     @contextmanager
-    def slate(self, armed: np.ndarray | float = 0.0) -> Iterator[Slate]:
+    def run_data(self, armed: np.ndarray | float = 0.0) -> Iterator[RunData]:
         """Run data for evaluating single states, reused by the next call. `armed` : event flags, 0 as at a start.
 
         Its first occurrences and extremes have no meaning.
         """
         try:
-            run_data = self.slates.pop()  # atomic: no other thread gets the same object
+            run_data = self.idle_run_data.pop()  # atomic: no other thread gets the same object
         except IndexError:
-            run_data = Slate(self)
-        run_data.blank(armed)
+            run_data = RunData(self)
+        run_data.reset(armed)
         yield run_data
-        self.slates.append(run_data)
+        self.idle_run_data.append(run_data)
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
         """df/dy : float64[n, n] by central differences of the scaled states."""
-        self.refuse_lines("jacobian")
-        return self.held_jacobian(t, y)
+        self.refuse_delay_lines("jacobian")
+        return self.jacobian_without_delays(t, y)
 
-    def held_jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
+    def jacobian_without_delays(self, t: float, y: np.ndarray) -> np.ndarray:
         """Jacobian by central differences, with the waves that arrive from delay lines held constant."""
-        (t, y), n = self.given(t, y), self.y_size
+        (t, y), n = self.checked(t, y), self.y_size
         jacobian = np.empty((n, n))
         for j in range(n):
             step = 1e-6 * (self.scale[j] + abs(y[j]))
@@ -353,19 +357,19 @@ class Model(Displayable):
 
         Devices are in the position of a start at (t, y), or as stored in a state that `advance` returned.
         """
-        armed, limit, past = 0.0, given_limit(limit), None
+        armed, limit, past = 0.0, as_limit(limit), None
         if isinstance(t, State) and y is None:
             t, y, armed, past = t.t, t.y, flags_of(t, self), t
-        t, y = self.given(t, y)
-        with self.slate(armed) as run_data:
-            run_data.recall(past)
+        t, y = self.checked(t, y)
+        with self.run_data(armed) as run_data:
+            run_data.restore_history(past)
             return run_data.observe(t, y, run_data.evaluate(t, y, limit)[1])
 
     # physical meaning of states --------------------------------------------------------------------------------
 
     def cell_pressure(self, k: int, waves: np.ndarray) -> np.ndarray:
         """Pressure [Pa] in the cells of pipe k from the sum of both waves [kg/s]."""
-        waves = given_numbers("waves", waves)
+        waves = as_numbers("waves", waves)
         if (
             not isinstance(k, (int, np.integer))
             or not 0 <= k < len(self.pipes)
@@ -377,7 +381,7 @@ class Model(Displayable):
 
     def head(self, pressure: np.ndarray, elevation) -> np.ndarray:
         """Head [m] of the case's fluid above datum: 0 at ambient pressure and datum level."""
-        pressure, elevation = given_numbers("pressure", pressure), given_numbers("elevation", elevation)
+        pressure, elevation = as_numbers("pressure", pressure), as_numbers("elevation", elevation)
         return self.case.law.head(pressure, elevation)
 
     @property
@@ -390,7 +394,7 @@ class Model(Displayable):
 
         lines : pipe -> both waves of delay lines, as returned by `RunData.along`
         """
-        y = self.sized(y)
+        y = self.checked_size(y)
         if np.shape(out) != (int(self.layout["size"]),):
             raise FvsolveError(f"out has shape {np.shape(out)}; expected the second array that Model.evaluate returns")
         fields, law = {}, self.case.law
@@ -424,14 +428,14 @@ class Model(Displayable):
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:
         """Mass stored in the starting profile, and change of mass in state y [kg]."""
-        y = self.sized(y)
+        y = self.checked_size(y)
         initial, change = 0.0, 0.0
         for k, row in enumerate(self.tables.pipes):
             o, n = row["y"], int(row["cells"])
             initial += self.case.law.held_in_pipe(row, self.profiles[k], self.tables.profile)
             change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
             change += float(y[o]) if row["delay"] >= 0 else 0.0
-            change += held_by_wall(self.tables.floats, row, y)
+            change += mass_in_creep(self.tables.floats, row, y)
         for row in self.tables.nodes:
             if row["y"] >= 0:
                 initial += float(row["mass"])
@@ -452,6 +456,6 @@ class Model(Displayable):
     @property
     def checks(self) -> dict[str, Any]:
         """Facts about the compiled case, for `fvsolve check`."""
-        from fvsolve.model.checks import checks
+        from fvsolve.model.model_facts import checks
 
         return checks(self)

@@ -15,12 +15,12 @@ from fvsolve.parts.schedule import Schedule
 # Number of cells from which peaks at a valve are accurate to a tenth of their rise, for closures at once or within
 # five travel times (tests/model/test_resolution.py); `fromm` and `central` overshoot jumps by more, with any number.
 # they rise (tests/model/test_resolution.py); `fromm` and `central` overshoot jumps by more, whatever the cells.
-FEWEST, ENOUGH = {"upwind": 40, "weno5": 6}, 10  # for these schemes, and for all others
-SLOW = 100.0  # travel times: for longer events the liquid is practically rigid
-SHORT = 0.1  # of the longest travel time: shorter pipes count only next to fast events
-QUICK = 4.0  # of a pipe's own travel times: events next to it that are shorter count as fast
-ANSWER = 3  # least cells of a piece next to a check valve or vessel
-DEAR = 10.0  # steps shorter by this factor than those of other pieces of a pipe are reported
+SCHEME_CELLS, OTHER_CELLS = {"upwind": 40, "weno5": 6}, 10  # for these schemes, and for all others
+SLOW_EVENT = 100.0  # travel times: for longer events the liquid is practically rigid
+SHORT_PIPE = 0.1  # of the longest travel time: shorter pipes count only next to fast events
+FAST_EVENT = 4.0  # of a pipe's own travel times: events next to it that are shorter count as fast
+LEAST_CELLS = 3  # least cells of a piece next to a check valve or vessel
+COSTLY_RATIO = 10.0  # steps shorter by this factor than those of other pieces of a pipe are reported
 
 
 def too_few_cells(draft: Any) -> list[Notice]:
@@ -29,7 +29,7 @@ def too_few_cells(draft: Any) -> list[Notice]:
     if not len(table):
         return []
     cells = np.where(table["delay"] < 0, table["cells"], np.inf)  # delay lines have no cells
-    return [*_behind_events(draft, cells), *(_beside_answers(draft, cells) or _dear(draft, cells))]
+    return [*_behind_events(draft, cells), *(_near_answering(draft, cells) or _costly_piece(draft, cells))]
 
 
 def events(case: Any) -> Iterator[tuple[str, float]]:
@@ -59,7 +59,7 @@ def duration(schedule: Schedule, start: float, end: float) -> float:
 def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
     """Notice of pipes with too few cells for the waves of the fastest event."""
     case, scheme = draft.case, draft.case.numerics.scheme
-    needed = FEWEST.get(scheme, ENOUGH) * _flattened(draft)
+    needed = SCHEME_CELLS.get(scheme, OTHER_CELLS) * _diffusion(draft)
     few = cells < needed
     if not few.any():
         return []
@@ -68,7 +68,7 @@ def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
     key = min(durations, key=durations.get)
     cell = draft.pipe_table["dx"] / draft.pipe_table["speed"]
     travel = cell * draft.pipe_table["cells"]
-    few &= ((travel > SHORT * travel.max()) & (durations[key] < SLOW * travel)) | _beside_events(
+    few &= ((travel > SHORT_PIPE * travel.max()) & (durations[key] < SLOW_EVENT * travel)) | _near_events(
         draft, durations, travel
     )
     if not few.any():
@@ -83,7 +83,7 @@ def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
     return [Notice("range", f"links.{name}", text, "cells", float(cells[worst]), float(least))]
 
 
-def _flattened(draft: Any) -> np.ndarray:
+def _diffusion(draft: Any) -> np.ndarray:
     """Numerical diffusion of upwind with Euler's method, relative to upwind alone: 1 - Courant number; else 1."""
     numerics, rate = draft.case.numerics, draft.pipe_table["speed"] / draft.pipe_table["dx"]
     if numerics.scheme != "upwind" or numerics.method != "euler" or numerics.rtol is not None:
@@ -91,7 +91,7 @@ def _flattened(draft: Any) -> np.ndarray:
     return 1.0 - np.minimum(rate * (numerics.step or numerics.courant / rate.max()), 1.0)
 
 
-def _beside_events(draft: Any, durations: dict[str, float], travel: np.ndarray) -> np.ndarray:
+def _near_events(draft: Any, durations: dict[str, float], travel: np.ndarray) -> np.ndarray:
     """Pipes with a schedule at an end that changes within a few of their travel times : bool[pipes]."""
     case, shortest = draft.case, {}
     for key, time in durations.items():
@@ -99,27 +99,27 @@ def _beside_events(draft: Any, durations: dict[str, float], travel: np.ndarray) 
         for node in (name,) if group == "nodes" else case.links[name].ports.values() if group == "links" else ():
             shortest[node] = min(shortest.get(node, math.inf), math.inf if key_name == "trip" else time)
     ends = [[shortest.get(end, math.inf) for end in _ends(case, name)] for name in draft.pipe_names]
-    return np.min(np.array(ends).reshape(-1, 2), axis=1) < QUICK * travel
+    return np.min(np.array(ends).reshape(-1, 2), axis=1) < FAST_EVENT * travel
 
 
-def _beside_answers(draft: Any, cells: np.ndarray) -> list[Notice]:
+def _near_answering(draft: Any, cells: np.ndarray) -> list[Notice]:
     """Notice of pipes and pieces too short for their waves to reach a check valve or vessel next to them."""
-    if not (cells < ANSWER).any():
+    if not (cells < LEAST_CELLS).any():
         return []
-    case, parts_at = draft.case, answering(draft.case)
+    case, parts_at = draft.case, answering_parts(draft.case)
     adjacent = [parts_at.get(name, []) for name in draft.pipe_names]
-    few = (cells < ANSWER) & np.array([bool(notice) for notice in adjacent])
+    few = (cells < LEAST_CELLS) & np.array([bool(notice) for notice in adjacent])
     if not few.any():
         return []
     worst = int(np.argmin(np.where(few, draft.pipe_table["dx"] * draft.pipe_table["cells"], np.inf)))
-    name, cost = draft.pipe_names[worst], "".join(f"; {notice.text}" for notice in _dear(draft, cells))
-    text = (f"{_where(case, name)}: {_cells(cells[worst])}, too few for its waves to reach "
-            f"{listing(adjacent[worst], 3)}; expected {_remedy(case, name)}"
+    name, cost = draft.pipe_names[worst], "".join(f"; {notice.text}" for notice in _costly_piece(draft, cells))
+    text = (f"{_location(case, name)}: {_cells(cells[worst])}, too few for its waves to reach "
+            f"{listing(adjacent[worst], 3)}; expected {_advice(case, name)}"
             f"{_others(draft, few, worst)}{cost}")  # fmt: skip
-    return [Notice("cells", f"links.{name}", text, "cells", float(cells[worst]), float(ANSWER))]
+    return [Notice("cells", f"links.{name}", text, "cells", float(cells[worst]), float(LEAST_CELLS))]
 
 
-def answering(case: Any) -> dict[str, list[str]]:
+def answering_parts(case: Any) -> dict[str, list[str]]:
     """Pipe -> check valves and vessels at its ends."""
     parts_at: dict[str, list[str]] = {name: [name] for name, node in case.nodes.items() if node.kind == "accumulator"}
     for name, link in case.links.items():
@@ -129,7 +129,7 @@ def answering(case: Any) -> dict[str, list[str]]:
     return {name: [part for end in _ends(case, name) for part in parts_at.get(end, ())] for name in pipes}
 
 
-def _dear(draft: Any, cells: np.ndarray) -> list[Notice]:
+def _costly_piece(draft: Any, cells: np.ndarray) -> list[Notice]:
     """Notice of the piece of a cut pipe that needs far shorter steps than the other pieces."""
     case, numerics = draft.case, draft.case.numerics
     if numerics.courant is None:
@@ -137,26 +137,26 @@ def _dear(draft: Any, cells: np.ndarray) -> list[Notice]:
     rate = np.where(np.isfinite(cells), draft.pipe_table["speed"] / draft.pipe_table["dx"], 0.0)
     worst = int(np.argmax(rate))
     name = draft.pipe_names[worst]
-    pipe = _whole(case, name)
+    pipe = _cut_pipe(case, name)
     if pipe is None:
         return []
     ratio = rate[worst] / min(rate[draft.pipe_names.index(piece)] or math.inf for piece in case.routes[pipe].pipes)
-    if ratio <= DEAR:
+    if ratio <= COSTLY_RATIO:
         return []
-    text = f"{_where(case, name)}: steps are {ratio:.3g} times shorter than other pieces of {pipe} need"
-    return [Notice("cost", f"links.{name}", text, "length", float(ratio), DEAR)]
+    text = f"{_location(case, name)}: steps are {ratio:.3g} times shorter than other pieces of {pipe} need"
+    return [Notice("cost", f"links.{name}", text, "length", float(ratio), COSTLY_RATIO)]
 
 
-def _whole(case: Any, piece: str) -> str | None:
+def _cut_pipe(case: Any, piece: str) -> str | None:
     """Name of the cut pipe of a piece; None for a pipe that is not cut."""
     name = piece.rpartition("-")[0]
     route = case.routes.get(name)
     return name if route is not None and piece in route.pipes and is_cut(name, route.pipes) else None
 
 
-def _where(case: Any, name: str) -> str:
+def _location(case: Any, name: str) -> str:
     """Name of a pipe; for a piece also the chainages of its ends."""
-    pipe = _whole(case, name)
+    pipe = _cut_pipe(case, name)
     if pipe is None:
         return name
     route, lengths = case.routes[pipe], [case.links[value].length for value in case.routes[pipe].pipes]
@@ -165,13 +165,13 @@ def _where(case: Any, name: str) -> str:
     return f"{name} (chainage {span} of {pipe})"
 
 
-def _remedy(case: Any, name: str) -> str:
+def _advice(case: Any, name: str) -> str:
     """Keys that give a pipe enough cells."""
-    own, pipe = f"links.{name}.cells = {ANSWER}", _whole(case, name)
+    own, pipe = f"links.{name}.cells = {LEAST_CELLS}", _cut_pipe(case, name)
     if pipe is None:
         return own
     length = sum(case.links[piece].length for piece in case.routes[pipe].pipes)
-    return f"links.{pipe}.cells = {math.ceil((ANSWER - 0.5) * length / case.links[name].length)}, or {own}"
+    return f"links.{pipe}.cells = {math.ceil((LEAST_CELLS - 0.5) * length / case.links[name].length)}, or {own}"
 
 
 def _ends(case: Any, name: str) -> tuple[str, str]:

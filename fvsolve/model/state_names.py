@@ -10,17 +10,17 @@ class Numbered(Sequence):
     """Sequence `stem[0]`, `stem[1]` and so on, of a given length."""
 
     def __init__(self, stem: str, count: int) -> None:
-        self.stem, self.many = stem, count
+        self.stem, self.count = stem, count
 
     def __len__(self) -> int:
-        return self.many
+        return self.count
 
     def __getitem__(self, i):
         if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(self.many))]
-        if not -self.many <= i < self.many:
+            return [self[k] for k in range(*i.indices(self.count))]
+        if not -self.count <= i < self.count:
             raise IndexError(i)
-        return f"{self.stem}[{int(i) % self.many}]"
+        return f"{self.stem}[{int(i) % self.count}]"
 
 
 class StateNames(Sequence):
@@ -29,23 +29,23 @@ class StateNames(Sequence):
     def __init__(self) -> None:
         self.parts: list[Sequence[str]] = []
         self.firsts: list[int] = []
-        self.many = 0
+        self.count = 0
 
     def add(self, names: Sequence[str]) -> None:
         """Append names."""
         self.parts.append(names)
-        self.firsts.append(self.many)
-        self.many += len(names)
+        self.firsts.append(self.count)
+        self.count += len(names)
 
     def __len__(self) -> int:
-        return self.many
+        return self.count
 
     def __getitem__(self, i):
         if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(self.many))]
-        if not -self.many <= i < self.many:
+            return [self[k] for k in range(*i.indices(self.count))]
+        if not -self.count <= i < self.count:
             raise IndexError(i)
-        i = int(i) % self.many
+        i = int(i) % self.count
         k = bisect_right(self.firsts, i) - 1
         return self.parts[k][i - self.firsts[k]]
 
@@ -53,7 +53,7 @@ class StateNames(Sequence):
         return (name for part in self.parts for name in part)
 
     def __eq__(self, other) -> bool:
-        return isinstance(other, Sequence) and len(other) == self.many and all(map(str.__eq__, self, other))
+        return isinstance(other, Sequence) and len(other) == self.count and all(map(str.__eq__, self, other))
 
     __hash__ = None
 

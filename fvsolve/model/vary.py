@@ -7,7 +7,7 @@ from typing import Any
 
 from fvsolve.case import load, located
 from fvsolve.errors import CaseError
-from fvsolve.model.build import built
+from fvsolve.model.build import build_like
 from fvsolve.model.model import Model
 from fvsolve.validation import TABLE, instance_of, validated
 
@@ -22,6 +22,6 @@ def vary(model: Model, set: Mapping[str, Any]) -> Model:
     """
     case = load(model.case, dict(set))
     try:
-        return built(case, model)
+        return build_like(case, model)
     except CaseError as error:
         raise located(error, case) from None

@@ -14,8 +14,8 @@ from fvsolve.output.directory import ENDED, RunDirectory, pictures_there, read_d
 from fvsolve.output.memory import MemorySink
 from fvsolve.output.restart import identity
 from fvsolve.output.summary import described, write_summary
-from fvsolve.run import ranks
-from fvsolve.run.claims import claims
+from fvsolve.run import mpi_run
+from fvsolve.run.case_claims import claims
 from fvsolve.run.result import Result
 from fvsolve.validation import COUNT_FROM_ONE, FLAG, FUNCTION, PATH, TABLE, validated
 
@@ -44,11 +44,11 @@ def run(
     Under MPI rank 0 does all this; the other ranks take part in the computation and return None.
     Raises CaseError, FluidError, RunError.
     """
-    begun, comm = time.perf_counter(), ranks.world()
-    if ranks.follows():
-        ranks.follow(lambda: model_of(case, set))
+    begun, comm = time.perf_counter(), mpi_run.world()
+    if mpi_run.is_other_rank():
+        mpi_run.serve_rank(lambda: model_of(case, set))
         return None
-    with ranks.leading(comm):
+    with mpi_run.rank_zero_first(comm):
         model = model_of(case, set)
     with contextlib.closing(sink_of(model, out, force, resume, threads)) as sink:
         result = solved(model, sink, progress, threads, begun)
@@ -60,7 +60,7 @@ def run(
 @validated(directory=PATH)
 def open_run(directory: str | Path) -> Result:
     """Read a run directory. Raises RunError if it holds no finished run, or a run of another version."""
-    from fvsolve.run.complete import check
+    from fvsolve.run.summary_fields import check
 
     contents = read_directory(Path(directory))
     check(contents[0], Path(directory) / ENDED)
@@ -74,13 +74,13 @@ def model_of(case, set: Mapping | None = None, like=None):
     """
     from fvsolve.case import Case, load, located
     from fvsolve.model import Model
-    from fvsolve.model.build import built
+    from fvsolve.model.build import build_like
 
     if not isinstance(case, Model):
         if set or not isinstance(case, Case):
             case = load(case, dict(set or {}))
         try:
-            return built(case, like)
+            return build_like(case, like)
         except CaseError as error:
             raise located(error, case) from None
         except MemoryError:
@@ -92,7 +92,7 @@ def model_of(case, set: Mapping | None = None, like=None):
 
 def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: int = 1):
     """Output of a run: memory, or a run directory, which is locked until it is closed."""
-    with ranks.leading(comm := ranks.world()):
+    with mpi_run.rank_zero_first(comm := mpi_run.world()):
         if comm is not None and threads > 1:
             raise RunError(f"threads = {threads}: under MPI each of the {comm.size} ranks is one thread; omit threads")
         if out is not None:
@@ -104,7 +104,7 @@ def sink_of(model, out: str | Path | None, force: bool, resume: bool, threads: i
 
 def solved(model, sink, progress=None, threads: int = 1, begun: float | None = None) -> Result:
     """Solve and return the result; all files are written except pictures. begun : start by time.perf_counter()."""
-    begun, comm = time.perf_counter() if begun is None else begun, ranks.world()
+    begun, comm = time.perf_counter() if begun is None else begun, mpi_run.world()
     if not sink.ended:
         return _result(model, _solve(model, sink, progress, threads, comm), sink, begun)
     if comm is not None:
@@ -137,12 +137,12 @@ def _solve(model, sink, progress, threads, comm):
     from fvsolve.solve.solve import MemoryMismatch
 
     if comm is not None:
-        threads, comm = comm.size, ranks.gathered(comm, model)
+        threads, comm = comm.size, mpi_run.all_ranks_ready(comm, model)
     restart = sink.restart
     state = initial_state(model) if restart is None else State(restart.t, restart.y, restart.memory)
     sink.begin(model, state)
     if comm is not None and sink.folder is not None:
-        sink.among(comm, ranks.rows_of(model, comm.size))
+        sink.among(comm, mpi_run.rows_of(model, comm.size))
     try:
         return solve(model, state, sink, progress, threads, comm)
     except MemoryMismatch as error:

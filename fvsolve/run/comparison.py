@@ -6,7 +6,7 @@ import numpy as np
 
 from fvsolve.output.column import UnitColumn
 
-FOUND = (
+RESULT_KEYS = (
     "rms",
     "greatest_difference",
     "t_greatest_difference",
@@ -35,14 +35,14 @@ def comparison(compare, column: UnitColumn, result) -> dict:
         "points": len(time),
     }
     if not len(time):
-        return head | dict.fromkeys(FOUND)
+        return head | dict.fromkeys(RESULT_KEYS)
     difference = interpolated(t, computed, time) - measured
     overlap = (t >= time.min()) & (t <= time.max())
     peak, top = int(np.argmax(measured)), int(np.argmax(np.where(overlap, computed, -np.inf)))
     worst = int(np.argmax(np.abs(difference)))
     values = [np.sqrt(np.mean(difference**2)), difference[worst], time[worst]]
     values += [measured[peak], time[peak], computed[top], t[top]]
-    return head | dict(zip(FOUND, map(float, values), strict=True))
+    return head | dict(zip(RESULT_KEYS, map(float, values), strict=True))
 
 
 def interpolated(t: np.ndarray, values: np.ndarray, times: np.ndarray) -> np.ndarray:

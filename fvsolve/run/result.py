@@ -16,7 +16,7 @@ from fvsolve.output.fields import read_series
 from fvsolve.units import show
 from fvsolve.validation import COUNT_FROM_ZERO, NUMBER, PATH, TEXT, validated
 
-FIELDED = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
+KINDS_WITH_FIELDS = frozenset(("pipe", "basin", "body"))  # kinds of parts that frames show
 
 HOLDS, OPEN, FAILS = "holds", "open", "fails"  # states of a limit
 IN_WORDS = {HOLDS: "holds", OPEN: "open", FAILS: "FAILS"}
@@ -298,7 +298,7 @@ class Result(Displayable):
         bodies, only the parts are drawn. `contours` : number of contour lines. Raises RunError without frames,
         FvsolveError if drawing is not possible.
         """
-        if field is None and self._lumped:
+        if field is None and self._without_fields:
             return self._draw([], "parts", path, ".png", 0)
         times = [t for t, _ in self._frames()]
         t = times[-1] if time is None else min(times, key=lambda frame_time: abs(frame_time - time))
@@ -310,10 +310,10 @@ class Result(Displayable):
         return self._draw(list(dict.fromkeys(t for t, _ in self._frames())), field, path, ".gif", contours)
 
     @property
-    def _lumped(self) -> bool:
+    def _without_fields(self) -> bool:
         """True if no part has fields."""
         kinds = {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())}
-        return self.directory is not None and not kinds & FIELDED
+        return self.directory is not None and not kinds & KINDS_WITH_FIELDS
 
     def _frames(self) -> list[tuple[float, Path]]:
         if self.directory is None or not (self.directory / "fields.pvd").is_file():
@@ -327,15 +327,15 @@ class Result(Displayable):
         """Reason for a run without frames."""
         if self.directory is None:
             return "nothing was written; give the run a directory"
-        if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & FIELDED:
-            return f"the case has no {listing(sorted(FIELDED))}"
+        if not {part.kind for part in (*self.case.nodes.values(), *self.case.links.values())} & KINDS_WITH_FIELDS:
+            return f"the case has no {listing(sorted(KINDS_WITH_FIELDS))}"
         if self.case.output.fields == 0:
             return "[output] fields is 0; run again with --set output.fields=20"
         return f"{self.directory / 'fields.pvd'} is missing; run again with --force"
 
     def _draw(self, times: list[float], field: str | None, path, suffix: str, contours: int) -> Path:
         from fvsolve.draw.view import view
-        from fvsolve.run.drawn import scene_of
+        from fvsolve.run.plot_scene import scene_of
 
         if field is None:
             pipes = any(link.kind == "pipe" for link in self.case.links.values())

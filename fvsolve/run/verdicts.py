@@ -12,7 +12,7 @@ from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.case.limits import VACUUM
 from fvsolve.case.routes import Leg, alone, is_cut, legs
 from fvsolve.output.column import UnitColumn, column
-from fvsolve.run.met import Met, in_quantity, met, pressure_of
+from fvsolve.run.part_extremes import PartExtremes, in_quantity, part_extremes, pressure_of
 from fvsolve.run.result import FAILS, HOLDS, OPEN
 
 ROUNDING = 1e-9  # relative to a limit and the typical size of its quantity; a smaller excess is within the limit
@@ -22,7 +22,7 @@ NEAR = 1e-3  # relative to a vapour pressure, within which a limit counts as equ
 WORST = 10  # places that a limit lists
 STATES = (FAILS, OPEN, HOLDS)  # worst first
 SHARED = ("name", "quantity", "until")  # keys with one value for all places of a limit
-BESIDE = "beside"  # key of a row that is not written to files: all places of its part and bound
+PLACES_KEY = "beside"  # key of a row that is not written to files: all places of its part and bound
 
 
 class Nearest(NamedTuple):
@@ -33,14 +33,14 @@ class Nearest(NamedTuple):
     limit: float
     bound: str
     time: float
-    met: Met
+    part: PartExtremes
     at: int
     state: str
     margins: np.ndarray  # of all places of the part
     limits: np.ndarray
 
 
-class Beside(NamedTuple):
+class PlaceMargins(NamedTuple):
     """All places of a part under a bound of a limit: probes, allowed values and margins, in the limit's unit."""
 
     probes: list[str]
@@ -67,21 +67,23 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
         shown = column(extent.quantity, "head" if extent.quantity == "pressure_head" else extent.dimension, model.case)
         shared = {"name": limit.name, "quantity": extent.quantity, "until": float(summary.t)}
         nearest_rows = [
-            row for part in met(model, summary, extent) for row in nearest(model, summary, limit, part, complete)
+            row
+            for part in part_extremes(model, summary, extent)
+            for row in nearest(model, summary, limit, part, complete)
         ]
-        tables.append([row_of(row, shown, chainage, extent) | shared | {BESIDE: beside(model, extent, shown, row)}
+        tables.append([row_of(row, shown, chainage, extent) | shared | {PLACES_KEY: place_margins(model, extent, shown, row)}
                      for row in nearest_rows])  # fmt: skip
     return tables
 
 
 def verdict(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Verdict of a limit: its worst row with its state, and its worst places."""
-    rows = [{key: value for key, value in row.items() if key != BESIDE} for row in sorted(rows, key=badness)]
+    rows = [{key: value for key, value in row.items() if key != PLACES_KEY} for row in sorted(rows, key=sort_key)]
     listed = [{key: value for key, value in row.items() if key not in SHARED} for row in worst(rows)]
     return {**rows[0], "ok": rows[0]["state"] == HOLDS, "worst": listed}
 
 
-def badness(row: dict[str, Any]) -> tuple[int, float]:
+def sort_key(row: dict[str, Any]) -> tuple[int, float]:
     """Sort key, worst row first: by state, then by margin."""
     return STATES.index(row["state"]), -math.inf if row["margin"] is None else row["margin"]
 
@@ -92,7 +94,7 @@ def worst(rows: list[dict]) -> list[dict]:
     return [*rows[:WORST], *(row for row in first.values() if row not in rows[:WORST])]
 
 
-def nearest(model, summary, limit, part: Met, complete: bool):
+def nearest(model, summary, limit, part: PartExtremes, complete: bool):
     """For every bound of a limit, the place of a part nearest to it, or most beyond it."""
     quantity = limit.extent.quantity
     for bound, (values, times), sign in zip(
@@ -107,22 +109,22 @@ def nearest(model, summary, limit, part: Met, complete: bool):
         at = int(np.argmin(np.where(unknown, -tolerance, margin)))
         state = FAILS if margin[at] < -tolerance[at] else HOLDS if complete and not unknown[at] else OPEN
         if state == FAILS and bound == "minimum" and bounds[at] == cavity_of(model, quantity, part.elevation[at]):
-            at = opened(summary, part, margin, at)
+            at = first_cavity(summary, part, margin, at)
         yield Nearest(float(margin[at]), float(values[at]), float(bounds[at]), bound, float(times[at]), part, at, state,
                       margin, bounds)  # fmt: skip
 
 
-def beside(model, extent, shown: UnitColumn, row: Nearest) -> Beside:
+def place_margins(model, extent, shown: UnitColumn, row: Nearest) -> PlaceMargins:
     """All places of a row. A pressure head is read as a head, and its limit includes the elevation."""
-    part, above = row.met, extent.quantity == "pressure_head"
+    part, above = row.part, extent.quantity == "pressure_head"
     text = f"{part.group}.{part.part}.{'head' if above else extent.quantity}"
     shares = part.distance / getattr(model.case.links.get(part.part), "length", np.nan)
     texts = [text if np.isnan(share) else f"{text}@{min(max(float(share), 0.0), 1.0)!r}" for share in shares]
     limits = row.limits + (part.elevation if above else 0.0)
-    return Beside(texts, np.asarray(shown.from_si(limits)), np.asarray(shown.span_from_si(row.margins)))
+    return PlaceMargins(texts, np.asarray(shown.from_si(limits)), np.asarray(shown.span_from_si(row.margins)))
 
 
-def allowed(model, limit, bound: str, part: Met):
+def allowed(model, limit, bound: str, part: PartExtremes):
     """Values that a bound allows at the places of a part [SI]; None without a bound.
 
     Under `cavitation` no pressure falls below that of vapour. A least value at or below it is replaced by the value at
@@ -148,7 +150,7 @@ def cavity_of(model, quantity: str, elevation):
     return in_quantity(model, quantity, model.case.law.cavity_pressure, elevation)
 
 
-def opened(summary, part: Met, margin: np.ndarray, at: int) -> int:
+def first_cavity(summary, part: PartExtremes, margin: np.ndarray, at: int) -> int:
     """Place at which the first cavity of a pipe opened, if the limit is exceeded there; else `at`."""
     distance = next(
         (cavity.distance for cavity in summary.cavities if cavity.place == f"{part.group}.{part.part}"), np.nan
@@ -157,7 +159,7 @@ def opened(summary, part: Met, margin: np.ndarray, at: int) -> int:
     return place if margin[place] < 0.0 else at
 
 
-def extremes(model, quantity: str, part: Met):
+def extremes(model, quantity: str, part: PartExtremes):
     """Least and greatest of a quantity, or of its magnitude, at the places of a part, each with its times."""
     if quantity in OF_PRESSURE:
         low, high = (
@@ -175,7 +177,7 @@ def extremes(model, quantity: str, part: Met):
 
 def row_of(row: Nearest, shown: UnitColumn, chainage: Chainages, extent) -> dict[str, Any]:
     """Row of a place: part, chainage and elevation [m], time [s], value, limit and margin in their unit."""
-    part, at, known = row.met, row.at, not math.isnan(row.margin)
+    part, at, known = row.part, row.at, not math.isnan(row.margin)
     return {
         "place": part.part, "chainage": chainage.of(part, at, extent.on) if known else None,
         "elevation": finite(part.elevation[at]), "time": finite(row.time) if known else None, "bound": row.bound,
@@ -197,7 +199,7 @@ class Chainages:
         self.case = case
         self.legs = {name: legs(route, case.links) for name, route in case.routes.items()}
 
-    def of(self, part: Met, at: int, on: tuple[str, ...]) -> float | None:
+    def of(self, part: PartExtremes, at: int, on: tuple[str, ...]) -> float | None:
         """Chainage of a place of a part [m]; None for a node on no route."""
         if part.group == "links":
             distance = part.distance[at]

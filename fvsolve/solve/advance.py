@@ -35,13 +35,13 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         raise FvsolveError(f"until = {until} is not a time. Expected a finite number of seconds")
     if not until >= state.t:
         raise FvsolveError(f"until = {until:g} s is before the time of the state, {state.t:g} s")
-    model.given(state.t, state.y)
+    model.checked(state.t, state.y)
     held = hold(model, inputs or {})
     loop = RunLoop(held, lambda: model.structure)  # the structure does not depend on the held inputs
     loop.now[:] = state.y
     loop.loop_state[loop_indices.T] = state.t
     loop.armed[:] = flags_of(state, model)
-    loop.slate.recall(state)
+    loop.slate.restore_history(state)
     loop.on_switch = lambda: loop.stop_columns(loop.controls[loop_indices.END])
     adaptive = loop.controls[loop_indices.CONTROL] == loop_indices.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
@@ -103,14 +103,14 @@ def checked(name: str, value: float, target: Input) -> float:
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.item()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real):
-        raise FvsolveError(f"{name} = {show(value)} is not a number. Expected {target.sort.wanted}")
+        raise FvsolveError(f"{name} = {show(value)} is not a number. Expected {target.sort.expected}")
     number = float(value)
     if not math.isfinite(number):
-        raise FvsolveError(f"{name} = {number} is not finite. Expected {target.sort.wanted}")
+        raise FvsolveError(f"{name} = {number} is not finite. Expected {target.sort.expected}")
     if not target.sort.least <= number <= target.sort.greatest:
-        raise FvsolveError(f"{name} = {number:g} is out of range. Expected {target.sort.wanted}")
+        raise FvsolveError(f"{name} = {number:g} is out of range. Expected {target.sort.expected}")
     pressure = target.scale * number + target.offset
     if target.node >= 0 and not pressure > 0.0:
         text = f"{name} = {number:g}" + (f" is {pressure:.4g} Pa absolute" if target.sort is HEAD else " is a vacuum")
-        raise FvsolveError(f"{text}. Expected {target.sort.wanted}")
+        raise FvsolveError(f"{text}. Expected {target.sort.expected}")
     return number

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels.column_junctions import gate_inflow
-from fvsolve.model import Model, Slate
+from fvsolve.model import Model, RunData
 
 ROUNDING = 1e-9  # relative to a small flow: columns that separate more slowly separate by rounding
 
@@ -34,7 +34,7 @@ def air_valve_of(model: Model, i: int) -> int | None:
     return None
 
 
-def flow_before(run_data: Slate, t: float, y: np.ndarray) -> np.ndarray:
+def flow_before(run_data: RunData, t: float, y: np.ndarray) -> np.ndarray:
     """Flow of the columns just before t, less the flow of the profile [kg/s]; at the start, their states."""
     model = run_data.model
     before, columns = model.new_out(), model.tables.columns
@@ -70,7 +70,7 @@ def impact_impulses(model: Model, carried: np.ndarray, out: np.ndarray, places: 
     return np.diag(matrix) * np.linalg.lstsq(matrix, sums)[0]
 
 
-def separate(run_data: Slate, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
+def separate(run_data: RunData, t: float, y: np.ndarray, out: np.ndarray) -> int | None:
     """Opening event of the air valve where columns separate fastest; None where no columns separate."""
     model = run_data.model
     places = shut_places(model, out)

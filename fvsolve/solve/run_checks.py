@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.model.past import crowded
+from fvsolve.model.delay_history import jump_overflow_notices
 from fvsolve.solve.sloshing_validity import SloshingCheck
 from fvsolve.solve.step_doubling import StepDoubling
 from fvsolve.step_limits.forcing_ranges import forcing_sizes
@@ -75,7 +75,7 @@ class RunChecks:
             notices = step_limits(self.model, self.rates, np.inf if self.grown else self.step_doubling.worst()[1])
         step_error = self.step_doubling.notice()
         notices += [] if step_error is None else [step_error]
-        notices += crowded(self.slate.past)
+        notices += jump_overflow_notices(self.slate.past)
         notices += self.sloshing.notices()
         notices += [] if self.grown is None else [self.grown]
         return notices + [notice for name, ledger in ledgers.items() for notice in ledger_notices(name, ledger)]

@@ -10,9 +10,9 @@ import numpy as np
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import tank_limits
 from fvsolve.kernels.compiled_functions import fused_step_function
-from fvsolve.model import Model, Slate
-from fvsolve.model.scalars import amounts
-from fvsolve.model.within import within
+from fvsolve.model import Model, RunData
+from fvsolve.model.scalar_tables import amount_indices
+from fvsolve.model.state_bounds import state_bounds
 from fvsolve.solve.blocked_stages import blocked_sums
 from fvsolve.solve.column_impact import separate, shut_places
 from fvsolve.solve.partition import make_partition
@@ -40,7 +40,7 @@ class RunLoop:
 
     def __init__(self, model: Model, structure: Callable[[], Structure] | None = None, threads=1, comm=None) -> None:
         numerics = model.case.numerics
-        self.model, self.slate = model, Slate(model)
+        self.model, self.slate = model, RunData(model)
         method = method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
@@ -58,11 +58,11 @@ class RunLoop:
         sums = [
             *model.tables.nodes["y"],
             *model.tables.masses["y"],
-            *amounts(model),
+            *amount_indices(model),
         ]  # travel is stored too
         stepper.stored = np.array([at for at in sums if at >= 0], dtype=np.int64)
         stepper.carry = np.zeros(len(stepper.stored))
-        stepper.bounds = within(model)
+        stepper.bounds = state_bounds(model)
         stepper.out, stepper.out_row, stepper.values = (
             model.new_out(),
             model.new_out(),
@@ -197,7 +197,7 @@ class RunLoop:
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
         for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
-            device.settle(self.slate, row, self.t, self.now, self.stepper.scale)
+            device.apply_event(self.slate, row, self.t, self.now, self.stepper.scale)
 
     def handle_events(self, before: np.ndarray) -> bool:
         """Record the last events; returns False where they chatter: too many at the same time or in a short span."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model import Model, Slate
+from fvsolve.model import Model, RunData
 
 DRIFT = 1e-6  # deviation of the length of Euler parameters from 1 above which a notice is given
 
@@ -86,7 +86,7 @@ class Summary:
         return 1e9 * self.processor / max(1, self.steps * max(1, self.cells))
 
 
-def find_marks(run_data: Slate) -> list[Mark]:
+def find_marks(run_data: RunData) -> list[Mark]:
     """First time and place of each condition outside the model's validity.
 
     Cavities are not marked under a law that models them; nor is overflow of tanks, which is in the ledger.
@@ -124,7 +124,7 @@ def find_marks(run_data: Slate) -> list[Mark]:
     ]
 
 
-def spill_notices(run_data: Slate) -> list[Notice]:
+def spill_notices(run_data: RunData) -> list[Notice]:
     """Notices for tanks that overflow, with the time of the first overflow."""
     model, notices = run_data.model, []
     first = len(model.pipes) + 2 * len(model.node_names)
@@ -137,13 +137,13 @@ def spill_notices(run_data: Slate) -> list[Notice]:
     return notices
 
 
-def device_notices(run_data: Slate) -> list[Notice]:
+def device_notices(run_data: RunData) -> list[Notice]:
     """Notices of devices outside their laws that are not marks: pumps that ran down, or with an extended curve."""
     model, marks = run_data.model, run_data.marks
     first = len(model.pipes) + 3 * len(model.node_names) + len(model.column_names) + len(model.piston_names)
     times = marks[first + len(model.devices) :]
     return [
-        device.passing(model, name, part, float(time))
+        device.passing_notice(model, name, part, float(time))
         for (name, part, device), time in zip(model.devices, times, strict=False)
         if np.isfinite(time)
     ]
@@ -165,7 +165,7 @@ def drift_notices(model: Model, y: np.ndarray) -> list[Notice]:
     return notices
 
 
-def find_cavities(run_data: Slate) -> list[Cavity]:
+def find_cavities(run_data: RunData) -> list[Cavity]:
     """Cavity of every pipe whose pressure fell below twice the vapour pressure: more vapour than gas in the bubbles."""
     model, marks, cavities = run_data.model, run_data.marks, []
     for k, pipe in enumerate(model.pipes if model.cavitates else ()):
@@ -180,19 +180,19 @@ def find_cavities(run_data: Slate) -> list[Cavity]:
     return cavities
 
 
-def find_extremes(run_data: Slate) -> dict[str, tuple[float, float, float, float]]:
+def find_extremes(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
     """Extremes of the probes over all accepted steps and rows: probe -> (least, its time, greatest, its time)."""
     table = run_data.extremes
     return {probe.text: tuple(map(float, table[:, k])) for k, probe in enumerate(run_data.model.probes)}
 
 
-def find_watched(run_data: Slate) -> dict[str, tuple[float, float, float, float]]:
+def find_watched(run_data: RunData) -> dict[str, tuple[float, float, float, float]]:
     """Extremes, as `find_extremes`, of the watched quantities that are not probes."""
     table, probe_count = run_data.extremes, len(run_data.model.probes)
     return {probe.text: tuple(map(float, table[:, probe_count + k])) for k, probe in enumerate(run_data.model.watched)}
 
 
-def find_point_envelopes(run_data: Slate) -> dict[str, dict[str, np.ndarray]]:
+def find_point_envelopes(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
     """Envelopes, as `find_envelope`, and initial pressure at watched points of pipes: ends and points of profiles."""
     model, probe_count, points = run_data.model, len(run_data.model.probes), {}
     rows: dict[str, list[int]] = {}
@@ -208,7 +208,7 @@ def find_point_envelopes(run_data: Slate) -> dict[str, dict[str, np.ndarray]]:
     return points
 
 
-def find_envelope(run_data: Slate) -> dict[str, dict[str, np.ndarray]]:
+def find_envelope(run_data: RunData) -> dict[str, dict[str, np.ndarray]]:
     """Envelopes: pipe -> distance, elevation [m], least and greatest pressure [Pa] and head [m] with times [s]."""
     model, envelope, result = run_data.model, run_data.envelope, {}
     for k, pipe in enumerate(model.pipes):

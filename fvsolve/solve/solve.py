@@ -9,8 +9,8 @@ import numpy as np
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model, State
-from fvsolve.model.past import without_past
-from fvsolve.model.scalars import scalar_ledgers
+from fvsolve.model.delay_history import split_memory
+from fvsolve.model.scalar_tables import scalar_ledgers
 from fvsolve.solve.mpi_ranks import CLOSE_MESSAGE
 from fvsolve.solve.partition import threads_of
 from fvsolve.solve.run_checks import RunChecks, split_step_notices
@@ -72,7 +72,7 @@ def solve(model: Model, state: State, sink, progress=None, threads: int = 1, com
         )
     missing = [name for name in ("rows", "field", "checkpoint", "end") if not callable(getattr(sink, name, None))]
     try:
-        model.given(state.t, state.y)
+        model.checked(state.t, state.y)
         run = Run(model, state, sink, progress, threads, comm)
         if missing:
             raise FvsolveError(f"sink = {show(sink)} is not a sink: it has no {listing(missing)}()")
@@ -150,7 +150,7 @@ class Run:
         return np.concatenate([own, *views, *arrays, self.checks.step_doubling.restart_data, past, [float(past.size)]])
 
     def restore(self, memory: np.ndarray) -> None:
-        memory, past = without_past(memory)
+        memory, past = split_memory(memory)
         if (past.size == 0) != (self.slate.past.size == 0):
             raise ValueError("history of delay lines does not match")
         self.slate.past = past.copy()

@@ -20,8 +20,8 @@ import numpy as np
 
 from fvsolve.kernels import band_exchange
 from fvsolve.kernels.compiled_functions import functions
-from fvsolve.model import Slate
-from fvsolve.model.slate import lined
+from fvsolve.model import RunData
+from fvsolve.model.run_data import aligned_zeros
 from fvsolve.solve.blocked_stages import blocked_sums
 from fvsolve.solve.partition import Partition
 from fvsolve.steppers import loop_indices
@@ -45,7 +45,7 @@ class Worker:
     team : a `ThreadTeam` or `MpiRanks`, with the addresses and arrays for the exchange in `kernels.joint`
     """
 
-    def __init__(self, team, k: int, run_data: Slate, stepper: Integrator) -> None:
+    def __init__(self, team, k: int, run_data: RunData, stepper: Integrator) -> None:
         cut, loop = team.cut, team.loop
         self.loop, self.number, self.slate, self.stepper = loop, k, run_data, stepper
         self.stepper.join, self.stepper.row_blocks = team.join, cut.row_blocks(k)
@@ -82,7 +82,7 @@ class Worker:
     def open(self) -> None:
         """Collect the written arrays and make their handle; repeated when the history of delay lines has grown."""
         self.written = self.slate.written._replace(**self.own_arrays)
-        self.handle = self.slate.linked(self.written, self.call_tables)
+        self.handle = self.slate.linked_handle(self.written, self.call_tables)
 
     def store(self, name: str, values: np.ndarray) -> None:
         """Copy values into an array of `WRITTEN`."""
@@ -143,10 +143,12 @@ class ThreadTeam:
     def __init__(self, loop, cut: Partition) -> None:
         self.loop, self.cut, self.yield_address, self.callback, self.seconds = loop, cut, yield_address(), 0, 0.0
         self.functions, self.join = band_functions(cut)
-        self.board = lined(band_exchange.LINE * cut.count)
-        self.buffer = lined(2 * cut.sum_count)
+        self.board = aligned_zeros(band_exchange.LINE * cut.count)
+        self.buffer = aligned_zeros(2 * cut.sum_count)
         self.members = [Worker(self, 0, loop.slate, loop.stepper)]
-        self.members += [Worker(self, k, Slate(loop.model), copy_integrator(loop.stepper)) for k in range(1, cut.count)]
+        self.members += [
+            Worker(self, k, RunData(loop.model), copy_integrator(loop.stepper)) for k in range(1, cut.count)
+        ]
         self.stale = True  # True where the workers do not have the present rows of the loop
         self.requests = [SimpleQueue() for _ in self.members]
         self.answers: SimpleQueue = SimpleQueue()

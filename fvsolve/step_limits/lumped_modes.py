@@ -105,7 +105,7 @@ def modes_outside_cells(model) -> Modes:
         model.functions.rhs(t, moved, result, out, run_data.handle)
         return result[states]
 
-    with model.slate() as run_data:
+    with model.run_data() as run_data:
         run_data.evaluate(t, y, np.inf)  # sets the device states there
         for k, i in enumerate(states):
             high, low = y.copy(), y.copy()

@@ -15,7 +15,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError, Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.slate import Slate
+from fvsolve.model.run_data import RunData
 from fvsolve.schemes import LEAST_CELLS, SCHEMES
 from fvsolve.step_limits.advection_limit import advection_limit, growth_of
 from fvsolve.step_limits.delay_line_growth import line_growth_notices
@@ -53,7 +53,7 @@ class CourantCheck(NamedTuple):
 
 
 def step_limits(
-    model, rates: dict[str, float] | None = None, step_error: float | None = None, run_data: Slate | None = None
+    model, rates: dict[str, float] | None = None, step_error: float | None = None, run_data: RunData | None = None
 ) -> list[Notice]:
     """Notices for the worst pipe, for basins, and for modes other than waves, whose step exceeds its limit.
 
@@ -88,7 +88,7 @@ def step_limits(
     )
 
 
-def first_step(model, run_data: Slate | None = None) -> float:
+def first_step(model, run_data: RunData | None = None) -> float:
     """Step of a run, under a Courant number its first step; 0 where it is unknown [s]."""
     numerics = model.case.numerics
     if numerics.step is not None:
@@ -97,7 +97,7 @@ def first_step(model, run_data: Slate | None = None) -> float:
         rate = float(model.evaluate(numerics.start, model.start)[1][rec.RATE])
     else:
         rate = float(run_data.evaluate(numerics.start, model.start, math.inf)[1][rec.RATE])
-        run_data.blank()
+        run_data.reset()
     return numerics.courant / rate if rate > 0.0 else 0.0
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.restart import programs
-from fvsolve.run.crew import done
+from fvsolve.run.process_pool import compute
 
 PATIENCE = 10.0  # timeout for a scheduler, and for its first worker [s]
 AHEAD = 2  # chunks per thread: one in work, one that waits on the worker
@@ -80,7 +80,7 @@ def done_there(name: str, work: bytes, tasks: list) -> tuple[Any, float]:
     """Compute a chunk of tasks on a worker; the unpickled work is reused for later chunks."""
     if getattr(KNOWN, "name", None) != name:
         KNOWN.name, KNOWN.work = name, pickle.loads(work)
-    return done(KNOWN.work, tasks)
+    return compute(KNOWN.work, tasks)
 
 
 def connected(address: str) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fvsolve.model.delay import followed
+from fvsolve.model.delay_line_selection import line_methods
 
 POINTS = 5  # points of a cell of a line at which waves are evaluated
 WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
@@ -22,7 +22,7 @@ EXACT = "delay lines are exact here, at any step and stretch: rows are exact to 
 
 def lines(case) -> list[str]:
     """Names of pipes that are delay lines. With `fixed_choices` in the case, no pipe is left to `auto`."""
-    return [name for name, pipe in followed(case).items() if pipe.pipe_model == "delay-line"]
+    return [name for name, pipe in line_methods(case).items() if pipe.pipe_model == "delay-line"]
 
 
 def slowest(case) -> str:

@@ -82,9 +82,9 @@ def opened(work: Work, jobs: int, dask: str | None) -> Hands:
         from fvsolve.studies.cluster import Cluster
 
         return Cluster(work, dask)
-    from fvsolve.run.crew import Crew
+    from fvsolve.run.process_pool import ProcessPool
 
-    return Crew(work, jobs)
+    return ProcessPool(work, jobs)
 
 
 def handed(work: Work, tasks: Sequence, workers: Hands, first: int) -> Iterator[tuple[int, Any]]:

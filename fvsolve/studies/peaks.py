@@ -18,7 +18,7 @@ from fvsolve.case import load
 from fvsolve.errors import CaseError, listing
 from fvsolve.run import Result, run
 from fvsolve.run.result import HOLDS, OPEN
-from fvsolve.run.verdicts import BESIDE, MAGNITUDES, Beside, verdict
+from fvsolve.run.verdicts import MAGNITUDES, PLACES_KEY, PlaceMargins, verdict
 from fvsolve.studies.extrema import greatest_error
 from fvsolve.studies.levels import finer, kept
 from fvsolve.studies.unresolved import NAMED, WIDE, Unresolved, parted
@@ -83,7 +83,7 @@ def levels(own: Result, case: Any, progress: Callable[[str], None] | None) -> di
 
 def followed(own: Result, case: Any, named: list[str]) -> list[str]:
     """Probes at selected places of limits, as far as the case accepts them."""
-    rows = [row[BESIDE] for rows in own.places for row in rows]
+    rows = [row[PLACES_KEY] for rows in own.places for row in rows]
     texts = dict.fromkeys(
         neighbours.probes[position] for neighbours in rows for position in chosen(neighbours, len(rows))
     )
@@ -91,7 +91,7 @@ def followed(own: Result, case: Any, named: list[str]) -> list[str]:
     return extra if says(case, extra) else [text for text in extra if says(case, [text])]
 
 
-def chosen(neighbours: Beside, rows: int) -> list[int]:
+def chosen(neighbours: PlaceMargins, rows: int) -> list[int]:
     """Indices of the place with the least margin, of local minima of the margin, and of some places between."""
     margins, most = np.where(np.isfinite(neighbours.margins), neighbours.margins, -np.inf), max(MOST_PLACES // rows, 1)
     padded = np.pad(margins, 1, constant_values=np.inf)
@@ -165,10 +165,10 @@ def judged(runs: dict[float, Result], limit: int, k: int, row: dict[str, Any], u
     sign, magnitude = SIGNS[row["bound"]], row["quantity"] in MAGNITUDES
     triple = values(runs, lambda run: run.places[limit][k]["margin"], -1.0)
     places = []
-    for position, probe in enumerate(row[BESIDE].probes):
-        allowed = float(row[BESIDE].limits[position])
+    for position, probe in enumerate(row[PLACES_KEY].probes):
+        allowed = float(row[PLACES_KEY].limits[position])
         places.append(signals(runs, probe, lambda v, a=allowed: sign * ((np.abs(v) if magnitude else v) - a)))
-    part = (row[BESIDE].probes[0].split(".")[0], row["place"])
+    part = (row[PLACES_KEY].probes[0].split(".")[0], row["place"])
     error = None if part in unresolved.unknown else bounded(runs, triple, places)
     span = max((float(np.ptp(run[-2][1])) for run in places if usable(run)), default=math.inf)
     if error is not None:

@@ -93,7 +93,7 @@ def row_of(model, summary, sink) -> dict[str, Any]:
 def claimed_of(model, summary, sink) -> list[dict[str, Any]]:
     """Expectations of the case with their results, as in the summary of a run."""
     from fvsolve.run import Result
-    from fvsolve.run.claims import expectations
+    from fvsolve.run.case_claims import expectations
 
     columns = {column.name: column for column in sink.columns}
     probes = {name: {"dimension": column.dimension, "unit": column.unit} for name, column in columns.items()}

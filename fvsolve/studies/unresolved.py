@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import listing
-from fvsolve.model.resolution import ANSWER, answering
+from fvsolve.model.resolution import LEAST_CELLS, answering_parts
 from fvsolve.parts.schedule import Schedule
 from fvsolve.studies.accuracy.cells import counts, from_files, in_cells, scaled
 from fvsolve.studies.lines import lines
@@ -140,10 +140,10 @@ def parted(runs: dict[float, Any]) -> bool:
 
 def few_beside_answers(case: Any) -> list[str]:
     """Texts on pipes with too few cells next to devices that respond to waves."""
-    pipes, devices = in_cells(case), answering(case)
+    pipes, devices = in_cells(case), answering_parts(case)
     texts = [f"{name} has {pipe.cells} cell{'' if pipe.cells == 1 else 's'} beside {listing(devices[name], NAMED)}; "
-             f"set links.{name}.cells = {ANSWER}"
-             for name, pipe in pipes.items() if pipe.cells < ANSWER and devices[name]]  # fmt: skip
+             f"set links.{name}.cells = {LEAST_CELLS}"
+             for name, pipe in pipes.items() if pipe.cells < LEAST_CELLS and devices[name]]  # fmt: skip
     return texts[:NAMED]
 
 

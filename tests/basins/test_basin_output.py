@@ -24,9 +24,9 @@ from fvsolve.draw.sheet import PictureSheet, span
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.mesh import read, rectangle
 from fvsolve.mesh.points import MeshPoints
-from fvsolve.model import Slate
+from fvsolve.model import RunData
 from fvsolve.output.fields import parted, shape, write_frame
-from fvsolve.run.drawn import lengths_of, unit_of
+from fvsolve.run.plot_scene import lengths_of, unit_of
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
 FIELDS = ("depth", "surface", "bed", "u", "v", "speed")
@@ -132,7 +132,7 @@ def test_probes_of_a_liquid_read_its_frames_at_centres(tmp_path):
     model = fvsolve.build(fvsolve.load(liquid(probes, mesh={"file": str(path)})))
     y = random_state(model, 1e-3)
     found = np.zeros(len(probes))
-    slate = Slate(model)
+    slate = RunData(model)
     observe_liquid(0.0, y, model.new_out(), slate.handle, found)
     frame = model.fields(y, model.new_out())["block"]
     for k, values in zip(cells, found.reshape(-1, 4), strict=True):
@@ -167,7 +167,7 @@ def test_the_flow_of_a_patch_has_the_density_of_its_place():
     node = model.node_names.index("block.hole")
     out[int(model.layout["net"]) + node] = -3.0
     out[int(model.layout["pressure"]) + node] = 3e7 - model.tables.nodes[node]["pressure"]
-    slate = Slate(model)
+    slate = RunData(model)
     observe_flows(0.0, model.start, out, slate.handle, found)
     assert found[0] == approx(-3.0 / RHO, rel=1e-14)
     observe_dense_flows(0.0, model.start, out, slate.handle, found)

@@ -15,9 +15,9 @@ import fvsolve
 from fvsolve.basins.free_surface.lower import FreeSurfaceRows
 from fvsolve.basins.free_surface.lower_dispersion import on_grid, on_mesh, waves
 from fvsolve.errors import FvsolveError
-from fvsolve.model import Slate
-from fvsolve.model.dependence import sparsity
-from fvsolve.model.energy_ledger import Accounts
+from fvsolve.model import RunData
+from fvsolve.model.energy_accounts import Accounts
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.accuracy.cells import counts, keys, scaled
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.order import order
@@ -136,7 +136,7 @@ def test_no_rate_depends_on_a_state_that_its_pattern_has_not(scheme):
     for t in (0.0, 0.1, 0.9):
         y = model.start + model.scale * rng.normal(scale=0.2, size=model.y_size)
         assert stray(model, t, y) < 1e-9
-    entries = sparsity(model).nnz
+    entries = jacobian_pattern(model).nnz
     assert entries < 0.35 * model.y_size**2  # a pattern that has everything would show nothing
 
 
@@ -144,7 +144,7 @@ def test_a_cell_feels_its_row_and_column_and_no_corner():
     """Upwind: five cells of three quantities in the middle of a grid; muscl nine."""
     for scheme, cells in (("upwind", 5), ("muscl", 9)):
         model = built(alone(pool((7, 7)), 1.0, scheme=scheme))
-        per_row = np.diff(sparsity(model).tocsr().indptr)
+        per_row = np.diff(jacobian_pattern(model).tocsr().indptr)
         assert per_row[24] == 3 * cells
 
 
@@ -281,9 +281,9 @@ def test_what_passes_a_patch_is_no_loss_of_the_scheme(head):
         links = {"tap": valve("pool.west", "lake", 0.2) | {"opening": opening}}
         model = built(scene(nodes, links, 1.0, PLANE, ["tap.flow"]))
         y = model.scale * np.random.default_rng(5).normal(scale=0.5, size=model.y_size)
-        accounts = Accounts(Slate(model))
+        accounts = Accounts(RunData(model))
         power = accounts.power_at(0.5, y, np.zeros(model.y_size), model.new_out())
-        kinds = {(one.what, one.place): value for one, value in zip(accounts.accounts, power, strict=True)}
+        kinds = {(one.category, one.place): value for one, value in zip(accounts.accounts, power, strict=True)}
         found.append(kinds)
     shut, open_ = found
     assert open_["scheme", "pool"] == approx(shut["scheme", "pool"], rel=1e-9)

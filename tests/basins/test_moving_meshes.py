@@ -81,7 +81,7 @@ def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(
     model = build(load(case))
     basin, y = model.basins[0], model.start.copy()
     y[[int(row["y"]) for row in model.tables.walls]] = 0.2, -0.3
-    with model.slate() as slate:
+    with model.run_data() as slate:
         model.functions.rhs(0.0, y, np.zeros(y.size), model.new_out(), slate.handle)
     now = as_it_is(basin.mesh, basin.mesh.points + sum(y[at] * goes for at, _, goes in basin.stretches))
     assert now.area / basin.mesh.area == pytest.approx(basin.stretched(y), rel=1e-13)

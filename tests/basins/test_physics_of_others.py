@@ -115,7 +115,7 @@ import json, sys
 import numpy as np
 import fvsolve
 from fvsolve.case.schema import schema
-from fvsolve.model.dependence import sparsity
+from fvsolve.model.jacobian_pattern import sparsity
 
 case = json.loads(sys.argv[2])
 

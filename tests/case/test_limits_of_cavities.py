@@ -19,7 +19,7 @@ from fvsolve.report.legs import ways
 from fvsolve.report.report import write_report
 from fvsolve.report.section import section, window
 from fvsolve.run import model_of
-from fvsolve.run.met import met
+from fvsolve.run.part_extremes import part_extremes
 from fvsolve.run.verdicts import nearest, verdict
 from fvsolve.solve import initial_state, solve
 from fvsolve.studies.calibrate import calibrate
@@ -104,7 +104,7 @@ def test_a_value_that_is_no_number_never_holds(wrong: float, bounds: dict) -> No
     model = model_of(weightless(limits={"a": {"on": "main", **bounds}}))
     summary = solve(model, initial_state(model), MemorySink(model))
     limit = model.case.limits["a"]
-    (part,) = met(model, summary, limit.extent)
+    (part,) = part_extremes(model, summary, limit.extent)
     spoilt = {
         side: np.where(np.arange(part.minimum.size) == 2, wrong, getattr(part, side)) for side in ("minimum", "maximum")
     }

@@ -18,7 +18,7 @@ from fvsolve.draw.network import Network
 from fvsolve.draw.symbols import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
 from fvsolve.parts.link import Link
 from fvsolve.parts.node import Node
-from fvsolve.run.drawn import scene_of
+from fvsolve.run.plot_scene import scene_of
 
 TOWN = {"works": (0, 0, 30), "market": (900, 0, 10), "mill": (1200, -300, 5), "tower": (1800, 400, 45)}
 

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import reject
 
 import fvsolve
-from fvsolve.model.checks import dear
+from fvsolve.model.model_facts import cost_notices
 
 
 @dataclass
@@ -38,7 +38,7 @@ def told(source, **more) -> Told:
     try:
         model = fvsolve.build(fvsolve.load(source)) if isinstance(source, dict) else source
         SCENES["built"] += 1
-        if isinstance(model, fvsolve.Model) and dear(model, None, ""):
+        if isinstance(model, fvsolve.Model) and cost_notices(model, None, ""):
             SCENES["dear"] += 1
             assert SCENES["dear"] <= FIRST + FAIR * SCENES["built"], SCENES
             reject()

@@ -11,13 +11,13 @@ from reference.folders import CASES
 import fvsolve
 from fvsolve.kernels.rhs_assembly import PHASES
 from fvsolve.kernels.table_handle import make_handle
-from fvsolve.model import Slate
+from fvsolve.model import RunData
 
 BANDED = ("answer", "rates")  # phases in which pipes write nothing that another reads
 ENDS = 4  # numbers that a pipe offers
 
 
-def handles(slate: Slate, cuts: list[int]) -> list[np.ndarray]:
+def handles(slate: RunData, cuts: list[int]) -> list[np.ndarray]:
     """A handle for each band of pipes between cuts, with scratch of its own."""
     tables, functions = slate.model.tables, slate.model.functions
     found = []
@@ -39,7 +39,7 @@ def test_bands_of_pipes_give_the_bits_of_all(law, cuts):
     model = fvsolve.build(fvsolve.load(path, {"fluid.law": law}))
     y = model.start + 0.1 * model.scale * np.random.default_rng(3).normal(size=model.y_size)
     dydt, out = model.evaluate(0.3, y)
-    slate = Slate(model)
+    slate = RunData(model)
     bands, whole = handles(slate, cuts), slate.handle
 
     def found(each) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from reference.scenes import AMBIENT, junction, lake, pipe, reservoir, scene, va
 import fvsolve
 from fvsolve.errors import CaseError
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.dependence import sparsity
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.energy.energy import energy
 
 CASE = CASES / "adelaide.toml"
@@ -215,7 +215,7 @@ def test_what_bounds_the_step_is_of_its_own_state_alone_and_no_table_is_written(
 def test_the_pattern_of_the_jacobian_holds_while_cavities_are_open():
     model = fvsolve.build(fvsolve.load(network()))
     state = fvsolve.advance(model, fvsolve.initial_state(model), 0.25)
-    pattern = sparsity(model).toarray()[: model.y_size]
+    pattern = jacobian_pattern(model).toarray()[: model.y_size]
     assert not np.any(model.jacobian(state.t, state.y)[pattern == 0])
 
 

@@ -15,7 +15,7 @@ from fvsolve.basins.liquid import grid_full as liquid_log
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels import limiters, reconstruction, scalar_transport
 from fvsolve.kernels.limiters import by_limiter, limited
-from fvsolve.model.schemes import CODES
+from fvsolve.model.scheme_codes import CODES
 
 CELLS, NONE = 40, 99
 

@@ -10,9 +10,9 @@ from reference.trees import pinocchio_of, random_tree
 import fvsolve
 from fvsolve.kernels.dtypes import BODY_OUT
 from fvsolve.kernels.mechanism.body_layout import ACCELERATION, ATTITUDE, POSITION, SPIN_RATE
-from fvsolve.model import Slate
-from fvsolve.model.energy_ledger import Accounts
-from fvsolve.model.statics import factored
+from fvsolve.model import RunData
+from fvsolve.model.energy_accounts import Accounts
+from fvsolve.model.static_forces import mass_factor
 
 pytest.importorskip("pinocchio", reason="pinocchio (pin) is the peer here")
 SIZES = [(1, "free"), (3, ""), (6, "free"), (12, ""), (30, "free")]
@@ -84,7 +84,7 @@ def test_the_mass_matrix_of_random_trees_is_that_of_pinocchio(seed):
     truth = pin.crba(peer, data, q)
     truth = np.triu(truth) + np.triu(truth, 1).T
     freedoms, n = model.tables.freedoms, len(model.tables.freedoms)
-    factor, entries = np.zeros((n, n)), factored(model, model.start)[8 * n :]
+    factor, entries = np.zeros((n, n)), mass_factor(model, model.start)[8 * n :]
     for j, row in enumerate(freedoms):
         path = model.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
         factor[j, path] = entries[row["row"] : row["row"] + row["depth"] + 1]
@@ -104,7 +104,7 @@ def test_a_wall_beside_a_tree_leaves_its_mass_matrix_at_the_state_that_is_asked_
     y = model.start.copy()
     y[model.state_names.index("bob.angle")] = 1.1
     factor = np.zeros((2, 2))
-    factor[np.tril_indices(2)] = factored(model, y)[16:19]
+    factor[np.tril_indices(2)] = mass_factor(model, y)[16:19]
     wanted = [[7.0, -1.4 * np.cos(1.1)], [-1.4 * np.cos(1.1), 2.0 * 0.49]]
     assert factor.T @ factor == pytest.approx(np.array(wanted), rel=1e-13)
 
@@ -129,7 +129,7 @@ def test_power_of_a_tree_is_that_of_its_weight():
     """d/dt of v' M v / 2 = v . weight: what Coriolis' terms take adds up to nothing (M' - 2 C is skew)."""
     bodies = random_tree(np.random.default_rng(9), 10, "free")
     model = model_of(bodies)
-    accounts = Accounts(Slate(model))
+    accounts = Accounts(RunData(model))
     dydt, out = np.zeros(model.y_size), model.new_out()
     power = accounts.power_at(0.0, model.start.copy(), dydt, out)
     kinetic = max(abs(one) for one in power)

@@ -28,7 +28,7 @@ import fvsolve
 from fvsolve import studies
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model import past
+from fvsolve.model import delay_history
 from fvsolve.output.memory import MemorySink
 from fvsolve.solve.solve import Run
 
@@ -326,8 +326,8 @@ def test_what_a_store_is_given_is_taken_from_its_own_line(control):
 
 def test_jumps_that_find_no_room_are_told(monkeypatch):
     """Two of each wave are kept, where some hundred live."""
-    monkeypatch.setattr(past, "LEAST_JUMPS", 2)
-    monkeypatch.setattr(past, "JUMPS", 2)
+    monkeypatch.setattr(delay_history, "LEAST_JUMPS", 2)
+    monkeypatch.setattr(delay_history, "TOTAL_JUMPS", 2)
     found = fvsolve.run(fork({"pipe_model": "delay-line", "delay_tolerance": 1e-6, "method": "euler", "step": 0.04}))
     told = [one for one in found.summary["warnings"] if one["kind"] == "jumps"]
     assert len(told) == 1 and "numerics.delay_tolerance" in told[0]["text"] and 0.0 < told[0]["value"] <= 1.0

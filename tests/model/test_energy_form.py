@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from reference.scenes import scene
 
-from fvsolve.model.energy import energy_form, form_of
+from fvsolve.model.energy_norm import energy_form, form_of
 from fvsolve.steppers import method_named, stability_function
 from fvsolve.studies.linear.frozen import frozen
 from fvsolve.studies.linear.linearise import linearised
@@ -90,12 +90,12 @@ def test_masses_that_nothing_holds_are_idle_together_and_a_held_one_is_not():
     free, held = (frozen(pair(1e6, hold)).model for hold in (0.0, 0.1))
     form = energy_form(free)
     together = np.array([1.0, 0.0, 1.0, 0.0])
-    assert form.size == 3 and form.forth @ together == pytest.approx(np.zeros(3), abs=1e-9)
+    assert form.size == 3 and form.forward @ together == pytest.approx(np.zeros(3), abs=1e-9)
     assert form.idle[:, 0] / form.idle[0, 0] == pytest.approx(together)
     assert energy_form(held).size == 4
     y = np.array([1e-3, 0.2, -2e-3, 0.1])
     energy = 0.5 * 1e6 * 3e-3**2 + 0.5 * MASS * (0.2**2 + 0.1**2)
-    assert np.sum((form.forth @ y) ** 2) == pytest.approx(energy, rel=1e-12)
+    assert np.sum((form.forward @ y) ** 2) == pytest.approx(energy, rel=1e-12)
     assert np.sum((form.rows @ y) ** 2) == pytest.approx(energy, rel=1e-12)
 
 
@@ -112,8 +112,8 @@ def test_an_idle_state_that_moves_what_has_energy_gets_the_least_weight():
     assert form.closed(np.array([[0.0, 1.0], [0.0, -3.0]]))
     driven = np.array([[0.0, 1.0], [5.0, -3.0]])
     assert not form.closed(driven)
-    whole = form.fitting(driven)
-    assert np.sum((whole.forth @ [0.1, 0.0]) ** 2) == pytest.approx((2.0 * 0.5) ** 2)
+    whole = form.suited_to(driven)
+    assert np.sum((whole.forward @ [0.1, 0.0]) ** 2) == pytest.approx((2.0 * 0.5) ** 2)
     assert np.sort(np.linalg.eigvals(whole.seen(driven))) == pytest.approx(np.sort(np.linalg.eigvals(driven)))
 
 

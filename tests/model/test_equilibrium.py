@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 import fvsolve
 from fvsolve.case.changes import changes
 from fvsolve.errors import CaseError
-from fvsolve.model.build import drafted
-from fvsolve.model.places import Displaced
+from fvsolve.model.build import tables_with_start
+from fvsolve.model.configuration import Configuration
 from fvsolve.studies import order
 
 CEILING = {"type": "frame", "points": {"a": [0, 0, 0]}}
@@ -450,8 +450,8 @@ def test_shut_oil_holds_a_boom_that_open_valves_do_not(shut, law):
 @pytest.mark.parametrize("law", ["linear", "log"])
 def test_oil_that_is_shut_in_is_the_spring_of_both_chambers(law):
     crane = Crane()
-    at = Displaced(drafted(fvsolve.load(crane.case(1.0, law=law))))
-    assert at.oil(at.y) == approx(np.array([[crane.spring(law) * crane.lever**2]]), rel=1e-12)
+    at = Configuration(tables_with_start(fvsolve.load(crane.case(1.0, law=law))))
+    assert at.fluid_stiffness(at.y) == approx(np.array([[crane.spring(law) * crane.lever**2]]), rel=1e-12)
 
 
 def test_what_nothing_holds_finds_no_balance_and_is_named():

@@ -7,7 +7,7 @@ import pytest
 from reference.scenes import WATER, junction, pipe, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.model.reading import around
+from fvsolve.model.probe_weights import cells_around
 from fvsolve.schemes import SCHEMES
 
 CELLS = 10
@@ -19,7 +19,7 @@ PLACES = (0.05, 0.1, 0.15, 0.3, 0.37, 0.45, 0.5, 0.6, 0.65, 0.7, 0.9, 0.95)
 def test_a_place_is_read_with_the_same_weights_from_either_end(degree, n):
     """Also where n times the fraction misses a face or a centre by a rounding."""
     for k in range(1, 4 * n):
-        there, back = (around(k / (4 * n) * n, degree, n), around((1.0 - k / (4 * n)) * n, degree, n))
+        there, back = (cells_around(k / (4 * n) * n, degree, n), cells_around((1.0 - k / (4 * n)) * n, degree, n))
         assert there[0] == n - back[0] - back[1].size
         assert there[1] == pytest.approx(back[1][::-1], abs=1e-11)
         cells = there[0] + np.arange(there[1].size)

@@ -10,7 +10,7 @@ from reference.scenes import junction, lake, pipe, ramp, reservoir, scene, step,
 
 import fvsolve
 from fvsolve.case import load, shipped
-from fvsolve.model.resolution import ENOUGH, FEWEST
+from fvsolve.model.resolution import OTHER_CELLS, SCHEME_CELLS
 from fvsolve.run import model_of
 
 CLOSURE = {"output.fields": 0}
@@ -35,7 +35,7 @@ def peaks(settings: dict) -> list[float]:
 def test_cells_without_a_notice_give_peaks_to_a_tenth(duration: float) -> None:
     right = peaks(opening(duration) | {"links.main.cells": 400, "numerics.scheme": "weno5"})
     for scheme in KINDS:
-        enough = FEWEST.get(scheme, ENOUGH)
+        enough = SCHEME_CELLS.get(scheme, OTHER_CELLS)
         chosen = opening(duration) | {"numerics.scheme": scheme, "links.main.cells": enough}
         assert not told("valve-closure", chosen)
         off = [abs(a - b) / (right[1] - right[0]) for a, b in zip(peaks(chosen), right, strict=True)]
@@ -48,7 +48,9 @@ def test_cells_without_a_notice_give_peaks_to_a_tenth(duration: float) -> None:
 def test_a_closure_that_few_cells_flatten_is_noted(cells: int) -> None:
     """These err by up to 40 %, and with a single cell every claim of the case holds."""
     (note,) = told("valve-closure", {"links.main.cells": cells})
-    assert note.value == cells and f"links.main.cells = {ENOUGH}" in note.text and "links.valve.opening" in note.text
+    assert (
+        note.value == cells and f"links.main.cells = {OTHER_CELLS}" in note.text and "links.valve.opening" in note.text
+    )
 
 
 def test_what_is_slow_or_is_exact_needs_no_cells() -> None:
@@ -71,9 +73,9 @@ def behind_a_stub(closure: dict | float, length: float = 8.0, cells: int = 1) ->
 
 def test_a_short_pipe_counts_beside_what_is_quicker_than_its_waves() -> None:
     (note,) = told(behind_a_stub(step(0.5, 1.0, 0.0)))
-    assert (note.place, note.value, note.limit) == ("links.short", 1, ENOUGH)
+    assert (note.place, note.value, note.limit) == ("links.short", 1, OTHER_CELLS)
     assert not told(behind_a_stub(ramp(0.5, 0.05, 1.0, 0.0)))
-    assert not told(behind_a_stub(step(0.5, 1.0, 0.0), cells=ENOUGH))
+    assert not told(behind_a_stub(step(0.5, 1.0, 0.0), cells=OTHER_CELLS))
     turned = behind_a_stub(step(0.5, 1.0, 0.0))
     turned["links"]["short"] |= {"from": "gate", "to": "j"}
     assert told(turned)[0].text == note.text

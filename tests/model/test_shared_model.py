@@ -11,7 +11,7 @@ import pytest
 from reference.folders import CASES
 
 import fvsolve
-from fvsolve.model import Model, Slate
+from fvsolve.model import Model, RunData
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import loop_indices
 from fvsolve.studies.outcome import outcome
@@ -133,5 +133,5 @@ assert found[0] == found[1]
 
 def test_slates_of_one_model_share_no_array_that_is_written():
     model = built("tracer in a basin")
-    one, other = Slate(model), Slate(model)
+    one, other = RunData(model), RunData(model)
     assert not any(np.shares_memory(a, b) for a, b in zip(one.written, other.written, strict=True))

@@ -13,8 +13,8 @@ from scipy.sparse import csc_array
 
 import fvsolve
 from fvsolve.jit import COMPILING, njit
-from fvsolve.model import Slate
-from fvsolve.model.dependence import sparsity
+from fvsolve.model import RunData
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.steppers.differences import differences, multiply
 from fvsolve.steppers.signatures import addresses, compiled_as
 from fvsolve.steppers.structure import KINDS, Structure
@@ -44,7 +44,7 @@ def stray(model, t: float, y: np.ndarray) -> float:
     states = np.arange(model.y_size)
     if states.size > 2000:  # of a basin a sample
         states = np.random.default_rng(states.size).choice(states, 100, replace=False)
-    pattern, base = sparsity(model)[:, states].toarray(), rates(model, t, y)
+    pattern, base = jacobian_pattern(model)[:, states].toarray(), rates(model, t, y)
     change = np.empty(pattern.shape)
     for k, j in enumerate(states):
         moved = y.copy()
@@ -103,7 +103,9 @@ def test_a_pipe_couples_no_more_than_its_scheme_reads():
     counts = []
     for friction in (NO_FRICTION, {"model": "steady", "factor": 0.02}):
         links = {"p": pipe("a", "b", 90.0, 0.2, 1000.0, 9, friction=friction)}
-        found = sparsity(fvsolve.build(fvsolve.load(scene({"a": lake(30.0), "b": lake(30.0)}, links, 1.0, SHARP))))
+        found = jacobian_pattern(
+            fvsolve.build(fvsolve.load(scene({"a": lake(30.0), "b": lake(30.0)}, links, 1.0, SHARP)))
+        )
         counts.append(found[:18].nnz)
         assert found[18:].toarray().sum() == 2  # what each lake gives: its own edge cell
     assert counts == [18 + 16 + 2, 18 + 16 + 18]  # itself, the one it comes from; its other wave at ends, or everywhere
@@ -130,7 +132,7 @@ def compiled_differences():
 def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
     """d(dydt, supply)/dy : float64[n + nodes, n], by the compiled differences."""
     n, m, at = model.y_size, len(model.node_names), int(model.layout["supply"])
-    slate = Slate(model)
+    slate = RunData(model)
     f, out = slate.evaluate(t, y, np.inf)
     supply, jacobian = out[at : at + m].copy(), np.full(structure.nnz, np.nan)
     given = (addresses((model.functions.rhs,)), slate.handle, structure.shape, at, t, y, f, supply, model.scale.copy())
@@ -147,7 +149,7 @@ def slopes(model, t: float, y: np.ndarray, structure: Structure) -> np.ndarray:
 @pytest.mark.parametrize("law, scheme", [("linear", "upwind"), ("linear", "upwind5"), ("log", "muscl")])
 def test_differences_by_color_are_those_state_by_state(law, scheme):
     model, rng = random_model(4, scheme, law), np.random.default_rng(4)
-    colored, full = Structure(sparsity(model)), Structure.full(model.y_size, len(model.node_names))
+    colored, full = Structure(jacobian_pattern(model)), Structure.full(model.y_size, len(model.node_names))
     assert colored.color_count < model.y_size / 2
     for t in TIMES:
         y = random_state(model, rng)
@@ -162,7 +164,7 @@ def test_what_slopes_store_is_what_they_supply(law, scheme):
     for seed in (0, 2):  # with friction and without
         model, rng = random_model(seed, scheme, law), np.random.default_rng(seed)
         n, weight = model.y_size, masses(model)
-        structure = Structure(sparsity(model))
+        structure = Structure(jacobian_pattern(model))
         for t in TIMES:
             y = random_state(model, rng)
             found, base = slopes(model, t, y, structure), rates(model, t, y)
@@ -175,7 +177,7 @@ def test_what_slopes_store_is_what_they_supply(law, scheme):
 def test_every_kind_solves_steps_of_a_microsecond_and_of_minutes(law, scheme):
     """Without exchanges of rows as well: 1e-7 is far below what Newton needs, at a Courant number of 1e5."""
     model, rng = random_model(3, scheme, law), np.random.default_rng(3)
-    n, pattern = model.y_size, sparsity(model)
+    n, pattern = model.y_size, jacobian_pattern(model)
     entry = (pattern.indices, np.repeat(np.arange(n), np.diff(pattern.indptr)))
     for t in TIMES:
         found = slopes(model, t, random_state(model, rng), Structure(pattern))

@@ -133,8 +133,8 @@ def test_sizes_of_restrictions_are_written_into_the_tables_that_were_there(monke
     table["links"]["bleed"] = {"type": "orifice", "from": "lake", "to": "sump", "diameter": "2 mm"}
     model, room = fvsolve.build(fvsolve.load(table, SMALL)), sys.modules["fvsolve.model.build"]
     before, found = said(model), []
-    taken = room.resized
-    monkeypatch.setattr(room, "resized", lambda *given: found.append(taken(*given)) or found[-1])
+    taken = room.with_new_sizes
+    monkeypatch.setattr(room, "with_new_sizes", lambda *given: found.append(taken(*given)) or found[-1])
     for move, in_place in (
         ({"links.valve.area": 0.001}, True),
         ({"links.hole.diameter": "3 mm", "links.bleed.discharge_coefficient": 0.7}, True),

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.model.dependence import sparsity
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.output.memory import MemorySink
 from fvsolve.solve.solve import Run
 from fvsolve.studies.energy.energy import energy
@@ -155,18 +155,18 @@ def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
 
 def test_its_energy_at_the_start_is_what_it_can_give():
     """Isothermal gas down to ambient: p0 V0 ln(p0 / pa) less the work against ambient."""
-    from fvsolve.model.energy_start import available
+    from fvsolve.model.available_energy import available_energy
 
     model = model_of(swing(0.0, 1.0, exponent=1.0, volume=1.0))
     volume = GAS * P0 / AMBIENT
     exact = P0 * GAS * math.log(P0 / AMBIENT) - AMBIENT * (volume - GAS)
-    assert available(model)["a"] == pytest.approx(exact, rel=1e-9)
+    assert available_energy(model)["a"] == pytest.approx(exact, rel=1e-9)
 
 
 def test_the_pattern_holds_every_coupling():
     connection = {"diameter": 0.05, "loss_in": 2.0, "loss_out": 9.0}
     model = model_of(swing(0.01, 1.0, connection=connection))
-    pattern = sparsity(model).toarray()[: model.y_size]
+    pattern = jacobian_pattern(model).toarray()[: model.y_size]
     assert not np.any((np.abs(model.jacobian(0.0, np.array([0.1, 0.3]))) > 1e-9) & ~pattern)
 
 

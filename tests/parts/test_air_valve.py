@@ -11,8 +11,8 @@ from reference.scenes import AMBIENT, RHO, WATER, area, junction, lake, pipe, re
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.model import Slate
-from fvsolve.model.dependence import sparsity
+from fvsolve.model import RunData
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.energy.energy import energy
 
 LENGTH, DIAMETER = 200.0, 0.3
@@ -157,19 +157,19 @@ def test_its_energy_closes_and_its_bores_only_dissipate(law):
 
 
 def test_its_norm_is_its_energy_to_second_order_and_its_pattern_holds():
-    from fvsolve.model.energy_ledger import Accounts
+    from fvsolve.model.energy_accounts import Accounts
 
     model = fvsolve.build(fvsolve.load(drained(flow=0.0, low=2e5)))
-    accounts, y = Accounts(Slate(model)), np.zeros(model.y_size)
+    accounts, y = Accounts(RunData(model)), np.zeros(model.y_size)
     i, j = (model.state_names.index(f"v.inside.{name}") for name in ("mass", "air"))
     y[i], y[j] = -0.01 * 0.1, 2e-4 * 0.1
-    place = [one.place for one in accounts.held].index("v.inside")
+    place = [one.place for one in accounts.stored_accounts].index("v.inside")
     device = next(one for name, _, one in model.devices if name == "v.inside")
     row = model.tables.devices[0]
-    square = device.squares(model, None, row, np.zeros(model.y_size), None)[0]
+    square = device.energy_rows(model, None, row, np.zeros(model.y_size), None)[0]
     small = sum(factor * y[k] for k, factor in square.items()) ** 2
     assert accounts.stored_at(0.0, y)[place] == pytest.approx(small, rel=0.2)
-    pattern = sparsity(model).toarray()[: model.y_size]
+    pattern = jacobian_pattern(model).toarray()[: model.y_size]
     assert not np.any((np.abs(model.jacobian(0.0, y)) > 1e-9) & ~pattern)
 
 

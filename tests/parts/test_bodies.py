@@ -581,17 +581,17 @@ def test_the_ledger_of_energy_closes_to_the_order_of_its_method():
 
 @pytest.mark.parametrize("kind, place", [("joint", "arm"), ("drive", "cart"), ("bushing", "rubber")])
 def test_what_the_ledger_of_bodies_forgets_is_what_remains(kind, place, monkeypatch):
-    from fvsolve.model import energy_ledger
+    from fvsolve.model import energy_accounts
 
-    honest, plain = energy(machine()), energy_ledger.Accounts.bodies
+    honest, plain = energy(machine()), energy_accounts.Accounts.bodies
     lost = honest.supplied[place][-1] if kind == "drive" else honest.dissipated[f"{place} {kind}"][-1]
 
     def forgetful(self):
         plain(self)
-        own = [one for one in self.accounts if (one.place, one.kind) == (place, kind) and one.what != "rate"]
+        own = [one for one in self.accounts if (one.place, one.kind) == (place, kind) and one.category != "rate"]
         self.accounts = [one for one in self.accounts if one not in own]
 
-    monkeypatch.setattr(energy_ledger.Accounts, "bodies", forgetful)
+    monkeypatch.setattr(energy_accounts.Accounts, "bodies", forgetful)
     remains = energy(machine()).remainder[-1]
     assert abs(lost) > 1e-3 and abs(remains) == approx(abs(lost), rel=1e-4)
 

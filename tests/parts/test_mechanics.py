@@ -254,9 +254,9 @@ def test_a_spool_opens_one_pair_of_edges_on_each_side_of_zero(kind):
     for key in ("ports", "position"):
         del plain[key]
     schedule = model.case.links["spool"].position
-    from fvsolve.model.schedules import lower, piece_value
+    from fvsolve.model.schedule_tables import piece_value, schedule_pieces
 
-    pieces = lower(schedule)
+    pieces = schedule_pieces(schedule)
     jumps = [t for t, jump in model.breaks if jump]
     t = np.asarray(result.t)
     smooth = ~np.isin(t, jumps)

@@ -238,11 +238,14 @@ def test_torque_is_an_input():
 
 def test_every_dependence_of_a_tripped_pump_is_in_the_pattern():
     """Differences of the right-hand side about a state after the trip, column by column."""
-    from fvsolve.model.dependence import sparsity
+    from fvsolve.model.jacobian_pattern import jacobian_pattern
 
     model = fvsolve.build(fvsolve.load(line(40.0, 3.0, {}, ["pump.flow"], 6, **SHAFT, trip=0.0)))
     rng = np.random.default_rng(1)
-    y, pattern = 1e-2 * model.scale * rng.standard_normal(model.y_size), sparsity(model).toarray()[: model.y_size]
+    y, pattern = (
+        1e-2 * model.scale * rng.standard_normal(model.y_size),
+        jacobian_pattern(model).toarray()[: model.y_size],
+    )
     for k in range(model.y_size):
         step_y = np.zeros(model.y_size)
         step_y[k] = 1e-3 * model.scale[k]

@@ -10,7 +10,7 @@ from reference.scenes import GRAVITY, WATER, area, lake, pipe, scene, valve
 from scipy.optimize import brentq
 
 import fvsolve
-from fvsolve.model.dependence import sparsity
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.studies.energy.energy import energy
 
 LENGTH, DIAMETER, FACTOR, SHAFT, THROAT = 2000.0, 3.0, 0.015, 80.0, 2.0
@@ -83,7 +83,7 @@ def test_a_tank_behind_a_pipe_starts_at_rest_and_stays():
     for law in ("linear", "log"):
         model = fvsolve.build(fvsolve.load(scene(nodes, links, 1.0, {}, fluid=WATER | {"law": law})))
         assert not model.rhs(0.0, np.zeros(model.y_size)).any()
-        pattern = sparsity(model).toarray()[: model.y_size]
+        pattern = jacobian_pattern(model).toarray()[: model.y_size]
         assert not np.any((np.abs(model.jacobian(0.0, np.zeros(model.y_size))) > 1e-6) & ~pattern)
 
 

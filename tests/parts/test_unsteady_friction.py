@@ -16,7 +16,7 @@ from reference.scenes import WATER, area, junction, reservoir, scene
 import fvsolve
 from fvsolve import exact
 from fvsolve.errors import CaseError
-from fvsolve.model import unsteady
+from fvsolve.model import unsteady_terms
 from fvsolve.studies.accuracy.rungs import column
 from fvsolve.studies.energy.energy import energy
 from fvsolve.studies.ports.response import response
@@ -70,7 +70,7 @@ def errors(number: float, cells: int, kind: str):
 
 def test_the_transform_of_zielkes_function_is_his_sum_over_the_zeros_of_a_bessel_function():
     s = np.array([0.3, 20.0, 5.0 + 40.0j, 2000.0j])
-    assert unsteady.zielke(s) == approx((laminar.inertia(s) - 1.0 - 8.0 / s) / 4.0, rel=1e-8)
+    assert unsteady_terms.zielke(s) == approx((laminar.inertia(s) - 1.0 - 8.0 / s) / 4.0, rel=1e-8)
 
 
 def printed(weighting: str, tau: np.ndarray, reynolds: float, roughness: float) -> np.ndarray:
@@ -95,7 +95,7 @@ def printed(weighting: str, tau: np.ndarray, reynolds: float, roughness: float) 
 def test_a_sum_of_exponentials_is_the_printed_function_over_all_times_that_are_resolved(
     weighting, reynolds, roughness, cell, span
 ):
-    m, n, _ = unsteady.terms(weighting, reynolds, roughness, cell, span, 1e-4)
+    m, n, _ = unsteady_terms.terms(weighting, reynolds, roughness, cell, span, 1e-4)
     tau = np.geomspace(32.0 * cell, span, 200)
     exact_w = printed(weighting, tau, reynolds, roughness)
     kept = exact_w > 1e-3 * exact_w[0]
@@ -105,11 +105,11 @@ def test_a_sum_of_exponentials_is_the_printed_function_over_all_times_that_are_r
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-4, 1e-5, 1e-6])
 def test_a_wave_of_any_frequency_that_cells_resolve_meets_the_friction_within_the_accuracy(accuracy):
-    for weighting, transform in (("zielke", unsteady.zielke), ("vardy-brown", None)):
-        m, n, highest = unsteady.terms(weighting, 1e5, 0.0, 1e-6, 1e-2, accuracy)
+    for weighting, transform in (("zielke", unsteady_terms.zielke), ("vardy-brown", None)):
+        m, n, highest = unsteady_terms.terms(weighting, 1e5, 0.0, 1e-6, 1e-2, accuracy)
         s = 1j * np.geomspace(100.0, highest, 500)  # from the span of the run on
         if transform is None:
-            a, b = unsteady.vardy_brown(1e5, 0.0)
+            a, b = unsteady_terms.vardy_brown(1e5, 0.0)
             value = a * np.sqrt(np.pi / (s + b))
         else:
             value = transform(s)

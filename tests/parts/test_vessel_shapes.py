@@ -10,7 +10,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, reservoir, scen
 from scipy.integrate import quad, solve_ivp
 
 import fvsolve
-from fvsolve.model.dependence import sparsity
+from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.parts.accumulator import law_shape, law_vessel
 from fvsolve.studies.energy.energy import energy
 
@@ -243,8 +243,8 @@ def test_an_empty_vessel_says_so_and_fills_again():
 
 def test_the_pattern_holds_every_coupling():
     model = model_of(swing(0.01, 1.0, compressor={"start": 0.3, "stop": 0.1, "flow": 1e-3}))
-    with model.slate(1.0):
-        pattern = sparsity(model).toarray()[: model.y_size]
+    with model.run_data(1.0):
+        pattern = jacobian_pattern(model).toarray()[: model.y_size]
         assert not np.any((np.abs(model.jacobian(0.0, np.array([0.1, 0.3, 0.01]))) > 1e-9) & ~pattern)
 
 
@@ -256,7 +256,7 @@ def test_its_norm_is_what_its_energy_is_bent_by():
     ((_, part, device),), (row,) = model.devices, model.tables.devices
     out = model.evaluate(0.0, np.zeros(model.y_size))[1]
     found = sum(sum(factor * y[k] for k, factor in one.items()) ** 2 for one in
-                device.squares(model, part, row, np.zeros(model.y_size), out))  # fmt: skip
+                device.energy_rows(model, part, row, np.zeros(model.y_size), out))  # fmt: skip
     tables, node = model.tables, model.tables.nodes[row["node"]]
     both = [law_vessel.energy_since(tables.settings[0], tables.floats, node, int(row["data"]), sign * y[node["y"]],
                                     sign * y[row["y"]]) for sign in (1.0, -1.0)]  # fmt: skip

@@ -18,8 +18,8 @@ from fvsolve.report.figures import as_it_stands
 from fvsolve.report.legs import ways
 from fvsolve.report.page import embedded, page
 from fvsolve.report.report import write_report
-from fvsolve.run.complete import ROWS
 from fvsolve.run.result import Result
+from fvsolve.run.summary_fields import ROWS
 
 WICKED = "</script><script>alert('x')</script> & \"quoted\" $5 {{ 7 * 7 }} <!-- \u2028 </style><b>bold"
 

@@ -14,7 +14,7 @@ import fvsolve
 from fvsolve.jit import COMPILING
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import PHASES
-from fvsolve.model import Slate
+from fvsolve.model import RunData
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.steppers import loop_indices
 
@@ -75,7 +75,7 @@ def test_two_tanks_are_two_states_and_no_more():
     rows = {name: len(rows) for name in rec.RECORDS if len(rows := getattr(model.tables, name))}
     assert rows == {"settings": 1, "layout": 1, "nodes": 2, "valves": 1, "schedules": 1, "probes": 1}
     assert model.new_out().size == rec.OUT_HEAD + 3 * 2 + 3  # pressure, supply, net flow; valve, conductance, drive
-    assert Slate(model).envelope.size == 0
+    assert RunData(model).envelope.size == 0
 
 
 def test_two_tanks_compile_nothing_of_pipes_bodies_and_implicit_steps(compiling):

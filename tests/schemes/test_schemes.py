@@ -9,7 +9,7 @@ import pytest
 
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.limiters import limited
-from fvsolve.model.schemes import CODES, FAMILIES, family
+from fvsolve.model.scheme_codes import CODES, FAMILIES, family
 from fvsolve.schemes import LEAST_CELLS, LIMITED, LINEAR, SCHEMES, Scheme
 
 KNOWN = {  # order, reach, in the plane on rectangles, with cavities

@@ -13,7 +13,7 @@ import pytest
 from reference.scenes import chamber, lake, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.model import Slate
+from fvsolve.model import RunData
 from fvsolve.run import model_of
 from fvsolve.solve.run_checks import LEDGER_TOLERANCE, RunChecks, ledger_notices
 from fvsolve.solve.run_loop import MOST_EVENTS_IN_SPAN, SPAN, RunLoop
@@ -214,7 +214,7 @@ def test_rows_of_a_sweep_hold_the_warnings(tmp_path):
 
 def test_what_must_not_be_exceeded_follows_the_start_and_what_is_given():
     """1 l/s of 1000 kg/m3: no wave below a million times 1 kg/s is growth, and none beyond it is anything else."""
-    watch = RunChecks(Slate(model_of(closing(scheme="upwind", method="euler", courant=1.0))))
+    watch = RunChecks(RunData(model_of(closing(scheme="upwind", method="euler", courant=1.0))))
     assert watch.largest == pytest.approx(np.full(watch.largest.size, watch.largest[0])) and watch.largest[0] >= 1e6
     assert not watch.check(0.0, 0.99 * watch.largest) and watch.check(0.0, 1.01 * watch.largest).startswith("stopped: ")
 

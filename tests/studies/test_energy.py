@@ -211,17 +211,17 @@ def test_a_shaped_tank_stores_the_moment_of_its_areas():
 
 def test_a_leak_planted_in_the_ledger_is_found(monkeypatch):
     """A valve that the ledger forgets is what remains."""
-    from fvsolve.model import energy_ledger
+    from fvsolve.model import energy_accounts
 
     case = slope_scene({"scheme": "upwind5", "method": "rk4", "courant": 0.8})
     honest = energy(case).dissipated["tap"][-1]
-    plain = energy_ledger.Accounts.valves
+    plain = energy_accounts.Accounts.valves
 
     def forgetful(self):
         plain(self)
         self.accounts = [one for one in self.accounts if one.place != "tap"]
 
-    monkeypatch.setattr(energy_ledger.Accounts, "valves", forgetful)
+    monkeypatch.setattr(energy_accounts.Accounts, "valves", forgetful)
     found = energy(case)
     assert found.remainder[-1] == pytest.approx(honest, rel=1e-12)
     assert found.verdict != "rounding"

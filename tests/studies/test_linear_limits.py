@@ -10,7 +10,7 @@ from reference.scenes import chamber, junction, lake, pipe, scene, valve
 
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
-from fvsolve.model.energy import energy_form
+from fvsolve.model.energy_norm import energy_form
 from fvsolve.studies.linear import matrices
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.linear.spectrum import near, poles_of
@@ -127,8 +127,8 @@ def test_a_sparse_matrix_goes_to_a_file_of_its_own_name(tmp_path):
 
 
 def test_a_train_too_long_for_its_energy_norm_is_refused(monkeypatch):
-    from fvsolve.model import energy
+    from fvsolve.model import energy_norm
 
-    monkeypatch.setattr(energy, "TOGETHER", 1)
+    monkeypatch.setattr(energy_norm, "MAX_GROUP", 1)
     with pytest.raises(FvsolveError, match="2 positions are joined by springs"):
         stability(masses(), steps=50)

@@ -29,7 +29,7 @@ from scipy.linalg import expm, matrix_balance
 import fvsolve
 from fvsolve.cli import main
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.model.energy import energy_form
+from fvsolve.model.energy_norm import energy_form
 from fvsolve.solve import initial_state
 from fvsolve.solve.advance import advance, hold
 from fvsolve.studies.linear.linearise import linearise, linearised

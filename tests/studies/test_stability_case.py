@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from fvsolve import build, load
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
-from fvsolve.model.energy import energy_form
+from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
 from fvsolve.studies.linear.frozen import frozen
 from fvsolve.studies.linear.linearise import linearise, linearised

@@ -27,8 +27,8 @@ from reference.scenes import (
 import fvsolve
 from fvsolve.case import load
 from fvsolve.kernels.limiters import limited
-from fvsolve.model.energy import energy_weights
-from fvsolve.model.schemes import CODES
+from fvsolve.model.energy_norm import energy_weights
+from fvsolve.model.scheme_codes import CODES
 from fvsolve.step_limits.step_notices import step_limits
 from fvsolve.steppers import analyse, method_named, stability_function
 from fvsolve.studies.outcome import outcome, prepared

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fvsolve.errors import Notice
-from fvsolve.model.device import Device
+from fvsolve.model.device_lowering import Device
 from fvsolve.parts.accumulator import law
 
 ROUNDED = 1e-5  # share of the released mass added to the scale of errors in the neck, so that it exceeds rounding
@@ -38,7 +38,7 @@ class AccumulatorRows(Device, kind="accumulator"):
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0] * law.NUMBERS
 
-    def settle(self, run_data, row, t, y, scale) -> None:
+    def apply_event(self, run_data, row, t, y, scale) -> None:
         model = run_data.model
         floats, at = model.tables.floats[row["data"] :], model.tables.nodes[row["node"]]["y"]
         scale[at] = model.scale[at]
@@ -165,13 +165,13 @@ class CompressedRows(ShapedRows, kind=""):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1]
 
-    def squares(self, model, part, row, y, out):
+    def energy_rows(self, model, part, row, y, out):
         """n p V / 2 (da / (1 + a) + dy / (rho V))^2 of the gas, g / (2 rho surface) dy^2 of the weight of the fluid."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
         u, change, _, _ = self.law.standing(st, floats, node, at, float(y[mass]), a)
         gas, p = floats[at + law.GAS] * math.exp(u), floats[at + self.law.FIRST] + change
         root = math.sqrt(0.5 * part.exponent * p * gas)
-        total = super().squares(model, part, row, y, out)[0][mass]
+        total = super().energy_rows(model, part, row, y, out)[0][mass]
         rest = math.sqrt(max(0.0, total**2 - (root / (rho * gas)) ** 2))
         return [{int(row["y"]): root / (1.0 + a), mass: root / (rho * gas)}, {mass: rest}]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fvsolve.errors import Notice
-from fvsolve.model.device import Device
+from fvsolve.model.device_lowering import Device
 from fvsolve.parts.air_valve import law
 
 GAS_CONSTANT = 287.05  # of air [J/kg/K]
@@ -15,7 +15,7 @@ class AirValveRows(Device, kind="air-valve"):
     """The chamber of an air valve, which is shut at the start."""
 
     law = law
-    vessel = sudden = True
+    vessel = events_only = True
     states = ("air",)
     quantities = ("air_volume", "air_mass", "air_pressure")
     events = ("opens", "shuts")
@@ -47,7 +47,7 @@ class AirValveRows(Device, kind="air-valve"):
     def scales(self, draft, name, part) -> list[float]:
         return [self.numbers(draft, name, part)[law.AIR]]
 
-    def revise(self, start, part, row) -> bool:
+    def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
         new = k not in start.shut
         start.shut |= {k}
@@ -67,7 +67,7 @@ class AirValveRows(Device, kind="air-valve"):
         start.draft.warnings.append(Notice("start", f"nodes.{name}", text, "pressure", float(deficit), 0.0))
         return [f"air valve {name}: {below} below ambient, so it opens"]
 
-    def squares(self, model, part, row, y, out):
+    def energy_rows(self, model, part, row, y, out):
         """R T / (2 m) (dm + m / (V rho) dy)^2 : pressure energy of air and fluid in the chamber."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes
         node, at = node[row["node"]], int(row["data"])

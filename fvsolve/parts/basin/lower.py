@@ -9,7 +9,7 @@ from fvsolve.model.lowering import Lowering
 class PatchRows(Lowering, kind="patch"):
     """A node whose pressure is that of the cells behind the patch."""
 
-    books = "dry patch"
+    ledger_name = "dry patch"
 
     def place(self, draft, name, node, row) -> None:
         row["kind"], row["row"] = rec.PATCH, draft.stiff()
@@ -19,7 +19,7 @@ class PatchRows(Lowering, kind="patch"):
             return node.pressure
         return start.law.pressure_under(node.depth) if node.depth else start.case.ambient_pressure
 
-    def moves(self, name, node, row, inflow, flow, amount) -> str:
+    def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         return f"basin {name}: {amount(flow, 'flow')} flow in"
 
     def probe(self, draft, name, probe, row) -> None:

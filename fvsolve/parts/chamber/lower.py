@@ -27,7 +27,7 @@ class ChamberRows(Lowering, kind="chamber"):
     def pressure_at_start(self, start, i, node, row) -> float | None:
         if node.initial_pressure is not None:
             return node.initial_pressure
-        return start.case.ambient_pressure if row["kind"] == rec.MOVING and not start.touched(i) else None
+        return start.case.ambient_pressure if row["kind"] == rec.MOVING and not start.is_joined(i) else None
 
-    def moves(self, name, node, row, inflow, flow, amount) -> str:
+    def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         return f"chamber {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"

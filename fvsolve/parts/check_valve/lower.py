@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.model.device import Device
+from fvsolve.model.device_lowering import Device
 from fvsolve.parts.check_valve import law, law_slam
 from fvsolve.parts.disc.law import CHECK
 from fvsolve.parts.disc.lower import Lifting
@@ -65,7 +65,7 @@ class CheckLag(CheckDisc, kind=""):
 class CheckValveRows(Device, kind="check-valve"):
     """An open or shut valve. In the steady state no open valve has reverse flow, and no shut valve is pushed open."""
 
-    law, sudden = law, True
+    law, events_only = law, True
     quantities = ("opening",)
     events = ("shuts", "opens")
 
@@ -77,7 +77,7 @@ class CheckValveRows(Device, kind="check-valve"):
     def numbers(self, draft, name, part) -> list[float]:
         return [part.cracking_pressure]
 
-    def revise(self, start, part, row) -> bool:
+    def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
         if k in start.shut:
             before, behind = start.across(k)
@@ -103,7 +103,7 @@ class Slamming(CheckValveRows, kind=""):
     def scales(self, draft, name, part) -> list[float]:
         return [1.0, 1.0]
 
-    def settle(self, run_data, row, t, y, scale) -> None:
+    def apply_event(self, run_data, row, t, y, scale) -> None:
         o, at, curve = row["y"], row["event"], run_data.model.case.conduits[self.name(run_data, row)].deceleration
         if run_data.armed[at + law_slam.TURNED] == 0.0:
             y[o] = y[o + 1] = 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.inputs import opening
+from fvsolve.model.inputs import opening_input
 from fvsolve.model.lowering import Restriction
 from fvsolve.parts.schedule import constant
 
@@ -15,4 +15,4 @@ class ConnectionRows(Restriction, kind="connection"):
         super().restriction(draft, name, link, row)
 
     def inputs(self, model, name, part):
-        return opening(model, name)
+        return opening_input(model, name)

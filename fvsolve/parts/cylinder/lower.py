@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.masses import Push, join
+from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
-class CylinderRows(Push, kind="cylinder"):
+class CylinderRows(PushLowering, kind="cylinder"):
     """A piston between two chambers and two masses or points."""
 
     table = "piston"
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        distance, row["speed"] = join(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
+        distance, row["speed"] = join_ports(draft, row, ("case", "rod"), (link.ports["case"], link.ports["rod"]))
         row["position"] = distance - link.closed_length
         row["a"], row["b"] = draft.node_index[f"{name}.A"], draft.node_index[f"{name}.B"]
         row["area_a"], row["area_b"] = link.areas()

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from fvsolve.model.masses import Push, join
+from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
-class DamperRows(Push, kind="damper"):
+class DamperRows(PushLowering, kind="damper"):
     """A force proportional to the relative velocity of two bodies."""
 
-    books = "dissipated"
+    ledger_name = "dissipated"
     table, rank = "brace", 1
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
+        _, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["damping"], row["force"] = -1, link.damping, -link.damping * row["speed"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from fvsolve.kernels.valves import LEAST, flow_at_drop, flow_slope, transition_of
-from fvsolve.model.device import Device, opening_of
+from fvsolve.model.device_lowering import Device, opening_of
 from fvsolve.parts.disc import law
 from fvsolve.steady import Edge
 
@@ -19,7 +19,7 @@ STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "
 class Lifting(Device, kind=""):
     """A valve that is shut, fully open, or lifted between; a disc with a delay has its lift as a state."""
 
-    law, leads = law, 4
+    law, controlling_event = law, 4
     quantities = ("opening",)
     events = STOPS
     remedy = "give it a greater overpressure"
@@ -33,7 +33,7 @@ class Lifting(Device, kind=""):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, 0.1 * 2.0 * math.pi * (part.natural_frequency or 1.0)][: len(self.states)]
 
-    def settle(self, run_data, row, t, y, scale) -> None:
+    def apply_event(self, run_data, row, t, y, scale) -> None:
         tables = run_data.model.tables
         stop, seat = (run_data.armed[row["event"] + k] > 0.0 for k in (0, 2))
         if self.states and seat and law.disc_lift(y, tables, row) > 0.0:  # the disc has slammed
@@ -51,7 +51,7 @@ class Lifting(Device, kind=""):
     def edge(self, start, k):
         if start.rest:
             start.shut.add(k)
-        if k in start.shut or start.modes.setdefault(k, LIFTING) == OPEN:
+        if k in start.shut or start.valve_modes.setdefault(k, LIFTING) == OPEN:
             return None
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
         return Edge(i, j, self.row(start, k), 0.0, sensed_node=i)
@@ -67,15 +67,15 @@ class Lifting(Device, kind=""):
         steep = flow_slope(g, transition, drop) if transition > 0.0 else 0.5 * g / max(abs(full), LEAST * math.sqrt(g))
         return x * full, x * steep, max(full, 0.0)
 
-    def revise(self, start, part, row) -> bool:
+    def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
         if start.rest:
             return False
-        before = "shut" if k in start.shut else start.modes[k]
+        before = "shut" if k in start.shut else start.valve_modes[k]
         x, flow = self.felt(start, k) / part.overpressure, float(start.valve_flows()[k])
         after = self.next(x, flow < -SMALL_LIFT * start.flow_scale, before)
         start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
-        start.modes[k] = LIFTING if after == "shut" else after
+        start.valve_modes[k] = LIFTING if after == "shut" else after
         return after != before
 
     def next(self, x: float, back: bool, now: str) -> str:
@@ -89,13 +89,13 @@ class Lifting(Device, kind=""):
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
         valve, name = start.valves[k], start.draft.valve_names[k]
-        lifts = k not in start.shut and start.modes[k] == LIFTING
+        lifts = k not in start.shut and start.valve_modes[k] == LIFTING
         x = 0.0 if k in start.shut else opening_of(start, k) if lifts else 1.0
         self.put_lift(start, row, x, x if lifts else self.felt(start, k) / part.overpressure)
         valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
         if self.states and x > 0.0 and valve["transition"] == 0.0:
             valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
-        start.draft.tables.floats[row["data"] + 2] = start.law_of(k)[1]
+        start.draft.tables.floats[row["data"] + 2] = start.valve_law(k)[1]
         self.tell(start, name, x)
         target = self.felt(start, k) / part.overpressure
         return (

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from fvsolve.model.masses import Push, join
+from fvsolve.model.mass_tables import PushLowering, join_ports
 
 FAR = 1e300  # distance to a stop that does not exist
 
 
-class EndStopRows(Push, kind="end-stop"):
+class EndStopRows(PushLowering, kind="end-stop"):
     """A spring and a damper that act while two bodies are in contact."""
 
     table = "stop"
@@ -16,7 +16,7 @@ class EndStopRows(Push, kind="end-stop"):
         from fvsolve.kernels.mass_dynamics import contact_force  # not loaded by models without bodies
 
         (row,) = rows
-        x, speed = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
+        x, speed = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
         row["below"] = FAR if link.minimum is None else x - link.minimum
         row["above"] = FAR if link.maximum is None else link.maximum - x

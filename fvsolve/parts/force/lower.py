@@ -7,19 +7,19 @@ import numpy as np
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.inputs import FORCE, Input
 from fvsolve.model.lowering import rows_in
-from fvsolve.model.masses import Push, join
+from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
-class ForceRows(Push, kind="force"):
+class ForceRows(PushLowering, kind="force"):
     """A force given by a schedule."""
 
-    books = "supplied"
+    ledger_name = "supplied"
     table, rank = "brace", 2
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
         direction = () if link.direction is None else (rec.TOWARD, link.direction / np.linalg.norm(link.direction))
-        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *direction)
+        _, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *direction)
         row["schedule"] = draft.schedules.add(link.force)
 
     def inputs(self, model, name, part):

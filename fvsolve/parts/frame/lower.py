@@ -1,7 +1,7 @@
 """Frames in the tables of a model."""
 
-from fvsolve.model.masses import OnAxis
+from fvsolve.model.mass_tables import AxisLowering
 
 
-class FrameRows(OnAxis, kind="frame"):
+class FrameRows(AxisLowering, kind="frame"):
     """A fixed body on the axis."""

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.inputs import FLOW, Input, values_in
+from fvsolve.model.inputs import FLOW, Input, scalar_inputs
 from fvsolve.model.lowering import Lowering
 
 
 class InflowRows(Lowering, kind="inflow"):
     """A junction with negative demand."""
 
-    books = "inflow"
+    ledger_name = "inflow"
 
     def place(self, draft, name, node, row) -> None:
         row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.flow, -draft.fluid.density)
 
     def inputs(self, model, name, part):
         schedule = int(model.tables.nodes[model.node_names.index(name)]["schedule"])
-        return {"flow": Input(FLOW, schedule, -model.case.properties.density), **values_in(model, name)}
+        return {"flow": Input(FLOW, schedule, -model.case.properties.density), **scalar_inputs(model, name)}

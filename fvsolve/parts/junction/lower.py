@@ -10,7 +10,7 @@ from fvsolve.model.lowering import Lowering
 class JunctionRows(Lowering, kind="junction"):
     """A node at which the flows add up to the demand."""
 
-    books = "demand"
+    ledger_name = "demand"
 
     def place(self, draft, name, node, row) -> None:
         row["kind"], row["schedule"] = rec.JUNCTION, draft.schedules.add(node.demand, draft.fluid.density)

@@ -1,7 +1,7 @@
 """Masses in the tables of a model."""
 
-from fvsolve.model.masses import OnAxis
+from fvsolve.model.mass_tables import AxisLowering
 
 
-class MassRows(OnAxis, kind="mass"):
+class MassRows(AxisLowering, kind="mass"):
     """A body on an axis, moved by forces."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.device import Device
-from fvsolve.model.inputs import opening
+from fvsolve.model.device_lowering import Device
+from fvsolve.model.inputs import opening_input
 from fvsolve.model.lowering import Lowering, Restriction
 from fvsolve.parts.outlet import law
 from fvsolve.parts.schedule import constant
@@ -15,15 +15,15 @@ SPAN = 1e5  # default drop at which an outlet has its nominal flow [Pa]
 class OutsideRows(Lowering, kind="outside"):
     """A node at ambient pressure."""
 
-    books = "outside"
+    ledger_name = "outside"
 
     def place(self, draft, name, node, row) -> None:
         row["kind"], row["schedule"] = rec.FIXED, draft.schedules.add(constant(draft.case.ambient_pressure))
 
     def pressure_at_start(self, start, i, node, row) -> float:
-        return start.given(row["schedule"])
+        return start.schedule_value(row["schedule"])
 
-    def moves(self, name, node, row, inflow, flow, amount) -> str:
+    def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         return ""
 
 
@@ -49,7 +49,7 @@ class OutletRows(Restriction, kind="outlet"):
         return SPAN if link.upper is None else link.upper - draft.case.ambient_pressure - self.least(draft, link)
 
     def inputs(self, model, name, part):
-        return opening(model, name)
+        return opening_input(model, name)
 
 
 class RelievingRows(Device, kind=""):
@@ -67,7 +67,7 @@ class RelievingRows(Device, kind=""):
     def numbers(self, draft, name, part) -> list[float]:
         return [0.5, 0.0, SPAN, law.NO_END][: self.mode] + self.own_numbers(draft, name, part)
 
-    def revise(self, start, part, row) -> bool:
+    def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
         new = k not in start.shut
         start.shut |= {k}

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fvsolve.kernels import dtypes as rec
+from fvsolve.model.body_tables import point_row
 from fvsolve.model.lowering import Lowering
-from fvsolve.model.mechanism import point_row
 
 
 class PinRows(Lowering, kind="pin"):

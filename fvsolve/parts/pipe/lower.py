@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.creep import add_creep
 from fvsolve.model.lowering import Lowering
 from fvsolve.model.model import PipeMesh
-from fvsolve.model.reading import along
-from fvsolve.model.unsteady import reserve
+from fvsolve.model.probe_weights import lower_position
+from fvsolve.model.unsteady_terms import reserve_terms
+from fvsolve.model.wall_creep import add_creep
 from fvsolve.schemes import end_rate_factor
 
 
@@ -39,7 +39,7 @@ class PipeRows(Lowering, kind="pipe"):
         row["compliance"] = draft.hydraulics.compliance(name, speed, draft.fault)
         draft.hydraulics.friction(name, link, row, draft.fault)
         if link.friction.model == "unsteady":
-            reserve(draft, row)
+            reserve_terms(draft, row)
         if delayed:
             row["y"] = draft.states([f"{name}.mass"], 1e5 * row["admittance"] * link.length / speed)
         else:
@@ -75,6 +75,6 @@ class PipeRows(Lowering, kind="pipe"):
             row["weights"] = len(draft.floats)
             draft.floats.append(probe.fraction)
         else:
-            along(draft, row, probe.fraction, 1 if probe.straight else None)
+            lower_position(draft, row, probe.fraction, 1 if probe.straight else None)
         if probe.straight and probe.quantity == "pressure" and not draft.case.law.cavitates:
             row["mark"] = row["index"]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.errors import Notice
-from fvsolve.model.device import Device
+from fvsolve.model.device_lowering import Device
 from fvsolve.model.inputs import SPEED, Input
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump import law_curve as curves
@@ -46,14 +46,14 @@ class PumpRows(Turning, Device, kind="pump"):
         numbers, own = self.turning(draft, name, part), shaft_points(part, weight)
         numbers |= {
             law.CHECK: part.check_valve, law.INERTIA: (inertia(part, weight) or np.inf) * rated, law.RATED: rated,
-            law.COUNT_OR_TORQUE: own[0], law.KNOWN: self.resists(part),
+            law.COUNT_OR_TORQUE: own[0], law.KNOWN: self.dissipates(part),
         }  # fmt: skip
         return numbers_of(numbers, self.given(draft, name), own[1:])
 
-    def resists(self, part) -> bool:
+    def dissipates(self, part) -> bool:
         return not part.inertia is part.trip is part.efficiency is part.shaft_power is part.suter is None
 
-    def squares(self, model, part, row, y, out) -> list[dict[int, float]]:
+    def energy_rows(self, model, part, row, y, out) -> list[dict[int, float]]:
         if row["y"] < 0:
             return []
         return [{int(row["y"]): part.rated_speed * math.sqrt(0.5 * inertia(part, weight_of(model)))}]
@@ -62,7 +62,7 @@ class PumpRows(Turning, Device, kind="pump"):
         speed = float(model.tables.valves[row["valve"]]["drive"])
         return 0.5 * inertia(part, weight_of(model)) * (part.rated_speed * speed) ** 2 if row["y"] >= 0 else 0.0
 
-    def passing(self, model, name, part, time) -> Notice:
+    def passing_notice(self, model, name, part, time) -> Notice:
         """Notice of a pump that left its curve in an allowed way."""
         moment = model.case.amount(time, "time", 6)
         rated = rated_point(part, weight_of(model))
@@ -107,7 +107,7 @@ class PumpRows(Turning, Device, kind="pump"):
         at, speed = int(row["data"]), float(row["drive"])
         return float(rho * start.case.gravity * curves.curve_head(floats, at, speed, float(flow) / rho)[0])
 
-    def revise(self, start, part, row) -> bool:
+    def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
         if not part.check_valve or start.rest:
             return False

@@ -46,7 +46,7 @@ class Turning:
     def speed_at(self, start, k: int) -> float:
         """Speed at the start by the schedule `speed`."""
         row = start.draft.device_table[start.valves[k]["device"]]
-        return start.given(row["schedule"])
+        return start.schedule_value(row["schedule"])
 
     def asked(self, start, row, valve) -> float:
         """Torque of the fluid on the shaft at the start [N m]."""
@@ -65,7 +65,7 @@ class Turning:
         braking = self.asked(start, row, valve)
         first, total = at + law.OWN_NUMBERS, 0.0
         for k in range(int(floats[at + law.GIVEN])):
-            value = start.given(floats[first + 2 * k])
+            value = start.schedule_value(floats[first + 2 * k])
             floats[first + 2 * k + 1], total = value, total + value
         rest = total - braking if abs(total - braking) > SNAP * (abs(total) + abs(braking)) else 0.0
         speed = float(valve["drive"])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.model.device import Device, opening_of
+from fvsolve.model.device_lowering import Device, opening_of
 from fvsolve.model.inputs import FLOW, SET_PRESSURE, Input
 from fvsolve.parts.regulating import law
 from fvsolve.steady import Edge
@@ -36,7 +36,7 @@ class Here(NamedTuple):
 class Regulator(Device, kind=""):
     """Active, it keeps the sensed quantity at its set value; else it is open or shut. Its opening is a state."""
 
-    law, leads = law, 6
+    law, controlling_event = law, 6
     states = ("opening",)
     quantities = ("opening",)
     events = ("shuts against reversed flow", "opens again", "is fully open", "leaves full opening", "is shut",
@@ -81,7 +81,7 @@ class Regulator(Device, kind=""):
     def given(self, start, k: int) -> float:
         """Set value at the start: pressure [Pa] or mass flow [kg/s]."""
         row = start.draft.device_table[start.valves[k]["device"]]
-        return start.given(row["schedule"])
+        return start.schedule_value(row["schedule"])
 
     def target(self, start, k: int) -> float:
         """Set value at the start, a pressure as potential [Pa]."""
@@ -94,10 +94,10 @@ class Regulator(Device, kind=""):
 
     def free(self, start, k: int) -> bool:
         """True if the flow through the valve can change the sensed quantity."""
-        return not self.end or bool(np.isnan(start.held[self.sensed(start, k)]))
+        return not self.end or bool(np.isnan(start.fixed_potentials[self.sensed(start, k)]))
 
     def stands(self, start, k: int) -> str:
-        return start.modes.setdefault(k, ACTIVE if self.free(start, k) else OPEN)
+        return start.valve_modes.setdefault(k, ACTIVE if self.free(start, k) else OPEN)
 
     def edge(self, start, k):
         if k in start.shut or self.stands(start, k) == OPEN:
@@ -110,7 +110,7 @@ class Regulator(Device, kind=""):
             return Edge(i, j, None, 0.0, drop=lambda flow: 0.0, held_potential=(self.sensed(start, k), goal))
         return Edge(i, j, lambda flow, drop: (0.0, 0.0, 0.0), 0.0, held_potential=(self.sensed(start, k), goal))
 
-    def revise(self, start, part, row) -> bool:
+    def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
         flow = float(start.valve_flows()[k])
         p_from, p_to = start.across(k)
@@ -121,7 +121,7 @@ class Regulator(Device, kind=""):
         if after == ACTIVE and not self.free(start, k):
             after = "shut"
         start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
-        start.modes[k] = OPEN if after == OPEN else ACTIVE if after == ACTIVE else start.modes[k]
+        start.valve_modes[k] = OPEN if after == OPEN else ACTIVE if after == ACTIVE else start.valve_modes[k]
         return after != before
 
     def next(self, here: Here, now: str) -> str:
@@ -134,7 +134,7 @@ class Regulator(Device, kind=""):
         shut, active = k in start.shut, self.stands(start, k) == ACTIVE
         error = self.error(start, k)
         if active and not shut:
-            if abs(error) > start.slack(self.end):
+            if abs(error) > start.set_point_tolerance(self.end):
                 self.refuse(start, k)
             error = 0.0
         x = opening_of(start, k) if active and not shut else 1.0 if error > 0.0 or not shut else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fvsolve.errors import Notice
-from fvsolve.model.device import Device
+from fvsolve.model.device_lowering import Device
 from fvsolve.parts.disc.law import RELIEF
 from fvsolve.parts.disc.lower import Lifting
 from fvsolve.parts.relief_valve import law
@@ -52,7 +52,7 @@ class ReliefLag(ReliefDisc, kind=""):
 class Relief(ReliefDisc, kind="relief-valve"):
     """A relief valve whose lift follows the pressure at once."""
 
-    law, leads = law, -1
+    law, controlling_event = law, -1
     events = ("is shut", "opens", "is fully open", "leaves full opening")
 
     def of(self, part) -> Device:

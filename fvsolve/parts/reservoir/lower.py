@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.inputs import HEAD, PRESSURE, Input, values_in
+from fvsolve.model.inputs import HEAD, PRESSURE, Input, scalar_inputs
 from fvsolve.model.lowering import Lowering
 
 
 class ReservoirRows(Lowering, kind="reservoir"):
     """A node whose pressure or head follows a schedule."""
 
-    books = "reservoir"
+    ledger_name = "reservoir"
 
     def place(self, draft, name, node, row) -> None:
         row["kind"] = rec.FIXED
@@ -20,10 +20,10 @@ class ReservoirRows(Lowering, kind="reservoir"):
             row["schedule"] = draft.schedules.add(node.pressure)
 
     def pressure_at_start(self, start, i, node, row) -> float:
-        value = start.given(row["schedule"])
+        value = start.schedule_value(row["schedule"])
         return start.law.pressure_under(value - row["elevation"]) if row["head_given"] else value
 
-    def moves(self, name, node, row, inflow, flow, amount) -> str:
+    def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         return ""
 
     def inputs(self, model, name, part):
@@ -31,4 +31,4 @@ class ReservoirRows(Lowering, kind="reservoir"):
         row = model.tables.nodes[i]
         index, ground = int(row["schedule"]), model.case.ambient_pressure - weight * float(row["elevation"])
         inputs = {"pressure": Input(PRESSURE, index, node=i), "head": Input(HEAD, index, weight, ground, node=i)}
-        return inputs | values_in(model, name)
+        return inputs | scalar_inputs(model, name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.model.device import Device
+from fvsolve.model.device_lowering import Device
 from fvsolve.parts.outlet.law import EVENTS
 from fvsolve.parts.outlet.lower import RelievingRows
 from fvsolve.parts.rupture_disc import law, law_outside
@@ -11,7 +11,7 @@ from fvsolve.parts.rupture_disc import law, law_outside
 class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
     """A rupture disc between two nodes."""
 
-    law, sudden = law, True
+    law, events_only = law, True
     events = ("bursts",)
 
     def of(self, part) -> Device:
@@ -22,7 +22,7 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
 
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
-        drop, name = start.drive_of(k)[0], start.draft.valve_names[k]
+        drop, name = start.valve_drive(k)[0], start.draft.valve_names[k]
         if drop >= part.burst_pressure:
             across = start.case.amount(drop, "pressure", 6, span=True)
             text = f"{across} across the disc at the start would burst it; set it higher or remove the disc"

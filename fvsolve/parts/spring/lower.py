@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from fvsolve.model.masses import Push, join
+from fvsolve.model.mass_tables import PushLowering, join_ports
 
 
-class SpringRows(Push, kind="spring"):
+class SpringRows(PushLowering, kind="spring"):
     """Rows of springs: a force by the distance of two bodies."""
 
-    books = "stored"
+    ledger_name = "stored"
     table, rank = "brace", 0
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
-        x, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
+        x, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["stiffness"] = -1, link.stiffness
         row["force"] = -link.stiffness * (x - link.free_length) if link.preload is None else link.preload
         if link.preload is not None and draft.case.found:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fvsolve.errors import Notice
-from fvsolve.model.device import Device
+from fvsolve.model.device_lowering import Device
 from fvsolve.parts.outlet.law import EVENTS
 from fvsolve.parts.outlet.lower import RelievingRows
 from fvsolve.parts.surge_anticipating import law, law_outside
@@ -32,7 +32,7 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1, part.hold + part.opening_time]
 
-    def settle(self, run_data, row, t, y, scale) -> None:
+    def apply_event(self, run_data, row, t, y, scale) -> None:
         at, o = row["event"] + row["mode"], row["y"]
         if run_data.armed[at + law.SHUT] > 0.0:
             y[o] = 0.0

@@ -11,7 +11,7 @@ from fvsolve.model.lowering import Lowering
 class TankRows(Lowering, kind="tank"):
     """A node with the hydrostatic pressure under the level of its water."""
 
-    books = "over the rim"
+    ledger_name = "over the rim"
 
     def place(self, draft, name, node, row) -> None:
         rho = draft.case.law.open_density
@@ -41,7 +41,7 @@ class TankRows(Lowering, kind="tank"):
         upright = 1.0 if node.on is None else start.case.poses[node.on].attitude[2, 2]
         return start.law.pressure_under(row["level"] * upright)
 
-    def moves(self, name, node, row, inflow, flow, amount) -> str:
+    def motion_text(self, name, node, row, inflow, flow, amount) -> str:
         direction = "rises" if flow > 0 else "falls"
         return f"tank {name} {direction} at {amount(abs(flow) / row['area'], 'velocity', silent='mm/s')}"
 

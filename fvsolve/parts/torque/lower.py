@@ -7,7 +7,7 @@ import numpy as np
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.inputs import TORQUE, Input
 from fvsolve.model.lowering import Lowering, lowering_of
-from fvsolve.model.masses import Push, join
+from fvsolve.model.mass_tables import PushLowering, join_ports
 from fvsolve.parts.force.lower import brace_of
 from fvsolve.parts.pump.law import OWN_NUMBERS
 from fvsolve.parts.pump.lower_turning import torques_on
@@ -26,16 +26,16 @@ class TorqueRows(Lowering, kind="torque"):
         return {"torque": Input(TORQUE, int(model.tables.floats[row["data"] + OWN_NUMBERS + 2 * place]))}
 
 
-class BodyTorqueRows(Push):
+class BodyTorqueRows(PushLowering):
     """A torque by a schedule about an axis of a body."""
 
-    books = "supplied"
+    ledger_name = "supplied"
     table, rank = "brace", 3
 
     def fill(self, draft, name, link, rows) -> None:
         (row,) = rows
         axis = rec.ABOUT, link.axis / np.linalg.norm(link.axis)
-        _, row["speed"] = join(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *axis)
+        _, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to), *axis)
         row["schedule"] = draft.schedules.add(link.torque)
 
     def inputs(self, model, name, part):

@@ -9,8 +9,8 @@ import numpy as np
 
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
-from fvsolve.model.device import Device
-from fvsolve.model.inputs import TURNING, Input, opening
+from fvsolve.model.device_lowering import Device
+from fvsolve.model.inputs import ANGULAR_SPEED, Input, opening_input
 from fvsolve.parts.pump.law import INERTIA, RATED
 from fvsolve.parts.pump.lower_notes import odd_inertia
 from fvsolve.parts.pump.lower_turning import Turning, numbers_of
@@ -30,8 +30,8 @@ class TurbineRows(Turning, Device, kind="turbine"):
     small = 1.0  # rad/s
 
     def inputs(self, model, name, part):
-        opening_input = opening(model, name)
-        return opening_input | {"speed": Input(TURNING, int(self.row_of(model, name)["schedule"]))}
+        opening_input = opening_input(model, name)
+        return opening_input | {"speed": Input(ANGULAR_SPEED, int(self.row_of(model, name)["schedule"]))}
 
     def restriction(self, draft, name, link, row) -> None:
         density = draft.fluid.density
@@ -43,14 +43,14 @@ class TurbineRows(Turning, Device, kind="turbine"):
         by_index = self.turning(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
         return numbers_of(by_index, self.given(draft, name), [])
 
-    def squares(self, model, part, row, y, out) -> list[dict[int, float]]:
+    def energy_rows(self, model, part, row, y, out) -> list[dict[int, float]]:
         return [{int(row["y"]): math.sqrt(0.5 * part.inertia)}] if row["y"] >= 0 else []
 
     def above(self, model, part, row) -> float:
         speed = float(model.tables.valves[row["valve"]]["drive"])
         return 0.5 * part.inertia * speed**2 if row["y"] >= 0 else 0.0
 
-    def passing(self, model, name, part, time) -> Notice:
+    def passing_notice(self, model, name, part, time) -> Notice:
         moment = model.case.amount(time, "time", 6)
         text = (f"{name}: it leaves its hill chart at {moment}; beyond the chart its curves are straight lines to the "
                 "flow at rest and to the speed without flow; give more points there")  # fmt: skip
@@ -60,7 +60,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
         row = start.valves[k]
         i, j = int(row["from_node"]), int(row["to_node"])
         row["drive"] = omega = self.speed_at(start, k)
-        vanes = float(start.given(row["schedule"]))
+        vanes = float(start.schedule_value(row["schedule"]))
         row["open"] = g = row["conductance"] * vanes * vanes if vanes * vanes >= law.SHUT else 0.0
         if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
@@ -87,7 +87,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
         name = draft.valve_names[row["valve"]]
         if valve["open"] > 0.0:
             rho, floats = start.density_at(int(valve["from_node"])), draft.tables.floats
-            vanes = float(start.given(valve["schedule"]))
+            vanes = float(start.schedule_value(valve["schedule"]))
             at = floats, int(valve["data"]), vanes, float(valve["drive"])
             drop = rho * start.case.gravity * charts.chart_head(*at, float(valve["flow"]) / rho)[0]
             ratio = rho / draft.fluid.density
@@ -101,7 +101,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
 
     def asked(self, start, row, valve) -> float:
         rho = start.density_at(int(valve["from_node"]))
-        vanes, omega = float(start.given(valve["schedule"])), float(valve["drive"])
+        vanes, omega = float(start.schedule_value(valve["schedule"])), float(valve["drive"])
         floats, density_ratio = start.draft.tables.floats, rho / start.draft.fluid.density
         return -density_ratio * charts.chart_torque(
             floats, int(valve["data"]), vanes, omega, float(valve["flow"]) / rho

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fvsolve.model.clusters import soften_root
-from fvsolve.model.inputs import opening
+from fvsolve.model.cluster_tables import set_transition
+from fvsolve.model.inputs import opening_input
 from fvsolve.model.lowering import Restriction
 
 
@@ -27,8 +27,8 @@ class ValveRows(Restriction, kind="valve"):
         softened = part.laminar_reynolds is None and row["transition"] > 0.0
         draft.restriction(name, part, row)
         if softened:
-            soften_root(draft, name, part, row)
+            set_transition(draft, name, part, row)
         return True
 
     def inputs(self, model, name, part):
-        return opening(model, name)
+        return opening_input(model, name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fvsolve.model.checks import rhs_seconds
+from fvsolve.model.model_facts import rhs_seconds
 from fvsolve.steppers import automatic
 from fvsolve.steppers.tableau import method_named
 from fvsolve.studies.accuracy.cells import basins, counts, loads, most, scaled, total

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
-from fvsolve.model.delay import followed
+from fvsolve.model.delay_line_selection import line_methods
 from fvsolve.parts import Basin, Pipe
 from fvsolve.schemes import SCHEMES
 from fvsolve.studies.accuracy.plane import contents
@@ -104,7 +104,7 @@ def greatest_rate(case, cells_by_key: Mapping[str, tuple[int, ...]]) -> float:
     """
     rates = [case.wave_speed(name) * cells_by_key[f"links.{name}.cells"][0] / pipe.length
              for name, pipe in in_cells(case).items()]  # fmt: skip
-    rates += [method.rate for method in followed(case).values() if method.pipe_model == "delay-line"]
+    rates += [method.rate for method in line_methods(case).values() if method.pipe_model == "delay-line"]
     if basins(case):
         own_cells = {key: numbers for key, numbers in counts(case).items() if key.startswith("nodes.")}
         factor = max((max(cells_by_key[key]) / max(numbers) for key, numbers in own_cells.items()), default=1.0)

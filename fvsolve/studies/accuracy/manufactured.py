@@ -10,7 +10,7 @@ import numpy as np
 
 from fvsolve.errors import FvsolveError
 from fvsolve.exact.solution import Solution, averages
-from fvsolve.model import Slate
+from fvsolve.model import RunData
 from fvsolve.studies.accuracy.cells import pipes
 from fvsolve.studies.accuracy.judge import Judge
 from fvsolve.studies.accuracy.rows import Order
@@ -125,7 +125,7 @@ class Sourced:
     """One run with a source, in segments between the kinks and jumps of the case."""
 
     def __init__(self, model, source: Given) -> None:
-        self.model, self.slate, self.source, self.limit = model, Slate(model), source, np.inf
+        self.model, self.slate, self.source, self.limit = model, RunData(model), source, np.inf
 
     def rates(self, t: float, y: np.ndarray, dydt: np.ndarray) -> None:
         """Rates of the model plus the source."""

@@ -14,7 +14,7 @@ from fvsolve.case.sloshing import slowest
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
 from fvsolve.kernels.schedule_pieces import value_with_limit
-from fvsolve.model.checks import velocities
+from fvsolve.model.model_facts import velocities
 from fvsolve.studies.accuracy.rungs import Unsayable, finer, restated, structures, tanks
 from fvsolve.studies.accuracy.timing import GIVEN_UP, Capped
 from fvsolve.studies.distance import Gap, moving

@@ -9,7 +9,7 @@ from fvsolve.case import load
 from fvsolve.case.case import Case
 from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME
 from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
-from fvsolve.model.checks import rhs_seconds
+from fvsolve.model.model_facts import rhs_seconds
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import counts, greatest_rate, pipes, total

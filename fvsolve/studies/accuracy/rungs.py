@@ -14,7 +14,7 @@ import numpy as np
 from fvsolve.case.defaults import link_said
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
-from fvsolve.model.delay import what_needs_cells
+from fvsolve.model.delay_line_selection import reason_for_cells
 from fvsolve.studies.outcome import prepared
 
 SLOSHING = ("frozen", "modes", "cells")
@@ -107,7 +107,7 @@ def sloshing(case, level: str) -> dict[str, Any]:
 def delayed(case, pipes: dict[str, Any]) -> dict[str, Any]:
     """Keys that make all pipes delay lines."""
     for name, pipe in pipes.items():
-        if reason := what_needs_cells(case, name, pipe):
+        if reason := reason_for_cells(case, name, pipe):
             raise Unsayable(f"{name} cannot be a delay line: {reason}")
     return {f"links.{name}.pipe_model": "delay-line" for name in pipes}
 

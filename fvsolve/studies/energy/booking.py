@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.kernels.delay_lines.wave_history import JUMPS_TRAVELLING, time_tolerance
-from fvsolve.model.energy_ledger import Accounts
-from fvsolve.model.past import times_of_jumps
+from fvsolve.model.delay_history import jump_times
+from fvsolve.model.energy_accounts import Accounts
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.solve.solve import Run
 from fvsolve.steppers import automatic, loop_indices
@@ -109,7 +109,7 @@ class Booked(RunLoop):
         if self.stepper.method.kind == "linear":
             b = self.weights_beside()
         begin, end = t + min(0.0, float(c.min())) * h, t + max(1.0, float(c.max())) * h
-        for jump_time in times_of_jumps(past, self.model.tables.delays, begin, end):
+        for jump_time in jump_times(past, self.model.tables.delays, begin, end):
             before, after = (
                 self.power(time, y + (time - t) / h * (self.now - y))
                 for time in (jump_time - 2.0 * separation, jump_time + 2.0 * separation)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.model.energy_ledger import Account
-from fvsolve.model.energy_start import available, datum_of
+from fvsolve.model.available_energy import available_energy, datum_of
+from fvsolve.model.energy_accounts import Account
 from fvsolve.solve import initial_state
 from fvsolve.studies.energy.booking import EnergyRun
 from fvsolve.studies.outcome import RowSink, prepared
@@ -157,7 +157,7 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
     """Energy ledger from the recorded totals of a run."""
     accounts, totals, holdings = run.accounts, np.array(run.totals), np.array(run.holdings)
     lines = {kind: by_name(accounts.accounts, kind, totals) for kind in ("supplied", "dissipated", "scheme", "law")}
-    stored = by_name(accounts.held, "stored", holdings)
+    stored = by_name(accounts.stored_accounts, "stored", holdings)
     impact_losses = np.array(run.losses)
     for name, column in zip(run.model.column_names, impact_losses.T, strict=True):
         if column.any():
@@ -171,7 +171,7 @@ def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
         reason, summary.finished, np.array(run.times), lines["supplied"], stored, lines["dissipated"],
         lines["scheme"], lines["law"], totals[:, accounts.of("rate")].sum(axis=1)
         - impact_losses.sum(axis=1) - stored_sum,
-        totals[:, -1], supplied - stored_sum - dissipated, available(run.model),
+        totals[:, -1], supplied - stored_sum - dissipated, available_energy(run.model),
         float(run.model.tables.settings[0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
         [f"{mark.text}: the ledger from {run.model.case.amount(mark.time, 'time', 6)} on is not to be trusted"
          for mark in summary.marks],
@@ -183,7 +183,7 @@ def by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> dict[str
     """Ledger lines of a kind that are not always zero, named "PART", or "PART KIND" if a part has several kinds."""
     lines = {}
     for k, account in enumerate(accounts):
-        if account.what == kind and columns[:, k].any():
+        if account.category == kind and columns[:, k].any():
             several = kind == "dissipated" and account.kind not in SHORT or account.kind == "over the rim"
             name = f"{account.place} {account.kind}" if several else account.place
             lines[name] = lines.get(name, 0.0) + columns[:, k]
@@ -202,12 +202,12 @@ def check_port(case, port: str | None) -> None:
 def judged(run: EnergyRun, port: str) -> Port:
     """Check condition (2) of passivity at every step of a run; heights are measured from the port."""
     lines, totals = run.accounts.accounts, np.array(run.step_totals)
-    own_lines = [k for k, account in enumerate(lines) if account.what == "supplied" and account.place == port]
+    own_lines = [k for k, account in enumerate(lines) if account.category == "supplied" and account.place == port]
     supplied_lines = run.accounts.of("supplied")
     work = totals[:, own_lines].sum(axis=1)
     others = totals[:, supplied_lines].sum(axis=1) - work
     at_rows = np.searchsorted(run.step_times, run.times, side="right") - 1
-    start = sum(available(run.model).values())
+    start = sum(available_energy(run.model).values())
     margin = start + work + others
     least, worst = int(np.argmin(work)), int(np.argmin(margin))
     size = start + np.max(np.abs(work)) + np.max(np.abs(others))

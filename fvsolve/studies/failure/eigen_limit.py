@@ -27,7 +27,7 @@ def spectrum(case, set: dict) -> np.ndarray | None:
         return None
     rest = np.zeros(model.y_size)
     times = (model.case.numerics.start, model.case.numerics.end)
-    return np.concatenate([np.linalg.eigvals(model.held_jacobian(t, rest)) for t in times])
+    return np.concatenate([np.linalg.eigvals(model.jacobian_without_delays(t, rest)) for t in times])
 
 
 def twin(case, scheme: str) -> str:

@@ -10,7 +10,7 @@ from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.ghost_cells import difference_rows
 from fvsolve.kernels.schedule_pieces import POLYNOMIAL, piece_at, piece_slopes, value_with_limit
-from fvsolve.model.delay import followed
+from fvsolve.model.delay_line_selection import line_methods
 from fvsolve.schemes import LIMITED, SCHEMES
 from fvsolve.step_limits.symbol import symbol
 from fvsolve.studies.outcome import outcome, prepared
@@ -51,7 +51,7 @@ def frozen(case, set=None, at: float | None = None, before: bool = False, probes
     from fvsolve.case import load
 
     case = load(case, dict(set or {}))
-    delay_lines = [name for name, choice in followed(case).items() if choice.pipe_model == "delay-line"]
+    delay_lines = [name for name, choice in line_methods(case).items() if choice.pipe_model == "delay-line"]
     if delay_lines:
         case = load(
             case,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.model.energy import EnergyForm
+from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.studies.sheet import Column
 
 MANY = 1500  # greatest number of states for which all eigenvalues are computed; above, some by ARPACK
@@ -50,7 +50,7 @@ class Spectrum:
 
 def poles_of(a: Any, form: EnergyForm) -> Spectrum:
     """Eigenvalues of A in the energy norm, with those of motions that store no energy."""
-    form = form.fitting(a)
+    form = form.suited_to(a)
     moving = spectrum(form.seen(a))
     if form.idle.shape[1] == 0:
         return moving

@@ -159,10 +159,10 @@ def _dense(a) -> np.ndarray:
 
 def _transfer(at, a, b, c, d, error: float) -> Transfer:
     """Transfer function from a state space in coordinates whose squared norm is the energy."""
-    from fvsolve.model.energy import energy_form
+    from fvsolve.model.energy_norm import energy_form
 
-    form = energy_form(at.model, at.y).completed()
-    return Transfer(form.seen(a), form.forth @ b, c @ form.back, d, error)
+    form = energy_form(at.model, at.y).full_norm()
+    return Transfer(form.seen(a), form.forward @ b, c @ form.back, d, error)
 
 
 def _table(verdict: StateVerdict, h: Transfer) -> np.ndarray:

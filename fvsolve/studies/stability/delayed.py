@@ -15,7 +15,7 @@ import numpy as np
 
 from fvsolve.kernels.delay_lines import wave_history as at
 from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
-from fvsolve.model.energy import energy_form
+from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers.tableau import Method
 
 BEYOND = 4  # entries before the oldest reading, for its interpolation
@@ -198,7 +198,7 @@ def local(model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
     first = np.cumsum(rows["stretches"]) - rows["stretches"]
     admittance = np.repeat(model.tables.pipes["admittance"][rows["pipe"]], 2)
 
-    with model.slate() as data:
+    with model.run_data() as data:
         past, arrivals = data.past, at.offsets_of(data.past)[0]
         inputs = (
             arrivals + at.ARRIVALS_SIZE * np.stack([first, first + rows["stretches"] - 1], axis=1) + np.array([0, 1])

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.model.energy import EnergyForm
+from fvsolve.model.energy_norm import EnergyForm
 from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
 from fvsolve.steppers import loop_indices
 from fvsolve.studies.linear.frozen import Frozen
@@ -119,14 +119,14 @@ class Runs:
     def grown(self, start: np.ndarray, h: float, base_at: Callable) -> tuple[float, int]:
         """(greatest growth of one start, its number of steps); stops above the threshold."""
         size, after, run = 1.0, 0, self.loop(self.at.y + start, h)
-        first = np.linalg.norm(self.form.forth @ start)
+        first = np.linalg.norm(self.form.forward @ start)
         for k, n in enumerate(self.looks):
             if time.monotonic() > self.latest:
                 raise TimeoutError
             base = base_at(k)
             if base is None or run.run(self.strides[k]) != loop_indices.BUDGET_SPENT:
                 return (size, after) if self.end_of_state(h) <= n * h else (np.inf, n)
-            growth = float(np.linalg.norm(self.form.forth @ (run.now - base))) / first
+            growth = float(np.linalg.norm(self.form.forward @ (run.now - base))) / first
             if not growth <= self.threshold:
                 return growth if growth > self.threshold else np.inf, n
             if growth > size:

@@ -16,7 +16,7 @@ import numpy as np
 
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError, RunError
-from fvsolve.model.energy import EnergyForm, energy_form
+from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.built_in_methods import AUTO
@@ -71,7 +71,7 @@ class Side:
         self.at = at
         self.linear: Linear = linearised(at)
         self.whole = energy_form(at.model, at.y)
-        self.form: EnergyForm = self.whole.fitting(self.linear.a)
+        self.form: EnergyForm = self.whole.suited_to(self.linear.a)
         self.e = self.form.seen(self.linear.a)
 
     @property

@@ -1,0 +1,171 @@
+"""Tables of bodies, joints, points and lines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.case import bodies
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model.schedule_tables import break_times
+from fvsolve.parts.body.part import Body
+
+SMALL_ANGLE, SMALL_TRAVEL = 1e-3, 1e-3  # [rad], [m]
+SMALL_SPIN, SMALL_SPEED = 0.1, 0.1  # [rad/s], [m/s]
+PLAIN_LINE = (-1, -1, -1, rec.ALONG, (0.0, 0.0, 0.0), 0.0)  # a line
+KINDS = {"revolute": rec.REVOLUTE, "prismatic": rec.PRISMATIC, "ball": rec.BALL, "free": rec.FREE, "fixed": rec.WELD}
+ANGLES, SPINS = ("eta", "eps_x", "eps_y", "eps_z"), ("spin_x", "spin_y", "spin_z")
+STATES = {  # for each kind: coordinates, then velocities, each with its size of a small deviation
+    "revolute": ({"angle": SMALL_ANGLE}, {"rate": SMALL_SPIN}),
+    "prismatic": ({"travel": SMALL_TRAVEL}, {"travel_rate": SMALL_SPEED}),
+    "ball": (dict.fromkeys(ANGLES, SMALL_ANGLE), dict.fromkeys(SPINS, SMALL_SPIN)),
+    "free": (dict.fromkeys(("centre_x", "centre_y", "centre_z"), SMALL_TRAVEL) | dict.fromkeys(ANGLES, SMALL_ANGLE),
+             dict.fromkeys(("centre_vx", "centre_vy", "centre_vz"), SMALL_SPEED) | dict.fromkeys(SPINS, SMALL_SPIN)),
+    "fixed": ({}, {}),
+}  # fmt: skip
+
+
+def lower_bodies(draft) -> None:
+    """Fill the tables of bodies and of their freedoms, each body after its parent."""
+    nodes = draft.case.loaded
+    draft.body_names = list(draft.case.poses)
+    table = draft.body_table = np.zeros(len(draft.body_names), rec.BODY)
+    paths: list[list[int]] = []
+    chains: list[list[int]] = []  # for each body, the freedoms from its root to it
+    for i, (name, row) in enumerate(zip(draft.body_names, table, strict=True)):
+        body = nodes[name]
+        parent_name = bodies.hangs_on(body)[0]
+        row["parent"] = draft.body_names.index(parent_name) if isinstance(nodes.get(parent_name), Body) else -1
+        row["root"] = table[row["parent"]]["root"] if row["parent"] >= 0 else i
+        fill_body(draft, name, body, row)
+        row["freedom"] = len(paths)
+        path = list(chains[row["parent"]]) if row["parent"] >= 0 else []
+        for _ in range(row["freedoms"]):
+            path = [*path, len(paths)]
+            paths.append(path)
+        chains.append(path)
+    freedoms = draft.freedom_table = np.zeros(len(paths), rec.FREEDOM)
+    at = 0
+    for row, path in zip(freedoms, paths, strict=True):
+        row["depth"], row["path"], row["row"] = len(path) - 1, len(draft.integers), at
+        draft.integers += path
+        at += len(path)
+    draft.factor_size = at
+
+
+def fill_body(draft, name: str, body: Body, row) -> None:
+    """Fill the row of a body, and add its states."""
+    joint, t = body.joint, draft.case.numerics.start
+    row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
+    row["inertia"], row["axis"] = body.moment().ravel(), joint.unit_axis
+    row["at"], row["attitude"] = bodies.joint_place(draft.case.nodes, body), joint.attitude.rotation.ravel()
+    row["damping"], row["stiffness"] = joint.damping or 0.0, joint.stiffness or 0.0
+    pose = draft.case.poses[name]
+    row["height"] = pose.at(body.centre_of_mass)[2]
+    speed, spin = pose.moves(body.centre_of_mass), pose.attitude.T @ pose.spin
+    row["energy"] = 0.5 * (body.mass * speed @ speed + spin @ body.moment() @ spin)
+    row["y"] = row["rate"] = row["schedule"] = -1
+    if joint.driven is not None:
+        drive_joint(draft, name, joint.driven, row)
+        return
+    coordinates, velocities = STATES[joint.kind]
+    if not coordinates:
+        return
+    row["freedoms"] = len(velocities)
+    row["y"] = draft.states([f"{name}.{key}" for key in coordinates], list(coordinates.values()))
+    row["rate"] = draft.states([f"{name}.{key}" for key in velocities], list(velocities.values()))
+    if joint.kind == "free":
+        row["start"] = [*pose.at(body.centre_of_mass), *joint.attitude.parameters]
+        row["speed"] = [*joint.speed, *joint.turning]
+    elif joint.kind == "ball":
+        row["start"][0], row["speed"][:3] = 1.0, joint.turning
+    else:
+        row["start"][0], row["speed"][0] = bodies.coordinate(joint, t), joint.rate or 0.0
+
+
+def drive_joint(draft, name: str, schedule, row) -> None:
+    """Drive a joint by a schedule. Faults of schedules whose rate jumps: they would need infinite forces."""
+    row["schedule"] = draft.schedules.add(schedule)
+    key = "travel" if row["joint"] == rec.PRISMATIC else "angle"
+    start, end = draft.case.numerics.start, draft.case.numerics.end  # kinks before the start have no effect
+    kinks = [time for time, _ in sorted(rate_jumps(schedule)) if start < time <= end]
+    if kinks:
+        kind = "it jumps" if schedule.kind == "step" else "its rate jumps"
+        time_text = draft.case.amount(kinks[0], "time", 6)
+        text = f"drives the joint, and at t = {time_text} {kind}, which needs an infinite force"
+        draft.fault(
+            f"nodes.{name}.joint.{key}", f'{text}; expected kind = "smooth" with zero slope at both ends, or a harmonic'
+        )
+    for time in schedule.time if np.all(np.isfinite(schedule.time)) else ():  # jumps of acceleration
+        draft.schedules.breaks.setdefault(float(time), False)
+
+
+def rate_jumps(schedule) -> list[tuple[float, bool]]:
+    """Times at which the rate or the value of a schedule jumps : (time, True for a value); a ramp may end level."""
+    if schedule.kind != "ramp":
+        return break_times(schedule)
+    (first, last), n = break_times(schedule), schedule.exponent
+    return [first] + ([last] if n <= 1.0 else [])  # v1 + (v0 - v1) (1 - s)^n never begins level
+
+
+def point_row(draft, place: str) -> int:
+    """Row of the point that a link or a probe names; added on first use."""
+    if place not in draft.point_index:
+        name, position = bodies.point_of(draft.case.nodes, place)
+        draft.point_index[place] = len(draft.points)
+        draft.points.append((draft.body_names.index(name) if name != bodies.WORLD else -1, tuple(position)))
+    return draft.point_index[place]
+
+
+def pose_of(draft, place: str) -> bodies.Pose:
+    """Stated pose of the body of a point; the world's pose for a frame."""
+    return draft.case.stated.poses.get(bodies.point_of(draft.case.nodes, place)[0], bodies.AT_REST)
+
+
+def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direction=(0.0, 0.0, 0.0)) -> int:
+    """Row of a line between two points, whose push is numbered later."""
+    ends = [-1 if place is None else point_row(draft, place) for place in places]
+    draft.lines.append((-1, *ends, acts, tuple(direction), 0.0))
+    return len(draft.lines) - 1
+
+
+def lower_lines(draft) -> None:
+    """Fill tables of pins and bushings; number the push of each line."""
+    draft.pin_names, draft.pin_table = draft.fill("pin", rec.PIN)
+    draft.bushing_names, draft.bushing_table = draft.fill("bushing", rec.BUSHING)
+    for name, row in zip(draft.bushing_names, draft.bushing_table, strict=True):
+        link = draft.case.links[name]
+        row["energy"] = 0.5 * row["stiffness"] * distance_and_rate(draft, (link.from_, link.to), PLAIN_LINE)[0] ** 2
+        if draft.case.found:
+            row["energy"] += 2.0 * row["turn_stiffness"] * relative_turn(draft, (link.from_, link.to))
+    draft.line_table = np.array(draft.lines, rec.LINE) if draft.lines else np.zeros(0, rec.LINE)
+    rows = [row for table in (draft.brace_table, draft.stop_table, draft.piston_table) for row in table]
+    for k, row in enumerate(rows):
+        if row["line"] >= 0:
+            draft.line_table[row["line"]]["push"] = k
+
+
+def relative_turn(draft, places: tuple[str, str]) -> float:
+    """eps.eps of the deviation (56) of two bodies at the start from their stated relative attitude."""
+    relative = []
+    for case in (draft.case, draft.case.stated):
+        here, there = (case.poses.get(bodies.point_of(case.nodes, place)[0], bodies.AT_REST) for place in places)
+        relative.append(here.attitude.T @ there.attitude)
+    return 0.25 * (3.0 - float(np.sum(relative[0] * relative[1])))
+
+
+def distance_and_rate(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
+    """Distance between two points at the start [m], and its rate [m/s]."""
+    ends = []
+    for place in places:
+        name, position = (bodies.WORLD, np.zeros(3)) if place is None else bodies.point_of(draft.case.nodes, place)
+        pose = draft.case.poses.get(name, bodies.AT_REST)
+        ends.append((pose.at(position), pose.moves(position), pose.spin))
+    (x, u, a), (z, v, b) = ends
+    _, _, _, acts, direction, _ = line
+    if acts == rec.ABOUT:
+        axis = draft.case.poses[bodies.point_of(draft.case.nodes, places[1])[0]].attitude @ direction
+        return 0.0, float(np.dot(axis, b - a))
+    if acts == rec.TOWARD:
+        return 0.0, float(np.dot(direction, v - u))
+    length = float(np.linalg.norm(z - x))
+    return length, float(np.dot(z - x, v - u)) / length if length > 0.0 else 0.0

@@ -1,0 +1,212 @@
+"""Solution method of each node without storage: direct, by a closed root, or by Newton's method with other nodes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.errors import listing
+from fvsolve.kernels import dtypes as rec
+from fvsolve.steady import union
+
+
+def classify_nodes(draft) -> None:
+    """Sort nodes and valves into those with closed roots and clusters solved by Newton's method."""
+    nodes, valves = draft.node_table, draft.valve_table
+    inner = nodes["kind"] == rec.JUNCTION
+    short = np.flatnonzero(draft.delay_table["now"] > 0.0)
+    joins = [draft.pipe_table[draft.delay_table["pipe"][k]] for k in short]
+    group = union(len(nodes), [(v["from_node"], v["to_node"]) for v in (*valves, *joins)
+                               if inner[v["from_node"]] and inner[v["to_node"]]])  # fmt: skip
+    touched: dict[int, list[int]] = {}
+    couples: dict[int, list[int]] = {}
+    for k, row in zip(short.tolist(), joins, strict=True):
+        for i in {int(row["from_node"]), int(row["to_node"])}:
+            if inner[i]:
+                touched.setdefault(group[i], [])
+                own = couples.setdefault(group[i], [])
+                own += [] if k in own else [k]
+    for k, v in enumerate(valves):
+        for i in {int(v["from_node"]), int(v["to_node"])}:
+            if inner[i]:
+                touched.setdefault(group[i], [])
+                if k not in touched[group[i]]:
+                    touched[group[i]].append(k)
+    mark_event_ends(draft, group)
+    fixed = ~inner[valves["from_node"]] & ~inner[valves["to_node"]]
+    integers = draft.integers
+    clusters = []
+    members = {root: [i for i in range(len(nodes)) if group[i] == root and inner[i]] for root in touched}
+    nodes["solve"], symmetric = rec.ALONE, has_closed_root(valves)
+    for root, ks in touched.items():
+        regular = np.all(nodes["admittance"][members[root]] > 0.0)
+        plain = np.all(symmetric[ks])
+        single = len(ks) == 1 and regular and plain and draft.case.law.linear and root not in couples
+        nodes["solve"][members[root]] = rec.SINGLE if single else rec.CLUSTER
+        valves["solve"][ks] = rec.SINGLE if single else rec.CLUSTER
+        if not np.any(nodes["admittance"][members[root]] > 0.0) and not follows_column(draft, members[root], ks):
+            regularise(draft, ks)
+        if single:
+            continue
+        nodes["row"][members[root]] = np.arange(len(members[root]))
+        n, own = len(members[root]), couples.get(root, [])
+        at = len(integers)
+        inverse = add_inverse(draft, members[root], own) if not ks else -1
+        clusters.append((at, n, at + n, len(ks), at + n + len(ks), len(own), inverse))
+        integers += members[root] + ks + own
+    for k in np.flatnonzero(fixed & ~symmetric):  # clusters without nodes
+        valves["solve"][k] = rec.CLUSTER
+        clusters.append((len(integers), 0, len(integers), 1, 0, 0, -1))
+        integers.append(int(k))
+    if not draft.case.law.linear:
+        for i in np.flatnonzero(inner & (nodes["solve"] == rec.ALONE) & (nodes["admittance"] > 0.0)):
+            nodes["row"][i] = 0
+            clusters.append((len(integers), 1, len(integers) + 1, 0, 0, 0, -1))
+            integers.append(int(i))
+    store_gates(draft)
+    refuse_isolated_groups(draft, members)
+    for k in np.flatnonzero(fixed):
+        regularise(draft, [k])
+    draft.cluster_table = np.array(clusters, dtype=rec.CLUSTER_RECORD)
+    for i in np.flatnonzero(inner & (nodes["admittance"] == 0.0)):
+        if nodes["solve"][i] == rec.ALONE:
+            name = list(draft.case.places)[i]
+            draft.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
+                       "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+
+
+def mark_event_ends(draft, group) -> None:
+    """Mark ends of delay lines at junctions whose group contains a device with events."""
+    inner, valves, acting = draft.node_table["kind"] == rec.JUNCTION, draft.valve_table, set()
+    for v in valves:
+        if v["hooks"] >= 0 or (v["device"] >= 0 and draft.devices[v["device"]][2].events):
+            acting |= {int(v["from_node"]), int(v["to_node"])}
+    acting |= {int(row["node"]) for row, (_, _, device) in zip(draft.device_table, draft.devices, strict=True)
+               if device.events}  # fmt: skip
+    roots = {group[i] for i in acting if i >= 0 and inner[i]}
+    for row in draft.delay_table:
+        pipe = draft.pipe_table[row["pipe"]]
+        ends = [int(pipe[end]) for end in ("from_node", "to_node")]
+        row["acts"] = sum(side for side, i in zip((1, 2), ends, strict=True) if inner[i] and group[i] in roots)
+
+
+def add_inverse(draft, members, couples) -> int:
+    """Append the inverse of the admittance matrix of nodes joined by short delay lines to `floats`.
+
+    Returns its offset. The matrix lies row by row.
+    """
+    rows, place = {i: k for k, i in enumerate(members)}, len(draft.floats)
+    matrix = np.diag(draft.node_table["admittance"][members])
+    for k in couples:
+        line = draft.delay_table[k]
+        pipe = draft.pipe_table[line["pipe"]]
+        ends = [rows[i] for i in (int(pipe["from_node"]), int(pipe["to_node"])) if i in rows]
+        for i in ends:
+            matrix[i, i] += line["couple"]
+        if len(ends) == 2:
+            matrix[ends[0], ends[1]] -= line["couple"]
+            matrix[ends[1], ends[0]] -= line["couple"]
+    draft.floats += np.linalg.inv(matrix).ravel().tolist()
+    return place
+
+
+def has_closed_root(valves) -> np.ndarray:
+    """True for valves solved by a closed root that is the same in both directions : bool[valves]."""
+    return (valves["hooks"] < 0) & (valves["back"] == 1.0)
+
+
+def store_gates(draft) -> None:
+    """For nodes that only valves and rigid columns join, store these valves and the number of columns."""
+    nodes, valves, columns = draft.node_table, draft.valve_table, draft.column_table
+    nodes["gates"] = -1
+    bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
+    for i in np.flatnonzero(bare):
+        joined = [k for k, v in enumerate(valves) if i in (v["from_node"], v["to_node"])]
+        if any(is_sensed(draft, int(valves["device"][k])) for k in joined):
+            continue
+        column_count = sum(i in (c["from_node"], c["to_node"]) for c in columns)
+        if column_count > 0 and joined and has_no_demand(draft, i):
+            nodes["gates"][i], nodes["gate_count"][i], nodes["columns"][i] = (
+                len(draft.integers),
+                len(joined),
+                column_count,
+            )
+            draft.integers += joined
+
+
+def refuse_isolated_groups(draft, members) -> None:
+    """Faults of groups of nodes that only valves join, apart from air valves and rigid columns."""
+    nodes, valves, names = draft.node_table, draft.valve_table, list(draft.case.places)
+    for group in members.values():
+        links = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
+        air = [v for v in links if v["device"] >= 0 and draft.devices[v["device"]][2].vessel]
+        to_fixed = [v for v in links if not {int(v["from_node"]), int(v["to_node"])} <= set(group)]
+        if len(group) < 2 or len(to_fixed) > len(air) or np.any(nodes["admittance"][group] > 0.0):
+            continue
+        first = int(air[0]["from_node"]) if air else group[0]
+        place, other = (names[i] for i in sorted(group, key=lambda i: i != first)[:2])
+        reason, span = "a valve joins this air valve", " while it is shut"
+        if not air:
+            joins = [name for name, v in zip(draft.valve_names, valves, strict=True) if int(v["from_node"]) in group]
+            reason, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} it", ""
+        draft.fault(f"nodes.{place}", f"{reason} to {other}, and only rigid columns join beyond, so nothing sets their "
+                    f"pressure{span}; give {other} a chamber volume, or make one of the columns a pipe")  # fmt: skip
+
+
+def is_sensed(draft, device: int) -> bool:
+    """True if a device that is not a vessel reads the pressure of a node."""
+    return device >= 0 and draft.device_table["node"][device] >= 0 and not draft.devices[device][2].vessel
+
+
+def has_no_demand(draft, i: int) -> bool:
+    node = list(draft.case.places.values())[i]
+    schedule = node.demand if node.kind == "junction" else node.flow
+    return not np.any(schedule.value)
+
+
+def follows_column(draft, members, ks) -> bool:
+    """True if a single valve takes the flow of a rigid column: its drop follows the flow, smooth at zero."""
+    ends = np.concatenate((draft.column_table["from_node"], draft.column_table["to_node"]))
+    plain = has_closed_root(draft.valve_table)[ks[0]]
+    return len(ks) == 1 and len(members) == 1 and members[0] in ends and bool(plain)
+
+
+TOLERANCES = 10.0  # tolerances of a vessel: its tolerance grows with its deviation, here up to nine times its scale
+
+
+def regularise(draft, ks) -> None:
+    """Bound the slope at zero drop where no pipe end does: laminar flow below Reynolds number 10.
+
+    At a bladder accumulator the bound is at least a drop of 1 Pa, as its neck stores hardly any mass. It is also at
+    least the drop below error control (`tolerated_drop`).
+    """
+    places, unseen = list(draft.case.places.values()), tolerated_drop(draft, ks)
+    for k in ks:
+        row = draft.valve_table[k]
+        if row["transition"] == 0.0 and row["hooks"] < 0:
+            link = draft.case.conduits[draft.valve_names[k]]
+            neck = any(getattr(places[row[end]], "precharge", None) is not None for end in ("from_node", "to_node"))
+            set_transition(draft, draft.valve_names[k], link, row)
+            row["rounding_drop"] = max(1.0 if neck else 0.0, unseen)
+
+
+def set_transition(draft, name: str, link, row) -> None:
+    """Make a restriction laminar below Reynolds number 10."""
+    row["transition"] = draft.hydraulics.transition_flow(name, link, 10.0, draft.fault)
+
+
+def tolerated_drop(draft, ks) -> float:
+    """Drop [Pa] whose decay changes each vessel by a few tolerances of a step at most.
+
+    It is 0 without error control. Below it the slope of a root is unbounded. Linearly implicit steps then alternate in
+    sign: each error is below the tolerance, but none comes nearer to rest. A chamber of 10 l took 1e6 steps in 10 s.
+    """
+    rtol, nodes = draft.case.numerics.rtol, draft.node_table
+    ends = {int(draft.valve_table[k][end]) for k in ks for end in ("from_node", "to_node")}
+    vessels = [nodes[i] for i in ends if nodes[i]["y"] >= 0 and nodes[i]["stiffness"] > 0.0]
+    if rtol is None or not vessels:
+        return 0.0
+    stiffness = sum(float(row["stiffness"]) for row in vessels)
+    least = min(draft.scale[row["y"]] for row in vessels)
+    return TOLERANCES * rtol * math.sqrt(len(draft.scale)) * least * stiffness

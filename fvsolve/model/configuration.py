@@ -1,0 +1,217 @@
+"""Forces of bodies and masses in configurations other than that of the start.
+
+Pressures and rates are those of the start. Lines, springs, stops and bushings act as in the configuration; water in
+basins on bodies is level there. Pins, and pistons with closed chambers that support a load, are constraints with given
+forces. Unknowns are freedoms of joints as in the velocities, then positions of masses.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.basins.lower import at_start
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model.mass_tables import pushed_masses
+from fvsolve.model.static_forces import GAPS, HOLD, LINES, MOTION, StaticForces
+
+DIFFERENCE_STEP = 1e-6  # step of finite differences [rad], [m]
+CHAMBERS, PUSHES = "kernels.mass_dynamics: piston_chambers", "kernels.mass_dynamics: mass_rates"
+
+
+class Configuration(StaticForces):
+    """Forces on freedoms and masses in any configuration; y : states, deviations from the start."""
+
+    def __init__(self, draft) -> None:
+        super().__init__(draft, draft.case.numerics.start)
+        self.bodies, self.masses = draft.body_table, draft.mass_table
+        self.freedoms = len(draft.freedom_table)
+        self.free = np.flatnonzero(self.masses["y"] >= 0)
+        self.size = self.freedoms + len(self.free)
+        draft.freedom_table["balance"] = 0.0
+        self.written.armed[:] = 1.0  # with flags set, a stop without contact exerts no force
+        self.locked, self.pins = list(draft.locked), int(draft.pin_table["rows"].sum())
+        self.starting_forces = [draft.piston_table[k]["force"].item() for k in self.locked]
+        self.first = len(draft.brace_table) + len(draft.stop_table)
+        self.count = self.pins + len(self.locked)
+        self.hold(np.zeros(self.count))
+
+    def hold(self, sizes: np.ndarray) -> None:
+        """Set the forces of pins, then those of supporting pistons."""
+        at = 0
+        for row in self.draft.pin_table:
+            row["force"][: row["rows"]] = sizes[at : at + row["rows"]]
+            at += int(row["rows"])
+        for k, own, size in zip(self.locked, self.starting_forces, sizes[at:], strict=True):
+            self.draft.piston_table[k]["force"] = own + size
+
+    def move_to(self, y: np.ndarray) -> None:
+        """Move bodies, lines and water to a configuration, water level again, pressures unchanged."""
+        self.y[:] = y
+        self.run(*(MOTION,) * (self.freedoms > 0), *(CHAMBERS,) * (len(self.masses) > 0))
+        first = int(self.layout["pressure"])
+        for row in self.draft.piston_table:
+            self.out[[first + row["a"], first + row["b"]]] = 0.0
+        if (self.draft.basin_table["frame"] >= 0).any():
+            level = at_start(self.draft.basins, self.draft.size, self.attitudes())
+            for basin in self.draft.basins:
+                basin.own(self.y)[:] = basin.own(level)
+
+    def force(self, y: np.ndarray) -> np.ndarray:
+        """Forces of freedoms, then of masses."""
+        self.move_to(y)
+        if len(self.masses):
+            self.run(PUSHES)
+        own = np.zeros(0)
+        if self.freedoms:
+            self.run(*self.pushes[1:], *(HOLD,) * (len(self.draft.pin_table) > 0))
+            own = self.forces()
+        net = self.out[int(self.layout["net_force"]) :][: len(self.masses)]
+        return np.concatenate([own, net[self.free]])
+
+    def scale(self) -> np.ndarray:
+        """Sum of force magnitudes on each freedom and mass, in the present configuration."""
+        sizes, first = np.zeros(self.size), int(self.layout["push"])
+        pushes = self.out[first : first + len(self.draft.push_names)].copy()
+        if self.freedoms:
+            sizes[: self.freedoms] = self.sizes(pushes)
+        net = sizes[self.freedoms :]
+        for push, ends in zip(pushes, pushed_masses(self.draft), strict=True):
+            net += abs(push) * np.isin(self.free, ends)
+        for row in self.draft.piston_table:
+            parts = [self.draft.node_table[row[side]]["pressure"] * row[f"area_{side}"] for side in "ab"]
+            net += sum(parts) * np.isin(self.free, (row["case"], row["rod"]))
+        for row in self.draft.wall_table:
+            net += abs(row["rest"]) * (self.free == row["mass"])
+        return sizes
+
+    def rows(self, y: np.ndarray) -> np.ndarray:
+        """Effect of each constraint force of size 1 on freedoms and masses : float64[constraints, size]."""
+        effects = np.zeros((self.count, self.size))
+        if not self.count:
+            return effects
+        self.move_to(y)
+        base = self.by(np.zeros_like(self.loads()))
+        for i in range(self.pins):
+            self.hold(np.eye(self.count)[i])
+            self.loads()[:] = 0.0
+            self.run(HOLD)
+            effects[i, : self.freedoms] = self.forces() - base
+        self.hold(np.zeros(self.count))
+        for i, k in enumerate(self.locked):
+            effects[self.pins + i] = self.lever(k)
+        return effects
+
+    def lever(self, k: int) -> np.ndarray:
+        """Effect of a unit push of piston k on freedoms and masses, in the present configuration."""
+        effects, piston = np.zeros(self.size), self.draft.piston_table[k]
+        if piston["line"] < 0:
+            for mass, sign in ((piston["case"], -1.0), (piston["rod"], 1.0)):
+                effects[self.freedoms :] += sign * (self.free == mass)
+            return effects
+        base, first = self.by(np.zeros_like(self.loads())), int(self.layout["push"])
+        self.loads()[:] = 0.0
+        self.out[first : first + len(self.draft.push_names)] = 0.0
+        self.out[first + self.first + k] = 1.0
+        self.run(LINES)
+        effects[: self.freedoms] = self.forces() - base
+        return effects
+
+    def fluid_stiffness(self, y: np.ndarray) -> np.ndarray:
+        """Stiffness of fluid trapped behind pistons, A^2 K / V of each chamber, in -dF/dq : float64[size, size]."""
+        matrix, nodes, first = np.zeros((self.size, self.size)), self.draft.node_table, int(self.layout["stiffness"])
+        self.move_to(np.zeros_like(y))
+        per_mass = self.out[first : first + self.draft.moving].copy()  # with chambers at their starting mass
+        for k, sides in self.draft.shut.items():
+            row = self.draft.piston_table[k]
+            self.move_to(y)
+            travel = self.out[int(self.layout["travel"]) + 2 * (self.first + k)]
+            lever, stiffness = self.lever(k), 0.0
+            for side, sign in (("a", 1.0), ("b", -1.0)):
+                node, area = nodes[row[side]], row[f"area_{side}"]
+                bulk = per_mass[node["row"]] * node["mass"]
+                stiffness += area**2 * bulk / (node["volume"] + sign * area * travel) if side in sides else 0.0
+            matrix += stiffness * np.outer(lever, lever)
+        return matrix
+
+    def gaps(self, y: np.ndarray) -> np.ndarray:
+        """Gaps of constraints [m]."""
+        self.move_to(y)
+        pin_gaps, travel = [], int(self.layout["travel"])
+        if len(self.draft.pin_table):
+            self.run(GAPS)
+            at = int(self.layout["pin"])
+            pin_gaps = [
+                self.out[at + 3 * k + r] for k, row in enumerate(self.draft.pin_table) for r in range(row["rows"])
+            ]
+        return np.array([*pin_gaps, *(self.out[travel + 2 * (self.first + k)] for k in self.locked)])
+
+    def mass(self, y: np.ndarray) -> np.ndarray:
+        """Mass matrix M : float64[size, size] [kg], [kg m2]."""
+        matrix, n = np.zeros((self.size, self.size)), self.freedoms
+        if n:
+            self.force(y)
+        for j, row in enumerate(self.draft.freedom_table):
+            path = self.draft.tables.integers[row["path"] : row["path"] + row["depth"] + 1]
+            matrix[j, path] = matrix[path, j] = self.written.scratch[8 * n + row["row"] :][: row["depth"] + 1]
+        matrix[range(n, self.size), range(n, self.size)] = 1.0 / self.masses["lightness"][self.free]
+        return matrix
+
+    def stiffness(self, y: np.ndarray) -> np.ndarray:
+        """-dF/dq by differences, with constant constraint forces : float64[size, size]."""
+        matrix = np.zeros((self.size, self.size))
+        for i in range(self.size):
+            step = DIFFERENCE_STEP * np.eye(self.size)[i]
+            matrix[:, i] = (self.force(self.after_step(y, -step)) - self.force(self.after_step(y, step))) / (
+                2.0 * DIFFERENCE_STEP
+            )
+        return matrix
+
+    def moving(self) -> bool:
+        """True if a velocity is stated."""
+        poses = self.draft.case.poses.values()
+        bodies_move = any(np.any(pose.spin) or np.any(pose.velocity) for pose in poses)
+        return bodies_move or bool(np.any(self.masses["velocity"]))
+
+    def after_step(self, y: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """States after a step of freedoms and masses; Euler parameters turn about axes of their body."""
+        new = y.copy()
+        for row in self.bodies:
+            own, at = step[row["freedom"] : row["freedom"] + row["freedoms"]], int(row["y"])
+            if row["joint"] in (rec.BALL, rec.FREE):
+                slides = 3 if row["joint"] == rec.FREE else 0
+                new[at : at + slides] += own[:slides]
+                at += slides
+                start = row["start"][slides : slides + 4]
+                new[at : at + 4] = rotated(start + y[at : at + 4], own[slides:]) - start
+            elif len(own):
+                new[at] += own[0]
+        new[self.masses["y"][self.free]] += step[self.freedoms :]
+        return new
+
+    def angular(self) -> np.ndarray:
+        """True for unknowns that are angles : bool[size]."""
+        angular = np.zeros(self.size, bool)
+        for row in self.bodies:
+            slides = {rec.FREE: 3, rec.PRISMATIC: 1}.get(int(row["joint"]), 0)
+            angular[row["freedom"] + slides : row["freedom"] + row["freedoms"]] = True
+        return angular
+
+    def shortest(self) -> float:
+        """Length of the shortest line between two points at the start [m]."""
+        lengths = self.draft.line_table["length"][self.draft.line_table["acts"] == rec.ALONG]
+        return float(min(lengths, default=np.inf))
+
+    def attitudes(self) -> dict[str, np.ndarray]:
+        """Rotation matrix of every body in the present configuration, by name."""
+        from fvsolve.kernels.mechanism.body_layout import ATTITUDE
+
+        return {name: self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3).copy()
+                for i, name in enumerate(self.draft.body_names)}  # fmt: skip
+
+
+def rotated(e: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Euler parameters after a rotation by a vector [rad] in axes of the body, (44) applied after e."""
+    angle = float(np.linalg.norm(rotation))
+    half = 0.5 * angle
+    eta, eps = np.cos(half), (np.sin(half) / angle if angle > 0.0 else 0.5) * rotation
+    return np.concatenate([[e[0] * eta - e[1:] @ eps], e[0] * eps + eta * e[1:] + np.cross(e[1:], eps)])

@@ -1,0 +1,275 @@
+"""Selection of pipes that become delay lines, their division into stretches, and bounds of the error.
+
+Bounds are relative to the greatest jump of a schedule. Friction concentrated in the middle of stretches: a quarter of
+the attenuation of a wave in a stretch. Interpolation of changes that schedules smooth over a time T: derivatives of
+half a cosine. A line shorter than the longest step h: curvature of the wave over its delay, tau (h - tau) / 2.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.delay_lines.line_rates import drag_and_slope
+from fvsolve.kernels.schedule_pieces import POWER, WAVE
+from fvsolve.model.cluster_tables import classify_nodes
+from fvsolve.model.delay_history import history_size, set_rings
+from fvsolve.steppers import automatic
+from fvsolve.steppers.built_in_methods import AUTO
+from fvsolve.steppers.tableau import method_named
+
+FRICTION_PRESSURE = 0.02 * 1e5  # pressure [Pa] whose flow is added to that of the start to evaluate friction
+UNBALANCED_SHARE = 1e-9  # relative to the wave of 1 bar: pressure drop that friction does not balance
+KINK_OVERSHOOT = 0.1  # relative to the change in a step: overshoot of six entries after a kink
+MAX_ATTENUATION = 0.5  # greatest attenuation of a wave by friction in a line shorter than a step
+
+
+@dataclass(frozen=True)
+class LineMethod:
+    """Method for a pipe, "finite-volume" or "delay-line", the reason, and the steps it implies.
+
+    rate : of lines that limit steps [1/s]; longest : step for which lines are divided [s]
+    """
+
+    pipe_model: str
+    reason: str
+    rate: float = 0.0
+    longest: float = math.inf
+
+
+def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
+    """Pipe -> method; unfit : pipes whose error `auto` has estimated to exceed `numerics.delay_tolerance`."""
+    pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
+    methods, lines = {}, []
+    for name, link in pipes.items():
+        line = link.pipe_model or case.numerics.pipe_model
+        need = "" if line == "finite-volume" else reason_for_cells(case, name, link)
+        if line == "finite-volume" or need:
+            methods[name] = LineMethod("finite-volume", need or f'pipe_model = "{line}"')
+        elif name in unfit:
+            methods[name] = LineMethod("finite-volume", "its bound as a delay line is above numerics.delay_tolerance")
+        else:
+            lines.append(name)
+    if not lines:
+        return {name: methods[name] for name in pipes}
+    travel = {name: link.length / case.wave_speed(name) for name, link in pipes.items()}
+    slowest = max(lines, key=travel.get)
+    rate = pipes[slowest].cells / travel[slowest]
+    cells = max((pipes[name].cells / travel[name] for name in methods), default=0.0)
+    numerics = case.numerics
+    longest = 1.0 / rate  # under error control, see `solve.run_loop.longest_step`
+    if numerics.step is not None or numerics.courant is not None:
+        longest = numerics.step or numerics.courant / max(rate, cells)
+    steppers = (automatic.EXPLICIT, automatic.IMPLICIT) if numerics.method == AUTO else (numerics.method,)
+    # no value is read that is not yet known
+    longest *= max(1.0, *(time for method in steppers for time in method_named(method).times))
+    for name in lines:
+        reason = "waves travel along it unchanged except for friction"
+        if travel[name] < longest:
+            reason += f", and faster than a step of {case.step_amount(longest, 4)}"
+        methods[name] = LineMethod("delay-line", reason, rate, longest)
+    return {name: methods[name] for name in pipes}
+
+
+def reason_for_cells(case, name: str, link) -> str:
+    """Reason why a pipe needs cells; "" for none."""
+    if not case.law.linear:
+        return f'law = "{case.law.name}" changes waves as they travel'
+    if case.scalars:
+        return "scalars are carried in cells"
+    if link.friction.model == "unsteady":
+        return "unsteady friction depends on the flow history of every cell"
+    if link.yielding:
+        return "its wall creeps in every cell"
+    if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
+        return "the acceleration of its body acts on its cells"
+    if any(
+        probe.quantity == "force" and (probe.part, probe.name) == ("links", name)
+        for probe in (*case.probes, *case.watched)
+    ):
+        return "its force is requested, which is computed from cells"
+    return ""
+
+
+def lower_delays(draft) -> None:
+    """Fill rows of delay lines; faults of pipes that cannot be delay lines."""
+    case, rows = draft.case, []
+    for k, name in enumerate(draft.pipe_names):
+        link, chosen = case.links[name], draft.followed[name]
+        stated = link.pipe_model or case.numerics.pipe_model
+        if stated == "delay-line" and chosen.pipe_model == "finite-volume":
+            key = f"links.{name}.pipe_model" if link.pipe_model else "numerics.pipe_model"
+            draft.fault(
+                key,
+                f'"delay-line" is not possible for links.{name}: {chosen.reason}; expected "finite-volume" or "auto"',
+            )
+        if chosen.pipe_model == "finite-volume":
+            continue
+        row = np.zeros((), rec.DELAY)
+        pipe = draft.pipe_table[k]
+        pipe["delay"], row["pipe"], row["places"] = len(rows), k, link.cells
+        row["tau"] = row["hold"] = link.length / pipe["speed"]
+        row["stretch"], row["stretches"] = len(rows), 1
+        if row["tau"] < chosen.longest * (1.0 - 1e-9):
+            row["hold"], beta = chosen.longest, 1.0 - row["tau"] / chosen.longest
+            row["now"], row["couple"] = beta, 2.0 * beta * pipe["admittance"] / (1.0 - beta * beta)
+        rows.append(row)
+    draft.delay_table = np.array(rows, rec.DELAY)
+    set_rings(draft.delay_table, longest_step(draft))
+    ends: list[list[int]] = [[] for _ in draft.node_table] if rows else []
+    for d, row in enumerate(rows):
+        for side, end in enumerate(("from_node", "to_node")):
+            ends[draft.pipe_table[row["pipe"]][end]].append(2 * d + side)
+    for i, lines in enumerate(ends):
+        draft.node_table["lines"][i], draft.node_table["line_count"][i] = len(draft.integers), len(lines)
+        draft.integers += lines
+
+
+def jump_tables(draft) -> dict[str, np.ndarray]:
+    """Tables that replace the model's while a jump is solved: lines shorter than a step as ordinary lines.
+
+    Empty without such lines.
+    """
+    short = draft.delay_table["now"] > 0.0
+    if not short.any():
+        return {}
+    own, tables = copy.copy(draft), draft.tables
+    own.node_table, own.valve_table, own.delay_table = (
+        table.copy() for table in (draft.node_table, draft.valve_table, draft.delay_table)
+    )
+    own.integers, own.floats, own.faults = tables.integers.tolist(), tables.floats.tolist(), []
+    for pipe in draft.pipe_table[draft.delay_table["pipe"][short]]:
+        for end in ("from_node", "to_node"):
+            own.node_table["admittance"][pipe[end]] += pipe["admittance"] * (1.0 - end_admittance_ratio(draft, pipe))
+    own.delay_table["now"] = own.delay_table["couple"] = 0.0
+    classify_nodes(own)
+    return {
+        "nodes": own.node_table, "valves": own.valve_table, "delays": own.delay_table, "clusters": own.cluster_table,
+        "integers": np.array(own.integers), "floats": np.array(own.floats),
+    }  # fmt: skip
+
+
+def end_admittance_ratio(draft, pipe) -> float:
+    """Admittance of a pipe's ends relative to that of its waves; less for a line shorter than a step.
+
+    The ends of such a line are coupled within the step.
+    """
+    beta = draft.delay_table["now"][pipe["delay"]] if pipe["delay"] >= 0 else 0.0
+    return float((1.0 - beta) / (1.0 + beta))
+
+
+def divide_lines(draft) -> list[str]:
+    """Divide all lines into stretches by friction at the start.
+
+    Returns names of lines whose bound exceeds the accuracy under `auto`.
+    """
+    case, at, unfit = draft.case, 0, []
+    facts = draft.steady["lines"] = {}
+    for name, chosen in draft.followed.items():
+        facts[name] = {"line": chosen.pipe_model, "line_bound": None, "line_why": chosen.reason}
+    scale, ramp = time_scales(draft) if len(draft.delay_table) else (0.0, 0.0)
+    for row in draft.delay_table:
+        name = draft.pipe_names[row["pipe"]]
+        pipe, chosen = draft.pipe_table[row["pipe"]], draft.followed[name]
+        travel = float(row["tau"] * row["stretches"])
+        flow = abs(float(pipe["flow"])) + float(pipe["admittance"]) * FRICTION_PRESSURE
+        attenuation = travel * float(drag_and_slope(pipe, flow)[1])
+        limit = max(1, math.floor(travel / chosen.longest * (1.0 + 1e-9)))
+        count = min(limit, max(1, math.ceil(0.5 * attenuation / case.numerics.delay_tolerance)))
+        if row["now"] > 0.0:
+            count = 1
+        row["stretches"], row["stretch"], row["tau"] = count, at, travel / count
+        row["transmission"] = 1.0 / (1.0 + 0.5 * row["tau"] * drag_and_slope(pipe, float(pipe["flow"]))[1])
+        row["hold"] = row["hold"] if row["now"] > 0.0 else row["tau"]
+        at += count
+        smoothed = interpolation_bound(float(row["tau"]), chosen.longest, scale, ramp)
+        bound = 0.25 * attenuation / count + smoothed
+        facts[name]["line_bound"] = bound
+        force = float(drag_and_slope(pipe, float(pipe["flow"]))[0])
+        if abs(float(pipe["drag"]) - force) > UNBALANCED_SHARE * float(pipe["admittance"]) * 1e5 / travel:
+            bound = math.inf
+            unfit.append(name)
+            if (case.links[name].pipe_model or case.numerics.pipe_model) == "delay-line":
+                draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: at the start friction does not '
+                            'balance the drop of pressure along it; expected "finite-volume"')  # fmt: skip
+            continue
+        if row["now"] > 0.0 and attenuation > MAX_ATTENUATION:
+            bound = math.inf
+            facts[name]["line_why"] += ", where friction attenuates a wave too much"
+        stated = case.links[name].pipe_model or case.numerics.pipe_model
+        if stated == "auto" and bound > case.numerics.delay_tolerance:
+            unfit.append(name)
+        elif smoothed > case.numerics.delay_tolerance and bound < math.inf:
+            draft.warnings.append(fast_schedule_notice(case, name, chosen.longest, min(scale, ramp or scale), smoothed))
+        elif bound == math.inf:
+            longest = draft.case.step_amount(chosen.longest, 4)
+            draft.fault(f"links.{name}.pipe_model", '"delay-line" is not possible: friction attenuates a wave by a '
+                        f"fraction of {attenuation:.3g} in a line shorter than a step of {longest}; expected shorter "
+                        'steps, or "finite-volume"')  # fmt: skip
+    shape_history(draft)
+    return unfit
+
+
+def fast_schedule_notice(case, name: str, step: float, scale: float, bound: float) -> Notice:
+    """Notice of a schedule that changes too fast for the steps of a delay line."""
+    text = (
+        f"{name}: a schedule changes something within {case.step_amount(scale, 3)}, and steps of "
+        f"{case.step_amount(step, 3)} may cause an error of its waves of {bound:.2g} of the change; "
+        f'expected shorter steps, or pipe_model = "finite-volume"'
+    )
+    return Notice("lines", f"links.{name}", text, "pipe_model", bound, case.numerics.delay_tolerance)
+
+
+def interpolation_bound(tau: float, step: float, scale: float, ramp: float) -> float:
+    """Bound of the error of interpolation between steps, relative to the change of a schedule.
+
+    scale : duration of half a cosine [s], 0 for none; ramp : duration of a straight ramp [s], at whose kinks a
+    polynomial through six entries overshoots by up to a tenth of the change in a step
+    """
+    kinks = KINK_OVERSHOOT * step / ramp if ramp > 0.0 else 0.0
+    bend = math.pi * step / scale if scale > 0.0 else 0.0
+    if tau < step:
+        kinks = tau * (step - tau) / (step * ramp) if ramp > 0.0 else 0.0
+        return max(kinks, 0.25 * (math.pi / scale) ** 2 * tau * (step - tau) if scale > 0.0 else 0.0)
+    if abs(tau / step - round(tau / step)) < 1e-9:
+        return 0.0
+    if tau >= 3.0 * step:
+        return max(kinks, 0.5 * 0.0049 * bend**6)
+    return max(kinks, 0.5 * (0.0234 * bend**4 if tau >= 2.0 * step else 0.0642 * bend**3))
+
+
+def time_scales(draft) -> tuple[float, float]:
+    """Shortest times of a change by a schedule : (of any shape, of a straight ramp) [s].
+
+    0 if there is none except jumps, which are followed exactly.
+    """
+    shortest, ramp, schedules = math.inf, math.inf, draft.schedules
+    for first, count in schedules.records:
+        rows = schedules.rows[first : first + count]
+        for k, row in enumerate(rows):
+            if row[1] == WAVE:
+                shortest = min(shortest, math.pi / row[5]) if row[4] != 0.0 else shortest
+            elif 0 < k < count - 1 and (row[1] != 0 or any(row[4:7])):
+                shortest = min(shortest, rows[k + 1][0] - row[0])
+                if row[1] == POWER or not any(row[5:7]):
+                    ramp = min(ramp, rows[k + 1][0] - row[0])
+    return tuple(duration if math.isfinite(duration) else 0.0 for duration in (shortest, ramp))
+
+
+def shape_history(draft) -> None:
+    """Set rings of all lines, and the size of their history in a run."""
+    set_rings(draft.delay_table, longest_step(draft))
+    draft.shapes = draft.shapes._replace(past=history_size(draft.delay_table))
+
+
+def longest_step(draft) -> float:
+    """Step for which lines are divided [s]."""
+    return min(
+        (method.longest for method in draft.followed.values() if method.pipe_model == "delay-line"), default=math.inf
+    )

@@ -1,0 +1,159 @@
+"""Device table: parts with a compiled law of their own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fvsolve.errors import Notice
+from fvsolve.kernels import calls
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.valves import flow_at_drop, transition_of
+from fvsolve.model.lowering import Lowering, Restriction, lowering_of
+
+
+class Device(Restriction):
+    """Lowering of a kind of device: its states, and its state in the steady start.
+
+    mode : code of the kind in its law; quantities : probes, in the order of codes in its `value`
+    sudden : True if only events open it; leads : index of its event that lets it control a rigid column, -1 for none
+    states : names of its states; remedy : advice for events that alternate
+    """
+
+    is_device, rank = True, 2
+    mode: ClassVar[int] = 0
+    events_only: ClassVar[bool] = False
+    controlling_event: ClassVar[int] = -1
+    states: ClassVar[tuple[str, ...]] = ()
+    quantities: ClassVar[tuple[str, ...]] = ()
+    remedy: ClassVar[str] = "give it a time_constant"
+    vessel: ClassVar[bool] = False  # True for a node whose pressure it computes
+
+    def place(self, draft, name: str, node: Any, row) -> None:
+        """Fill the NODE row of a vessel."""
+        row["kind"], row["row"] = rec.VESSEL, draft.stiff()
+
+    def pressure_at_start(self, start, i: int, node: Any, row) -> float | None:
+        """Pressure [Pa] of a vessel at the start."""
+        return node.initial_pressure
+
+    def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
+        """Text of the pressure change at the start."""
+        return f"{node.kind} {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"
+
+    def gate(self, name: str) -> str | None:
+        """Link that a vessel opens and closes in addition."""
+        return None
+
+    def row_of(self, model, name: str):
+        """DEVICE row of a part."""
+        return model.tables.devices[[device_name for device_name, _, _ in model.devices].index(name)]
+
+    def probe(self, draft, name: str, probe: Any, row) -> None:
+        """Fill the PROBE row of a quantity of the part."""
+        if probe.quantity in self.quantities:
+            row["index"] = draft.device_names.index(draft.inside(name))
+            row["kind"], row["side"] = rec.DEVICE_VALUE, self.quantities.index(probe.quantity)
+        elif self.vessel:
+            Lowering.probe(self, draft, name, probe, row)
+        else:
+            super().probe(draft, name, probe, row)
+
+    def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
+        """Names of the states of a part."""
+        return self.states
+
+    def scales(self, draft, name: str, part: Any) -> list[float]:
+        """Size of a small deviation of each of its states."""
+        return []
+
+    def revise_state(self, start, part: Any, row) -> bool:
+        """Set the state that a steady solution implies; True if it changed."""
+        return False
+
+    def begin(self, start, part: Any, row) -> list[str]:
+        """Fill in data that depend on the profile; return texts of motions at the start."""
+        return []
+
+    def passing_notice(self, model, name: str, part: Any, time: float) -> Notice:
+        """Notice for the result PASSING of its law's `outside`, first at that time."""
+        raise NotImplementedError
+
+    def apply_event(self, run_data, row, t: float, y: np.ndarray, scale: np.ndarray) -> None:
+        """Apply sudden changes of an event of the device to y, and new sizes of small deviations to `scale`."""
+
+    def dissipates(self, part: Any) -> bool:
+        """True if its restriction dissipates drop times flow; else that is energy supplied."""
+        return True
+
+    def energy_rows(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
+        """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it : state -> factor.
+
+        For a vessel, m^2 dp/dm / (2 rho) of its mass; none for other devices.
+        """
+        if not self.vessel:
+            return []
+        node = model.tables.nodes[row["node"]]
+        stiffness = float(out[model.layout["stiffness"] + node["row"]])
+        return [{int(node["y"]): float(np.sqrt(stiffness / (2.0 * model.case.properties.density)))}]
+
+    def above(self, model, part: Any, row) -> float:
+        """Energy of the device at the start above its least energy [J]."""
+        return 0.0
+
+
+def lower_devices(draft) -> None:
+    """Fill the table of devices of a draft, with their states, numbers and event functions."""
+    parts = [*draft.case.places.items(), *draft.case.conduits.items()]
+    lowered = [(name, part, lowering_of(type(part)).of(part)) for name, part in parts]
+    draft.devices = [(name, part, device) for name, part, device in lowered if device.is_device]
+    table = draft.device_table = np.zeros(len(draft.devices), rec.DEVICE)
+    table["valve"] = table["node"] = table["schedule"] = table["y"] = table["row"] = -1
+    for k, ((name, part, device), row) in enumerate(zip(draft.devices, table, strict=True)):
+        states = device.states_of(draft, name, part)
+        row["hooks"], row["mode"], row["states"] = draft.hooks(device), device.mode, len(states)
+        row["data"], row["opens_by_event"], row["event"] = (
+            len(draft.floats),
+            device.events_only,
+            draft.flags(name, device.events),
+        )
+        row["controls_column"] = row["event"] + device.controlling_event if device.controlling_event >= 0 else -1
+        if name in draft.valve_names:
+            row["valve"] = draft.valve_names.index(name)
+            link_device(draft.valve_table[row["valve"]], device, k, row)
+        elif name in draft.node_index:
+            row["node"] = draft.node_index[name]
+            row["row"] = draft.node_table[row["node"]]["row"]
+        if (gate := device.gate(name)) is not None:
+            row["valve"] = draft.valve_names.index(gate)
+            draft.valve_table["device"][row["valve"]] = k
+        draft.floats += device.numbers(draft, name, part)
+        for state, scale in zip(states, device.scales(draft, name, part), strict=True):
+            at = draft.states([f"{name}.{state}"], scale)
+            row["y"] = at if row["y"] < 0 else row["y"]
+
+
+def link_device(valve, device: Device, k: int, row) -> None:
+    """Write the device into its VALVE row: it opens the valve if its law has a `set`; offsets of flags and numbers."""
+    valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1
+    valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
+
+
+def opening_of(start, k: int) -> float:
+    """Opening x between 0 and 1 at which valve k has its flow of the profile, M |M| = G x^2 dP."""
+    valve = start.valves[k]
+    conductance, drop = start.valve_law(k)
+    flow = abs(float(valve["flow"]))
+    if flow == 0.0 or not conductance * drop > 0.0:
+        return 0.0
+    if flow >= valve["transition"] and drop >= valve["rounding_drop"]:
+        return min(flow / math.sqrt(conductance * drop), 1.0)
+    low, high, x = 0.0, 1.0, 0.5
+    for _ in range(60):
+        g = conductance * x * x
+        low, high = (x, high) if flow_at_drop(g, transition_of(valve, g), drop) < flow else (low, x)
+        x = 0.5 * (low + high)
+    return x

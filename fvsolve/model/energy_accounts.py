@@ -1,0 +1,215 @@
+"""Energy accounts of a model: the part and category of each row of power and of stored energy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case.riding_networks import unfelt
+from fvsolve.errors import FvsolveError
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model.lowering import lowering_of, rows_in
+from fvsolve.model.run_data import RunData
+
+
+@dataclass(frozen=True)
+class Account:
+    """Rows of power that form a line of the ledger, with signs: `category` at `place`."""
+
+    category: str  # "supplied" | "stored" | "dissipated" | "scheme" | "law"
+    place: str
+    kind: str  # "reservoir", "friction", "valve", ...
+    rows: tuple[int, ...]
+    signs: tuple[float, ...]
+
+
+class Accounts:
+    """Rows of power and of stored energy by account, for the run data of a run.
+
+    Accounts of stored energy in `stored_accounts` and of its rates (category "rate") are in the same order.
+    """
+
+    def __init__(self, run_data: RunData) -> None:
+        self.slate, self.model = run_data, run_data.model
+        model, case = run_data.model, run_data.model.case
+        refuse_unsupported(case)
+        if len(model.tables.rides):
+            run_data.tables.rides["loads_body"] = rec.JOINT_LOAD_READ
+        if any(basin.part.on is not None and basin.opening for basin in model.basins):
+            raise FvsolveError("the energy of a basin on a body with an open side is not supported")
+        if model.basins and not case.law.linear:
+            raise FvsolveError('the energy of basins is computed for law = "linear" only')
+        self.power, self.stored = model.functions.energies
+        if model.basins and len(model.tables.bodies):  # include loads of the fluid in basins on bodies, for its work
+            run_data.tables.basins["loads_body"] = 1
+        self.accounts: list[Account] = []
+        self.stored_accounts: list[Account] = []  # accounts of stored energy, by rows of `stored`
+        self.stops: list[tuple[int, int]] = []  # lines of the rate and of the loss of every stop
+        self.power_count = self.stores = 0
+        nodes = model.tables.nodes
+        for row, (name, place) in zip(nodes, case.places.items(), strict=True):
+            self.node(name, place, int(row["kind"]))
+        for pipe, row in zip(model.pipes, model.tables.pipes, strict=True):
+            at = self.take(6)
+            self.add("dissipated", pipe.name, "friction", at + 1)
+            self.add("dissipated", pipe.name, "jet", at + 2)
+            if row["elements"] > 0:
+                self.add("dissipated", pipe.name, "creep", at + 4)
+                self.add("law", pipe.name, "creep", at + 5)
+            self.hold(pipe.name, "pipe", at + 3, 2)
+            self.accounts.append(Account("scheme", pipe.name, "pipe", tuple(range(at, at + 6)), (1, *[-1] * 5)))
+        self.valves()
+        for name in model.column_names:
+            at = self.take(3)
+            self.add("dissipated", name, "friction", at + 1)
+            self.hold(name, "rigid column", at + 2)
+            self.accounts.append(Account("law", name, "rigid column", (at, at + 1, at + 2), (1, -1, -1)))
+        self.mechanics()
+        self.bodies()
+        self.devices()
+        self.walls()
+        self.basins()
+        self.matrix = matrix_of(self.accounts, self.power_count)
+        self.holding = matrix_of(self.stored_accounts, self.stores)
+
+    def take(self, count: int) -> int:
+        """First of `count` new rows of power."""
+        self.power_count += count
+        return self.power_count - count
+
+    def add(self, category: str, place: str, kind: str, row: int, sign: float = 1.0) -> None:
+        """Add an account with a single row of power."""
+        self.accounts.append(Account(category, place, kind, (row,), (sign,)))
+
+    def hold(self, place: str, kind: str, rate: int | None, rows: int = 1) -> None:
+        """Add a part that stores: its next rows of `stored`, and the row of power that is their rate."""
+        at = self.stores
+        self.stores += rows
+        if rate is not None:
+            self.stored_accounts.append(Account("stored", place, kind, tuple(range(at, at + rows)), (1.0,) * rows))
+            self.add("rate", place, kind, rate)
+
+    def node(self, name: str, place: Any, code: int) -> None:
+        at = self.take(2)
+        if books := lowering_of(type(place)).ledger_name:
+            self.add("supplied", name, books, at)
+        stores = code in (rec.TANK, rec.CHAMBER, rec.MOVING)  # the energy of a vessel is booked by its device
+        self.hold(name, place.kind, at + 1 if stores else None)
+
+    def valves(self) -> None:
+        self.taken: dict[str, tuple[int, bool]] = {}  # row of a device's restriction, and True if it dissipates
+        resists = {name: device.dissipates(part) for name, part, device in self.model.devices}
+        for link, _, lowering in rows_in(self.model.case, "valve"):
+            for name in lowering.row_names(link):
+                at = self.take(1)
+                if name in resists:
+                    self.taken[name] = at, resists[name]
+                else:
+                    self.add("dissipated", name, "valve", at)
+
+    def mechanics(self) -> None:
+        model, tables = self.model, self.model.tables
+        names = [*model.mass_names, *[""] * (len(tables.masses) - len(model.mass_names))]
+        for name, row in zip(names, tables.masses, strict=True):
+            at = self.take(1)
+            self.hold(name, "mass", at if row["y"] >= 0 else None)
+        for name, link, lowering in rows_in(model.case, "brace"):
+            at, stores = self.take(1), lowering.ledger_name == "stored"
+            self.hold(name, link.kind, at if stores else None)
+            if not stores:
+                self.add(lowering.ledger_name, name, link.kind, at)
+        for name, link, _ in rows_in(model.case, "stop"):
+            at = self.take(2)
+            self.stops.append((len(self.accounts), len(self.accounts) + 1))
+            self.hold(name, link.kind, at)
+            self.add("dissipated", name, link.kind, at + 1)
+        for name in model.piston_names:
+            at = self.take(3)
+            self.add("dissipated", name, "leak", at)
+            self.add("dissipated", name, "friction", at + 1)
+            self.add("law", name, "cylinder", at + 2)
+
+    def bodies(self) -> None:
+        for name in self.model.bushing_names:
+            at = self.take(2)
+            self.hold(name, "bushing", at)
+            self.add("dissipated", name, "bushing", at + 1)
+        for name, row in zip(self.model.body_names, self.model.tables.bodies, strict=True):
+            at = self.take(3)
+            self.hold(name, "body", at)
+            if row["damping"] > 0.0:
+                self.add("dissipated", name, "joint", at + 1)
+            if row["schedule"] >= 0:
+                self.add("supplied", name, "drive", at + 2)
+
+    def devices(self) -> None:
+        for name, part, _ in self.model.devices:
+            at, kind = self.take(3), part.kind.replace("-", " ")
+            own, resists = self.taken.get(name, (None, True))
+            rows = {"supplied": [at], "dissipated": [at + 2]}
+            if own is not None:
+                rows["dissipated" if resists else "supplied"].append(own)
+            for category, (sign, indices) in {
+                "supplied": (-1.0, rows["supplied"]),
+                "dissipated": (1.0, rows["dissipated"]),
+            }.items():
+                self.accounts.append(Account(category, name, kind, tuple(indices), (1.0, sign)[: len(indices)]))
+            self.hold(name, kind, at + 1)
+
+    def walls(self) -> None:
+        names = [f"{basin.name}.{patch}" for basin in self.model.basins for patch in basin.walls]
+        for name, row in zip(names, self.model.tables.walls, strict=True):
+            at = self.take(2)
+            if row["mass"] < 0 and row["body"] < 0:
+                self.add("supplied", name, "wall", at)
+            self.add("law", name, "wall", at + 1)
+
+    def basins(self) -> None:
+        for basin in self.model.basins:
+            at = self.take(5)
+            self.add("dissipated", basin.name, "patches", at + 1)
+            self.add("dissipated", basin.name, "friction", at + 2)
+            self.hold(basin.name, "basin", at + 3)
+            if basin.part.on is not None:
+                self.add("law", basin.name, "basin", at + 4)
+            rows = (at, at + 1, at + 2, at + 3, at + 4)
+            self.accounts.append(Account("scheme", basin.name, "basin", rows, (1, -1, -1, -1, -1)))
+
+    def of(self, category: str) -> list[int]:
+        """Numbers of the lines of a category."""
+        return [k for k, account in enumerate(self.accounts) if account.category == category]
+
+    def power_at(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """Power of every line [W] : float64[lines], at a state; writes its rates and `out`."""
+        self.model.functions.rhs(t, y, dydt, out, self.slate.handle)
+        return self.power_by(t, y, dydt, out)
+
+    def power_by(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """Power of every line [W] at a state whose rates and `out` are given."""
+        rows = np.zeros(self.power_count)
+        self.power(t, y, dydt, out, self.slate.handle, rows)
+        return self.matrix @ rows
+
+    def stored_at(self, t: float, y: np.ndarray) -> np.ndarray:
+        """Change of the energy of every storing part since the profile [J] : float64[stored]."""
+        rows, out = np.zeros(self.stores), self.model.new_out()
+        self.model.functions.rhs(t, y, np.zeros(0), out, self.slate.handle)
+        self.stored(t, y, np.zeros(0), out, self.slate.handle, rows)
+        return self.holding @ rows
+
+
+def refuse_unsupported(case) -> None:
+    """Raise FvsolveError if the energy of a network on a body is not booked."""
+    faults = [f"{'.'.join(place)}: {text}" for place, text in unfelt(case.nodes, case.links)]
+    if faults:
+        raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
+
+
+def matrix_of(accounts: list[Account], rows: int) -> np.ndarray:
+    """Matrix that sums rows with their signs : float64[accounts, rows]."""
+    matrix = np.zeros((len(accounts), rows))
+    for k, account in enumerate(accounts):
+        matrix[k, list(account.rows)] += account.signs
+    return matrix

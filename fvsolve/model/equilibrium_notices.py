@@ -1,0 +1,128 @@
+"""Results of the search for static equilibrium: bodies and masses in their new places, notices, faults."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fvsolve import attitude, units
+from fvsolve.case.bodies import coordinate
+from fvsolve.errors import Notice
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model.bodies_start import EQUILIBRIUM_SHARE
+from fvsolve.model.configuration import Configuration
+from fvsolve.parts.attitude import Attitude
+from fvsolve.parts.schedule import constant
+
+MOVE_TOLERANCE = 1e-15  # smaller changes of a length or an angle count as none, relative
+
+
+def moved_nodes(at: Configuration, y: np.ndarray) -> dict[str, Any]:
+    """Bodies and masses of a case that moved, with their new positions."""
+    draft, nodes = at.draft, {}
+    for name, row in zip(draft.body_names, at.bodies, strict=True):
+        body, first = draft.case.nodes.get(name), int(row["y"])
+        count = {rec.BALL: 4, rec.FREE: 7}.get(int(row["joint"]), int(row["freedoms"]))
+        if body is not None and np.any(
+            np.abs(y[first : first + count]) > MOVE_TOLERANCE * (1.0 + np.abs(row["start"][:count]))
+        ):
+            change = joint_keys(body.joint, row, row["start"][:count] + y[first : first + count])
+            nodes[name] = body.model_copy(update={"joint": body.joint.model_copy(update=change)})
+    distance = np.abs(y[at.masses["y"][at.free]])
+    for i in at.free[distance > MOVE_TOLERANCE * (1.0 + np.abs(at.masses["position"][at.free]))]:
+        name, place = draft.mass_names[i], at.masses["position"][i] + y[at.masses["y"][i]]
+        nodes[name] = draft.case.nodes[name].model_copy(update={"initial_position": float(place)})
+    return nodes
+
+
+def joint_keys(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
+    """Joint keys for coordinates q."""
+    if row["joint"] in (rec.REVOLUTE, rec.PRISMATIC):
+        return {"angle" if row["joint"] == rec.REVOLUTE else "travel": constant(float(q[0]))}
+    turn = attitude.of_euler_parameters(q[-4:])
+    if row["joint"] == rec.FREE:
+        place = q[:3] - turn @ row["centre"]
+        return {"at": tuple(place.tolist()), "attitude": attitude_from(turn)}
+    return {"attitude": attitude_from(joint.attitude.rotation @ turn)}
+
+
+def attitude_from(rotation: np.ndarray) -> Attitude:
+    """Attitude by Euler parameters, from a rotation matrix."""
+    return Attitude().model_copy(update={"euler_parameters": tuple(attitude.euler_parameters(rotation).tolist())})
+
+
+def position_notices(case) -> Iterator[Notice]:
+    """Notices of positions that differ from the stated positions."""
+    for name, node in case.found.items():
+        before = case.nodes[name]
+        if node.kind == "mass":
+            yield coordinate_notice(
+                case, name, "initial_position", before.initial_position, node.initial_position, "position"
+            )
+        elif node.joint.kind in ("revolute", "prismatic"):
+            key, dimension = ("angle", "angle") if node.joint.kind == "revolute" else ("travel", "position")
+            yield coordinate_notice(
+                case, name, f"joint.{key}", *(coordinate(part.joint, 0.0) for part in (before, node)), dimension
+            )
+        else:
+            yield from attitude_notices(
+                case, name, node.joint.kind == "free", case.poses[name], case.stated.poses[name]
+            )
+
+
+def attitude_notices(case, name: str, free: bool, pose, before) -> Iterator[Notice]:
+    """Notices of the attitude of a body on a ball joint or a free body, and of its distance from the stated one."""
+    turn = attitude.axis_angle(attitude.deviation(pose.attitude, before.attitude))[1]
+    roll, pitch, yaw = np.degrees(attitude.roll_pitch_yaw(pose.attitude))
+    text = f"roll {roll:.6g}, pitch {pitch:.6g}, yaw {yaw:.6g} deg, turned by {math.degrees(turn):.4g} deg"
+    yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.attitude", turn, 0.0)
+    if free:
+        own, far = case.unit_of("position"), float(np.linalg.norm(pose.place - before.place))
+        x, y, z = units.convert(pose.place, "position", own)
+        text = f"[{x:.6g}, {y:.6g}, {z:.6g}] {own}, {case.amount(far, 'position')} from the stated position"
+        yield Notice("start", f"nodes.{name}", f"{name}: forces balance at {text}", "joint.at", far, 0.0)
+
+
+def coordinate_notice(case, name: str, key: str, before: float, now: float, dimension: str) -> Notice:
+    """Notice of a coordinate that differs from its stated value."""
+    result, stated = (case.amount(value, dimension, 6) for value in (now, before))
+    text = f"{name}: forces balance at {key.removeprefix('joint.')} {result}, stated {stated}"
+    return Notice("start", f"nodes.{name}", text, key, now, before)
+
+
+def owner_name(at: Configuration, unknown: int) -> str:
+    """Name of the body or mass of an unknown; for a sloshing mode, of the basin, with which its name begins."""
+    if unknown >= at.freedoms:
+        return at.draft.mass_names[at.free[unknown - at.freedoms]]
+    ends = at.bodies["freedom"] + at.bodies["freedoms"]
+    return at.draft.body_names[int(np.searchsorted(ends, unknown, side="right"))].partition(" ")[0]
+
+
+def report_unbalanced(at: Configuration, force: np.ndarray, scale: np.ndarray) -> None:
+    """Faults of every body and mass with an unbalanced force at the end of the search."""
+    angular, unbalanced = at.angular(), np.abs(force) > EQUILIBRIUM_SHARE * scale
+    for name in dict.fromkeys(owner_name(at, int(i)) for i in np.flatnonzero(unbalanced)):
+        own = np.array([owner_name(at, i) == name for i in range(at.size)])
+        residuals = [f"{np.linalg.norm(force[own & part]):.4g} {unit}"
+                for part, unit in ((~angular, "N"), (angular, "N m")) if np.any(unbalanced & own & part)]  # fmt: skip
+        text = f'"equilibrium" finds no position where its forces balance: {" and ".join(residuals)} remain'
+        remedy = (
+            "support it by a spring, a cylinder or a driven joint, state a position nearer to equilibrium, "
+            'or use "steady"'
+        )
+        at.draft.fault(f"nodes.{name}", f"{text}; {remedy}")
+
+
+def refuse_overturned(at: Configuration, y: np.ndarray) -> None:
+    """Fault of a tank or basin on a body that is overturned in equilibrium."""
+    at.out[rec.STATUS] = rec.OK
+    at.force(y)
+    if at.out[rec.STATUS] != rec.NO_WEIGHT:
+        return
+    where = int(at.out[rec.WHERE]) - len(at.draft.basins)
+    name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
+    text = "in the equilibrium found it is turned over, and its contents would run out"
+    at.draft.fault(f"nodes.{name}", f'{text}; hold its body upright, state another position, or use "steady"')

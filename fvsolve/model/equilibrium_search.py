@@ -1,0 +1,175 @@
+"""Static equilibrium of bodies and masses: Newton's method on forces, for `initial = "equilibrium"`.
+
+With M the mass matrix and K = -dF/dq, steps are taken in M^(1/2) dq. There K has squares of angular frequencies as
+eigenvalues, and lengths and angles have comparable weight. The search runs in the directions that constraints leave
+free. If all eigenvalues are positive, a step is Newton's step. A negative eigenvalue enters by its magnitude, so that
+bodies move away from an unstable position. A position that is stated and in balance is kept, stable or not; so is a
+coordinate on which no force and no stiffness act.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case import check
+from fvsolve.errors import Notice
+from fvsolve.model.bodies_start import EQUILIBRIUM_SHARE, RANK_TOLERANCE, ROUNDING_SHARE
+from fvsolve.model.configuration import Configuration
+from fvsolve.model.equilibrium_notices import (
+    moved_nodes,
+    owner_name,
+    position_notices,
+    refuse_overturned,
+    report_unbalanced,
+)
+
+MAX_STEPS, MAX_HALVINGS = 100, 30
+MAX_TURN = 0.3  # largest rotation in a step [rad]
+MAX_STRETCH = 0.5  # largest displacement in a step, as a share of the shortest line
+ZERO_STIFFNESS = 1e-9  # share of the greatest eigenvalue below which the stiffness counts as zero
+LEAST_STIFFNESS = 1e-6  # same share: least magnitude used in a step, and threshold of instability
+STATED_TOLERANCE = 1e-4  # unbalanced share of forces up to which a stated position counts as an intended equilibrium
+GAP_TOLERANCE = 1e-14  # gap of constraints that counts as closed [m]
+MAX_REVERSAL = 0.5  # a step may reverse the force along it up to this share
+
+
+@dataclass(frozen=True)
+class StaticState:
+    """A configuration: states, generalised forces and their scale, rows of constraints and their gaps [m]."""
+
+    y: np.ndarray
+    force: np.ndarray
+    scale: np.ndarray
+    rows: np.ndarray
+    gaps: np.ndarray
+
+    @property
+    def share(self) -> float:
+        """Greatest unbalanced force, relative to the sum of magnitudes of the forces in it."""
+        return float(np.max(np.abs(self.force) / np.where(self.scale > 0.0, self.scale, 1.0), initial=0.0))
+
+    @property
+    def open(self) -> float:
+        """Greatest gap of a constraint [m]."""
+        return float(np.max(np.abs(self.gaps), initial=0.0))
+
+    def clearly_better(self, other: StaticState) -> bool:
+        """True if this configuration is clearly nearer to equilibrium than the other."""
+        own, others = ((max(place.share, ROUNDING_SHARE), max(place.open, GAP_TOLERANCE)) for place in (self, other))
+        return own[0] < 0.5 * others[0] or own[1] < 0.5 * others[1]
+
+
+def with_equilibrium(case, draft) -> tuple[Any, list[Notice]]:
+    """Case with bodies and masses in static equilibrium, and notices about it : (case, notices).
+
+    draft : tables of the case with its steady start. Bodies with stated velocities stay where they are.
+    Raises CaseError if no equilibrium is found.
+    """
+    at = Configuration(draft)
+    if not at.size or at.moving():
+        return case, []
+    result = search(at)
+    if result.share <= EQUILIBRIUM_SHARE:
+        refuse_overturned(at, result.y)
+    else:
+        report_unbalanced(at, result.force, result.scale)
+    draft.check()
+    case = replace(case, found=moved_nodes(at, result.y))
+    nodes, surroundings = case.nodes | case.found, (case.ambient_pressure, case.gravity, None, None)
+    for keys, text in check.parts(nodes, case.links, *surroundings, at.t, case.meshes, case.lumped):
+        draft.fault(".".join(map(str, keys)), f"where forces balance {text}")
+    draft.check()
+    return case, [*position_notices(case), *instability_notices(at, result)]
+
+
+def evaluate_configuration(at: Configuration, y: np.ndarray) -> StaticState:
+    """Evaluate a configuration. Constraint forces minimise the unbalanced forces, in the norm of M^-1."""
+    rows, gaps, sizes = at.rows(y), at.gaps(y), np.zeros(at.count)
+    at.hold(sizes)
+    force = at.force(y)
+    if at.count:
+        inverse_root = np.linalg.inv(np.linalg.cholesky(at.mass(y)))
+        sizes = -np.linalg.lstsq(inverse_root @ rows.T, inverse_root @ force, rcond=RANK_TOLERANCE)[0]
+        at.hold(sizes)
+        force = at.force(y)
+    return StaticState(y, force, at.scale(), rows, gaps)
+
+
+def search(at: Configuration) -> StaticState:
+    """Equilibrium reached by Newton steps, or the best configuration that was visited."""
+    here = best = evaluate_configuration(at, at.y.copy())
+    intended = here.share <= STATED_TOLERANCE
+    for _ in range(MAX_STEPS):
+        if here.share <= ROUNDING_SHARE and here.open <= GAP_TOLERANCE:
+            return here
+        new = evaluate_configuration(at, limited_step(at, here, *step(at, here, intended)))
+        if not np.all(np.isfinite(new.force)):
+            break
+        if here.share <= EQUILIBRIUM_SHARE and not new.clearly_better(here):
+            return min(here, new, key=lambda place: place.share)
+        here = new
+        best = here if here.clearly_better(best) else best
+    return best
+
+
+def step(at: Configuration, here: StaticState, intended: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Newton step : (step of all unknowns, its part in directions that constraints leave free).
+
+    With `intended` the step goes to the nearest equilibrium, stable or not.
+    """
+    inverse_root, free, close = free_directions(at, here)
+    k = inverse_root @ at.stiffness(here.y) @ inverse_root.T
+    own, pull = free.T @ k @ free, free.T @ (inverse_root @ here.force - k @ close)
+    values, modes = np.linalg.eigh(0.5 * (own + own.T))
+    great = np.max(np.abs(values), initial=0.0)
+    flat, pulls = np.abs(values) <= ZERO_STIFFNESS * great, modes.T @ pull
+    pulls[flat & (np.abs(pulls) <= EQUILIBRIUM_SHARE * np.linalg.norm(inverse_root @ here.scale))] = 0.0
+    if intended or not (np.any(values[~flat] < 0.0) or np.any(pulls[flat])):
+        way = np.linalg.pinv(own, rcond=ZERO_STIFFNESS) @ pull
+    else:
+        way = modes @ (pulls / np.maximum(np.abs(values), LEAST_STIFFNESS * great or 1.0))
+    return inverse_root.T @ (close + free @ way), inverse_root.T @ free @ way
+
+
+def free_directions(at: Configuration, here: StaticState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions of a step : (L^-1 with M = L L', basis of directions free of constraints, step that closes gaps).
+
+    The basis and the closing step are in the coordinates M^(1/2) dq.
+    """
+    inverse_root = np.linalg.inv(np.linalg.cholesky(at.mass(here.y)))
+    if not at.count:
+        return inverse_root, np.eye(at.size), np.zeros(at.size)
+    rows = here.rows @ inverse_root.T
+    _, sizes, directions = np.linalg.svd(rows)
+    rank = int(np.sum(sizes > RANK_TOLERANCE * sizes[0]))
+    return inverse_root, directions[rank:].T, -np.linalg.pinv(rows, rcond=RANK_TOLERANCE) @ here.gaps
+
+
+def limited_step(at: Configuration, here: StaticState, move: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Configuration after a step, shortened to limit rotations, displacements and a reversal of the force along it."""
+    angular = at.angular()
+    excess = [np.max(np.abs(move[angular]), initial=0.0) / MAX_TURN,
+           np.max(np.abs(move[~angular]), initial=0.0) / (MAX_STRETCH * at.shortest())]  # fmt: skip
+    share, before = 1.0 / max(1.0, *excess), here.force @ free
+    for _ in range(MAX_HALVINGS if before > 0.0 else 0):
+        if at.force(at.after_step(here.y, share * move)) @ free >= -MAX_REVERSAL * before:
+            break
+        share *= 0.5
+    return at.after_step(here.y, share * move)
+
+
+def instability_notices(at: Configuration, result: StaticState) -> list[Notice]:
+    """Notice if the equilibrium is unstable; closed chambers act as springs."""
+    inverse_root, free, _ = free_directions(at, result)
+    own = free.T @ inverse_root @ (at.stiffness(result.y) + at.fluid_stiffness(result.y)) @ inverse_root.T @ free
+    values, modes = np.linalg.eigh(0.5 * (own + own.T))
+    if not len(values) or values[0] >= -LEAST_STIFFNESS * np.max(np.abs(values)):
+        return []
+    name, rate = owner_name(at, int(np.argmax(np.abs(free @ modes[:, 0])))), float(np.sqrt(-values[0]))
+    duration = at.draft.case.amount(1.0 / rate, "time", 3)
+    text = (f"{name}: its forces balance, but the equilibrium is unstable: a small displacement grows by a factor e in "
+            f"{duration}; state another position, or support it")  # fmt: skip
+    return [Notice("start", f"nodes.{name}", text, "stability", rate, 0.0)]

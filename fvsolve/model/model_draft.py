@@ -1,0 +1,237 @@
+"""Tables of a model while they are filled."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case.case import Case
+from fvsolve.errors import CaseError, Fault, Notice
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels import tank_limits
+from fvsolve.model.device_lowering import Device
+from fvsolve.model.hydraulics import Hydraulics
+from fvsolve.model.lowering import Lowering, links_by_table
+from fvsolve.model.model import PipeMesh
+from fvsolve.model.run_data import CACHE_LINE, aligned_zeros
+from fvsolve.model.schedule_tables import Schedules
+from fvsolve.model.state_names import StateNames
+
+
+def no_rows(record: np.dtype) -> Any:
+    """Field for a table without rows."""
+    return field(default_factory=lambda: np.zeros(0, record))
+
+
+def byte_copy(table: np.ndarray) -> np.ndarray:
+    """Copy of a table, by bytes: numpy would copy records field by field."""
+    return np.ndarray(table.shape, table.dtype, bytearray(table.tobytes()))
+
+
+@dataclass(slots=True, eq=False)
+class ModelDraft:
+    """Tables, names and states of a model under construction. Slots: no other attributes can be added."""
+
+    case: Case
+    fluid: Any = None
+    hydraulics: Any = None
+    faults: list[Fault] = field(default_factory=list)
+    warnings: list[Notice] = field(default_factory=list)
+
+    # numbers that rows point to
+    schedules: Schedules = field(default_factory=Schedules)
+    floats: list[float] = field(default_factory=list)
+    integers: list[int] = field(default_factory=list)
+    pieces_of_plane: list[np.ndarray] = field(default_factory=list)
+    plane_size: int = 0
+    work_size: int = 0
+
+    # states
+    size: int = 0
+    state_names: StateNames = field(default_factory=StateNames)
+    scale: array = field(default_factory=lambda: array("d"))  # size of a small deviation of each state
+    cells: int = 0  # cells of pipes
+    tanks: int = 0
+    moving: int = 0  # nodes whose pressure follows their mass by a variable stiffness
+
+    # names, in the order of rows; nodes that links own
+    node_index: dict[str, int] = field(default_factory=dict)
+    owned: set[str] = field(default_factory=set)
+    pipe_names: list[str] = field(default_factory=list)
+    column_names: list[str] = field(default_factory=list)
+    valve_names: list[str] = field(default_factory=list)
+    body_names: list[str] = field(default_factory=list)
+    point_index: dict[str, int] = field(default_factory=dict)
+    points: list[tuple] = field(default_factory=list)  # rows, added on first use
+    pin_names: list[str] = field(default_factory=list)
+    bushing_names: list[str] = field(default_factory=list)
+    lines: list[tuple] = field(default_factory=list)
+    factor_size: int = 0  # entries of a mass matrix factor
+    mass_names: list[str] = field(default_factory=list)
+    mass_index: dict[str | None, int] = field(default_factory=dict)
+    piston_names: list[str] = field(default_factory=list)
+    push_names: list[str] = field(default_factory=list)
+    wall_names: list[str] = field(default_factory=list)
+    devices: list[tuple] = field(default_factory=list)  # (name, part, lowering)
+    laws: list[str] = field(default_factory=list)  # modules of compiled laws, in the order of the rows of `hooks`
+    events: list[tuple[str, str]] = field(default_factory=list)  # (name, meaning); "" if an event is not reported
+    meshes: list[PipeMesh] = field(default_factory=list)
+    basins: list[Any] = field(default_factory=list)
+    links: dict[str, list[tuple]] = field(default_factory=dict)  # table -> links with rows in it, see `model.lowering`
+    # pipe -> by cells or as a delay line, see `model.delay_line_selection`
+    followed: dict[str, Any] = field(default_factory=dict)
+
+    # rows
+    node_table: np.ndarray = no_rows(rec.NODE)
+    pipe_table: np.ndarray = no_rows(rec.PIPE)
+    column_table: np.ndarray = no_rows(rec.COLUMN)
+    valve_table: np.ndarray = no_rows(rec.VALVE)
+    cluster_table: np.ndarray = no_rows(rec.CLUSTER_RECORD)
+    device_table: np.ndarray = no_rows(rec.DEVICE)
+    body_table: np.ndarray = no_rows(rec.BODY)
+    freedom_table: np.ndarray = no_rows(rec.FREEDOM)
+    line_table: np.ndarray = no_rows(rec.LINE)
+    pin_table: np.ndarray = no_rows(rec.PIN)
+    bushing_table: np.ndarray = no_rows(rec.BUSHING)
+    ride_table: np.ndarray = no_rows(rec.MOVING_SEGMENT)
+    mass_table: np.ndarray = no_rows(rec.MASS)
+    brace_table: np.ndarray = no_rows(rec.BRACE)
+    stop_table: np.ndarray = no_rows(rec.STOP)
+    piston_table: np.ndarray = no_rows(rec.PISTON)
+    basin_table: np.ndarray = no_rows(rec.BASIN)
+    patch_table: np.ndarray = no_rows(rec.PATCHES)
+    scalar_table: np.ndarray = no_rows(rec.SCALAR)
+    wall_table: np.ndarray = no_rows(rec.WALL)
+    delay_table: np.ndarray = no_rows(rec.DELAY)
+    probe_table: np.ndarray = no_rows(rec.PROBE)
+
+    # results of the start
+    # piston -> sides whose closed chambers may support a load
+    locked: dict[int, list[str]] = field(default_factory=dict)
+    shut: dict[int, list[str]] = field(default_factory=dict)  # piston -> sides that no open link joins to another node
+    tables: Any = None  # all tables, as kernels read them
+    shapes: Any = None  # shapes of the arrays that runs write
+    watched_start: np.ndarray = field(default_factory=lambda: np.zeros(0))  # see `Model`
+    profiles: dict[int, np.ndarray] = field(default_factory=dict)  # pipe -> pressure of the profile at centres [Pa]
+    steady: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        case = self.case
+        self.fluid, self.hydraulics = case.properties, Hydraulics(case)
+        self.warnings += case.notes
+        self.links = links_by_table(case)
+        self.schedules.span = case.numerics.start, case.numerics.end
+        self.node_index = {name: i for i, name in enumerate(case.places)}
+        self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
+
+    def copy_for(self, case: Case) -> ModelDraft:
+        """Copy of packed tables for a case of equal tables; later changes, and arrays of a start, are its own."""
+        copy = object.__new__(ModelDraft)
+        tables = {id(source): byte_copy(source) for source in self.tables if source.flags.writeable}
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if isinstance(value, np.ndarray):
+                value = tables.get(id(value), value)
+            elif isinstance(value, (list, dict)):
+                value = value.copy()
+            setattr(copy, name, value)
+        copy.case, copy.hydraulics = case, Hydraulics(case)
+        copy.tables = rec.Tables(*(tables.get(id(table), table) for table in self.tables))
+        copy.warnings = [*case.notes, *self.warnings[len(self.case.notes) :]]
+        for table, entries in self.links.items():
+            copy.links[table] = [(name, case.links.get(name, link), lowering) for name, link, lowering in entries]
+        return copy
+
+    def fault(self, place: str, message: str) -> None:
+        self.faults.append(Fault(place, message))
+
+    def check(self) -> None:
+        if self.faults:
+            raise CaseError(self.faults, str(self.case.path or self.case.name))
+
+    def states(self, names: Sequence[str], scale: float | list[float]) -> int:
+        """Offset of new states; `scale` : of each, or of all of them."""
+        self.state_names.add(names)
+        self.scale += array("d", scale) if isinstance(scale, list) else array("d", [scale]) * len(names)
+        self.size += len(names)
+        return self.size - len(names)
+
+    def to_plane(self, values: np.ndarray) -> int:
+        """Offset of new values in `plane`, at the start of a cache line."""
+        self.pieces_of_plane.append(np.append(np.ravel(values), np.zeros(-values.size % CACHE_LINE)))
+        self.plane_size += self.pieces_of_plane[-1].size
+        return self.plane_size - self.pieces_of_plane[-1].size
+
+    def plane(self) -> np.ndarray:
+        """All values of the plane, aligned to cache lines."""
+        plane = aligned_zeros(self.plane_size)
+        np.concatenate([np.zeros(0), *self.pieces_of_plane], out=plane)
+        return plane
+
+    def to_work(self, size: int) -> int:
+        """Offset of `size` new numbers in `work`, at the start of a cache line."""
+        self.work_size += size + -size % CACHE_LINE
+        return self.work_size - size - -size % CACHE_LINE
+
+    def room(self) -> int:
+        """Count of numbers that basins have used up to now."""
+        return self.plane_size + self.work_size + len(self.integers)
+
+    def flags(self, name: str, events: tuple[str, ...]) -> int:
+        """Offset in `armed` of new flags, one for each event function of a part."""
+        first = tank_limits.EVENTS * self.tanks + len(self.events)
+        self.events += [(name.removesuffix(".inside"), text) for text in events]
+        return first
+
+    def hooks(self, lowering: Lowering) -> int:
+        """Row of `hooks` of the functions of a law."""
+        law = lowering.law.__name__
+        self.laws += [] if law in self.laws else [law]
+        return self.laws.index(law)
+
+    def inside(self, name: str) -> str:
+        """Name of the inner node of a part with a connection, else of the part itself."""
+        return f"{name}.inside" if f"{name}.inside" in self.node_index else name
+
+    @property
+    def device_names(self) -> list[str]:
+        """Names of devices, in the order of their table."""
+        return [name for name, _, _ in self.devices]
+
+    def device_of(self, name: str) -> Device:
+        """Lowering of a device."""
+        return self.devices[self.device_names.index(name)][2]
+
+    def fill(self, table: str, record: np.dtype) -> tuple[list[str], np.ndarray]:
+        """Rows of a table : (name of the link of each row, rows)."""
+        parts = self.links.get(table, [])
+        names = [name for name, _, lowering in parts for _ in range(lowering.rows)]
+        table_rows, at = np.zeros(len(names), record), 0
+        if table == "valve":
+            table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows["event"] = -1
+            table_rows["back"] = 1.0
+        for key in {"ride", "delay"}.intersection(record.names):
+            table_rows[key] = -1
+        for name, link, lowering in parts:
+            lowering.fill(self, name, link, table_rows[at : at + lowering.rows])
+            at += lowering.rows
+        return names, table_rows
+
+    def ends(self, link, row) -> None:
+        """Write the nodes that a link joins."""
+        row["from_node"], row["to_node"] = self.node_index[link.from_], self.node_index[link.to]
+
+    def stiff(self) -> int:
+        """New row of a node whose pressure follows its mass by a variable stiffness."""
+        self.moving += 1
+        return self.moving - 1
+
+    def restriction(self, name, link, row) -> None:
+        """Set G of a valve from its size, and the flow below which it is laminar."""
+        row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
+        if link.laminar_reynolds is not None:
+            row["transition"] = self.hydraulics.transition_flow(name, link, link.laminar_reynolds, self.fault)

@@ -1,0 +1,138 @@
+"""Probe table: what each probe reads, with scale and offset, in SI units."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.case import sloshing
+from fvsolve.kernels import dtypes as rec
+from fvsolve.model.body_tables import point_row
+from fvsolve.model.lowering import lowering_of
+from fvsolve.model.probe_weights import lower_position
+
+
+def lower_probes(draft) -> np.ndarray:
+    """Probe table of a case. Pressures of the profile are filled in later, by `probe_offsets`."""
+    case, table = draft.case, np.zeros(len(all_probes(draft.case)), rec.PROBE)
+    parts = {"nodes": {**case.places, **case.nodes}, "links": {**case.links, **case.conduits}}
+    for row, probe in zip(table, all_probes(case), strict=True):
+        row["mark"] = -1
+        if probe.point is not None:
+            lower_basin_point(draft, row, probe)
+        elif probe.quantity in draft.case.scalars:
+            scalar_probe(draft, row, probe)
+        elif probe.part == "nodes" and probe.name not in parts["nodes"]:  # a point of a body, or of the world
+            lower_body_point(draft, row, probe)
+        else:
+            part = parts[probe.part][probe.name]
+            lowering_of(type(part)).of(part).probe(draft, probe.name, probe, row)
+    return table
+
+
+def all_probes(case) -> list:
+    """All that is read after every step: probes, then quantities watched for their extremes only."""
+    return [*case.probes, *case.watched]
+
+
+def scalar_probe(draft, row, probe) -> None:
+    """Probe of a scalar at a node or along a pipe, there by linear interpolation between cell centres."""
+    row["scalar"] = list(draft.case.scalars).index(probe.quantity)
+    if probe.part == "nodes":
+        row["kind"], row["index"] = rec.NODE_SCALAR, draft.node_index[draft.inside(probe.name)]
+    else:
+        row["kind"], row["index"] = rec.PIPE_SCALAR, draft.pipe_names.index(probe.name)
+        lower_position(draft, row, probe.fraction, 1)
+
+
+def lower_body_point(draft, row, probe) -> None:
+    """Probe of a quantity at a named point."""
+    from fvsolve.kernels.mechanism.body_probes import POINT_QUANTITIES
+
+    row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
+    row["index"] = point_row(draft, probe.name)
+
+
+def lower_basin_point(draft, row, probe) -> None:
+    """Cells of a basin that a probe reads, and their weights."""
+    if probe.name in draft.case.lumped:
+        return lower_surface(draft, row, probe)
+    k = list(draft.case.meshes).index(probe.name)
+    basin = draft.basins[k]
+    cells, weights = basin.points.reading(*probe.point)
+    row["index"], row["count"], row["cell"] = k, cells.size, len(draft.integers)
+    row["weights"] = len(draft.floats)
+    draft.integers += cells.tolist()
+    draft.floats += weights.tolist()
+    if probe.quantity in draft.case.scalars:
+        row["kind"], row["scalar"] = rec.CELL_SCALAR, list(draft.case.scalars).index(probe.quantity)
+    else:
+        row["kind"] = rec.CELL_FIELD
+        basin.lower_probe(row, probe.quantity, cells, weights)
+
+
+def lower_surface(draft, row, probe) -> None:
+    """Probe of depth at a point of a basin with sloshing modes."""
+    case, basin = draft.case, draft.case.nodes[probe.name]
+    arguments = basin, case.lumped[probe.name]
+    modes, shares = sloshing.reading(*arguments, *probe.point, case.properties.density, case.gravity)
+    row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
+    row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
+    draft.integers += [draft.body_names.index(sloshing.slider(probe.name, mode)) for mode in modes]
+    draft.floats += shares
+
+
+def probe_offsets(draft, start) -> None:
+    """Set scale and offset of every probe, and start pressures of watched quantities along pipes, from the profile."""
+    count = len(draft.case.probes)
+    draft.watched_start = np.full(len(draft.probe_table) - count, np.nan)
+    for k, (row, probe) in enumerate(zip(draft.probe_table[count:], draft.case.watched, strict=True)):
+        if probe.straight and row["kind"] == rec.PIPE_PRESSURE:
+            draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
+    for row, probe in zip(draft.probe_table, all_probes(draft.case), strict=True):
+        if row["kind"] >= rec.CELL_FIELD:  # basins hold the profile of these
+            continue
+        if draft.case.law.linear:
+            linear_offsets(draft, start, row, probe)
+        else:
+            barotropic_offsets(draft, start, row, probe)
+
+
+def linear_offsets(draft, start, row, probe) -> None:
+    """Offsets for the law `linear`: value = scale * (deviation of pressure or flow) + offset."""
+    weight = draft.fluid.density * draft.case.gravity
+    row["scale"], row["offset"] = 1.0, 0.0
+    if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW, rec.SPOOL_FLOW):
+        row["scale"] = 1.0 / draft.fluid.density
+        if probe.quantity == "velocity":
+            row["scale"] /= draft.pipe_table[row["index"]]["area"]
+    elif row["kind"] in (rec.PRESSURE, rec.PIPE_PRESSURE):
+        if row["kind"] == rec.PRESSURE:
+            base, z = (draft.node_table[row["index"]][key] for key in ("pressure", "elevation"))
+        else:
+            base, z = start.profile_at(int(row["index"]), probe.fraction)
+            row["scale"] = 1.0 / draft.pipe_table[row["index"]]["admittance"]
+        row["offset"] = base - (0.0 if probe.quantity == "pressure" else draft.case.ambient_pressure)
+        if probe.quantity == "head":
+            divisor = weight if weight > 0.0 else np.nan  # without gravity there is no head
+            row["scale"] /= divisor
+            row["offset"] = row["offset"] / divisor + z
+
+
+def barotropic_offsets(draft, start, row, probe) -> None:
+    """Offsets that convert pressure to gauge pressure or head, and the profile's mass per length at the probe."""
+    if row["kind"] == rec.DEVICE_VALUE:
+        return
+    if row["kind"] in (rec.PIPE_PRESSURE, rec.PIPE_FLOW):
+        row["mass"] = start.mass_at(int(row["index"]), probe.fraction)
+    if probe.quantity == "gauge_pressure":
+        row["offset"] = -draft.case.ambient_pressure
+    elif probe.quantity == "velocity":
+        row["head"] = 2
+    elif probe.quantity == "head":
+        row["head"] = 1
+        if row["kind"] == rec.PRESSURE:
+            row["offset"] = draft.node_table[row["index"]]["elevation"]
+        else:
+            row["offset"] = start.profile_at(int(row["index"]), probe.fraction)[1]
+        if draft.case.gravity == 0.0:
+            row["offset"] = np.nan

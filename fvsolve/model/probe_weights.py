@@ -1,0 +1,49 @@
+"""Cells of a pipe that a probe reads, and their weights."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from fvsolve.schemes import SCHEMES
+
+TIE_TOLERANCE = 1e-6  # in cells; two sets of cells that differ by less count as equally near
+
+
+def lower_position(draft, row, fraction: float, degree: int | None = None) -> None:
+    """Set the position of a probe along its pipe: an end, or cells and weights of a polynomial.
+
+    degree : of the polynomial; by default that of the scheme
+    """
+    if fraction in (0.0, 1.0):
+        row["side"] = -1 if fraction == 0.0 else 1
+        return
+    n = int(draft.pipe_table[row["index"]]["cells"])
+    degree = min(degree or max(SCHEMES[draft.case.numerics.scheme].degree, 1), n - 1)
+    first, weights = cells_around(fraction * n, degree, n)
+    row["cell"], row["count"], row["weights"] = first, weights.size, len(draft.floats)
+    draft.floats += weights.tolist()
+
+
+@functools.lru_cache(maxsize=4096)
+def cells_around(x: float, degree: int, n: int) -> tuple[int, np.ndarray]:
+    """First cell that is read at x cells from the `from` end, and weights of the cells.
+
+    The nearest degree + 1 cells are read. If two such sets are equally near, as at a face for an even degree, the
+    result is the mean of both, so that a pipe drawn in the opposite direction reads the same value.
+    """
+    middle = x - 0.5 * (degree + 1)
+    firsts = sorted({int(np.clip(round(middle + side), 0, n - degree - 1)) for side in (-TIE_TOLERANCE, TIE_TOLERANCE)})
+    weights = np.zeros(firsts[-1] - firsts[0] + degree + 1)
+    for first in firsts:
+        weights[first - firsts[0] :][: degree + 1] += reading_weights(x - first, degree) / len(firsts)
+    return firsts[0], weights
+
+
+def reading_weights(x: float, degree: int) -> np.ndarray:
+    """Weights w with sum w_k (average over [k, k+1]) = value at x, exact for polynomials up to `degree`."""
+    powers = np.arange(degree + 1)
+    cells = np.arange(degree + 1)[:, None]
+    averages = ((cells + 1.0) ** (powers + 1) - cells ** (powers + 1.0)) / (powers + 1)
+    return np.linalg.solve(averages.T, float(x) ** powers)

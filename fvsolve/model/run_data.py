@@ -1,0 +1,166 @@
+"""Data that one run of a model writes: event flags, first occurrences, extremes, work arrays."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.delay_lines.wave_history import COUNT
+from fvsolve.model.delay_history import LEAST_STEPS, reset_history, split_memory, steps_left, with_doubled_rings
+
+if TYPE_CHECKING:
+    from fvsolve.model.model import Model
+
+
+CACHE_LINE = 8  # floats of a cache line
+
+
+def aligned_zeros(size: int) -> np.ndarray:
+    """Zeros whose first element starts a cache line."""
+    buffer = np.zeros(size + CACHE_LINE)
+    first = -(buffer.ctypes.data // 8) % CACHE_LINE
+    return buffer[first : first + size]
+
+
+def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:
+    """Arrays that a run writes, of these shapes, filled with zeros."""
+    arrays = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
+    arrays |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
+    arrays |= {"clock": np.zeros(1, rec.CLOCK), "work": aligned_zeros(shapes.work)}
+    if shapes.sharp:
+        from fvsolve.kernels.table_handle import empty_handle
+
+        arrays["sharp"] = empty_handle()
+    return rec.RunArrays(**arrays)
+
+
+class RunData:
+    """Mutable data of one run. Created anew for each run; the model itself is read-only and shared by runs.
+
+    clock : end of the segment (schedules take their left limit there) and the given step, see `records.CLOCK`
+    armed : 1.0 while the condition of an event holds; marks : first times at which the model does not hold [s]
+    envelope, extremes : least and greatest value of each cell, and of each probe and watched quantity, with their times
+    bands : for each basin, first row (of a mesh: first cell) computed here, and the one after the last
+    joint : see `kernels.band_exchange`, empty if one thread computes all; sums : see `kernels.stage_sums`
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.written, self.tables = model, zeros_for_run(model.shapes), model.tables
+        if len(model.tables.walls) > 0 or (model.tables.basins["frame"] >= 0).any():  # the geometry changes with time
+            basins = model.tables.basins.copy()
+            self.tables = model.tables._replace(plane=aligned_zeros(model.tables.plane.size), basins=basins)
+            self.tables.plane[:] = model.tables.plane
+        if len(model.tables.rides):  # `loads_body` is set where joint forces are read
+            self.tables = self.tables._replace(rides=model.tables.rides.copy())
+        self.clock, self.full_at = self.written.clock[0], -np.inf  # number of history entries at which rings are full
+        self.armed, self.marks = self.written.armed, self.written.marks
+        self.envelope, self.extremes = self.written.envelope, self.written.extremes
+        reset_history(self.written.past, model.tables.delays)
+        self.clock["limit"], self.marks[:] = np.inf, np.nan
+        basins = model.tables.basins
+        self.written.bands[1::2] = np.where(basins["nx"] > 0, basins["ny"], basins["n"])  # all
+        for array in (self.envelope, self.extremes):
+            array[0], array[1], array[2], array[3] = np.inf, np.nan, -np.inf, np.nan
+
+    @cached_property
+    def handle(self) -> np.ndarray:
+        """Handle of the model's tables, these arrays and the functions to call, as compiled functions take it."""
+        functions = self.model.functions
+        return self.linked_handle(self.written, (functions.calls, functions.hooks))
+
+    def linked_handle(self, written: rec.RunArrays, callables: tuple) -> np.ndarray:
+        """Handle of the tables with these written arrays and these functions."""
+        from fvsolve.kernels.table_handle import addresses_of, linked_handles
+
+        model = self.model
+        shared = model.places if self.tables is model.tables else addresses_of(self.tables)
+        sharp = addresses_of(self.tables._replace(**model.sharp)) if model.sharp else shared
+        return linked_handles(shared, sharp, written, callables)
+
+    def reset(self, armed: np.ndarray | float = 0.0) -> None:
+        """Reset for another state: flags as given, no waves in delay lines."""
+        self.armed[:], self.clock["limit"] = armed, np.inf
+        reset_history(self.past, self.model.tables.delays)
+
+    @property
+    def past(self) -> np.ndarray:
+        """History of waves in delay lines."""
+        return self.written.past
+
+    @past.setter
+    def past(self, past: np.ndarray) -> None:
+        self.written, self.full_at = self.written._replace(past=past), -np.inf
+        self.__dict__.pop("handle", None)
+
+    def restore_history(self, state) -> None:
+        """Restore the history of delay lines from the memory of a state; without memory it stays empty."""
+        if len(self.model.tables.delays) and state is not None and state.memory.size:
+            self.past = split_memory(state.memory)[1].copy()
+
+    def room(self) -> float:
+        """Steps that fit before a ring of delay-line history would lose an entry that is still needed.
+
+        Enlarges the rings where needed; infinite without delay lines.
+        """
+        delays = self.model.tables.delays
+        if not len(delays):
+            return np.inf
+        count = self.past[COUNT]
+        if self.full_at - count < LEAST_STEPS:  # a bound for any steps: checked again only near it
+            while (left := steps_left(self.past, delays)) < LEAST_STEPS:
+                self.past = with_doubled_rings(self.past, delays)
+            self.full_at = count + left
+        return float(self.full_at - count)
+
+    def along(self, t: float, out: np.ndarray, parts: int = 1) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+        """Pipe -> both waves of a delay line in the middle of each of `parts` equal parts of its cells [kg/s]."""
+        waves = {}
+        if len(self.model.tables.delays):
+            from fvsolve.kernels.delay_lines.line_interior import waves_along_line_number
+
+            for index, row in enumerate(self.model.tables.delays):
+                n = parts * int(row["places"])
+                waves[int(row["pipe"])] = r, l = np.zeros(n), np.zeros(n)  # noqa: E741
+                waves_along_line_number(t, out, self.handle, index, r, l)
+        return waves
+
+    def evaluate(self, t: float, y: np.ndarray, limit: float) -> tuple[np.ndarray, np.ndarray]:
+        """Right-hand side and `out`, as `Model.evaluate`, with event flags set to the conditions at (t, y)."""
+        t, y = self.model.checked(t, y)
+        self.clock["limit"] = limit
+        dydt, out = np.zeros(y.size), self.model.new_out()
+        self.set_flags(t, y)
+        self.model.functions.rhs(t, y, dydt, out, self.handle)
+        return dydt, out
+
+    def set_flags(self, t: float, y: np.ndarray) -> None:
+        """Set the flags of all events to the conditions at (t, y). Iterates, as devices may depend on other devices."""
+        if not self.armed.size:
+            return
+        g = np.zeros(self.armed.size)
+        for _ in range(3 + 2 * len(self.model.events)):
+            self.model.functions.events(t, y, self.handle, g)
+            changed = np.any((g <= 0.0) != (self.armed > 0.0))
+            self.armed[:] = g <= 0.0
+            if not changed:
+                return
+
+    def fields(self, t: float, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
+        """Fields as in `Model.fields`, with least and greatest pressures of pipes up to now."""
+        fields = self.model.fields(y, out, self.along(t, out))
+        fields["out"] = out
+        for k, (pipe, row) in enumerate(zip(self.model.pipes, self.model.tables.pipes, strict=True)):
+            own, cells = fields[pipe.name], row["cell"] + np.arange(pipe.cells)
+            least, greatest = (self.model.cell_pressure(k, self.envelope[i, cells]) for i in (0, 2))
+            own["min_pressure"] = np.minimum(least, own["pressure"])
+            own["max_pressure"] = np.maximum(greatest, own["pressure"])
+        return fields
+
+    def observe(self, t: float, y: np.ndarray, out: np.ndarray) -> np.ndarray:
+        """Values of all probes at (t, y), `out` as returned by `evaluate` : float64[probes] [SI]."""
+        values = np.zeros(len(self.model.tables.probes))
+        self.model.functions.observe(t, y, out, self.handle, values)
+        return values[: len(self.model.probes)]

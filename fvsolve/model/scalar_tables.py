@@ -1,0 +1,166 @@
+"""Scalar table: amounts as states, values at nodes, balances of a run."""
+
+from __future__ import annotations
+
+from array import array
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case.cells import means, samples
+from fvsolve.kernels import dtypes as rec
+from fvsolve.steppers.built_in_methods import METHODS
+
+STORES = (rec.TANK, rec.CHAMBER)
+
+
+def lower_scalars(draft) -> None:
+    """Fill the table of scalars, states for their amounts and schedules for their values."""
+    case, pipes, nodes, basins = draft.case, draft.pipe_table, draft.node_table, draft.basin_table
+    draft.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
+    for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
+        for key in ("diffusivity", "decay", "ambient", "initial"):
+            row[key] = getattr(scalar, key)
+        names = [f"{mesh.name}.{name}[{i}]" for mesh in draft.meshes for i in range(mesh.cells)]
+        row["y"] = draft.states(names, 1.0)
+        row["places"], places = len(draft.integers), []
+        for place, node, kind in zip(case.places, case.places.values(), nodes["kind"], strict=True):
+            given = node.scalars.get(name)
+            if kind in STORES:
+                places.append(draft.states([f"{place}.{name}"], 1.0))
+            else:
+                places.append(-1 if given is None else draft.schedules.add(given))
+        draft.integers += places
+        row["least"], row["greatest"] = bounds(case, name)
+        if scalar.decay > 0.0:
+            row["loss"] = sum(draft.scalar_table["losses"])
+            row["losses"] = 1 if explicit(case.numerics.method) else draft.size - row["y"] + sum(basins["n"])
+        basins["lost"] = draft.size - row["y"] + np.cumsum(basins["n"]) - basins["n"]
+    if len(case.scalars):
+        pipes["center"] = draft.cells + pipes["cell"]
+
+
+def explicit(method: str) -> bool:
+    """True if no step of a method solves equations."""
+    return method in METHODS and METHODS[method].explicit
+
+
+def bounds(case, name: str) -> tuple[float, float]:
+    """Least and greatest possible value of a scalar: those stated in the case, as mixing stays between them."""
+    scalar = case.scalars[name]
+    values = [scalar.initial] + [scalar.ambient] * (scalar.decay > 0.0)
+    patches = [patch for basin in case.meshes for patch in case.nodes[basin].patches.values()]
+    for part in [*case.places.values(), *case.links.values(), *patches]:
+        given = getattr(part, "scalars", {}).get(name)
+        values += np.ravel(getattr(given, "value", given)).tolist() if given is not None else []
+    for basin, mesh in case.meshes.items():
+        if name in case.nodes[basin].scalars:
+            values += means(samples(case.nodes[basin].scalars[name], mesh)).tolist()
+    return min(values), max(values)
+
+
+def scale_scalars(draft) -> None:
+    """Set masses per length of the profile, and scales of amounts, from the starting profile."""
+    profile, rho = draft.tables.profile, draft.fluid.density
+    for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) else ()):
+        strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
+        profile[row["center"] + np.arange(row["cells"])] = rho * row["area"] * (1.0 + strain)
+    scale = np.array(draft.scale)
+    for row in draft.scalar_table:
+        typical = max(abs(row["least"]), abs(row["greatest"])) or 1.0
+        for pipe in draft.pipe_table:
+            at = row["y"] + pipe["cell"]
+            scale[at : at + pipe["cells"]] = typical * rho * pipe["area"]
+        for node, place in zip(draft.node_table, indices_at_nodes(draft, row), strict=True):
+            if node["kind"] in STORES:
+                scale[place] = typical * max(node["mass"], scale[node["y"]])
+    draft.scale = array("d", scale.tobytes())
+
+
+def indices_at_nodes(draft, row) -> np.ndarray:
+    """State of the amount, or schedule, of a scalar at every node."""
+    return np.array(draft.integers[row["places"] : row["places"] + len(draft.node_table)], dtype=int)
+
+
+def start_amounts(draft, y: np.ndarray) -> None:
+    """Write amounts of all scalars at the start into a state."""
+    case, profile = draft.case, draft.tables.profile
+    for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
+        for pipe, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
+            cells = np.arange(mesh.cells)
+            value = case.links[mesh.name].scalars.get(name, scalar.initial)
+            y[row["y"] + pipe["cell"] + cells] = value * profile[pipe["center"] + cells]
+        for node, part, place in zip(draft.node_table, case.places.values(), indices_at_nodes(draft, row), strict=True):
+            if node["kind"] in STORES:
+                value = part.scalars[name].first if name in part.scalars else scalar.initial
+                y[place] = value * node["mass"]
+
+
+def amount_indices(model) -> np.ndarray:
+    """Indices of all amounts in pipes and nodes in the state."""
+    if not len(model.tables.scalars):
+        return np.zeros(0, dtype=int)
+    count = model.cells + int(np.isin(model.tables.nodes["kind"], STORES).sum())
+    return np.concatenate([row["y"] + np.arange(count) for row in model.tables.scalars])
+
+
+def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
+    """Values of all scalars in the cells of pipe k."""
+    pipe, values = model.tables.pipes[k], {}
+    n, o = int(pipe["cells"]), int(pipe["y"])
+    for row, name in zip(model.tables.scalars, model.case.scalars, strict=True):
+        base, at = int(pipe["center"]), int(row["y"] + pipe["cell"])
+        mass = model.tables.profile[base : base + n] + (y[o : o + n] + y[o + n : o + 2 * n]) / pipe["speed"]
+        values[name] = y[at : at + n] / mass
+    return values
+
+
+def node_values(model, i: int, out: np.ndarray) -> dict[str, float]:
+    """Values of all scalars at node i, from `out` of the right-hand side."""
+    at, nodes = int(model.layout["value"]), len(model.node_names)
+    return {name: float(out[at + q * nodes + i]) for q, name in enumerate(model.case.scalars)}
+
+
+def total_amount(model, q: int, y: np.ndarray) -> float:
+    """Amount of scalar q in all pipes, nodes and basins [kg, times its unit]."""
+    pipes, nodes, row = model.tables.pipes, model.tables.nodes, model.tables.scalars[q]
+    total = 0.0
+    for pipe in pipes:
+        at = int(row["y"] + pipe["cell"])
+        total += float(np.sum(y[at : at + int(pipe["cells"])])) * pipe["dx"]
+    total += sum(float(np.sum(basin.held() * basin.amounts(y)[q])) for basin in model.basins)
+    places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
+    return total + float(sum(y[place] for place, kind in zip(places, nodes["kind"], strict=True) if kind in STORES))
+
+
+def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
+    """Balance of each scalar: initial, final, inflow, outflow, decayed, remainder [kg, times its unit].
+
+    ledger : float64[2, m]  inflow, and outflow as a negative number
+    """
+    ledgers, n = {}, len(model.node_names)
+    for q, (name, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
+        flows = ledger[:, n + q * n : n + (q + 1) * n]
+        decay = ledger[:, n * (1 + len(model.case.scalars)) + row["loss"] :]
+        decayed = -float(np.sum(decay[:, : row["losses"]]))
+        initial, final = total_amount(model, q, model.start), total_amount(model, q, y)
+        remainder = final - initial - (float(np.sum(flows)) - decayed)
+        turnover = max(abs(initial), abs(final), float(np.sum(np.abs(flows))) + abs(decayed))
+        ledgers[name] = {
+            "initial": initial,
+            "final": final,
+            "inflow": float(flows[0].sum()),
+            "outflow": float(0.0 - flows[1].sum()),
+            "decayed": decayed,
+            "by_node": {
+                node: float(x) for node, x in zip(model.node_names, flows.sum(axis=0), strict=True) if x != 0.0
+            },
+            "nodes": {
+                node: {"inflow": float(x), "outflow": float(0.0 - y)}
+                for node, x, y in zip(model.node_names, *flows, strict=True)
+                if x != 0.0 or y != 0.0
+            },
+            "remainder": remainder,
+            "relative": abs(remainder) / turnover if turnover > 0.0 else 0.0,
+        }
+    return ledgers

@@ -1,0 +1,184 @@
+"""Schedules as polynomial pieces for kernels, and times at which steps must end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fvsolve.kernels.dtypes import PIECE_COLUMNS, SCHEDULE
+from fvsolve.kernels.schedule_pieces import CREST, POWER, WAVE
+
+STEPS_PER_PERIOD = 8  # least number of steps in a period
+SAMPLED = 32  # schedules with more entries are samples of a smooth function
+SAMPLE_KINK = 0.2  # for samples, change of slope, relative to the greatest slope, at which a step must end
+
+
+@dataclass
+class Schedules:
+    """Table of all schedules of a model, filled one by one.
+
+    span : time span in which kinks of periodic schedules are listed [s]
+    """
+
+    span: tuple[float, float] = (0.0, 0.0)
+
+    records: list[tuple[int, int]] = field(default_factory=list)
+    rows: list[list[float]] = field(default_factory=list)
+    breaks: dict[float, bool] = field(default_factory=dict)  # time -> True if a value jumps
+    spacing: float = np.inf  # greatest step that does not skip samples [s]
+    known_values: dict[tuple[int, float], float] = field(
+        default_factory=dict
+    )  # (index, time) -> value, after all are added
+
+    def add(self, schedule, scale: float = 1.0, offset: float = 0.0) -> int:
+        """Index of a new schedule whose value is scale * value + offset."""
+        if schedule.kind == "constant":
+            pieces = [[-np.inf, 0.0, 0.0, schedule.first * scale + offset, *(0.0 * scale,) * 3]]
+        else:
+            table = schedule_pieces(schedule)
+            table[:, 3:] = scaled(table, scale, offset)
+            pieces = table.tolist()
+        self.records.append((len(self.rows), len(pieces)))
+        self.rows += pieces
+        for time, jump in break_times(schedule):
+            self.breaks[time] = self.breaks.get(time, False) or jump
+        if schedule.kind == "harmonic":
+            self.spacing = min(self.spacing, schedule.wave[2] / STEPS_PER_PERIOD)
+        if len(schedule.time) > SAMPLED:
+            self.spacing = min(self.spacing, 4.0 * float(np.median(np.diff(schedule.time))))
+        return len(self.records) - 1
+
+    def add_part(self, schedule, side: int) -> int:
+        """Index of the positive part of side * value; it has kinks where it reaches zero."""
+        index = self.add(schedule, side)
+        first, count = self.records[index]
+        if schedule.kind == "harmonic":
+            self.rows[first][1] = CREST
+            self.breaks |= {time: self.breaks.get(time, False) for time in wave_roots(self.rows[first], self.span)}
+            return index
+        rows, crossings = positive_part(np.array(self.rows[first : first + count]))
+        self.rows[first:], self.records[index] = rows, (first, len(rows))
+        for time in crossings:
+            self.breaks.setdefault(time, False)
+        return index
+
+    def tables(self) -> tuple[np.ndarray, np.ndarray]:
+        """Arrays that kernels read : (schedules, pieces)."""
+        rows = np.array(self.rows, dtype=np.float64).reshape(-1, PIECE_COLUMNS)
+        return np.array(self.records, dtype=[("first", "i8"), ("pieces", "i8")]).astype(SCHEDULE), rows
+
+
+def schedule_pieces(schedule) -> np.ndarray:
+    """Pieces of a schedule : float64[pieces, 7].
+
+    Columns: start, kind, origin, then a, b, c, d of a polynomial, or v0, v1, duration, exponent of a power.
+    """
+    t, v = schedule.time, schedule.value
+    if schedule.kind == "harmonic":
+        mean, amplitude, period, phase = schedule.wave
+        return np.array([[-np.inf, WAVE, 0.0, mean, amplitude, 2.0 * np.pi / period, phase]])
+    hold = [[-np.inf, 0, 0.0, v[0], 0, 0, 0]]
+    last = [[t[-1], 0, t[-1], v[-1], 0, 0, 0]]
+    if schedule.kind == "constant":
+        return np.array(hold)
+    if schedule.kind == "ramp":
+        span = t[1] - t[0]
+        return np.array([*hold, [t[0], 1, t[0], v[0], v[1], span, schedule.exponent], *last])
+    if schedule.kind == "step":
+        return np.array([*hold, *[[t[k], 0, t[k], v[k], 0, 0, 0] for k in range(1, len(t))]])
+    if schedule.kind == "linear":
+        slope = np.diff(v) / np.diff(t)
+        inner = [[t[k], 0, t[k], v[k], slope[k], 0, 0] for k in range(len(t) - 1)]
+        return np.array([*hold, *inner, *last])
+    from scipy.interpolate import PchipInterpolator
+
+    c = PchipInterpolator(t, v).c
+    inner = np.column_stack([t[:-1], np.zeros(len(t) - 1), t[:-1], *c[::-1]])
+    return np.concatenate([hold, inner, last])
+
+
+def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
+    """Coefficients of scale * value + offset."""
+    values, nonpolynomial = pieces[:, 3:] * scale, pieces[:, 1] != 0
+    values[:, 0] += offset
+    if not nonpolynomial.any():
+        return values
+    power = pieces[:, 1] == POWER
+    values[power, 1] += offset
+    values[nonpolynomial, 2:] = pieces[nonpolynomial, 5:]
+    return values
+
+
+def break_times(schedule) -> list[tuple[float, bool]]:
+    """Times of kinks and jumps at which steps must end : (time, True if the value jumps)."""
+    t, v = schedule.time, schedule.value
+    if schedule.kind in ("constant", "harmonic"):
+        return []
+    if schedule.kind == "ramp":
+        return [(float(t[0]), False), (float(t[1]), False)]
+    if schedule.kind == "step":
+        return [(float(t[k]), True) for k in range(1, len(t)) if v[k] != v[k - 1]]
+    slope = np.diff(v) / np.diff(t)
+    if schedule.kind == "smooth":
+        pieces = schedule_pieces(schedule)[1:-1]
+        ends = pieces[0, 4], piece_slope(pieces[-1], t[-1])
+        change = np.zeros(len(t))
+        change[0], change[-1] = ends
+    else:
+        change = np.diff(np.concatenate(([0.0], slope, [0.0])))
+    least = (SAMPLE_KINK if len(t) > SAMPLED else 1e-9) * np.max(np.abs(slope), initial=0.0)
+    return [(float(time), False) for time, slope_change in zip(t, change, strict=True) if abs(slope_change) > least]
+
+
+def piece_slope(piece: np.ndarray, t: float) -> float:
+    """d/dt of a polynomial piece."""
+    s = t - piece[2]
+    return piece[4] + s * (2.0 * piece[5] + s * 3.0 * piece[6])
+
+
+def positive_part(pieces: np.ndarray) -> tuple[list[list[float]], list[float]]:
+    """Pieces of max(0, value), and times at which a piece crosses zero between its ends."""
+    rows, crossings = [], []
+    for k, piece in enumerate(pieces):
+        start, end = piece[0], pieces[k + 1, 0] if k + 1 < len(pieces) else np.inf
+        tolerance = 1e-12 * max(abs(start), abs(end), end - start) if np.isfinite([start, end]).all() else 0.0
+        inside = [t for t in piece_roots(piece) if start + tolerance < t < end - tolerance]
+        crossings += inside
+        for low, high in zip([start, *inside], [*inside, end], strict=True):
+            middle = 0.5 * (low + high) if np.isfinite([low, high]).all() else piece[2]
+            positive = piece_value(piece, middle) > 0.0
+            rows.append([low, *piece[1:]] if positive else [low, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    return rows, crossings
+
+
+def wave_roots(piece: list[float], span: tuple[float, float]) -> list[float]:
+    """Times between both ends of `span` at which a wave is zero, increasing."""
+    mean, amplitude, frequency, phase = piece[3:]
+    if abs(mean) >= abs(amplitude):
+        return []
+    up = np.arcsin(-mean / amplitude)
+    roots = []
+    for angle in (up, np.pi - up):
+        first, last = ((frequency * t + phase - angle) / (2.0 * np.pi) for t in span)
+        roots += [
+            (angle - phase + 2.0 * np.pi * k) / frequency for k in range(int(np.ceil(first)), int(np.floor(last)) + 1)
+        ]
+    return sorted(roots)
+
+
+def piece_value(piece: np.ndarray, t: float) -> float:
+    """Value of a piece at a time within it."""
+    s = t - piece[2]
+    if piece[1] == 0:
+        return piece[3] + s * (piece[4] + s * (piece[5] + s * piece[6]))
+    return piece[4] + (piece[3] - piece[4]) * max(0.0, 1.0 - s / piece[5]) ** piece[6]
+
+
+def piece_roots(piece: np.ndarray) -> list[float]:
+    """Times at which a piece is zero, increasing; none for a constant piece."""
+    if piece[1] == 1:
+        v0, v1, duration, exponent = piece[3:]
+        return [piece[2] + duration * (1.0 - (v1 / (v1 - v0)) ** (1.0 / exponent))] if v0 * v1 < 0.0 else []
+    roots = np.roots(piece[:2:-1]) if np.any(piece[4:]) else np.zeros(0)
+    return sorted(piece[2] + float(s.real) for s in roots if abs(s.imag) <= 1e-9 * abs(s))

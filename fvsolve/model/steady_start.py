@@ -1,0 +1,477 @@
+"""Starting profile of a run, from which the state deviates: pressures, flows, and motions at the start."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from functools import cached_property
+from random import Random
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import Notice, listing
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.schedule_pieces import value_with_limit
+from fvsolve.kernels.steady_friction import drag, drag_slope, factor_times_reynolds
+from fvsolve.kernels.table_handle import make_handle
+from fvsolve.kernels.valves import conductance_of, flow_at_drop, flow_slope, transition_of
+from fvsolve.model.bodies_start import start_bodies
+from fvsolve.model.lowering import lowering_of
+from fvsolve.model.mass_tables import start_masses
+from fvsolve.model.moving_networks import driven_at_start
+from fvsolve.model.run_data import zeros_for_run
+from fvsolve.steady import Edge, solve_steady, union
+
+FIXED_PRESSURE = (rec.FIXED, rec.TANK, rec.PATCH)  # nodes whose pressure does not depend on flows
+STORING = (rec.CHAMBER, rec.MOVING, rec.VESSEL)
+MAX_REVISIONS = 200  # greatest number of revisions of devices
+# revisions in which all devices change together; interval at which regulating devices restart at random
+SIMULTANEOUS_REVISIONS, RESTART_INTERVAL = 10, 20
+PRESSURE_SCALE = 1e5
+ROUNDING_SHARE = 1e-12  # flows below this share of the flow scale are zero
+
+
+class SteadyStart:
+    """Steady flow problem of a case and its solution, with the same density in all pressure drops."""
+
+    def __init__(self, draft) -> None:
+        self.draft, self.case, self.law = draft, draft.case, draft.case.law
+        self.nodes, self.pipes = draft.node_table, draft.pipe_table
+        self.columns, self.valves, self.pistons = draft.column_table, draft.valve_table, draft.piston_table
+        self.rest = self.case.numerics.initial == "rest"
+        self.t = self.case.numerics.start
+        self.weight = draft.fluid.density * self.case.gravity
+        sizes = [
+            1e-9,
+            *(draft.fluid.density * self.pipes["area"]),
+            *(draft.fluid.density * self.columns["area"]),
+        ]
+        sizes += list(np.sqrt(self.valves["conductance"] * PRESSURE_SCALE))
+        self.flow_scale = max(sizes)
+        self.extra: dict[str, float] = {}  # pressure drop in addition to the law's [Pa], for laws with changing density
+        self.exit_losses: dict[
+            str, tuple[float, float]
+        ] = {}  # of pipes: loss of the flow that leaves at each end, per M^2 [Pa]
+        self.density_ratios: dict[
+            int, tuple[float, float]
+        ] = {}  # of valves: density relative to reference, driving pressure drop relative to potential drop
+        self.factor: dict[int, float] = {}  # factor on the conductance of valves, likewise
+        self.ratio: dict[
+            int, float
+        ] = {}  # ratio of the pressure drop that drives a valve to its drop of potential, likewise
+        self.moving: list[str] = []
+        self.shut: set[int] = set()  # valves that a device holds shut
+        self.valve_modes: dict[int, str] = {}  # modes of valves that regulate
+        self.loads: dict[int, float] = {}  # of closed chambers: pressures that support bodies [Pa]
+
+    @cached_property
+    def out(self) -> np.ndarray:
+        """Values that the right-hand side writes in addition to dydt, for zero deviations."""
+        return np.zeros(int(self.draft.tables.layout[0]["size"]))
+
+    @cached_property
+    def run_arrays(self) -> rec.RunArrays:
+        """Arrays that runs write, before any event."""
+        return zeros_for_run(self.draft.shapes)
+
+    @cached_property
+    def handle(self) -> np.ndarray:
+        """Handle of the tables for compiled laws."""
+        return make_handle((*self.draft.tables, *self.run_arrays))
+
+    def pressure(self, i: int) -> float:
+        """Pressure [Pa] at node i in the latest solution."""
+        return self.law.pressure_of(self.answer.potential[i], self.nodes["elevation"][i])
+
+    def density_at(self, i: int) -> float:
+        """Density [kg/m3] at node i; the reference density before a solution exists."""
+        return self.law.density(self.pressure(i)) if hasattr(self, "answer") else self.law.rho
+
+    def schedule_value(self, schedule: int) -> float:
+        """Value of a schedule up to the start."""
+        values, key = self.draft.schedules.known_values, (int(schedule), self.t)
+        if key not in values:
+            schedules, pieces = self.draft.tables.schedules, self.draft.tables.pieces
+            values[key] = float(value_with_limit(schedules, pieces, key[0], self.t, self.t))
+        return values[key]
+
+    def solve(self) -> None:
+        """Solve the steady state in which the state of every device agrees with its pressures and flows."""
+        random, devices = Random(0), list(zip(self.draft.devices, self.draft.device_table, strict=True))
+        for turn in range(MAX_REVISIONS):
+            self.balance()
+            revised = (device.revise_state(self, part, row) for (_, part, device), row in devices)
+            if not (
+                any(revised) if turn > SIMULTANEOUS_REVISIONS else sum(revised)
+            ):  # later one by one, to avoid cycles
+                return self.report_faults(self.fixed_potentials)
+            random.shuffle(devices)
+            if turn % RESTART_INTERVAL == RESTART_INTERVAL - 1:
+                self.scatter(random)
+        self.report_faults(self.fixed_potentials)
+        names = listing([name for name, _, device in self.draft.devices])
+        self.draft.fault("numerics.initial", f"no steady state was found: the states of {names} keep changing; "
+                         'try initial = "rest"')  # fmt: skip
+        self.draft.check()
+
+    def scatter(self, random: Random) -> None:
+        """Set regulating devices to random states: revisions from their states did not converge."""
+        for k in sorted(self.valve_modes):
+            if random.random() < 0.5:
+                self.shut = self.shut | {k}
+            else:
+                self.shut = self.shut - {k}
+                del self.valve_modes[k]
+
+    def across(self, k: int) -> tuple[float, float]:
+        """Potentials at both ends of valve k in the latest solution [Pa]; -inf where demands are not supplied."""
+        potentials = []
+        for i in (int(self.valves[k][end]) for end in ("from_node", "to_node")):
+            unserved = i in self.answer.no_solution
+            drawn = sum(self.demand[self.answer.no_solution]) if unserved else 0.0
+            potentials.append(-math.copysign(math.inf, drawn) if unserved else float(self.answer.potential[i]))
+        return potentials[0], potentials[1]
+
+    def valve_flows(self) -> np.ndarray:
+        """Flows of valves in the latest solution [kg/s]."""
+        return self.answer.flow[len(self.pipes) + len(self.columns) :][: len(self.valves)]
+
+    def balance(self) -> None:
+        """Solve the steady state with devices in their present states."""
+        self.fixed_potentials, self.demand = self.boundary_values()
+        held = self.fixed_potentials
+        pipes = [self.friction_edge(mesh.name, row, mesh.length) for mesh, row in
+                 zip(self.draft.meshes, self.pipes, strict=True)]  # fmt: skip
+        columns = [self.friction_edge(name, row, row["length"]) for name, row in
+                   zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
+        valves = [self.valve_edge(k) for k in range(len(self.valves))]
+        leaks = [self.leak_edge(k) for k in range(len(self.pistons)) if self.pistons[k]["leakage"] > 0.0]
+        self.edges = [*pipes, *columns, *valves, *leaks]
+        self.answer = solve_steady(held, self.demand, self.edges, (PRESSURE_SCALE, self.flow_scale))
+        flow = self.answer.flow
+        flow[np.abs(flow) <= ROUNDING_SHARE * self.flow_scale] = 0.0
+        self.tolerance = ROUNDING_SHARE * (self.flow_scale + np.max(np.abs(flow), initial=0.0))
+        self.inflow = -self.demand.copy()
+        for edge, value in zip(self.edges, flow, strict=True):
+            self.inflow[edge.i] -= value
+            self.inflow[edge.j] += value
+        self.inflow[np.abs(self.inflow) <= 10.0 * self.tolerance] = 0.0
+        n, m = len(pipes), len(pipes) + len(columns)
+        self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
+
+    def boundary_values(self) -> tuple[np.ndarray, np.ndarray]:
+        """Fixed potentials (nan where unknown) and demands of junctions [kg/s]."""
+        held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
+        for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
+            if row["kind"] == rec.JUNCTION:
+                demand[i] = self.schedule_value(row["schedule"])
+            elif i in self.loads:
+                held[i] = self.law.potential_of(self.loads[i], row["elevation"])
+            elif (pressure := lowering_of(type(node)).pressure_at_start(self, i, node, row)) is not None:
+                held[i] = self.law.potential_of(pressure, row["elevation"])
+        return held, np.zeros_like(demand) if self.rest else demand
+
+    def set_supporting_pressures(self, pressures: dict[int, float]) -> bool:
+        """Set pressures of closed chambers that support bodies; True if there are any."""
+        self.loads = pressures
+        return bool(pressures)
+
+    def connected_nodes(self, i: int) -> list[int]:
+        """Nodes that open links join to node i, including node i."""
+        group = union(len(self.nodes), [(edge.i, edge.j) for edge in self.edges if not edge.shut])
+        return [j for j in range(len(self.nodes)) if group[j] == group[i]]
+
+    def is_joined(self, i: int) -> bool:
+        """True if a pipe, column or valve joins node i."""
+        tables = (self.pipes, self.columns, self.valves)
+        return any(np.any((table["from_node"] == i) | (table["to_node"] == i)) for table in tables)
+
+    def friction_edge(self, name: str, row, length: float) -> Edge:
+        """Edge of a pipe or column: drop = (L / A) drag(M)."""
+        law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
+        per = length / row["area"]
+        least = drag_slope(*law, 1e-6 * self.draft.fluid.density * float(row["area"]))
+        link = self.case.links[name]
+
+        extra, (back, ahead) = self.extra.get(name, 0.0), self.exit_losses.get(name, (0.0, 0.0))
+
+        def drop(flow):
+            return per * drag(*law, flow) + extra + (ahead if flow > 0.0 else back) * abs(flow) * flow
+
+        def newton(flow, present):
+            jet = 2.0 * (ahead if flow > 0.0 else back) * abs(flow)
+            return per * max(drag_slope(*law, flow), least) + jet, 1.0, present - drop(flow)
+
+        i, j = int(row["from_node"]), int(row["to_node"])
+        if self.rest:
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        if link.initial_flow is not None:
+            return Edge(i, j, None, link.initial_flow * self.draft.fluid.density, drop=drop)
+        free = row["friction"] == rec.FRICTION_NONE
+        # so that loops without friction get the solution of least norm
+        first = 0.0 if free else self.draft.fluid.density * row["area"]
+        return Edge(i, j, newton, first, drop=drop)
+
+    def valve_edge(self, k: int) -> Edge:
+        """Edge of a valve: M |M| = G dP, with the chord of the root as slope."""
+        row = self.valves[k]
+        own = self.valve_lowering(k).edge(self, k)
+        if own is not None:
+            return own
+        g, back = self.conductance(k), float(row["back"])
+        row["open"] = g
+        g *= self.factor.get(k, 1.0)
+        i, j = int(row["from_node"]), int(row["to_node"])
+        if g <= 0.0:
+            return Edge(i, j, None, 0.0, shut=True)
+        if self.rest:
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        ahead, behind = transition_of(row, g), transition_of(row, g * back) if back != 1.0 else None
+
+        def newton(flow, present):
+            here, transition = (g, ahead) if behind is None or not present < 0.0 else (g * back, behind)
+            target = flow_at_drop(here, transition, present)
+            if transition > 0.0 and abs(target) < transition:
+                slope = flow_slope(here, transition, present)
+                return 1.0 / slope, 1.0, (target - flow) / slope
+            chord = max(abs(target) + abs(flow), 1e-6 * math.sqrt(g))
+            return chord / here, 1.0, present - abs(flow) * flow / here
+
+        return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
+
+    def valve_lowering(self, k: int):
+        """Lowering that sets the state of valve k: that of its device, or of its own part."""
+        if self.valves[k]["device"] >= 0:
+            return self.draft.devices[self.valves[k]["device"]][2]
+        link = self.case.conduits[self.draft.valve_names[k]]
+        return lowering_of(type(link)).of(link)
+
+    def conductance(self, k: int) -> float:
+        """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its valve open or shut."""
+        row = self.valves[k]
+        if row["device"] >= 0:
+            return 0.0 if k in self.shut else float(row["conductance"])
+        opening = self.schedule_value(row["schedule"])
+        if row["characteristic"] == 0:  # as `conductance_of`, which needs all tables
+            return float(row["conductance"]) * opening * opening
+        return conductance_of(self.draft.tables, k, opening)
+
+    def leak_edge(self, k: int) -> Edge:
+        """Edge of the leakage past a piston: M = rho leakage dP."""
+        row = self.pistons[k]
+        g = row["leakage"] * self.draft.fluid.density * self.factor.get(len(self.valves) + k, 1.0)
+        i, j = int(row["a"]), int(row["b"])
+        if self.rest:
+            return Edge(i, j, None, 0.0, drop=lambda flow: 0.0)
+        return Edge(i, j, lambda flow, present: (1.0 / g, 1.0, present - flow / g))
+
+    def leak_flow(self, row, p_a: float, p_b: float) -> float:
+        """Mass flow from A to B past a piston, as `kernels.mass_dynamics.leak_flow` [kg/s]."""
+        return self.law.density(max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
+
+    def report_faults(self, held) -> None:
+        """Faults of parts for which no steady state exists, by name."""
+        names = list(self.case.places)
+        for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
+            drawn = self.demand[i] / self.draft.fluid.density
+            reason = f"the demand here is {self.case.amount(drawn, 'flow')}, but every path to it" if drawn > 0.0 else (
+                f"the inflow here is {self.case.amount(-drawn, 'flow')}, but every path out")  # fmt: skip
+            self.draft.fault(
+                f"nodes.{names[i]}",
+                f'no steady state: {reason} is shut; open a valve, or use initial = "rest"',
+            )
+        for name, row in zip(self.draft.pipe_names, self.pipes, strict=True):
+            ends = [int(row["from_node"]), int(row["to_node"])]
+            free = row["friction"] == rec.FRICTION_NONE and self.case.links[name].initial_flow is None
+            if free and not self.rest and abs(held[ends[0]] - held[ends[1]]) > 1e-6 * PRESSURE_SCALE:
+                a, b = ((held[k] - self.case.ambient_pressure) / self.weight for k in ends)
+                a, b = (self.case.amount(head, "head", 6) for head in (a, b))
+                self.draft.fault(
+                    f"links.{name}",
+                    f"no steady state: it has no friction, and heads of {a} and {b} at its ends; "
+                    'give it friction or initial_flow, or use initial = "rest"',
+                )
+        if not self.draft.faults and not self.answer.converged:
+            self.draft.fault("numerics.initial", "no steady state was found; check for demands that cannot be supplied "
+                             'and frictionless paths between unequal heads, or use "rest"')  # fmt: skip
+        self.draft.check()
+
+    def report_frictionless(self) -> None:
+        """Notices of frictionless columns between unequal heads, and of loops without friction.
+
+        In such loops friction does not set the flow split.
+        """
+        # fixed nodes count as a single node: paths between them close loops
+        merged = {i: -1 for i, potential in enumerate(self.fixed_potentials) if not np.isnan(potential)}
+        rows = [*zip(self.draft.pipe_names, self.pipes, strict=True),
+                *zip(self.draft.column_names, self.columns, strict=True)]  # fmt: skip
+        ends = {name: [merged.get(int(row[end]), int(row[end])) for end in ("from_node", "to_node")]
+                for name, row in rows if row["friction"] == rec.FRICTION_NONE and row["loss"] == 0.0}  # fmt: skip
+        swinging = [
+            name
+            for name, row in rows
+            if name in ends
+            and self.case.links[name].initial_flow is None
+            and abs(self.fixed_potentials[int(row["from_node"])] - self.fixed_potentials[int(row["to_node"])])
+            > 1e-6 * PRESSURE_SCALE
+        ]
+        for name in swinging:
+            text = (
+                f"{name}: without friction between unequal heads no flow is steady; it starts from rest and oscillates"
+            )
+            self.draft.warnings.append(Notice("start", f"links.{name}", text))
+        loops, before = {name: pair for name, pair in ends.items() if name not in swinging}, None
+        while self.answer.split and loops != before:  # a link to a node that no other link joins is in no loop
+            before, counts = loops, Counter(end for pair in loops.values() for end in pair)
+            loops = {name: pair for name, pair in loops.items() if min(counts[end] for end in pair) > 1}
+        if self.answer.split and (loops or not swinging):
+            text = (
+                f"{listing(loops) or 'paths'}: loops without friction, in which the flow is the solution of least norm"
+            )
+            self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
+
+    def freeze_factors(self) -> None:
+        """Set factors of `steady` friction by roughness: at the starting flow; at rest, fully rough."""
+        rows = [*zip(self.draft.pipe_names, self.pipes, self.pipe_flow, strict=True),
+                *zip(self.draft.column_names, self.columns, self.column_flow, strict=True)]  # fmt: skip
+        for name, row, flow in rows:
+            if row["friction"] != rec.FRICTION_ROUGH or self.case.links[name].friction.model != "steady":
+                continue
+            reynolds = row["reynolds"] * abs(flow)
+            if reynolds > 0.0:
+                factor = factor_times_reynolds(reynolds, row["roughness"]) / reynolds
+            else:
+                e = row["roughness"]
+                factor = (2.0 * math.log10(3.7 / e)) ** -2 if e > 0.0 else 0.0
+                text = f"{name}: no flow at the start; its steady factor is the fully rough one, {factor:.4g}"
+                self.draft.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
+            row["loss"] += row["rough"] * factor
+            row["rough"], row["friction"] = 0.0, rec.FRICTION_FACTOR
+
+    def fill_nodes(self) -> None:
+        for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
+            held = row["kind"] in FIXED_PRESSURE
+            row["pressure"] = (
+                lowering_of(type(node)).pressure_at_start(self, i, node, row) if held else self.pressure(i)
+            )
+            if row["kind"] in STORING:
+                row["mass"] = self.law.held(row["pressure"], row["volume"])
+        self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
+
+    def pipe_drop(self, row) -> float:
+        law = (row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds", "flow"))
+        return drag(*law)
+
+    def fill_pipes(self) -> None:
+        """Set pressure profiles linear between the ends; pressure that friction does not balance drives the flow."""
+        profile, self.unbalanced_drops = self.draft.tables.profile, {}
+        for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
+            row["flow"] = self.pipe_flow[k]
+            row["drag"] = self.pipe_drop(row)
+            p = self.answer.potential[[row["from_node"], row["to_node"]]]
+            self.set_unbalanced_drop(mesh, row, p[0] - p[1])
+            slope = row["drag"] / row["area"]
+            cells = slice(int(row["cell"]), int(row["cell"]) + mesh.cells)
+            pressure = self.draft.profiles[k] = p[0] - slope * mesh.x - self.weight * mesh.elevation
+            profile[cells] = (self.draft.fluid.vapor_pressure - pressure) * row["admittance"]
+
+    def set_unbalanced_drop(self, mesh, row, change: float) -> bool:
+        """Set a pipe's drag to a drop of potential [Pa] that friction does not balance; False if friction does."""
+        excess = change - row["drag"] / row["area"] * mesh.length
+        if abs(excess) <= 1e-10 * (PRESSURE_SCALE + abs(change)):
+            return False
+        self.unbalanced_drops[mesh.name] = excess
+        row["drag"] = change * row["area"] / mesh.length
+        return True
+
+    def height(self, row, mesh, fraction: float) -> float:
+        """Elevation of a pipe [m] at a fraction of its length."""
+        if mesh.profile is not None:
+            return float(mesh.profile.at(fraction * mesh.length))
+        return self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
+
+    def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
+        """Pressure [Pa] of the profile and elevation [m] at a fraction of pipe k."""
+        row, mesh = self.pipes[k], self.draft.meshes[k]
+        z = self.height(row, mesh, fraction)
+        potential = self.answer.potential[row["from_node"]] - row["drag"] / row["area"] * fraction * mesh.length
+        return potential - self.weight * z, z
+
+    def fill_columns(self) -> None:
+        for row, flow in zip(self.columns, self.column_flow, strict=True):
+            row["flow"] = flow
+            row["drag"] = self.pipe_drop(row)
+            p = self.answer.potential[[row["from_node"], row["to_node"]]]
+            offset = (p[0] - p[1]) - row["drag"] * row["length"] / row["area"]
+            row["offset"] = offset if abs(offset) > 1e-10 * (PRESSURE_SCALE + abs(p[0] - p[1])) else 0.0
+
+    def fill_valves(self) -> None:
+        for k, (row, flow) in enumerate(zip(self.valves, self.valve_flow, strict=True)):
+            row["flow"] = flow
+            row["drop"] = self.answer.potential[row["from_node"]] - self.answer.potential[row["to_node"]]
+            if flow == 0.0 and abs(row["drop"]) <= ROUNDING_SHARE * (
+                PRESSURE_SCALE + abs(self.answer.potential[row["from_node"]])
+            ):
+                row["drop"] = 0.0
+            if row["hooks"] >= 0:
+                self.valve_lowering(k).follow(self, k)
+                continue
+            here = row["open"] * (row["back"] if row["drop"] < 0.0 else 1.0)
+            law = flow_at_drop(here, transition_of(row, here), row["drop"])
+            if abs(law - flow) > 1e-6 * (self.flow_scale * 1e-6 + abs(flow)):
+                row["open"] = 0.0
+            elif row["transition"] == 0.0 and row["open"] > 0.0:
+                row["drop"] = abs(flow) * flow / here
+
+    def begin_devices(self) -> None:
+        """Fill in data of every device that depend on the profile."""
+        for (_, part, device), row in zip(self.draft.devices, self.draft.device_table, strict=True):
+            self.moving += device.begin(self, part, row)
+
+    def set_point_tolerance(self, end: str) -> float:
+        """Tolerance for a set point, from rounding: pressure [Pa] if `end` is given, else flow [kg/s]."""
+        return 1e-6 * PRESSURE_SCALE if end else 1e-6 * self.flow_scale
+
+    def valve_drive(self, k: int) -> tuple[float, float]:
+        """Drive of valve k in the profile : (drop [Pa], density in the valve relative to reference)."""
+        return float(self.valves[k]["drop"]), 1.0
+
+    def valve_law(self, k: int) -> tuple[float, float]:
+        """Law of valve k in the profile : (conductance fully open at the density in the valve, drop that drives it)."""
+        drop, denser = self.valve_drive(k)
+        return float(self.valves[k]["conductance"]) * denser, drop
+
+    def report(self) -> dict[str, Any]:
+        moving = start_masses(self.draft, self) + start_bodies(self.draft, self)
+        moving += driven_at_start(self.draft, self) + self.moving
+        fluid, net = self.draft.fluid, self.nodes["inflow"].copy()
+        for row in self.pistons:
+            net[[row["a"], row["b"]]] -= row["speed"] * np.array([row["sweep_a"], row["sweep_b"]])
+        for (name, node), row, inflow in zip(self.case.places.items(), self.nodes, net, strict=True):
+            name = name.removesuffix(".inside")
+            if inflow != 0.0:
+                text = lowering_of(type(node)).motion_text(
+                    name, node, row, inflow, inflow / fluid.density, self.case.amount
+                )
+                moving += [text] if text else []
+        amount = self.case.amount
+        for name, pressure in self.unbalanced_drops.items():
+            moving.append(
+                f"pipe {name}: {amount(pressure, 'pressure', span=True)} drives its flow, not balanced by friction"
+            )
+        for name, row in zip(self.draft.column_names, self.columns, strict=True):
+            if row["offset"] != 0.0:
+                moving.append(
+                    f"rigid column {name}: an unbalanced {amount(row['offset'], 'pressure', span=True)} drives its flow"
+                )
+        for k, (name, row) in enumerate(zip(self.draft.valve_names, self.valves, strict=True)):
+            if row["drop"] != 0.0 and row["open"] == 0.0 and row["flow"] == 0.0:
+                if self.conductance(k) > 0.0:
+                    moving.append(
+                        f"valve {name}: open with {amount(row['drop'], 'pressure', span=True)} across it and no flow"
+                    )
+        if self.case.numerics.initial == "equilibrium":
+            for text in moving:
+                self.draft.fault("numerics.initial", f'"equilibrium" expects that nothing moves, but {text}')
+        return {"moving": moving}

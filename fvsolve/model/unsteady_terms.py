@@ -1,0 +1,172 @@
+"""Weighting functions of unsteady friction, and their approximation by sums of exponentials.
+
+tau = 4 nu t / D^2 is dimensionless time, s its Laplace variable. A sum is fitted to the transform of W along s = i w,
+the value for a wave of that frequency, over all w that cells resolve and that fit into the run.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+
+ACCURACY = 1e-4
+LAMINAR = 2000.0  # Reynolds number of the start below which Zielke's function is used
+FASTEST_DECAY = 1.9  # decay of the fastest term times the travel time of a cell
+MAX_TERMS = 40
+ERROR_FACTOR, MAX_ERROR, LAST_FREQUENCY = (
+    2.0,
+    0.3,
+    0.7,
+)  # allowed error at w: 2 (w / top)^3, at most 0.3; last w over top
+SLOWEST_DECAYS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.4)  # slowest decay over the lowest frequency
+FLAT_FREQUENCY = 4.0  # frequency below which the transform of Zielke's function is nearly its value at zero, 1/12
+MAX_ZEROS = 8  # greatest number of zeros of J_2 that are used as exact decays
+
+
+def zielke(s: np.ndarray) -> np.ndarray:
+    """Transform of Zielke's W = sum of exp(-j^2 tau) over the zeros j of J_2, from the exact laminar profile.
+
+    s (1 + 8/s + 4 W(s)) is the exact laminar s I_0(x) / I_2(x), x = sqrt(s); Zielke, J. Basic Eng. 90 (1968) 109.
+    """
+    from scipy.special import ive
+
+    x = np.sqrt(np.asarray(s, dtype=complex))
+    return 0.25 * (ive(0, x) / ive(2, x) - 1.0 - 8.0 / x**2)
+
+
+def inverse_root(s: np.ndarray) -> np.ndarray:
+    """Transform of W = 1 / sqrt(pi tau), Vardy and Brown's W = A* exp(-B* tau) / sqrt(tau) without A* and B*."""
+    return 1.0 / np.sqrt(np.asarray(s, dtype=complex))
+
+
+def vardy_brown(reynolds: float, roughness: float) -> tuple[float, float]:
+    """(A*, B*) of W = A* exp(-B* tau) / sqrt(tau) in turbulent flow; roughness relative to the diameter.
+
+    Smooth walls, A* = 1 / (2 sqrt(pi)), B* = Re^k / 12.86, k = log10(15.29 / Re^0.0567): Vardy and Brown, J. Sound
+    Vib. 259 (2003) 1011. Fully rough walls, A* = 0.0103 sqrt(Re) (e/D)^0.39, B* = 0.352 Re (e/D)^0.41: Vardy and Brown,
+    J. Sound Vib. 270 (2004) 233. Between both, the pair with the greater A*.
+    """
+    smooth = 0.5 / math.sqrt(math.pi), reynolds ** math.log10(15.29 / reynolds**0.0567) / 12.86
+    rough = 0.0103 * math.sqrt(reynolds) * roughness**0.39, 0.352 * reynolds * roughness**0.41
+    return max(smooth, rough)
+
+
+def terms(
+    weighting: str, reynolds: float, roughness: float, cell: float, span: float, accuracy: float
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """(m, n) of W = sum of m exp(-n tau), and the highest frequency w at which it is accurate, in units of tau.
+
+    cell : travel time of a wave through a cell; span : duration of the run; both as tau
+    """
+    top = 2.0 ** math.floor(math.log2(FASTEST_DECAY / cell))
+    top = max(top, 512.0) if weighting == "zielke" else top
+    highest = top * (accuracy / ERROR_FACTOR) ** (1.0 / 3.0)
+    if weighting == "zielke":
+        return *fit("zielke", top, max(_power_of_two(1.0 / span), FLAT_FREQUENCY), accuracy), highest
+    a, b = vardy_brown(reynolds, roughness)
+    m, n = fit("root", top, _power_of_two(max(1.0 / span, 0.25 * b)), accuracy)  # along s = B* + i w, then shifted
+    return a * math.sqrt(math.pi) * m, n + b, highest
+
+
+def _power_of_two(x: float) -> float:
+    """Greatest power of two up to x."""
+    return 2.0 ** math.floor(math.log2(x))
+
+
+@functools.lru_cache(maxsize=256)
+def fit(transform: str, top: float, low: float, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
+    """Fit of nonnegative m and increasing n <= top, as few as possible, to a transform W(i w) from w = low on.
+
+    The relative error is at most `accuracy`; where decays up to `top` cannot follow, at most 2 (w / top)^3. As top is
+    near the travel time of a cell, that is third order in the cell size. Decays are in geometric progression; m is from
+    nonnegative least squares of (sum of m / (s + n)) / W(s) - 1 at s = i w. The result is checked at every w.
+    """
+    exact, heads = (zielke, _zeros()) if transform == "zielke" else (inverse_root, [np.zeros(0)])
+    w = np.geomspace(min(low, 0.01 * top), LAST_FREQUENCY * top, 32 + int(10 * math.log(max(top / low, 4.0))))
+    value, tolerance = exact(1j * w), np.maximum(accuracy, np.minimum(ERROR_FACTOR * (w / top) ** 3, MAX_ERROR))
+    for count in range(2, MAX_TERMS + 1):
+        fits = (_weights(w, value, tolerance, n) for n in _decays(heads, w[0], top, count))
+        error, m, n = min(fits, key=lambda candidate: candidate[0])
+        if error <= 1.0:
+            return m[m > 0.0], n[m > 0.0]
+    raise ArithmeticError(f"no sum of {MAX_TERMS} exponentials reaches an accuracy of {accuracy:g}")  # pragma: no cover
+
+
+def _zeros() -> list[np.ndarray]:
+    """First squared zeros of J_2: none of them, up to ZEROS of them."""
+    from scipy.special import jn_zeros
+
+    squares = jn_zeros(2, MAX_ZEROS) ** 2
+    return [squares[:k] for k in range(MAX_ZEROS + 1)]
+
+
+def _decays(starts, low: float, top: float, count: int):
+    """Sets of `count` decays: geometric from about `low` to `top`, or following given first decays."""
+    for given in starts:
+        if given.size == 0:
+            yield from (np.geomspace(bottom * low, top, count) for bottom in SLOWEST_DECAYS)
+        elif given.size < count and given[-1] < top:
+            first = given[-1] * (1.0 + 1.3 / (given.size + 0.5))
+            yield np.concatenate([given, np.geomspace(first, max(top, 1.01 * first), count - given.size)])
+
+
+def _weights(w, value, tolerance, n):
+    """Best nonnegative sum with decays n : (greatest relative error over its tolerance, m, n)."""
+    from scipy.optimize import nnls
+
+    shares = 1.0 / (1j * w[:, None] + n) / (tolerance * value)[:, None]
+    target = np.concatenate([1.0 / tolerance, np.zeros(w.size)])
+    m = nnls(np.vstack([shares.real, shares.imag]), target, maxiter=100 * n.size)[0]
+    return float(np.max(np.abs(shares @ m - target[: w.size]))), m, n
+
+
+def reserve_terms(draft, row) -> None:
+    """Reserve floats for the terms of a pipe, which depend on its flow at the start."""
+    row["term"] = len(draft.floats)
+    draft.floats += [0.0] * (2 * MAX_TERMS)
+
+
+def add_terms(draft) -> dict[str, dict]:
+    """Add terms and states of pipes with unsteady friction, from flows at the start; return facts for `check`."""
+    facts, settings, floats = {}, draft.tables.settings[0], draft.tables.floats
+    numerics, fluid = draft.case.numerics, draft.fluid
+    for name, row, mesh in zip(draft.pipe_names, draft.pipe_table, draft.meshes, strict=True):
+        law = draft.case.links[name].friction
+        if law.model != "unsteady":
+            continue
+        unit = 4.0 * fluid.viscosity / (fluid.density * mesh.diameter**2)  # tau per time [1/s]
+        reynolds = abs(float(row["flow"])) * mesh.diameter / (float(row["area"]) * fluid.viscosity)
+        weighting = law.weighting or ("zielke" if reynolds < LAMINAR else "vardy-brown")
+        if weighting == "vardy-brown" and reynolds == 0.0:
+            reason = "vardy-brown needs the Reynolds number of the start, but there is no flow"
+            draft.fault(f"links.{name}.friction.weighting", f"{reason}; expected an initial flow, or zielke")
+            continue
+        cell, span = unit * row["dx"] / row["speed"], unit * (numerics.end - numerics.start)
+        accuracy = ACCURACY if law.accuracy is None else law.accuracy
+        try:
+            m, n, highest = terms(weighting, reynolds, (law.roughness or 0.0) / mesh.diameter, cell, span, accuracy)
+        except ArithmeticError as error:
+            draft.fault(f"links.{name}.friction.accuracy", f"{error}; give a greater accuracy or more cells")
+            continue
+        gain, rate = 4.0 * unit * m, unit * n
+        floats[row["term"] : row["term"] + 2 * m.size] = np.column_stack([gain, rate]).ravel()
+        row["terms"] = m.size
+        names = [f"{name}.memory{k}[{i}]" for k in range(m.size) for i in range(mesh.cells)]
+        row["memory"] = draft.states(names, 1e5 * row["admittance"])
+        # upwind schemes reach twice that, so the other terms count half
+        waves = row["speed"] / row["dx"] * row["rate_factor"]
+        fastest = float(max(waves, 0.5 * rate[-1]) + 0.5 * gain.sum())
+        settings["rate"] = max(settings["rate"], fastest)
+        facts[name] = {
+            "weighting": weighting, "terms": m.size, "accuracy": accuracy, "rate": fastest,
+            "frequency": highest * unit / (2.0 * math.pi),
+        }  # fmt: skip
+    return facts
+
+
+def memory_shares(floats: np.ndarray, row) -> np.ndarray:
+    """g / n of every term of a pipe: a memory state z stores (g / n) z^2 / (2 rho A) per length."""
+    pairs = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2)
+    return pairs[:, 0] / pairs[:, 1]

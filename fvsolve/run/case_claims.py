@@ -1,0 +1,97 @@
+"""Comparison of a run with the claims of its case: expectations, limits, measured series."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.output.column import UnitColumn, column, probe_columns
+from fvsolve.run.comparison import comparison, interpolated
+from fvsolve.run.part_extremes import in_quantity, part_extremes
+from fvsolve.run.result import FAILS, HOLDS, OPEN
+from fvsolve.run.verdicts import places, verdict
+
+
+def claims(model, summary, result) -> dict:
+    """`expectations`, `comparisons` and `verdicts` of a run; also sets the `places` of limits in `result`."""
+    columns = {column_.name: column_ for column_ in probe_columns(model)}
+    case = model.case
+    result.places = places(model, summary)
+    return {
+        "expectations": expectations(model, summary, result),
+        "verdicts": [verdict(rows) for rows in result.places],
+        "comparisons": [comparison(compare, columns[compare.probe.text], result) for compare in case.compare.values()],
+    }
+
+
+def expectations(model, summary, result) -> list[dict]:
+    """Expectations of the case, in the order of the file."""
+    columns = {column_.name: column_ for column_ in probe_columns(model)}
+    first = min((mark.time for mark in summary.marks), default=math.inf)
+    rows = []
+    for text, expect in model.case.expect.items():
+        if expect.extent is None:
+            shown = columns[expect.probe.text]
+            value, time = _at_probe(expect, shown.name, summary, result)
+        else:
+            shown = column(text, expect.extent.dimension, model.case)
+            value, time = _at_places(model, summary, expect)
+        value = value if time < summary.invalid_from else math.nan
+        rows.append(expectation(text, expect, shown, value, bool(summary.ok and time < first)))
+    return rows
+
+
+def expectation(text: str, expect, column: UnitColumn, value: float, complete: bool) -> dict:
+    """Entry of `[expect]`: claimed, found, tolerance in the unit of the probe, and its state, as for limits.
+
+    `max` and `min` are over all steps and rows, as are `greatest` and `least`, these over all places of a part as well.
+    `mean` is over time (trapezoids), `at` is interpolated between rows. `error` is filled in by an error estimate.
+    """
+    tolerance = expect.atol + expect.rtol * abs(expect.value)
+    known = math.isfinite(value)
+    state = FAILS if known and abs(value - expect.value) > tolerance else HOLDS if known and complete else OPEN
+    return {
+        "text": text,
+        "claimed": float(column.from_si(expect.value)),
+        "found": float(column.from_si(value)) if known else None,
+        "tolerance": float(column.span_from_si(tolerance)),
+        "unit": column.unit,
+        "state": state,
+        "ok": state == HOLDS,
+        "error": None,
+    }
+
+
+def _at_places(model, summary, expect) -> tuple[float, float]:
+    """Greatest or least value of all places of an extent, and its time."""
+    extent, low = expect.extent, expect.function == "min"
+    values, times = [], []
+    for part in part_extremes(model, summary, extent):
+        extreme = part.minimum if low else part.maximum
+        times.append(part.t_min if low else part.t_max)
+        values.append(
+            in_quantity(model, extent.quantity, extreme, part.elevation) if extent.quantity in OF_PRESSURE else extreme
+        )
+    at = int((np.argmin if low else np.argmax)(np.concatenate(values)))
+    return float(np.concatenate(values)[at]), float(np.concatenate(times)[at])
+
+
+def _at_probe(expect, probe: str, summary, result) -> tuple[float, float]:
+    """Value of a probe for a claim, and its time; for a mean the end of the run."""
+    if expect.function == "min":
+        return summary.extremes[probe][:2]
+    if expect.function == "max":
+        return summary.extremes[probe][2:]
+    t, values = result.seconds, result.si(probe)
+    if not len(t):
+        return math.nan, summary.t
+    if expect.function == "final":
+        return float(values[-1]), summary.t
+    if expect.function == "at":
+        inside = t[0] <= expect.time <= t[-1]
+        return float(interpolated(t, values, np.array([expect.time]))[0]) if inside else math.nan, expect.time
+    span = t[-1] - t[0]
+    area = np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t))
+    return float(area / span) if span > 0.0 else float(values[0]), summary.t

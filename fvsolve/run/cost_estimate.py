@@ -1,0 +1,22 @@
+"""Estimate of duration and size of a run, before it starts."""
+
+from __future__ import annotations
+
+from fvsolve.case.size import on_disk, size
+
+LONG_RUN, LARGE_FILES = 180.0, 1e9  # [s], [B] above which an estimate is printed
+UNITS = ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"))
+
+
+def cost_text(model) -> str:
+    """Text of the expected duration and size, "" if both are small."""
+    seconds, bytes_ = model.checks["expected_seconds"] or 0.0, on_disk(model.case)
+    parts = [duration(seconds)] if seconds > LONG_RUN else []
+    parts += [f"{size(bytes_)} on disk"] if bytes_ > LARGE_FILES else []
+    return f"{model.case.name} will take about {' and '.join(parts)}" if parts else ""
+
+
+def duration(seconds: float) -> str:
+    """Duration in a suitable unit."""
+    length, name = next((unit for unit in UNITS if seconds >= 2.0 * unit[0]), (1.0, "s"))
+    return f"{seconds / length:.2g} {name}"

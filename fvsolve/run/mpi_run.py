@@ -1,0 +1,114 @@
+"""Run under MPI: rank 0 and the other ranks, with a check that all have the same case."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import sys
+from collections.abc import Callable
+from contextlib import contextmanager
+from functools import cache
+
+from fvsolve.errors import FvsolveError
+from fvsolve.solve.partition import make_partition, threads_of
+from fvsolve.solve.run_checks import RunChecks
+from fvsolve.solve.run_loop import RunLoop
+
+# environment variables by which MPI launchers state the number of processes
+SIZES = ("PMI_SIZE", "OMPI_COMM_WORLD_SIZE", "PALS_SIZE")
+EXTRA = 'pip install "fvsolve[mpi]"'
+
+
+@cache
+def world():
+    """MPI's communicator of all ranks, None for a single process. Raises FvsolveError without mpi4py."""
+    count = max(int(os.environ.get(name, "1")) for name in SIZES)
+    if count < 2:
+        return None
+    try:
+        from mpi4py import MPI
+    except ImportError as error:
+        raise FvsolveError(
+            f"MPI started {count} processes, but mpi4py is not installed ({error}); {EXTRA} installs it"
+        ) from None
+    if MPI.COMM_WORLD.size < 2:
+        text = f"MPI started {count} processes, but the MPI of mpi4py sees each of them as a single process"
+        raise FvsolveError(f"{text}; start them with the mpiexec of the MPI that mpi4py uses; {EXTRA} installs one")
+    return MPI.COMM_WORLD
+
+
+def is_other_rank() -> bool:
+    """True for ranks other than 0."""
+    return (comm := world()) is not None and comm.rank > 0
+
+
+def digest(model) -> str:
+    """Hash of a model, equal for equal models."""
+    hashed = hashlib.sha256()
+    for array in (*model.tables, model.start, model.scale):
+        hashed.update(array.tobytes())
+    numerics = model.case.numerics
+    return hashed.hexdigest() + repr(numerics)
+
+
+@contextmanager
+def rank_zero_first(comm):
+    """Context of rank 0 before all ranks run; releases the other ranks if it fails."""
+    try:
+        yield
+    except BaseException:
+        if comm is not None:
+            comm.bcast(None)
+        raise
+
+
+def all_ranks_ready(comm, model):
+    """Communicator after all ranks have the model; None if rank 0 runs alone.
+
+    Rank 0 compiles before the others begin. Raises FvsolveError if a rank fails, or has another case.
+    """
+    with rank_zero_first(comm):
+        count = threads_of(model, comm.size)[0]
+        RunLoop(model)
+    if count == 1:
+        comm.bcast(None)
+        return None
+    comm.bcast(digest(model))
+    faults = [text for text in comm.gather("") if text]
+    comm.bcast(faults)
+    if faults:
+        raise FvsolveError(faults[0])
+    return comm
+
+
+def rows_of(model, count: int) -> dict:
+    """Basin -> first row of each rank, and number of rows, of distributed basins : name -> int64[count + 1]."""
+    partition = make_partition(model, count)
+    return {model.basins[b].name: rows for b, rows in zip(partition.basins, partition.firsts, strict=True)}
+
+
+def serve_rank(make: Callable) -> None:
+    """Take part in a run as a rank other than 0; make : function that returns the model."""
+    comm = world()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # rank 0 handles it
+    expected = comm.bcast(None)
+    if expected is None:
+        return
+    model, fault = None, ""
+    try:
+        model = make()
+        if digest(model) != expected:
+            fault = f"rank {comm.rank} has another case than rank 0; expected the same file and the same --set on all"
+    except Exception as error:
+        fault = f"rank {comm.rank}: {error}"
+    comm.gather(fault)
+    if comm.bcast(None):
+        return
+    try:
+        loop = RunLoop(model, comm=comm)
+        loop.stepper.largest = RunChecks(loop.slate).largest_if_needed
+        loop.team.serve(*loop.functions)
+    except BaseException as error:  # the other ranks wait for this rank
+        print(f"fvsolve: rank {comm.rank}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)
+        comm.Abort(1)

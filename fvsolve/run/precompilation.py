@@ -1,0 +1,145 @@
+"""Compilation of all machine code for later runs, by several processes.
+
+Code and fluid properties are stored in the cache folder, which can be copied to machines of the same kind.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from fvsolve import jit, store
+from fvsolve.draw.beside import processors
+from fvsolve.errors import FvsolveError, RunError
+from fvsolve.run.process_pool import ProcessPool
+
+LINEAR = ("dense", "banded", "sparse")  # kinds of `steppers.structure`
+STEPS = ("explicit", "damped", "diagonal", "full", "linear")  # kinds of methods
+
+
+@dataclass(frozen=True)
+class CacheState:
+    """State of the cache: folder of this machine's code, kind of machine, and amounts.
+
+    compiled : number of functions that were added; functions, bytes : of all stored functions
+    """
+
+    directory: str
+    target: str
+    compiled: int
+    functions: int
+    bytes: int
+    seconds: float
+
+
+def warm(
+    cases: Sequence[Path], whole: bool, jobs: int | None = None,
+    progress: Callable[[int, int, str], None] = lambda done, total, task: None,
+) -> CacheState:  # fmt: skip
+    """Compile the code that these cases need, with `whole` also all kinds of steps, by `jobs` processes.
+
+    progress(done, total, task) is called after each task. Raises CaseError, FvsolveError.
+    """
+    folder, began = _folder(), time.perf_counter()
+    before = code_files(folder)
+    tasks = (
+        [("steps", "")]
+        + [("attempt", kind) for kind in STEPS if whole]
+        + [("algebra", kind) for kind in LINEAR if whole]
+    )
+    _all(tasks, jobs or processors(), lambda done, task: progress(done, len(tasks) + len(cases), task))
+    case_tasks = [("case", str(path)) for path in cases]
+    _all(
+        case_tasks, jobs or processors(), lambda done, task: progress(len(tasks) + done, len(tasks) + len(cases), task)
+    )
+    after = code_files(folder)
+    return CacheState(
+        str(folder), store.target()["name"], len(after.keys() - before.keys()), len(after), sum(after.values()),
+        time.perf_counter() - began,
+    )  # fmt: skip
+
+
+def _folder() -> Path:
+    """Folder of compiled code. Raises FvsolveError if there is none, or if the requested one cannot be used."""
+    if not jit.COMPILING:
+        raise FvsolveError("NUMBA_DISABLE_JIT is set, so nothing is compiled; expected it to be unset")
+    requested, folder = os.environ.get("FVSOLVE_CACHE"), jit.cache_folder()
+    if requested and Path(requested).expanduser().absolute() != folder:
+        raise FvsolveError(
+            f"FVSOLVE_CACHE = {requested}: cannot be written; expected a writable folder for compiled code"
+        )
+    return jit.code_folder()
+
+
+def code_files(folder: Path) -> dict[str, int]:
+    """Files of machine code and their sizes [bytes]."""
+    return {str(path): path.stat().st_size for path in folder.rglob(f"*{store.SUFFIX}")}
+
+
+def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str], None]) -> None:
+    """Run tasks in a process pool; the longest tasks are first."""
+    pool, started = ProcessPool(run_task, min(jobs, len(tasks))), 0
+    progress(0, "compiling")
+    try:
+        for count in range(len(tasks)):
+            while started < len(tasks) and started - count < pool.room:
+                pool.give(started, [tasks[started]])
+                started += 1
+            at, answers, _ = pool.take()
+            kind, name = tasks[at]
+            if answers is None:
+                raise RunError(f"the process that compiled {kind} {name} has ended; possibly memory was too small")
+            progress(count + 1, Path(name).stem if kind == "case" else f"{kind} {name}".strip())
+    finally:
+        pool.close()
+
+
+def run_task(task: tuple[str, str]) -> None:
+    """Compile the code of a task in this process."""
+    kind, name = task
+    TASKS[kind](name)
+
+
+def steps(_: str) -> None:
+    """Time loop, and the replacement of linear algebra for methods without it."""
+    from fvsolve.steppers.signatures import no_algebra
+    from fvsolve.steppers.time_loop import compiled, compiled_attempt
+
+    compiled(), compiled_attempt(), no_algebra()
+
+
+def attempt(kind: str) -> None:
+    """Step of a kind of methods."""
+    from fvsolve.steppers.integrator import attempt_of
+
+    attempt_of(kind)
+
+
+def algebra(kind: str) -> None:
+    """Factorisations and solutions of a kind, for real and complex shifts."""
+    from fvsolve.steppers.structure import functions
+
+    for complex in (False, True):
+        functions(kind, complex)
+
+
+def case(path: str) -> None:
+    """Code that a case needs: its start, checks, first steps and energies."""
+    from fvsolve.output.memory import MemorySink
+    from fvsolve.run import model_of
+    from fvsolve.solve import initial_state, solve
+
+    def stop(t: float, seconds: float, steps: int) -> None:
+        raise KeyboardInterrupt
+
+    model = model_of(path)
+    _ = model.checks, model.functions.energies
+    sink, state = MemorySink(model), initial_state(model)
+    sink.begin(model, state)
+    solve(model, state, sink, stop)
+
+
+TASKS = {"steps": steps, "attempt": attempt, "algebra": algebra, "case": case}
