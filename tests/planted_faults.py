@@ -120,7 +120,7 @@ FAULTS = [
         "return 1.01 * speed * size / np.pi * np.sin(x) ** 2",
     ),
     Fault("basins/free_surface/patches.py", "dydt[o + i] += flow * weight(", "dydt[o + i] -= flow * weight("),
-    Fault("parts/sizes.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
+    Fault("parts/pipe_sizes.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
     Fault(
         "parts/accumulator/law.py",
         "rho * (n * p * compressibility * (total - volume) + volume)",
@@ -129,7 +129,7 @@ FAULTS = [
     Fault("parts/tank/lower.py", "0.5 * s * (area[k + 1] - area[k])", "0.505 * s * (area[k + 1] - area[k])"),
     Fault("parts/pump/law_curve.py", "residual = drop + weight * head", "residual = drop + 1.01 * weight * head"),
     Fault("run/comparison.py", "compare.t + compare.shift", "compare.t - compare.shift"),
-    Fault("epanet/words.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
+    Fault("epanet/part_tables.py", "2.0 * GRAVITY * drop / velocity**2", "2.02 * GRAVITY * drop / velocity**2"),
     Fault("solve/run_summary.py", 'row["inflow"] - row["outflow"] for name', 'row["inflow"] + row["outflow"] for name'),
     Fault("exact/laminar_line.py", "self.length - places if self.reversed", "places if self.reversed"),
 ]

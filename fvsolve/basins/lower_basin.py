@@ -14,8 +14,8 @@ from fvsolve.basins.diffusion import diffusion_work
 from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.basins.observe import SPEED, U, V
-from fvsolve.case.basins import behind
-from fvsolve.case.cells import is_grid, means, samples
+from fvsolve.case.basins import boundary_cells
+from fvsolve.case.cell_means import is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
@@ -426,7 +426,7 @@ class BasinRows:
 
     def lower_patch(self, draft, patch: str, row) -> None:
         """Fill the row of a patch to which links may connect."""
-        cells = behind(self.mesh, patch)
+        cells = boundary_cells(self.mesh, patch)
         row["first"], row["count"] = len(draft.integers), cells.size
         draft.integers += cells.tolist()
         faces, outer = np.arange(self.mesh.left.size)[self.mesh.patch(patch)], self.mesh.inner

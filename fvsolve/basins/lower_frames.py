@@ -6,8 +6,8 @@ import numpy as np
 
 from fvsolve.basins.faces import BLOCK, blocks
 from fvsolve.basins.frames import FRAME, LEVEL, PHI, PLACES, SURFACE
-from fvsolve.case.riding import carriers, free_joints
-from fvsolve.case.riding_patches import level_over
+from fvsolve.case.basins_on_bodies import carriers, free_joints
+from fvsolve.case.patches_on_bodies import level_over
 
 
 def lower_frame(draft, basin, row) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from fvsolve.basins import faces, moving_meshes
 from fvsolve.basins.lower_mesh import lower_ends
 from fvsolve.basins.walls import BESIDE
-from fvsolve.case import walls as case
+from fvsolve.case import moving_wall_checks as case
 from fvsolve.kernels import dtypes as rec
 
 SCALE = 1e-2  # a small travel [m]
@@ -25,10 +25,10 @@ def lower_walls(draft) -> None:
         row["mass"] = draft.mass_index.get(stated.body, -1) if stated.body is not None else -1
         row["body"] = draft.body_names.index(stated.body) if stated.body in draft.body_names else -1
         if row["body"] >= 0:
-            row["toward"] = np.sign(case.direction(draft.case.nodes[stated.body])[axis])
+            row["toward"] = np.sign(case.slide_direction(draft.case.nodes[stated.body])[axis])
         row["schedule"] = draft.schedules.add(stated.travel) if stated.travel is not None else -1
         corner_weights = case.weights(basin.part, basin.mesh, patch, basin.mesh.points[:, axis])
-        line_weights, stretch_per_travel = corner_weights, case.widened(basin.mesh, axis, corner_weights)
+        line_weights, stretch_per_travel = corner_weights, case.area_growth(basin.mesh, axis, corner_weights)
         per_cell = stretch_per_travel
         if basin.is_grid:
             grid, lines = basin.mesh.grid, (basin.mesh.grid.x, basin.mesh.grid.y)[axis]

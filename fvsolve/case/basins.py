@@ -13,27 +13,27 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.case import riding, walls
-from fvsolve.case.cells import means, samples
-from fvsolve.case.riding_patches import on_body
+from fvsolve.case import basins_on_bodies, moving_wall_checks
+from fvsolve.case.cell_means import means, samples
+from fvsolve.case.patches_on_bodies import on_body
+from fvsolve.case.resource_checks import BASIN_CELL, LONGEST_NAME, byte_text, free_memory
 from fvsolve.case.sections import Output
-from fvsolve.case.size import BASIN_CELL, LONGEST_NAME, free_memory, size
 from fvsolve.errors import MeshError, did_you_mean, listing
 from fvsolve.fluid.laws import named
 from fvsolve.parts import Basin
 from fvsolve.parts.basin.part import MovingWall, Place, StartOfFields
-from fvsolve.parts.value import Misfit, Setting
+from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
     from fvsolve.mesh.points import MeshPoints
 
-Found = Iterator[tuple[tuple, str]]
+Faults = Iterator[tuple[tuple, str]]
 
 
 @dataclass(frozen=True)
-class Pool:
+class BasinFields:
     """Basin as seen by probes: name -> dimension of its fields, and its mesh."""
 
     fields: dict[str, str]
@@ -74,7 +74,7 @@ def lumped_fields(basin: Basin) -> dict[str, str]:
     return {"depth": basin.own.fields["depth"]} if basin.sloshing == "modes" and basin.own.sloshes else {}
 
 
-def mesh_of(basin: Basin, setting: Setting) -> Mesh:
+def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
     """Mesh of a basin. Raises Misfit with all faults of the mesh."""
     from fvsolve.mesh import read, rectangle
 
@@ -82,8 +82,8 @@ def mesh_of(basin: Basin, setting: Setting) -> Mesh:
         if basin.mesh is None:
             count = math.prod(basin.cells or ())
             if count * BASIN_CELL > free_memory():
-                text = f"{count:.3g} cells take about {size(count * BASIN_CELL)} of memory"
-                raise Misfit([(("cells",), f"{text}, and {size(free_memory())} are free; expected fewer")])
+                text = f"{count:.3g} cells take about {byte_text(count * BASIN_CELL)} of memory"
+                raise ValueFault([(("cells",), f"{text}, and {byte_text(free_memory())} are free; expected fewer")])
             sides = {name: (item.side, *item.span) if item.span else item.side for name, item in basin.patches.items()}
             grading = basin.grading or (1.0, 1.0)
             return rectangle(basin.size, basin.cells, grading=grading, patches=sides, holes=basin.holes or ())
@@ -91,21 +91,21 @@ def mesh_of(basin: Basin, setting: Setting) -> Mesh:
     except MeshError as error:
         if basin.mesh is not None:  # the faults are in the mesh file, not in keys of the case
             name, places = Path(basin.mesh.file).name, [item.place == "unit" for item in error.faults]
-            raise Misfit([(("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
+            raise ValueFault([(("mesh", "unit"), item.message) if key else (("mesh",), f"{name}: {item}")
                           for key, item in zip(places, error.faults, strict=True)]) from None  # fmt: skip
-        raise Misfit([(keys(fault.place), fault.message) for fault in error.faults]) from None
+        raise ValueFault([(fault_keys(fault.place), fault.message) for fault in error.faults]) from None
 
 
-def keys(place: str) -> tuple:
+def fault_keys(place: str) -> tuple:
     """Key path of the place of a mesh fault: "patches.east", "holes[0]"; empty if it is not a key of a basin."""
     path = [int(word) if word.isdigit() else word for word in re.split(r"[.\[\]]", place) if word]
     return tuple(path) if path and path[0] in Basin.keys() else ()
 
 
-def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
+def line_faults(output: Output, nodes: dict[str, Any]) -> Faults:
     """Faults of output lines across basins.
 
-    nodes : name -> kind of the node, or the `Pool` of a basin
+    nodes : name -> kind of the node, or the `BasinFields` of a basin
     """
     for name, line in output.lines.items():
         pool, key = nodes.get(line.basin), ("output", "lines", name)
@@ -115,8 +115,8 @@ def line_faults(output: Output, nodes: dict[str, Any]) -> Found:
             yield key, f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
         if line.basin in nodes and pool is None:
             continue  # the basin itself is faulty
-        if not isinstance(pool, Pool):
-            pools = [basin for basin, kind in nodes.items() if kind is None or isinstance(kind, Pool)]
+        if not isinstance(pool, BasinFields):
+            pools = [basin for basin, kind in nodes.items() if kind is None or isinstance(kind, BasinFields)]
             near = did_you_mean(line.basin, pools) or f"; basins are {listing(pools) or 'none'}"
             yield (*key, "basin"), f"no basin named {show(line.basin)}{near}"
             continue
@@ -136,7 +136,7 @@ def patch_names(mesh: Mesh) -> tuple[str, ...]:
     return mesh.patches[:-1]
 
 
-def behind(mesh: Mesh, patch: str) -> np.ndarray:
+def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
     """Indices of the cells next to a patch : int64[count]."""
     return np.unique(mesh.left[mesh.patch(patch)])
 
@@ -154,7 +154,7 @@ def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, P
     """
     result = {}
     for patch in patch_names(mesh):
-        rest = basin.own.rest(basin, lambda shape: means(samples(shape, mesh)), behind(mesh, patch), mesh.area)
+        rest = basin.own.rest(basin, lambda shape: means(samples(shape, mesh)), boundary_cells(mesh, patch), mesh.area)
         if basin.on is not None:
             rest = on_body(basin, mesh, patch, rest, pose)
         kind = place_kind(basin, patch)
@@ -162,7 +162,7 @@ def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, P
     return result
 
 
-def riding_places(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, Place]:
+def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, Place]:
     """Patches of basins on bodies as places; basins with faulty formulas are left out."""
     result: dict[str, Place] = {}
     for name, mesh in meshes.items():
@@ -172,7 +172,7 @@ def riding_places(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, P
     return result
 
 
-def _patches(basin: Basin, known: tuple[str, ...], name: str) -> str:
+def _patch_hint(basin: Basin, known: tuple[str, ...], name: str) -> str:
     """List the patches of a mesh, or explain how to name them in a mesh file."""
     if known or basin.mesh is None:
         return f"patches are {listing(known) or 'none'}"
@@ -180,9 +180,9 @@ def _patches(basin: Basin, known: tuple[str, ...], name: str) -> str:
     return f"{file} has no named groups of lines; in Gmsh name them by Physical Curve({show(name)}) = {{1, 2}};"
 
 
-def misfits(
+def find_faults(
     nodes: dict[str, Any], links: dict[str, Any], meshes: dict, fluid: Any, times: tuple, all_nodes: Any
-) -> Found:
+) -> Faults:
     """Faults of basins: density law, patches, moving walls, formulas.
 
     times : start and end [s]; all_nodes : names of all nodes, also of faulty ones
@@ -195,14 +195,14 @@ def misfits(
         if fluid is not None and not own.goes(fluid.law):
             laws = named(lambda law, own=own: own.goes(law.name))
             yield ("fluid", "law"), f"{show(fluid.law)} does not apply to {own.described}; expected {laws}"
-        yield from riding.misfits(name, basin, nodes, all_nodes)
+        yield from basins_on_bodies.find_faults(name, basin, nodes, all_nodes)
         if name not in meshes:
             continue
         known = patch_names(meshes[name])
-        yield from walls.misfits(name, basin, meshes[name], nodes, joined, times, all_nodes)
+        yield from moving_wall_checks.find_faults(name, basin, meshes[name], nodes, joined, times, all_nodes)
         for patch, options in basin.patches.items():
             if patch not in known:
-                yield (*key, "patches", patch), f"the mesh has no such patch; {_patches(basin, known, patch)}"
+                yield (*key, "patches", patch), f"the mesh has no such patch; {_patch_hint(basin, known, patch)}"
             elif f"{name}.{patch}" in joined and not own.joined:
                 yield (*key, "patches", patch), "a link joins here, but the flow is given by velocity"
             elif f"{name}.{patch}" in joined and (options.boundary or options.impedance) is not None:

@@ -13,15 +13,15 @@ import numpy as np
 
 from fvsolve import attitude
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.exact.schedule import value
-from fvsolve.parts.attitude import no_direction
+from fvsolve.exact.schedule_values import value
+from fvsolve.parts.attitude_keys import is_zero_vector
 from fvsolve.parts.body.part import Body
 from fvsolve.units import show
 
 # Largest gap of a pin at the start, relative to its lengths: typed numbers have few digits.
-OPEN = 1e-4
+PIN_GAP = 1e-4
 WORLD = ""  # root of all bodies; it has no name
-Found = Iterator[tuple[tuple, str]]
+Faults = Iterator[tuple[tuple, str]]
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Pose:
         """World position (59) of a point in body axes [m]."""
         return self.place + self.attitude @ np.asarray(place, dtype=float)
 
-    def moves(self, place: Any) -> np.ndarray:
+    def velocity_at(self, place: Any) -> np.ndarray:
         """World velocity (67) of a point in body axes [m/s]."""
         return self.velocity + np.cross(self.spin, self.attitude @ np.asarray(place, dtype=float))
 
@@ -46,7 +46,7 @@ AT_REST = Pose(np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
 
 @dataclass(frozen=True)
-class Riding:
+class BodyQuantities:
     """Body as seen by probes: the quantities that its joint has."""
 
     body: Body
@@ -72,8 +72,8 @@ def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
     frames = [name for name, node in nodes.items() if node.kind == "frame"]
     while waiting:
         ready = {name: body for name, body in waiting.items()
-                 if hangs_on(body)[0] not in waiting and placed(nodes, body)
-                 and hangs_on(body)[0] in (WORLD, *result, *frames)}  # fmt: skip
+                 if carrier_of(body)[0] not in waiting and carrier_exists(nodes, body)
+                 and carrier_of(body)[0] in (WORLD, *result, *frames)}  # fmt: skip
         if not ready:
             return result
         result |= ready
@@ -81,21 +81,21 @@ def bodies_of(nodes: dict[str, Any]) -> dict[str, Body]:
     return result
 
 
-def placed(nodes: dict[str, Any], body: Body) -> bool:
+def carrier_exists(nodes: dict[str, Any], body: Body) -> bool:
     """True if the node and the point that a body is joined to exist."""
-    name, point = hangs_on(body)
+    name, point = carrier_of(body)
     return name == WORLD or (hasattr(nodes.get(name), "points") and (not point or point in nodes[name].points))
 
 
-def hangs_on(body: Body) -> tuple[str, str]:
+def carrier_of(body: Body) -> tuple[str, str]:
     """(node, point) that a body is joined to; `WORLD` for the world, "" for no point."""
     name, _, point = (body.joint.on or WORLD).partition(".")
     return name, point
 
 
-def joint_place(nodes: dict[str, Any], body: Body) -> np.ndarray:
+def joint_position(nodes: dict[str, Any], body: Body) -> np.ndarray:
     """Position of a joint in the axes of the node that carries it [m]."""
-    name, point = hangs_on(body)
+    name, point = carrier_of(body)
     if point:
         return np.array(nodes[name].points[point])
     return np.array(body.joint.at or (0.0, 0.0, 0.0))
@@ -105,22 +105,22 @@ def poses(nodes: dict[str, Any], t: float) -> dict[str, Pose]:
     """Poses of all bodies at the start time t [s]."""
     result: dict[str, Pose] = {}
     for name, body in bodies_of(nodes).items():
-        up = result.get(hangs_on(body)[0], AT_REST)
-        result[name] = joined(body, up, joint_place(nodes, body), t)
+        up = result.get(carrier_of(body)[0], AT_REST)
+        result[name] = body_pose(body, up, joint_position(nodes, body), t)
     return result
 
 
-def joined(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
+def body_pose(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
     """Pose of a body whose joint lies at `at` [m] in the axes of its carrier, with pose `up`."""
     joint = body.joint
     turn, place = up.attitude @ joint.attitude.rotation, up.at(at)
-    velocity, spin, axis = up.moves(at), up.spin, turn @ joint.unit_axis
+    velocity, spin, axis = up.velocity_at(at), up.spin, turn @ joint.unit_axis
     if joint.kind == "revolute":
-        return Pose(turn @ attitude.of_axis(joint.axis, coordinate(joint, t)), place, velocity,
-                    spin + axis * rate(joint, t))  # fmt: skip
+        return Pose(turn @ attitude.of_axis(joint.axis, joint_coordinate(joint, t)), place, velocity,
+                    spin + axis * joint_rate(joint, t))  # fmt: skip
     if joint.kind == "prismatic":
-        far = axis * coordinate(joint, t)
-        return Pose(turn, place + far, velocity + np.cross(spin, far) + axis * rate(joint, t), spin)
+        far = axis * joint_coordinate(joint, t)
+        return Pose(turn, place + far, velocity + np.cross(spin, far) + axis * joint_rate(joint, t), spin)
     if joint.kind == "free":  # its stated velocity is that of the centre of mass
         spin = turn @ joint.turning
         centre = joint.speed - np.cross(spin, turn @ np.array(body.centre_of_mass))
@@ -128,12 +128,12 @@ def joined(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
     return Pose(turn, place, velocity, spin + turn @ joint.turning if joint.kind == "ball" else spin)
 
 
-def coordinate(joint: Any, t: float) -> float:
+def joint_coordinate(joint: Any, t: float) -> float:
     """Angle [rad] or travel [m] of a joint at the start."""
     return float(value(joint.coordinate, t, left=True)) if joint.coordinate is not None else 0.0
 
 
-def rate(joint: Any, t: float) -> float:
+def joint_rate(joint: Any, t: float) -> float:
     """Rate of a joint at the start; of a driven joint by one-sided differences of its schedule."""
     if joint.driven is None:
         return float(joint.rate or 0.0)
@@ -142,7 +142,7 @@ def rate(joint: Any, t: float) -> float:
     return (4.0 * soon - 3.0 * now - later) / (2.0 * h)
 
 
-def point_of(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | None:
+def body_point(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | None:
     """(body, position in its axes) of a place that a link names; (`WORLD`, ...) on a frame; None if it is no point."""
     name, _, point = place.partition(".")
     node = nodes.get(name)
@@ -153,12 +153,12 @@ def point_of(nodes: dict[str, Any], place: str) -> tuple[str, np.ndarray] | None
     return name if isinstance(node, Body) else WORLD, np.array(node.points[point])
 
 
-def ahead(nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, second: str) -> float | None:
+def separation(nodes: dict[str, Any], poses_of: dict[str, Pose], first: str, second: str) -> float | None:
     """Distance from place `first` to place `second` at the start [m], signed on the axis of masses; None if unknown."""
     ends = [nodes.get(place) for place in (first, second)]
     if all(getattr(end, "domain", "") == "translational" for end in ends):
         return ends[1].initial_position - ends[0].initial_position
-    points = [point_of(nodes, place) for place in (first, second)]
+    points = [body_point(nodes, place) for place in (first, second)]
     if None in points or any(name not in (WORLD, *poses_of) for name, _ in points):
         return None
     here, there = (poses_of.get(name, AT_REST).at(place) for name, place in points)
@@ -170,7 +170,7 @@ def point_inertia(mass: float, r: np.ndarray) -> np.ndarray:
     return mass * (np.dot(r, r) * np.eye(3) - np.outer(r, r))
 
 
-def one_place(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Found:
+def coincident_ends(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Faults:
     """Faults of links along a line between two points that coincide at the start: the line has no direction."""
     for name, link in links.items():
         ends = [link.ports.get(port) for port in (("case", "rod") if "rod" in link.ports else ("from", "to"))]
@@ -180,21 +180,21 @@ def one_place(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, 
             or any(getattr(link, key, None) for key in ("direction", "axis"))
         ):
             continue
-        if None not in [point_of(nodes, end) for end in ends] and ahead(nodes, poses_of, *ends) == 0.0:
+        if None not in [body_point(nodes, end) for end in ends] and separation(nodes, poses_of, *ends) == 0.0:
             text = f"{ends[0]} and {ends[1]} coincide at the start, so the line between them has no direction"
             yield ("links", name), text
 
 
-def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Found:
+def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, Pose]) -> Faults:
     """Faults of pins whose two points do not coincide at the start."""
     for name, link in links.items():
-        points = [point_of(nodes, link.ports[port]) for port in ("from", "to")] if link.kind == "pin" else [None]
-        if None in points or no_direction(link.axis) or any(body not in (WORLD, *poses_of) for body, _ in points):
+        points = [body_point(nodes, link.ports[port]) for port in ("from", "to")] if link.kind == "pin" else [None]
+        if None in points or is_zero_vector(link.axis) or any(body not in (WORLD, *poses_of) for body, _ in points):
             continue
         here, there = (poses_of.get(body, AT_REST).at(place) for body, place in points)
         turn = poses_of.get(points[0][0], AT_REST).attitude
         gap = float(np.linalg.norm(link.directions() @ (turn.T @ (there - here))))
-        if gap > OPEN * (1.0 + float(np.linalg.norm(points[0][1]))):
+        if gap > PIN_GAP * (1.0 + float(np.linalg.norm(points[0][1]))):
             across = " across its axis" if link.axis else ""
             yield (
                 ("links", name),
@@ -202,7 +202,7 @@ def open_pins(nodes: dict[str, Any], links: dict[str, Any], poses_of: dict[str, 
             )
 
 
-def misfits(nodes: dict[str, Any], named: Any) -> Found:
+def find_faults(nodes: dict[str, Any], named: Any) -> Faults:
     """Faults of the nodes that carry bodies: unknown body or point, and loops (each reported once).
 
     named : tables of all nodes, also of faulty ones
@@ -210,7 +210,7 @@ def misfits(nodes: dict[str, Any], named: Any) -> Found:
     own = {name: node for name, node in nodes.items() if hasattr(node, "points")}
     bodies = {name: node for name, node in own.items() if isinstance(node, Body)}
     for name, body in bodies.items():
-        on, point = hangs_on(body)
+        on, point = carrier_of(body)
         keys = ("nodes", name, "joint", "on")
         if on == WORLD or (on not in nodes and on in named):  # the carrier itself is faulty
             continue
@@ -223,11 +223,11 @@ def misfits(nodes: dict[str, Any], named: Any) -> Found:
             yield keys, f"{on} has no point {show(point)}; {has}{did_you_mean(point, own[on].points)}"
         elif not point and on not in bodies:
             yield keys, f"{show(on)} is a frame; expected a point of it, FRAME.POINT, or leave on out"
-    loop = set(bodies) - set(bodies_of(nodes)) - {name for name in bodies if not reaches(nodes, bodies, name)}
+    loop = set(bodies) - set(bodies_of(nodes)) - {name for name in bodies if not ends_in_loop(nodes, bodies, name)}
     while loop:
         name = min(loop, key=list(bodies).index)
         ring = [name]
-        while (up := hangs_on(bodies[ring[-1]])[0]) not in ring:
+        while (up := carrier_of(bodies[ring[-1]])[0]) not in ring:
             ring.append(up)
         ring = ring[ring.index(up) :]
         text = " on ".join([*ring, ring[0]])
@@ -235,17 +235,17 @@ def misfits(nodes: dict[str, Any], named: Any) -> Found:
             ("nodes", ring[0], "joint", "on"),
             f"is carried by itself: {text}; remove on from one of its bodies and close the loop by a pin",
         )
-        loop -= {member for member in loop if set(chain(bodies, member)) & set(ring)}
+        loop -= {member for member in loop if set(carrier_chain(bodies, member)) & set(ring)}
 
 
-def chain(bodies: dict[str, Body], name: str) -> list[str]:
+def carrier_chain(bodies: dict[str, Body], name: str) -> list[str]:
     """Names of a body and of all bodies that carry it, each once."""
     names = [name]
-    while (up := hangs_on(bodies[names[-1]])[0]) in bodies and up not in names:
+    while (up := carrier_of(bodies[names[-1]])[0]) in bodies and up not in names:
         names.append(up)
     return names
 
 
-def reaches(nodes: dict[str, Any], bodies: dict[str, Body], name: str) -> bool:
+def ends_in_loop(nodes: dict[str, Any], bodies: dict[str, Body], name: str) -> bool:
     """True if the carriers of a body form a loop, rather than end at a missing node."""
-    return hangs_on(bodies[chain(bodies, name)[-1]])[0] in bodies
+    return carrier_of(bodies[carrier_chain(bodies, name)[-1]])[0] in bodies

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, horizon, ranges, riding_networks, text
-from fvsolve.case.claims import Compare, Expect
+from fvsolve.case import basins, bodies, moving_network_checks, schedule_ends, text, usual_ranges
+from fvsolve.case.design_limits import DesignLimit
+from fvsolve.case.expectations import Compare, Expect
 from fvsolve.case.extent import of_profiles
-from fvsolve.case.limits import DesignLimit
+from fvsolve.case.pipe_routes import Route
 from fvsolve.case.probe import Probe
-from fvsolve.case.routes import Route
 from fvsolve.case.sections import CAVITY_SCHEMES, DEFAULT_CELLS, ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
@@ -22,7 +22,7 @@ from fvsolve.fluid import LAWS, Fluid
 from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.parts.pipe.wall import softness
-from fvsolve.parts.table import plain
+from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
 from fvsolve.units import show
 
@@ -63,7 +63,7 @@ class Case(Displayable):
     meshes: dict[str, Any] = field(default_factory=dict, repr=False)  # of basins
     lumped: dict[str, Any] = field(default_factory=dict, repr=False)  # meshes of basins with water as lumped masses
     read: dict[tuple, tuple] = field(default_factory=dict, repr=False)  # place -> (raw value, value as read)
-    found: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses in equilibrium
+    equilibrium_nodes: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses in equilibrium
 
     picture = "fvsolve.draw.objects:case_figure"
 
@@ -92,7 +92,7 @@ class Case(Displayable):
         return list({probe.text: probe for probe in named}.values())
 
     @cached_property
-    def watched(self) -> list[Probe]:
+    def extreme_probes(self) -> list[Probe]:
         """Probes followed only for their extremes: points of profiles, and extents of limits and claims."""
         named = [*of_profiles(self.links)]
         extents = [claim.extent for claim in [*self.limits.values(), *self.expect.values()] if claim.extent is not None]
@@ -119,45 +119,45 @@ class Case(Displayable):
             if name in self.meshes:
                 result |= basins.places(name, node, self.meshes[name], self.poses.get(node.on))
             elif node.domain == "hydraulic":
-                result |= riding_networks.standing(node, self.poses).inner(name)[0]
+                result |= moving_network_checks.with_elevation(node, self.poses).inner(name)[0]
         for name, link in self.links.items():
             result |= link.inner(name)[0]
             if "A" in link.owns:
-                x = self.ahead(link.ports["case"], link.ports["rod"]) - link.closed_length
+                x = self.separation(link.ports["case"], link.ports["rod"]) - link.closed_length
                 result |= {f"{name}.{place}": chamber for place, chamber in link.chambers(x).items()}
         return result
 
     @cached_property
     def poses(self) -> dict[str, Any]:
         """Poses of bodies at the start, name -> `bodies.Pose`; each body stands after its carrier."""
-        return bodies.poses(self.loaded, self.numerics.start)
+        return bodies.poses(self.nodes_with_water, self.numerics.start)
 
     @cached_property
-    def loaded(self) -> dict[str, Node]:
+    def nodes_with_water(self) -> dict[str, Node]:
         """Nodes at the start, with lumped water: bodies with added mass, and sloshing modes as extra bodies."""
-        from fvsolve.case.riding import loaded
+        from fvsolve.case.basins_on_bodies import nodes_with_water
 
-        nodes = {**self.nodes, **self.found} if self.found else self.nodes
+        nodes = {**self.nodes, **self.equilibrium_nodes} if self.equilibrium_nodes else self.nodes
         if not self.lumped:
             return nodes
-        return loaded(nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
+        return nodes_with_water(nodes, self.lumped, self.properties.density, self.gravity, self.numerics.start)
 
     @cached_property
-    def stated(self) -> Case:
+    def as_stated(self) -> Case:
         """Case with bodies and masses where the file puts them; bushings and preloads count from there."""
-        return replace(self, found={}) if self.found else self
+        return replace(self, equilibrium_nodes={}) if self.equilibrium_nodes else self
 
     @property
-    def settles(self) -> bool:
+    def needs_equilibrium(self) -> bool:
         """True if bodies and masses start in equilibrium and at least one of them is free to move."""
         joints = [node.joint for node in self.nodes.values() if node.kind == "body"]
         free = any(joint.kind != "fixed" and joint.driven is None for joint in joints)
         free = free or any(node.kind == "mass" for node in self.nodes.values())
         return free and self.numerics.initial == "equilibrium"
 
-    def ahead(self, first: str, second: str) -> float:
+    def separation(self, first: str, second: str) -> float:
         """Distance from place `first` to place `second` at the start [m], signed on the axis of masses."""
-        return bodies.ahead(self.loaded, self.poses, first, second)
+        return bodies.separation(self.nodes_with_water, self.poses, first, second)
 
     @cached_property
     def conduits(self) -> dict[str, Link]:
@@ -168,9 +168,9 @@ class Case(Displayable):
         return result
 
     @cached_property
-    def notes(self) -> list[Notice]:
+    def notices(self) -> list[Notice]:
         """Notices of values outside usual ranges and of schedules after the end of the run."""
-        return [*ranges.notices(self), *horizon.notices(self)]
+        return [*usual_ranges.notices(self), *schedule_ends.notices(self)]
 
     @cached_property
     def elevations_stated(self) -> bool:
@@ -255,7 +255,7 @@ class Case(Displayable):
             "fluid": self.fluid.table(),
             "nodes": {name: {"type": node.kind, **node.table()} for name, node in self.nodes.items()},
             "links": {name: {"type": link.kind, **link.table()} for name, link in self.links.items()},
-            "signals": {name: plain(signal) for name, signal in self.signals.items()},
+            "signals": {name: plain_value(signal) for name, signal in self.signals.items()},
             "scalars": {name: item.table() for name, item in self.scalars.items()},
             "numerics": self.numerics.table(),
             "output": self.output.table(),

@@ -8,19 +8,19 @@ from typing import Any
 
 from fvsolve.case import defaults
 from fvsolve.case.case import Case
-from fvsolve.case.claims import COMPARE_KEYS, expect_keys
-from fvsolve.case.defaults import link_said
-from fvsolve.case.limits import limit_keys
+from fvsolve.case.chainage import original_keys, pieces_of, placed
+from fvsolve.case.defaults import raw_link
+from fvsolve.case.design_limits import limit_keys
+from fvsolve.case.expectations import COMPARE_KEYS, expect_keys
 from fvsolve.case.load import TOP
-from fvsolve.case.placing import own_keys, pieces_of, placed
-from fvsolve.case.raw import dotted
-from fvsolve.case.routes import Route
+from fvsolve.case.pipe_routes import Route
+from fvsolve.case.raw import split_key
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled
-from fvsolve.parts.table import Inside
-from fvsolve.parts.value import COUNTED, PROFILE, SHAPE, VALUE, Quantity, Text, Value
+from fvsolve.parts.table_model import Nested
+from fvsolve.parts.value import BY_CELLS, PROFILE, SHAPE, VALUE, Quantity, Text, Value
 from fvsolve.units import show
 
 TABLES = {"fluid": FluidSpec, "numerics": Numerics, "output": Output, "exact": ExactSpec}
@@ -36,30 +36,35 @@ def changes(case: Case, key: str) -> str:
     This holds between values of the same meaning: zero demand or zero loss may be a special case. Raises FvsolveError
     for an unknown key.
     """
-    keys = dotted(key)
-    own = classed(case, keys)
+    keys = split_key(key)
+    own = class_of_key(case, keys)
     if keys[0] != "signals" or not keys[1:]:
         return own
-    return max((classed(case, other) for other in followers(case.raw, keys[1])), key=CLASSES.index, default=VALUE)
+    return max(
+        (class_of_key(case, other) for other in driven_keys(case.raw, keys[1])), key=CLASSES.index, default=VALUE
+    )
 
 
-def classed(case: Case, keys: tuple[Any, ...]) -> str:
+def class_of_key(case: Case, keys: tuple[Any, ...]) -> str:
     """Class of a key in this case."""
-    result, links = declared(case.raw, keys).changes, [link_said(case.raw, name) for name in case.raw.get("links", {})]
+    result, links = (
+        declaration_of(case.raw, keys).changes,
+        [raw_link(case.raw, name) for name in case.raw.get("links", {})],
+    )
     if keys[0] == "links" and keys[2:3] == ("length",) and keys[1] in pieces_of(case.raw):
         return SHAPE  # its pieces between chainages get other cells
-    if result == COUNTED:
+    if result == BY_CELLS:
         result = SHAPE if any(link["type"] == "pipe" and "cells" not in link for link in links) else PROFILE
     unsteady = any(link.get("friction", {}).get("model") == "unsteady" for link in links)
-    if result == VALUE and case.settles and keys[0] in ("nodes", "links"):
+    if result == VALUE and case.needs_equilibrium and keys[0] in ("nodes", "links"):
         result = PROFILE  # it may change the equilibrium
     return SHAPE if result == PROFILE and unsteady else result  # the start chooses the terms of unsteady friction
 
 
-def declared(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
+def declaration_of(raw: dict[str, Any], keys: tuple[str, ...]) -> Value:
     """Declaration of a key by its part; for a key inside a value without keys, the declaration of that value."""
-    result: Value | None = Keys(known(raw))
-    keys = own_keys(raw, keys)
+    result: Value | None = Keys(declarations(raw))
+    keys = original_keys(raw, keys)
     for key in (*keys[:2], *keys[4:]) if keys[2:3] == ("pieces",) else keys:
         outer = result
         try:
@@ -83,11 +88,11 @@ class Keys(Value):
         return self.values[key]
 
 
-def known(raw: dict[str, Any]) -> dict[str, Value]:
+def declarations(raw: dict[str, Any]) -> dict[str, Value]:
     """Declaration of each key of a case, with the names of its parts."""
     signals = Keys(dict.fromkeys(raw.get("signals", {}), Scheduled("number")))
     result = {**values_of(TOP), "ambient_pressure": Quantity("pressure"), "signals": signals}
-    result |= {name: Inside(model) for name, model in TABLES.items()}
+    result |= {name: Nested(model) for name, model in TABLES.items()}
     for group, kinds in KINDS.items():
         parts = raw.get(group, {}).items()
         result[group] = Keys({name: Keys({"type": Value(), **kinds[entry["type"]].values()}) for name, entry in parts})
@@ -104,10 +109,10 @@ def values_of(keys: dict[str, tuple[Value, Any]]) -> dict[str, Value]:
     return {key: value for key, (value, _) in keys.items()}
 
 
-def followers(table: Any, signal: str, keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+def driven_keys(table: Any, signal: str, keys: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
     """Key paths of everything that a signal drives."""
     if isinstance(table, dict):
         if table.get("signal") == signal and keys[:1] != ("signals",):
             yield keys
         for key, inner in table.items():
-            yield from followers(inner, signal, (*keys, key))
+            yield from driven_keys(inner, signal, (*keys, key))

@@ -6,26 +6,26 @@ from collections.abc import Iterator
 from typing import Any
 
 from fvsolve import units
-from fvsolve.case import basins, bodies, riding, riding_networks, sloshing
+from fvsolve.case import basins, basins_on_bodies, bodies, moving_network_checks, sloshing
 from fvsolve.case.bodies import WORLD
-from fvsolve.case.claims import Expect
+from fvsolve.case.expectations import Expect
 from fvsolve.case.raw import Raw
 from fvsolve.case.sections import CAVITY_SCHEMES, FluidSpec, Numerics
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Chamber
-from fvsolve.parts.around import Around
+from fvsolve.parts.context import CaseContext
 from fvsolve.parts.value import ROOT
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.steppers.tolerances import LEAST_STEP, LEAST_TOLERANCE
 from fvsolve.units import show
 
-Found = Iterator[tuple[tuple, str]]
+Faults = Iterator[tuple[tuple, str]]
 
 
-def network(table: dict[str, Any]) -> Found:
+def network(table: dict[str, Any]) -> Faults:
     """Faults of the incidence list, from names alone: unknown places, loose nodes, islands, no fixed pressure."""
     nodes, links = ({n: p for n, p in _dict(table.get(group)).items()} for group in ("nodes", "links"))
-    gone = [name for name in (*nodes, *links) if lost(name, nodes, links)]
+    gone = [name for name in (*nodes, *links) if has_unknown_places(name, nodes, links)]
     places = _places(nodes, links, gone)
     ends: dict[str, list[str]] = {}
     unjoined = 0  # ports that join no known place
@@ -36,7 +36,7 @@ def network(table: dict[str, Any]) -> Found:
                 yield ("links", name, *keys), _unknown_place(place, places, nodes, links)
             elif isinstance(place, str) and None not in (domain, places[place]) and not _fits(places[place], domain):
                 fits = False
-                yield ("links", name, *keys), _unlike_place(place, domain, places, nodes, _dict(link))
+                yield ("links", name, *keys), _wrong_domain(place, domain, places, nodes, _dict(link))
         sorts = {places.get(place): (keys, place) for keys, place, _ in ports if isinstance(place, str)}
         if fits and {"translational", "spatial"} <= set(sorts):
             keys, place = sorts["translational"]
@@ -47,14 +47,14 @@ def network(table: dict[str, Any]) -> Found:
             if isinstance(place, str) and place in [other for _, other, _ in ports[:k]]:
                 yield ("links", name, *keys), f"joins {show(place)} to itself"
         unjoined += len(ports) - len({*joined} & places.keys())
-        ends[name] = [place for place in [*joined, *_owned(name, link)] if place in places]
+        ends[name] = [place for place in [*joined, *_owned_places(name, link)] if place in places]
     for group in ("nodes", "links"):
         kinds = [_dict(node).get("type") for node in nodes.values()]
         alone = "body" in kinds or any(own_places(name, node) is not None for name, node in nodes.items())
         if table.get(group) == {} and not alone:
             yield (group,), "is empty; expected at least two places and a link between them"
-    tied = {name: _tied(name, node, places) for name, node in nodes.items()}
-    hanging = _hanging(nodes, places)
+    tied = {name: _joined_places(name, node, places) for name, node in nodes.items()}
+    hanging = _carrier_pairs(nodes, places)
     touched = {place for places in [*ends.values(), *tied.values(), *hanging] for place in places}
     loose = [name for name, node in nodes.items() if name not in gone and own_places(name, node) is None
              and not touched & {name, *points_of(name, node)}]  # fmt: skip
@@ -88,46 +88,50 @@ def parts(
     start: float,
     meshes: dict[str, Any],
     lumped: dict[str, Any],
-) -> Found:
+) -> Faults:
     """Faults of elevations, of bodies, and of each part in the context of the others."""
     poses = bodies.poses(nodes, start)
     named = nodes if raw is None else _dict(raw.table.get("nodes"))
-    high = {name: node for name, node in nodes.items() if riding_networks.has_height(node, poses)}
+    high = {name: node for name, node in nodes.items() if moving_network_checks.has_elevation(node, poses)}
     raw_links = {} if raw is None else _dict(raw.table.get("links"))
     lends = any("profile" in _dict(link) or kind_name(link, "links") is None or not {*_ends(link)} <= named.keys()
                 for name, link in raw_links.items() if name not in links or "profile" in _dict(link))  # fmt: skip
-    yield from _elevations({name: riding_networks.standing(node, poses) for name, node in high.items()}, links, lends)
+    yield from _elevations(
+        {name: moving_network_checks.with_elevation(node, poses) for name, node in high.items()}, links, lends
+    )
 
-    def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Found:
+    def vacuum(group: str, name: str, key: str, pressures: list[float]) -> Faults:
         if fluid is not None:
             for keys, text in _vacuum((group, name, key), pressures, fluid, raw):
                 yield (ROOT, *keys), text
 
     if meshes or lumped or gravity == 0.0 or any(map(in_space, (*nodes.values(), *links.values()))):
-        yield from bodies.misfits(nodes, named)
-        yield from riding_networks.misfits(nodes, links, basins.riding_places(nodes, meshes), named)
-        yield from bodies.one_place(nodes, links, poses)
+        yield from bodies.find_faults(nodes, named)
+        yield from moving_network_checks.find_faults(nodes, links, basins.places_on_bodies(nodes, meshes), named)
+        yield from bodies.coincident_ends(nodes, links, poses)
         yield from bodies.open_pins(nodes, links, poses)
-        yield from sloshing.misfits(nodes, lumped, poses)
+        yield from sloshing.find_faults(nodes, lumped, poses)
         yield from sloshing.weightless(nodes, gravity)
-        yield from riding.overturned(nodes, poses)
-    around = Around(nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.ahead(nodes, poses, *ends))
+        yield from basins_on_bodies.overturned(nodes, poses)
+    around = CaseContext(
+        nodes, links, ambient, gravity, fluid, vacuum, lambda *ends: bodies.separation(nodes, poses, *ends)
+    )
     for group, members in (("links", links), ("nodes", nodes)):
         for name, part in members.items():
             for keys, text in part.faults(name, around):
                 yield keys[1:] if keys[:1] == (ROOT,) else (group, name, *keys), text
 
 
-RIDES = ("on", "at", "attitude")  # keys of places on bodies
+PLACE_KEYS = ("on", "at", "attitude")  # keys of places on bodies
 
 
 def in_space(part: Any) -> bool:
     """True if a part has a place in space or on a body; a case without such parts has no faults in space."""
     values = vars(part)
-    return "points" in values or bool(values.get("route")) or any(values.get(key) is not None for key in RIDES)
+    return "points" in values or bool(values.get("route")) or any(values.get(key) is not None for key in PLACE_KEYS)
 
 
-def numerics(numerics: Numerics, has_cells: bool) -> Found:
+def numerics(numerics: Numerics, has_cells: bool) -> Faults:
     """Faults of times and of step control."""
     if not numerics.end > numerics.start:
         yield ("numerics", "end"), f"{numerics.end:g} s is not after the start at {numerics.start:g} s"
@@ -157,14 +161,14 @@ def follows_cavities(fluid: FluidSpec | None, has_cells: bool) -> bool:
     return has_cells and fluid is not None and bool(fluid.cavitation)
 
 
-def cavities(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) -> Found:
+def cavities(numerics: Numerics, has_cells: bool, fluid: FluidSpec | None) -> Faults:
     """Faults of schemes that cannot resolve the edge of a cavity."""
     if follows_cavities(fluid, has_cells) and numerics.scheme not in (None, *CAVITY_SCHEMES):
         able = " or ".join(map(show, CAVITY_SCHEMES))
         yield ("numerics", "scheme"), f"{show(numerics.scheme)} does not follow cavities in pipes; expected {able}"
 
 
-def claims(expect: dict[str, Expect], numerics: Numerics) -> Found:
+def claims(expect: dict[str, Expect], numerics: Numerics) -> Faults:
     """Faults of claims at a time outside the run."""
     for text, claim in expect.items() if numerics.end > numerics.start else ():
         if claim is not None and claim.time is not None and not numerics.start <= claim.time <= numerics.end:
@@ -180,7 +184,7 @@ def _kind(group: str, part: Any) -> Any:
     return KINDS[group].get(str(_dict(part).get("type")))
 
 
-def _owned(name: str, link: Any) -> dict[str, str]:
+def _owned_places(name: str, link: Any) -> dict[str, str]:
     """Full name -> domain of the places that a link owns."""
     kind = _kind("links", link)
     return {f"{name}.{place}": domain for place, domain in kind.owns.items()} if kind else {}
@@ -199,12 +203,12 @@ def kind_name(part: Any, group: str = "nodes") -> str | None:
     return None if kind is None else kind.kind
 
 
-def has_mesh(node: Any) -> bool:
+def has_mesh_file(node: Any) -> bool:
     """True if a raw node is a basin with its mesh in a file."""
     return _dict(node).get("type") == "basin" and "mesh" in node
 
 
-def named_of(name: str, links: dict[str, Any]) -> list[str]:
+def named_places(name: str, links: dict[str, Any]) -> list[str]:
     """Places of a part that raw links name."""
     places = [place for link in links.values() for _, place, _ in _ports(_dict(link)) if isinstance(place, str)]
     return [place.partition(".")[2] for place in places if place.startswith(f"{name}.")]
@@ -215,7 +219,7 @@ def _ends(link: Any) -> list[str]:
     return [str(_dict(link).get(key)) for key in ("from", "to")]
 
 
-def _tied(name: str, node: Any, places: dict[str, Any]) -> list[str]:
+def _joined_places(name: str, node: Any, places: dict[str, Any]) -> list[str]:
     """Places that a node joins without a link: its own places, and the bodies that carry it."""
     own, kind = own_places(name, node) or [], _kind("nodes", node)
     return own + [body for body in (kind.bodies(_dict(node)) if kind else ()) if body in places]
@@ -227,7 +231,7 @@ def points_of(name: str, node: Any) -> list[str]:
     return [f"{name}.{point}" for point in _dict(_dict(node).get("points"))] if kind and "points" in kind.keys() else []
 
 
-def _hanging(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
+def _carrier_pairs(nodes: dict[str, Any], places: dict[str, Any]) -> list[list[str]]:
     """Pairs of each body and its carrier, and of each frame with points and the world."""
     pairs = []
     for name, node in nodes.items():
@@ -251,12 +255,12 @@ def _places(nodes: dict[str, Any], links: dict[str, Any], gone: list[str]) -> di
         kind, own = _kind("nodes", node), own_places(name, node)
         result |= dict.fromkeys([name] if own is None else own, kind.domain if kind else None)
         result |= dict.fromkeys(points_of(name, node), "spatial")
-    result |= {place: domain for name, link in links.items() for place, domain in _owned(name, link).items()}
-    named = [f"{name}.{place}" for name in gone for place in named_of(name, links)]
+    result |= {place: domain for name, link in links.items() for place, domain in _owned_places(name, link).items()}
+    named = [f"{name}.{place}" for name in gone for place in named_places(name, links)]
     return dict.fromkeys(named, None) | result
 
 
-def lost(name: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
+def has_unknown_places(name: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
     """True if the places of a part are unknown because the part is faulty."""
     for group, parts in (("nodes", nodes), ("links", links)):
         if name in parts and _kind(group, parts[name]) is None:
@@ -289,7 +293,7 @@ def chambers_of(link: Any) -> list[str]:
     return [place for place, domain in link.owns.items() if domain == "hydraulic"]
 
 
-def _unlike_place(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
+def _wrong_domain(place: str, domain: str, places: dict[str, Any], nodes: dict[str, Any], link: dict[str, Any]) -> str:
     owned = "shaft" if places[place] == "rotational" else "chamber"
     owned = "point" if places[place] == "spatial" else owned
     state = f"is a {nodes[place]['type']}" if place in nodes else f"is a {owned}"
@@ -319,7 +323,7 @@ def _islands(ends: dict[str, list[str]]) -> list[list[str]]:
     return [[name for name in island if name != WORLD] for island in islands.values()]
 
 
-def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[str, list[str]]) -> Found:
+def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[str, list[str]]) -> Faults:
     touching: dict[str, set[str]] = {}
     for link, places in ends.items():
         for place in places:
@@ -331,7 +335,7 @@ def _rigid_junctions(nodes: dict[str, Any], links: dict[str, Any], ends: dict[st
             yield ("nodes", name), message
 
 
-def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Found:
+def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Faults:
     wet = {("nodes", name): node for name, node in nodes.items() if node.domain == "hydraulic"}
     wet |= {("links", name): link for name, link in links.items() if chambers_of(link)}
     stated = dict.fromkeys(name for (_, name), part in wet.items() if part.elevation is not None)
@@ -354,17 +358,17 @@ def _elevations(nodes: dict[str, Any], links: dict[str, Any], lends: bool) -> Fo
             )
 
 
-def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Found:
+def _vacuum(keys: tuple, values: list[float], fluid: Any, raw: Raw) -> Faults:
     lowest = min(values)
     if lowest > fluid.vapor_pressure:
         return
-    given, keys = _said(keys, values.index(lowest), raw)
+    given, keys = _raw_value(keys, values.index(lowest), raw)
     if isinstance(given, (dict, list)) or given is None:
         given = lowest
     yield keys, units.vacuum(given, lowest, fluid.vapor_pressure)
 
 
-def _said(keys: tuple, index: int, raw: Raw) -> tuple[Any, tuple]:
+def _raw_value(keys: tuple, index: int, raw: Raw) -> tuple[Any, tuple]:
     """Value that the file has for an entry of a schedule, and its key path."""
     given = raw.get(keys)
     if isinstance(given, dict) and "signal" in given:

@@ -7,18 +7,18 @@ from typing import Any
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import Pipe
-from fvsolve.parts.table import at_most_one
-from fvsolve.parts.value import Setting, Value
+from fvsolve.parts.table_model import at_most_one
+from fvsolve.parts.value import ReadContext, Value
 from fvsolve.units import show
 
 KINDS = {"pipe": Pipe}  # types of links that may have defaults
-OWN = ("from", "to")  # keys that each part must state itself
-TOGETHER = ("wall", "friction")  # tables that other keys may complete: checked only with their part
+NOT_DEFAULT = ("from", "to")  # keys that each part must state itself
+COMPLETED = ("wall", "friction")  # tables that other keys may complete: checked only with their part
 
 
 def values(kind: str) -> dict[str, Value]:
     """Keys that the defaults of a type may have."""
-    return {key: value for key, value in KINDS[kind].values().items() if key not in OWN}
+    return {key: value for key, value in KINDS[kind].values().items() if key not in NOT_DEFAULT}
 
 
 def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def defaults_of(table: Mapping[str, Any], kind: Any) -> dict[str, Any]:
     return result if isinstance(result, dict) else {}
 
 
-def filled(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+def with_defaults(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     """Table of a part, completed by the defaults of its type. Its own keys, and alternatives to them, come first."""
     general = defaults_of(table, given.get("type"))
     if not general:
@@ -40,34 +40,36 @@ def filled(table: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     return {**{key: value for key, value in general.items() if key in known and key not in stated}, **given}
 
 
-def link_said(table: Mapping[str, Any], name: str) -> dict[str, Any]:
+def raw_link(table: Mapping[str, Any], name: str) -> dict[str, Any]:
     """Raw table of a link with its defaults; for a piece of a cut pipe, that of the pipe."""
-    return filled(table, table["links"][whole(table, name)])
+    return with_defaults(table, table["links"][pipe_of_piece(table, name)])
 
 
-def whole(table: Mapping[str, Any], name: str) -> str:
+def pipe_of_piece(table: Mapping[str, Any], name: str) -> str:
     """Name in the file of a link: its own, or that of the pipe it is a piece of."""
     return name if name in table.get("links", ()) else name.rpartition("-")[0]
 
 
-def spread(table: Mapping[str, Any]) -> dict[str, Any]:
+def fill_pipes(table: Mapping[str, Any]) -> dict[str, Any]:
     """Copy a table with the defaults filled into every link and the table `defaults` removed."""
-    links = {name: filled(table, link) if isinstance(link, dict) else link for name, link in table["links"].items()}
+    links = {
+        name: with_defaults(table, link) if isinstance(link, dict) else link for name, link in table["links"].items()
+    }
     return {**{key: value for key, value in table.items() if key != "defaults"}, "links": links}
 
 
-def place(table: Mapping[str, Any], keys: tuple) -> tuple:
+def default_place(table: Mapping[str, Any], keys: tuple) -> tuple:
     """Key path at which the key of a part is stated: in the part, or in the defaults."""
     if len(keys) < 3 or keys[0] != "links":
         return keys
     links = table.get("links")
     part = links.get(keys[1]) if isinstance(links, dict) else None
-    if not isinstance(part, dict) or keys[2] in part or keys[2] not in filled(table, part):
+    if not isinstance(part, dict) or keys[2] in part or keys[2] not in with_defaults(table, part):
         return keys
     return ("defaults", part["type"], *keys[2:])
 
 
-def misfits(table: Mapping[str, Any], setting: Setting) -> Iterator[tuple[tuple, str]]:
+def find_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[tuple[tuple, str]]:
     """Faults of the tables of defaults, and of values that are invalid for every part."""
     given = table.get("defaults", {})
     if not isinstance(given, dict):
@@ -85,23 +87,23 @@ def misfits(table: Mapping[str, Any], setting: Setting) -> Iterator[tuple[tuple,
             yield from ((("defaults", kind, *below), text) for below, text in _of_keys(kind, keys, setting))
 
 
-def _of_keys(kind: str, given: dict[str, Any], setting: Setting) -> Iterator[tuple[tuple, str]]:
+def _of_keys(kind: str, given: dict[str, Any], setting: ReadContext) -> Iterator[tuple[tuple, str]]:
     known = values(kind)
     for group in KINDS[kind].alternatives:
         yield from at_most_one(given, group)
     for key, value in given.items():
         if key in known:
-            if key not in TOGETHER:
+            if key not in COMPLETED:
                 yield from _of_value(key, known[key], value, setting)
-        elif key in (*OWN, "type"):
+        elif key in (*NOT_DEFAULT, "type"):
             yield (key,), f"cannot be a default; each {kind} states its own"
         else:
-            hint = KINDS[kind].meant.get(key)
+            hint = KINDS[kind].synonyms.get(key)
             near = f"; use {hint}" if hint else did_you_mean(key, known) or f"; keys are {listing(list(known))}"
             yield (key,), f"unknown key{near}"
 
 
-def _of_value(key: str, value: Value, given: Any, setting: Setting) -> Iterator[tuple[tuple, str]]:
+def _of_value(key: str, value: Value, given: Any, setting: ReadContext) -> Iterator[tuple[tuple, str]]:
     try:
         value.read(given, setting)
     except ValueError as error:

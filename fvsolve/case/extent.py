@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fvsolve.case.probe import Kinds, Probe, of_uncut
+from fvsolve.case.probe import Kinds, Probe, may_be_piece
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe, Reservoir
-from fvsolve.parts.value import Misfit
+from fvsolve.parts.value import ValueFault
 from fvsolve.units import show
 
 ALL = {"pipes": "links", "nodes": "nodes"}  # words for all parts of a kind
@@ -68,7 +68,7 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
     for word in names:
         try:
             members = parts_of(word, quantity, kinds, routes)
-        except Misfit:
+        except ValueFault:
             raise
         except ValueError as error:
             problems.append(str(error))
@@ -89,7 +89,7 @@ def read_extent(given: Any, quantity: str, kinds: Kinds, routes: Mapping[str, An
         more = f", and {len(lacking) - 1} more" if len(lacking) > 1 else ""
         has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}" if known else "it has no quantities"
         text = f"{name}{more} has no {show(quantity)}: it is a {kinds[group][name].kind}; {has}"
-        raise Misfit([(("quantity",), text)])
+        raise ValueFault([(("quantity",), text)])
     if not known:
         return None
     return Extent(tuple(names), tuple(parts), quantity, dimensions.pop())
@@ -108,17 +108,17 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
     if name in routes:
         if quantity not in (known := quantities_of(Pipe)):
             has = f"it has {', '.join(known)}{did_you_mean(quantity, known)}"
-            raise Misfit([(("quantity",), f"{name} has no {show(quantity)}: it is a route; {has}")])
+            raise ValueFault([(("quantity",), f"{name} has no {show(quantity)}: it is a route; {has}")])
         return None if routes[name] is None else [("links", pipe) for pipe in routes[name].pipes]
-    if of_uncut(name, kinds) or (name in ALL and None in kinds[ALL[name]].values()):
+    if may_be_piece(name, kinds) or (name in ALL and None in kinds[ALL[name]].values()):
         return None
     if name in ALL:
-        included = (lambda kind: kind is Pipe) if name == "pipes" else (lambda kind: judged(kind, quantity))
+        included = (lambda kind: kind is Pipe) if name == "pipes" else (lambda kind: counts_as_node(kind, quantity))
         matches = [(ALL[name], part) for part, kind in kinds[ALL[name]].items() if kind is not None and included(kind)]
         if not matches:
             if name == "pipes":
                 raise ValueError(f"{show(name)}: the case has no pipe")
-            raise Misfit([(("quantity",), f"no node has {show(quantity)}")])
+            raise ValueFault([(("quantity",), f"no node has {show(quantity)}")])
         return matches
     known = [*kinds["nodes"], *kinds["links"], *routes, *ALL]
     raise ValueError(
@@ -126,7 +126,7 @@ def parts_of(name: str, quantity: str, kinds: Kinds, routes: Mapping[str, Any]) 
     )
 
 
-def judged(kind: Any, quantity: str) -> bool:
+def counts_as_node(kind: Any, quantity: str) -> bool:
     """True if a kind of node counts among "nodes" for a quantity.
 
     The pressure of a reservoir is given, perhaps without an elevation: it does not count.

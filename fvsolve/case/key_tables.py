@@ -12,34 +12,34 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case.load import TOP
-from fvsolve.case.routes import Route
-from fvsolve.case.sections import FluidSpec, Line, Numerics, Output
+from fvsolve.case.pipe_routes import Route
+from fvsolve.case.sections import FluidSpec, Numerics, Output, OutputLine
 from fvsolve.case.text import inline
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
 from fvsolve.parts.accumulator.shape import Compressor
-from fvsolve.parts.attitude import Attitude
+from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.basin.part import Patch, StartOfFields
 from fvsolve.parts.body.part import Joint
 from fvsolve.parts.connection.part import Connection
 from fvsolve.parts.disc.part import Disc
 from fvsolve.parts.link import TwoPort
-from fvsolve.parts.node import Rider
+from fvsolve.parts.node import PlaceOnBody
 from fvsolve.parts.pipe.materials import SI, materials
 from fvsolve.parts.pipe.wall import Lining, Wall
-from fvsolve.parts.table import Table, plain
+from fvsolve.parts.table_model import Table, plain_value
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
 from fvsolve.parts.valve.part import Sized
 from fvsolve.units import DIMENSIONS, show
 
 TABLES: dict[str, type[Table]] = {
-    "every node": Node, "riding": Rider, "every link": TwoPort, "friction": Friction, "connection": Connection,
+    "every node": Node, "riding": PlaceOnBody, "every link": TwoPort, "friction": Friction, "connection": Connection,
     "compressor": Compressor,
-    "wall": Wall, "lining": Lining, "patch": Patch, "start": StartOfFields, "line": Line, "scalar": Scalar,
+    "wall": Wall, "lining": Lining, "patch": Patch, "start": StartOfFields, "line": OutputLine, "scalar": Scalar,
     "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # base class -> part whose table lists its keys in full
-SHARED = {Node: "", Rider: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}
+SHARED = {Node: "", PlaceOnBody: "", TwoPort: "", Sized: "valve", Disc: "check-valve"}
 LEFT_OUT = " if left out"
 HEAD = ("key", "what it may be", "default", "changes", "")
 MARK = re.compile(r"(<!-- keys: (.+?) -->\n).*?(<!-- end -->)", re.DOTALL)
@@ -125,7 +125,7 @@ def default_cell(key: str, default: Any, needs: tuple[tuple[str, ...], ...]) -> 
             return f"*needed*, or {', '.join(f'`{other}`' for other in group if other != key)}"
     if default is NEEDED:
         return "*needed*"
-    content = plain(default)
+    content = plain_value(default)
     if isinstance(content, dict):
         content = {key: value for key, value in content.items() if value is not None}
     if content in (None, {}, (), ""):

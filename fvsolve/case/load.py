@@ -12,33 +12,44 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve import exact, units
-from fvsolve.case import basins, bodies, check, defaults, heights, placing, scalars, shipped, size, text
+from fvsolve.case import (
+    basins,
+    bodies,
+    chainage,
+    check,
+    defaults,
+    inherited_elevations,
+    resource_checks,
+    scalar_checks,
+    shipped,
+    text,
+)
 from fvsolve.case.case import Case, default_cells, wave_speed
-from fvsolve.case.claims import Compare, Expect, read_compare, read_expect
+from fvsolve.case.design_limits import DesignLimit, limit_faults, read_limit
+from fvsolve.case.expectations import Compare, Expect, read_compare, read_expect
 from fvsolve.case.extent import ALL
-from fvsolve.case.limits import DesignLimit, limit_faults, read_limit
-from fvsolve.case.moved import moved
+from fvsolve.case.pipe_routes import Route, expand_pieces, first_gap, legs
+from fvsolve.case.pipe_routes import find_faults as route_misfits
 from fvsolve.case.probe import Probe, default_probes, read_probe
-from fvsolve.case.raw import Raw, dotted, opened, override, read_raw
-from fvsolve.case.routes import Route, broken, legs, spread
-from fvsolve.case.routes import misfits as route_misfits
+from fvsolve.case.raw import Raw, copy_paths, override, read_raw, split_key
 from fvsolve.case.sections import DEFAULT_ROWS, ExactSpec, FluidSpec, Numerics, Output
+from fvsolve.case.update_values import update_values
 from fvsolve.errors import CaseError, Fault, FluidError, did_you_mean, listing
 from fvsolve.fluid import properties
 from fvsolve.parts import KINDS, Basin, Chamber, Friction, Pipe, Scalar
 from fvsolve.parts.body.part import Body, BodyPoint
-from fvsolve.parts.meant import MEANT
 from fvsolve.parts.node import Node
 from fvsolve.parts.pipe.part import MOST_CELLS
 from fvsolve.parts.schedule import Scheduled
-from fvsolve.parts.table import misfits, read_keys
+from fvsolve.parts.synonyms import SYNONYMS
+from fvsolve.parts.table_model import faults_of_error, read_keys
 from fvsolve.parts.value import (
     ROOT,
     VALUE,
-    Misfit,
     Quantity,
-    Setting,
+    ReadContext,
     Text,
+    ValueFault,
     Whole,
     between,
     nonnegative,
@@ -53,9 +64,16 @@ GROUPS = {
     "links": "parts between the places",
     "numerics": "settings of the solver",
 }
-ALONE = ("basin", "body")  # nodes that need no link
-NAMING = ("nodes", "links", "signals", "scalars", "routes", "defaults")  # tables with names that other tables refer to
-OF_STUDIES = {"events", "protections"}
+LINKLESS = ("basin", "body")  # nodes that need no link
+NAME_TABLES = (
+    "nodes",
+    "links",
+    "signals",
+    "scalars",
+    "routes",
+    "defaults",
+)  # tables with names that other tables refer to
+STUDY_KEYS = {"events", "protections"}
 KEYS = (
     "schema", "title", "description", "source", "ambient_pressure", "gravity", "fluid", "nodes", "links",
     "signals", "scalars", "defaults", "numerics", "output", "expect", "compare", "routes", "limits", "exact",
@@ -79,21 +97,21 @@ def load(source: str | Path | Mapping[str, Any] | Case | Raw, set: Mapping[str, 
     if isinstance(source, Raw):
         return _Reader(replace(source, table=read_raw(source.table).table, overridden=[]), set or {}).case()
     if not isinstance(source, Case):
-        return _Reader(read_raw(named(source)), set or {}).case()
+        return _Reader(read_raw(find_source(source)), set or {}).case()
     if not set:
         return source
-    table = opened(source.raw, [dotted(str(key)) for key in set])
+    table = copy_paths(source.raw, [split_key(str(key)) for key in set])
     return _Reader(Raw(table, source.name, source.path, source.folder), set, source).case()
 
 
-def named(source: Any) -> Any:
+def find_source(source: Any) -> Any:
     """Path of a shipped case if the source is its name and no such file exists; otherwise the source."""
     if isinstance(source, str) and not Path(source).is_file() and source in shipped.names():
         return shipped.find(source)
     return source
 
 
-def crossing(links: Mapping[str, Any], meshes: Mapping[str, Any], fluid: Any) -> float:
+def shortest_cell_time(links: Mapping[str, Any], meshes: Mapping[str, Any], fluid: Any) -> float:
     """Shortest travel time of a wave through a cell [s], in basins at 1 m/s; inf without cells."""
     times = [link.length / link.cells / wave_speed(link, fluid) for link in links.values() if isinstance(link, Pipe)]
     return min([*times, *(float(mesh.area.min()) ** 0.5 for mesh in meshes.values())], default=math.inf)
@@ -114,43 +132,43 @@ class _Reader:
 
     def __init__(self, raw: Raw, settings: Mapping[str, Any], before: Case | None = None):
         self.raw, self.before = raw, before
-        settings = placing.settings(raw.table, settings)
+        settings = chainage.settings(raw.table, settings)
         self.refused: list[Fault] = override(raw, settings, _alternatives())  # settings that cannot be applied
         self.faults = self.refused[:]
-        self.setting = Setting(folder=raw.folder)
+        self.setting = ReadContext(folder=raw.folder)
         self.read: dict[tuple, tuple[Any, Any]] = {}  # key path -> (raw value, value as read)
         self.origin: dict[tuple, tuple] = {}  # key path of a piece of a cut pipe -> key path in the file
         self.pieces: dict[str, list[str]] = {}  # cut pipe -> names of its pieces
-        self.said = raw.table  # before pipes are cut
-        self.lost: set[tuple[str, str]] = set()  # (group, name) that depend on faulty parts
+        self.original = raw.table  # before pipes are cut
+        self.unreadable: set[tuple[str, str]] = set()  # (group, name) that depend on faulty parts
         self.uncut: dict[str, Pipe] = {}  # pipes not cut, since parts placed on them are faulty
         self.joined = True  # True while the connections are known
         self.lumped: dict[str, Any] = {}  # meshes of basins whose water is lumped masses on a body
 
     def case(self) -> Case:
-        if (case := moved(self)) is not None:
+        if (case := update_values(self)) is not None:
             return case
-        self.faults, self.setting, self.read = self.refused[:], Setting(folder=self.raw.folder), {}
+        self.faults, self.setting, self.read = self.refused[:], ReadContext(folder=self.raw.folder), {}
         top = self.top()
         if self.before is not None and self.before.ambient_pressure != self.setting.ambient:
             self.before = None  # all gauge pressures change
-        if self.before is not None and self.before.raw.get("defaults") is not self.said.get("defaults"):
+        if self.before is not None and self.before.raw.get("defaults") is not self.original.get("defaults"):
             self.before = None  # every pipe may change
-        fluid, properties = self.kept(("fluid",), self.raw.table.get("fluid"), self.fluid)
+        fluid, properties = self.reuse(("fluid",), self.raw.table.get("fluid"), self.fluid)
         numerics = self.table("numerics", Numerics)
         self.setting.signals = self.group("signals")
-        self.add(defaults.misfits(self.raw.table, self.setting))
-        tables = [self.raw.table.get(name, {}) for name in NAMING]
+        self.add(defaults.find_faults(self.raw.table, self.setting))
+        tables = [self.raw.table.get(name, {}) for name in NAME_TABLES]
         tables += tables[-1].values() if isinstance(tables[-1], dict) else []  # of defaults
         if not all(isinstance(table, dict) for table in tables):
-            for name in NAMING[:-1]:
+            for name in NAME_TABLES[:-1]:
                 self.group(name)
             self.stop()  # the names are not known
         whole = self.raw.table
         self.cut(properties, numerics)
         carried = self.scalars()
         parts = {group: self.parts(group) for group in ("nodes", "links")}
-        parts["nodes"] = heights.lent(**parts)
+        parts["nodes"] = inherited_elevations.inherit_elevations(**parts)
         meshes = self.meshes(parts["nodes"])
         self.unused_signals()
         kinds = {group: self.kinds(group) for group in parts} | {"scalars": carried}
@@ -161,20 +179,20 @@ class _Reader:
                            for place, domain in kind.owns.items() if domain == "hydraulic"}  # fmt: skip
         for name, node in parts["nodes"].items():
             if isinstance(node, Body):
-                kinds["nodes"][name] = bodies.Riding(node)
+                kinds["nodes"][name] = bodies.BodyQuantities(node)
         for name, node in self.group("nodes").items():  # faulty nodes included
             kinds["nodes"] |= dict.fromkeys(check.points_of(name, node), BodyPoint)
         for name, kind in [*kinds["nodes"].items()]:
             if name in self.lumped and not parts["nodes"][name].own.sloshes:
                 kinds["nodes"][name] = None  # faulty
             elif name in self.lumped:
-                kinds["nodes"][name] = basins.Pool(basins.lumped_fields(parts["nodes"][name]), self.lumped[name])
+                kinds["nodes"][name] = basins.BasinFields(basins.lumped_fields(parts["nodes"][name]), self.lumped[name])
             elif kind is Basin and name not in meshes:
                 kinds["nodes"][name] = None  # faulty
             if name in meshes:
                 pool = parts["nodes"][name]
                 own = dict.fromkeys(carried, "number") if pool.own.carries else {}
-                kinds["nodes"][name] = basins.Pool(pool.own.fields | own, meshes[name])
+                kinds["nodes"][name] = basins.BasinFields(pool.own.fields | own, meshes[name])
                 kinds["nodes"] |= {f"{name}.{patch}": basins.place_kind(pool, patch)
                                    for patch in basins.patch_names(meshes[name])}  # fmt: skip
         routes = self.routes(parts["links"])
@@ -186,14 +204,14 @@ class _Reader:
         expect, compare = self.expect(kinds, routes), self.compare(kinds)
         limits = self.limits(kinds, routes, parts["links"], properties, top["gravity"])
         if self.joined:
-            self.add(check.network(self.drawn(meshes)))
+            self.add(check.network(self.network_table(meshes)))
         about = self.setting.ambient, top.get("gravity"), properties, self.raw
         start = numerics.start if numerics is not None else 0.0
         self.add(check.parts(parts["nodes"], parts["links"] | self.uncut, *about, start, meshes, self.lumped))
-        timed = numerics or self.timed()
+        timed = numerics or self.valid_times()
         if timed is not None:
             self.add(check.cavities(timed, has_cells, fluid))
-            self.add(basins.misfits(*parts.values(), meshes, properties, (timed.start, timed.end),
+            self.add(basins.find_faults(*parts.values(), meshes, properties, (timed.start, timed.end),
                                      self.group("nodes")))  # fmt: skip
             self.add(check.claims(expect, timed))
         if numerics is not None:
@@ -201,7 +219,7 @@ class _Reader:
             carries = bool(carried) and any(parts["nodes"][name].own.carries for name in meshes)
             rubs = any(parts["nodes"][name].own.rubs(parts["nodes"][name]) for name in meshes)
             numerics = numerics.filled(has_cells, carries, rubs, check.follows_cavities(fluid, has_cells))
-        self.add(scalars.misfits(carried, *parts.values(), properties))
+        self.add(scalar_checks.find_faults(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)
         if None not in (numerics, output, properties) and not self.faults:
             self.add(self.sizes(numerics, output, links, meshes, properties))
@@ -236,12 +254,12 @@ class _Reader:
 
     def sizes(self, numerics, output, links, meshes, properties) -> Iterator[tuple[tuple, str]]:
         """Faults of sizes, and of steps below the rounding of the time."""
-        yield from size.misfits(numerics, output, links, meshes)
-        yield from size.standstill(numerics, crossing(links, meshes, properties))
+        yield from resource_checks.find_faults(numerics, output, links, meshes)
+        yield from resource_checks.rounding_faults(numerics, shortest_cell_time(links, meshes, properties))
 
     def exact(self, case: Case) -> Case:
         """Check the case against its exact solution; settings that invalidate the solution remove it."""
-        faults = list(exact.misfits(case))
+        faults = list(exact.find_faults(case))
         settings = {keys[0] for keys in self.raw.overridden}
         if faults and settings and "exact" not in settings:
             return replace(case, exact=None)
@@ -251,35 +269,35 @@ class _Reader:
 
     def cut(self, properties: Any, numerics: Numerics | None) -> None:
         """Cut pipes at the chainages of the parts placed on them."""
-        table = placing.bent(self.raw.table)
+        table = chainage.add_bends(self.raw.table)
         tables = (table.get("nodes"), table.get("links"), table.get("routes", {}))
-        if not all(isinstance(item, dict) for item in tables) or not placing.placed(table):
+        if not all(isinstance(item, dict) for item in tables) or not chainage.placed(table):
             return
-        for group, name, part in placing.placed(table):
+        for group, name, part in chainage.placed(table):
             self.kind(group, name, part)
         self.origin = {("nodes", f"{name}-bend-{k + 1}"): ("links", name, "bends", k)
-                       for name, item in table["links"].items() if placing.is_pipe(item)
+                       for name, item in table["links"].items() if chainage.is_pipe(item)
                        for k in range(len(item["bends"]) if isinstance(item.get("bends"), list) else 0)}  # fmt: skip
-        odd = list(placing.faults(table))
+        odd = list(chainage.faults(table))
         self.add(odd)
         astray = {keys[:2] for keys, _ in odd}
-        pipes, table = {}, defaults.spread(table)
+        pipes, table = {}, defaults.fill_pipes(table)
         for name, given in table["links"].items():
-            if placing.is_pipe(given) and ("links", name) not in astray:
+            if chainage.is_pipe(given) and ("links", name) not in astray:
                 try:
                     pipes[name] = self.part(Pipe, {key: item for key, item in given.items() if key != "pieces"})
                 except ValueError as error:
-                    self.misfit(("links", name), error)
+                    self.add_error(("links", name), error)
         if None in (properties, numerics):
             counts = {name: pipe.cells or 1 for name, pipe in pipes.items()}
         else:
             counts = default_cells(pipes, properties, numerics.cell_time)
-        result = placing.cut(table, pipes, counts, astray, self.fault)
+        result = chainage.cut(table, pipes, counts, astray, self.fault)
         self.raw, self.pieces = replace(self.raw, table=result.table), result.pieces
-        self.lost, self.uncut, self.joined = result.lost, result.wholes, result.known
+        self.unreadable, self.uncut, self.joined = result.unreadable, result.uncut, result.connections_known
         self.origin |= result.origin
 
-    def kept(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
+    def reuse(self, place: tuple, given: Any, make: Callable[[], Any]) -> Any:
         """Value read at a key path in the case before, if its raw value is the same object; else the result of `make`.
 
         Values without faults that use no file and no signal are cached for the next reading.
@@ -288,9 +306,9 @@ class _Reader:
         if before is not None and before[0] is given:
             self.read[place] = before
             return before[1]
-        state = self.setting.asked, len(self.faults)
+        state = self.setting.lookups, len(self.faults)
         value = make()
-        if state == (self.setting.asked, len(self.faults)):
+        if state == (self.setting.lookups, len(self.faults)):
             self.read[place] = given, value
         return value
 
@@ -303,7 +321,7 @@ class _Reader:
         if ROOT in keys:
             keys = keys[len(keys) - keys[::-1].index(ROOT) :]
         own = (*self.origin.get(keys[:2], keys[:2]), *keys[2:])
-        keys = defaults.place(self.said, own)
+        keys = defaults.default_place(self.original, own)
         place = text.path(keys)
         if keys != own and any(fault.place == place for fault in self.faults):
             return  # a faulty default, already reported for another part
@@ -316,11 +334,11 @@ class _Reader:
         for keys, message in faults:
             self.fault(keys, message)
 
-    def misfit(self, keys: tuple, error: ValueError) -> None:
-        if isinstance(error, Misfit):
+    def add_error(self, keys: tuple, error: ValueError) -> None:
+        if isinstance(error, ValueFault):
             self.add(((*keys, *below), message) for below, message in error.faults)
         elif hasattr(error, "errors"):
-            self.add(((*keys, *below), message) for below, message in misfits(error, []))
+            self.add(((*keys, *below), message) for below, message in faults_of_error(error, []))
         else:
             self.fault(keys, str(error))
 
@@ -338,13 +356,13 @@ class _Reader:
                 return None
         given = self.raw.table
         try:
-            return self.kept((name, "table"), given.get(name), lambda: model.model_validate(
+            return self.reuse((name, "table"), given.get(name), lambda: model.model_validate(
                 given.get(name, {}), context=self.setting))  # fmt: skip
         except ValueError as error:
-            self.misfit((name,), error)
+            self.add_error((name,), error)
             return None
 
-    def in_order(self, name: str, model: Any) -> Any:
+    def valid_keys(self, name: str, model: Any) -> Any:
         """Model with the valid keys of a table only; all of them may be missing."""
         values = {}
         for key, value in model.values().items():
@@ -352,15 +370,15 @@ class _Reader:
                 values[key] = value.read(self.raw.table[name][key], self.setting)
         return model.model_construct(**values)
 
-    def timed(self) -> Numerics | None:
+    def valid_times(self) -> Numerics | None:
         """Valid keys of `[numerics]`, if start and end are among them, else None."""
         given = self.raw.table.get("numerics")
-        valid = self.in_order("numerics", Numerics) if isinstance(given, dict) else None
+        valid = self.valid_keys("numerics", Numerics) if isinstance(given, dict) else None
         times = {key for key in ("start", "end") if valid is not None and key in given}
         return valid if "end" in times and times <= valid.model_fields_set else None
 
     def top(self) -> dict[str, Any]:
-        if OF_STUDIES & self.raw.table.keys() and not {"nodes", "links"} & self.raw.table.keys():
+        if STUDY_KEYS & self.raw.table.keys() and not {"nodes", "links"} & self.raw.table.keys():
             self.fault((), f"is a study of a case; fvsolve study {self.raw.file} runs it")
             self.stop()
         for key in self.raw.table:
@@ -382,7 +400,7 @@ class _Reader:
                 if key in self.raw.table:
                     values |= read_keys({key: self.raw.table[key]}, {key: value}, self.setting)
             except ValueError as error:
-                self.misfit((), error)
+                self.add_error((), error)
         return values
 
     def fluid(self) -> tuple[FluidSpec | None, Any]:
@@ -423,7 +441,7 @@ class _Reader:
         return result
 
     def parts(self, group: str) -> dict[str, Any]:
-        alone = (*ALONE, None)  # faulty ones
+        alone = (*LINKLESS, None)  # faulty ones
         basin = any(check.kind_name(node) in alone for node in self.group("nodes").values())
         if group not in self.raw.table and not (group == "links" and basin):
             self.fault((), f"[{group}] is missing: {GROUPS[group]}")
@@ -431,30 +449,30 @@ class _Reader:
         for name, part in self.group(group).items():
             if not re.fullmatch(r"[\w-]+", name):
                 self.fault((group, name), f"{show(name)} is not a valid name; a name has only letters, digits, _ and -")
-            if len(name) > size.LONGEST_NAME:
-                self.fault((group, name), f"has {len(name)} letters; expected at most {size.LONGEST_NAME}")
+            if len(name) > resource_checks.LONGEST_NAME:
+                self.fault((group, name), f"has {len(name)} letters; expected at most {resource_checks.LONGEST_NAME}")
             if not isinstance(part, dict):
                 self.fault((group, name), f"{show(part)} is not a table; expected a table with a type")
                 continue
             kind = self.kind(group, name, part)
-            if kind is None or (group, name) in self.lost:
+            if kind is None or (group, name) in self.unreadable:
                 continue
             try:
-                result[name] = self.kept((group, name), part, functools.partial(self.part, kind, part))
+                result[name] = self.reuse((group, name), part, functools.partial(self.part, kind, part))
             except ValueError as error:
-                self.misfit((group, name), error)
+                self.add_error((group, name), error)
         return result
 
     def uncounted(self) -> list[str]:
         """Faulty parts whose places are unknown, and pipes whose number of pieces is unknown."""
         nodes, links = self.group("nodes"), self.group("links")
         pipes = [name for name, link in links.items()
-                if placing.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
-        return pipes + [name for name in (*nodes, *links) if check.lost(name, nodes, links)]
+                if chainage.is_pipe(link) and not isinstance(link.get("bends", []), list)]  # fmt: skip
+        return pipes + [name for name in (*nodes, *links) if check.has_unknown_places(name, nodes, links)]
 
     def part(self, kind: Any, given: dict[str, Any]) -> Any:
         """Read a part of a type from its table."""
-        rest = {key: value for key, value in defaults.filled(self.raw.table, given).items() if key != "type"}
+        rest = {key: value for key, value in defaults.with_defaults(self.raw.table, given).items() if key != "type"}
         kind = kind.variant(rest) if issubclass(kind, Node) else kind
         return kind.model_validate(rest, context=self.setting)
 
@@ -464,28 +482,30 @@ class _Reader:
         for name, node in [*nodes.items()]:
             try:
                 if isinstance(node, Basin):
-                    mesh = self.kept(("meshes", name), node, functools.partial(basins.mesh_of, node, self.setting))
+                    mesh = self.reuse(("meshes", name), node, functools.partial(basins.mesh_of, node, self.setting))
                     (self.lumped if node.lumped else result)[name] = mesh
-            except Misfit as error:
-                self.misfit(("nodes", name), error)
+            except ValueFault as error:
+                self.add_error(("nodes", name), error)
                 del nodes[name]
         return result
 
-    def drawn(self, meshes: dict[str, Any]) -> dict[str, Any]:
+    def network_table(self, meshes: dict[str, Any]) -> dict[str, Any]:
         """Table of the file for the check of connections: basins with all patches of their meshes.
 
         A lost node is a junction. A basin with a faulty mesh has the patches that links name.
         """
         nodes, links = self.group("nodes"), self.group("links")
         patches = {name: basins.patch_names(mesh) for name, mesh in meshes.items()}
-        lost = [name for name, part in nodes.items() if check.has_mesh(part) and name not in (*meshes, *self.lumped)]
-        patches |= {name: check.named_of(name, links) for name in lost}
-        if not patches and not self.lost:
+        lost = [
+            name for name, part in nodes.items() if check.has_mesh_file(part) and name not in (*meshes, *self.lumped)
+        ]
+        patches |= {name: check.named_places(name, links) for name in lost}
+        if not patches and not self.unreadable:
             return self.raw.table
         own = {name: {**nodes[name], "patches": dict.fromkeys(names, {}) | (nodes[name].get("patches") or {})}
                for name, names in patches.items()}  # fmt: skip
-        own |= {name: {"type": "junction"} for group, name in self.lost if group == "nodes"}
-        unfit = [name for group, name in self.lost if group == "links" and not placing.is_pipe(links[name])]
+        own |= {name: {"type": "junction"} for group, name in self.unreadable if group == "nodes"}
+        unfit = [name for group, name in self.unreadable if group == "links" and not chainage.is_pipe(links[name])]
         links = {name: part for name, part in links.items() if name not in unfit}
         return {**self.raw.table, "nodes": {**nodes, **own}, "links": links}
 
@@ -500,7 +520,7 @@ class _Reader:
             hint = did_you_mean(str(kind), known)
             if isinstance(kind, str) and kind in KINDS[other]:
                 hint = f"; it belongs under [{other}]"
-            synonym = MEANT.get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
+            synonym = SYNONYMS.get(str(kind).casefold().replace("_", "-").replace(" ", "-"))
             hint = f"; use {synonym}" if synonym else f"; types are {listing(sorted(known))}{hint}"
             self.fault((group, name, "type"), f"unknown type {show(kind)}{hint}")
             return None
@@ -514,7 +534,7 @@ class _Reader:
             try:
                 result[name] = Scalar.model_validate(given, context=self.setting)
             except ValueError as error:
-                self.misfit(("scalars", name), error)
+                self.add_error(("scalars", name), error)
         return result
 
     def unused_signals(self) -> None:
@@ -528,7 +548,7 @@ class _Reader:
                 except ValueError as error:
                     problems.append(error)
             if len(problems) == len(dimensions):
-                self.misfit(("signals", name), problems[0])
+                self.add_error(("signals", name), problems[0])
 
     def cells(self, links: dict[str, Any], properties: Any, numerics: Numerics | None) -> dict[str, Any]:
         pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
@@ -555,7 +575,7 @@ class _Reader:
 
     def output(self, numerics: Numerics | None, kinds: dict) -> Output | None:
         output = self.table("output", Output)
-        valid = output if output is not None else self.in_order("output", Output)
+        valid = output if output is not None else self.valid_keys("output", Output)
         if valid.probes is None:
             probes = default_probes(kinds)
         else:
@@ -579,19 +599,19 @@ class _Reader:
                 self.fault(("routes", name), f"{show(name)} is also the name of something else; expected another name")
                 continue
             try:
-                result[name] = spread(Route.model_validate(given, context=self.setting), self.pieces, links)
+                result[name] = expand_pieces(Route.model_validate(given, context=self.setting), self.pieces, links)
             except ValueError as error:
-                self.misfit(("routes", name), error)
+                self.add_error(("routes", name), error)
                 with suppress(KeyError, TypeError, ValueError):
                     pipes = Route.values()["pipes"].read(given["pipes"], self.setting)
-                    result[name] = spread(Route.model_construct(pipes=pipes), self.pieces, links)
+                    result[name] = expand_pieces(Route.model_construct(pipes=pipes), self.pieces, links)
                     odd.add(name)
         faulty = list(route_misfits(result, links, named, self.pieces)) if self.joined else []
         self.add(faulty)
         lost = odd | {keys[1] for keys, _ in faulty}
         pipes = {name for name, link in links.items() if isinstance(link, Pipe)}
         lost |= {name for name, route in result.items()
-                 if route and (not pipes.issuperset(route.pipes) or broken(route, links) is not None)}  # fmt: skip
+                 if route and (not pipes.issuperset(route.pipes) or first_gap(route, links) is not None)}  # fmt: skip
         return {name: None if name in lost else route for name, route in result.items()}
 
     def limits(self, kinds: dict, routes: dict, links: dict[str, Any], *about: Any) -> dict[str, DesignLimit | None]:
@@ -602,7 +622,7 @@ class _Reader:
                 result[name] = read_limit(name, given, kinds, routes, links, self.setting)
                 self.add((("limits", name, *keys), text) for keys, text in limit_faults(result[name], *about))
             except ValueError as error:
-                self.misfit(("limits", name), error)
+                self.add_error(("limits", name), error)
         return result
 
     def expect(self, kinds: dict, routes: dict) -> dict[str, Expect]:
@@ -611,7 +631,7 @@ class _Reader:
             try:
                 result[claim] = read_expect(claim, given, kinds, routes, self.setting)
             except ValueError as error:
-                self.misfit(("expect", claim), error)
+                self.add_error(("expect", claim), error)
         return result
 
     def compare(self, kinds: dict) -> dict[str, Compare]:
@@ -621,5 +641,5 @@ class _Reader:
             try:
                 result[name] = read_compare(probe, given, self.setting)
             except ValueError as error:
-                self.misfit(("compare", name), error)
+                self.add_error(("compare", name), error)
         return result

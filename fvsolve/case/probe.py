@@ -13,7 +13,7 @@ from fvsolve.parts import Link, Node, Pipe, Scalar
 from fvsolve.units import show
 
 if TYPE_CHECKING:
-    from fvsolve.case.basins import Pool
+    from fvsolve.case.basins import BasinFields
 
 _PROBE = re.compile(r"(?:(nodes|links)\.)?([^.@]+(?:\.[^.@]+)?)\.([^.@]+)(?:@(.*))?")
 
@@ -59,10 +59,10 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     parts = [part] if part else [part for part in ("nodes", "links") if name in kinds[part]]
     parts = [part for part in parts if name in kinds[part]]
     if not parts and part != "nodes" and name in kinds.get("routes", {}):
-        return of_route(given.strip(), name, quantity, place, kinds)
+        return route_probe(given.strip(), name, quantity, place, kinds)
     if not parts and kinds["nodes"].get(name.partition(".")[0], name) is None:
         return None  # a patch of a faulty basin
-    if not parts and of_uncut(name, kinds):
+    if not parts and may_be_piece(name, kinds):
         return None
     if not parts:
         names = [*kinds["nodes"], *kinds["links"]] if part is None else list(kinds[part])
@@ -83,14 +83,14 @@ def read_probe(given: object, kinds: Kinds) -> Probe | None:
     return probes[0]
 
 
-def of_uncut(name: str, kinds: Kinds) -> bool:
+def may_be_piece(name: str, kinds: Kinds) -> bool:
     """True if a name may be that of a piece, bend or place of a faulty part, whose places are unknown."""
     return any(name.startswith((f"{pipe}-", f"{pipe}.")) for pipe in kinds.get("uncut", ()))
 
 
-def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
+def route_probe(text: str, name: str, quantity: str, place: str | None, kinds: Kinds) -> Probe | None:
     """Probe at a fraction of the length or a chainage of a route; None if the route is faulty. Raises ValueError."""
-    along = Pipe.along | _carried(Pipe, kinds, "along")
+    along = Pipe.along | _scalars_of(Pipe, kinds, "along")
     if quantity not in along:
         near = did_you_mean(quantity, along)
         raise ValueError(f"{name} is a route, which has no {show(quantity)}; it has {', '.join(along)}{near}")
@@ -100,7 +100,7 @@ def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kind
     if place is None and quantity not in Pipe.quantities:
         raise ValueError(f'{name} is a route, and a probe of it needs a place, for example "{name}.{quantity}@0.5"')
     begin, end = legs[0].begin, legs[-1].end
-    at = begin + share_of(place or "0", end - begin, begin) * (end - begin)
+    at = begin + fraction_of(place or "0", end - begin, begin) * (end - begin)
     leg = next((item for item in legs if at <= item.end), legs[-1])
     if leg.backwards and quantity in ("flow", "velocity"):
         raise ValueError(f"{name} and {leg.pipe} have opposite directions there; expected {leg.pipe}.{quantity}@x")
@@ -110,7 +110,7 @@ def of_route(text: str, name: str, quantity: str, place: str | None, kinds: Kind
     return Probe(text, "links", leg.pipe, quantity, share, along[quantity], unit="" if scalar is None else scalar.unit)
 
 
-def share_of(place: str, length: float | None, begin: float) -> float:
+def fraction_of(place: str, length: float | None, begin: float) -> float:
     """Fraction of a length that a text gives as a fraction, or as a chainage with its unit. Raises ValueError.
 
     length : length [m]; None for a faulty pipe, where every chainage is accepted
@@ -145,13 +145,13 @@ def default_probes(kinds: Kinds) -> list[Probe]:
                 else []
             )
             own = [quantity_name for quantity_name in own if quantity_name not in getattr(kind, "asked", ())]
-            for quantity in [*own, *_carried(kind, kinds, "quantities")] if own else []:
+            for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 probes.append(_probe(text, part, name, quantity, None, kinds))
     return probes
 
 
-def _carried(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict[str, str]:
+def _scalars_of(kind: type[Node] | type[Link], kinds: Kinds, where: str) -> dict[str, str]:
     """Scalars that a kind of part has: all if it has a pressure, else none."""
     return dict.fromkeys(kinds["scalars"] if "pressure" in getattr(kind, where, {}) else (), "number")
 
@@ -162,8 +162,8 @@ def _probe(text: str, part: str, name: str, quantity: str, place: str | None, ki
     if quantity in (fields := getattr(kind, "fields", {})):  # of a basin
         point = kind.point(f"{name}.{quantity}", place)
         return Probe(text, part, name, quantity, None, fields[quantity], point, unit)
-    along = getattr(kind, "along", {}) | _carried(kind, kinds, "along")
-    quantities = kind.quantities | _carried(kind, kinds, "quantities")
+    along = getattr(kind, "along", {}) | _scalars_of(kind, kinds, "along")
+    quantities = kind.quantities | _scalars_of(kind, kinds, "quantities")
     pipe = kinds.get("pipes", {}).get(name) if part == "links" else None
     begin = 0.0 if pipe is None or pipe.profile is None else float(pipe.profile.chainage[0])
     fraction, dimension = _quantity(kind, along, quantities, name, quantity, place, pipe and pipe.length, begin)
@@ -193,4 +193,4 @@ def _quantity(
         return (0.0 if quantity in along else None), known[quantity]
     if quantity not in along:
         raise ValueError(f"{name} is {article} {kind.kind}, and {quantity} has no place along it; leave @{place} out")
-    return share_of(place, length, begin), known[quantity]
+    return fraction_of(place, length, begin), known[quantity]

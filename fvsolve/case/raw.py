@@ -10,8 +10,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from fvsolve.case.defaults import place
-from fvsolve.case.lines import key_lines
+from fvsolve.case.defaults import default_place
+from fvsolve.case.toml_lines import key_lines
 from fvsolve.errors import CaseError, Fault, did_you_mean
 from fvsolve.units import show
 
@@ -84,13 +84,13 @@ def read_raw(source: Any) -> Raw:
     return Raw(_copy(table), path.stem, path, path.parent.absolute(), text)
 
 
-def opened(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str, Any]:
+def copy_paths(table: dict[str, Any], paths: list[tuple[str, ...]]) -> dict[str, Any]:
     """Copy a table along the paths that are to be written; share all other values with the original."""
     copy = dict(table)
     for key in {path[0] for path in paths}:
         below = [path[1:] for path in paths if path[0] == key and path[1:]]
         if below and isinstance(copy.get(key), dict):
-            copy[key] = opened(copy[key], below)
+            copy[key] = copy_paths(copy[key], below)
     return copy
 
 
@@ -104,7 +104,7 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
     groups = {group: raw.get((group,)) for group in ("nodes", "links")}
     before = {group: list(parts) for group, parts in groups.items() if isinstance(parts, dict)}
     for key, value in settings.items():
-        keys = dotted(str(key))
+        keys = split_key(str(key))
         try:
             _put(raw.table, keys, _copy(parsed(value)))
             raw.overridden.append(keys)
@@ -125,7 +125,7 @@ def override(raw: Raw, settings: Mapping[str, Any], alternatives: list[tuple[str
     return faults
 
 
-def located(error: CaseError, case: Any) -> CaseError:
+def locate_faults(error: CaseError, case: Any) -> CaseError:
     """Locate the faults of a case that was read before: add line numbers or mark overrides, with the file's name."""
     if case.path is None:
         return CaseError(error.faults, case.name)
@@ -136,7 +136,7 @@ def located(error: CaseError, case: Any) -> CaseError:
     now = Raw(case.raw)
     faults = []
     for fault in error.faults:
-        keys = place(case.raw, tuple(fault.place.split(".")))
+        keys = default_place(case.raw, tuple(fault.place.split(".")))
         fault = replace(fault, place=".".join(keys))
         value, before = now.get(keys), source.get(keys)
         is_part = len(keys) == 2 and isinstance(value, dict)  # some other key of the part may have been set
@@ -214,7 +214,7 @@ def _copy(value: Any, depth: int = 0) -> Any:
 
 
 @functools.lru_cache(maxsize=4096)
-def dotted(key: str) -> tuple[str, ...]:
+def split_key(key: str) -> tuple[str, ...]:
     """Keys of a path written as in TOML: "links.valve.area"."""
     try:
         table: Any = tomllib.loads(f"{key} = 0") if "\n" not in key and "=" not in key else None

@@ -8,47 +8,47 @@ from json import dumps, loads
 from typing import Any
 
 from fvsolve.case import defaults
-from fvsolve.case.limits import limit_keys
-from fvsolve.case.load import ALONE, GROUPS, KEYS, TOP
-from fvsolve.case.routes import Route
+from fvsolve.case.design_limits import limit_keys
+from fvsolve.case.load import GROUPS, KEYS, LINKLESS, TOP
+from fvsolve.case.pipe_routes import Route
 from fvsolve.case.sections import ExactSpec, FluidSpec, Numerics, Output
 from fvsolve.parts import KINDS, Scalar
 from fvsolve.parts.schedule import Scheduled
-from fvsolve.parts.table import keys_json
+from fvsolve.parts.table_model import keys_json
 from fvsolve.parts.value import Quantity
 
-BESIDE = ("description", "default")  # words allowed beside a $ref
-WORDS = ("properties", "items", "anyOf", "additionalProperties", "$defs")
-SHORT = 60  # letters of JSON; shorter schemas are repeated, not shared
+SIBLING_WORDS = ("description", "default")  # words allowed beside a $ref
+SCHEMA_WORDS = ("properties", "items", "anyOf", "additionalProperties", "$defs")
+SHARED_LENGTH = 60  # letters of JSON; shorter schemas are repeated, not shared
 
 
 def schema() -> dict[str, Any]:
     """JSON schema (draft 2020-12) of a case file, with repeated parts under `$defs`."""
-    return shared(whole())
+    return share_definitions(full_schema())
 
 
-def printed(content: dict[str, Any]) -> str:
+def schema_text(content: dict[str, Any]) -> str:
     """JSON text of a schema; flat lists and bare references are written on one line."""
     text = re.sub(r"\[\s+([^][{}]*?)\s+\]", lambda match: f"[{' '.join(match[1].split())}]", dumps(content, indent=2))
     return re.sub(r'\{\s+("\$ref": "[^"]*")\s+\}', r"{ \1 }", text)
 
 
-def whole() -> dict[str, Any]:
+def full_schema() -> dict[str, Any]:
     """Schema of a case file without shared definitions."""
     definitions: dict[str, Any] = {}
     properties: dict[str, Any] = dict.fromkeys(KEYS, {})
     properties |= keys_json(TOP)["properties"]
     properties["ambient_pressure"] = Quantity("pressure").json()
     for name, model in (("fluid", FluidSpec), ("numerics", Numerics), ("output", Output), ("exact", ExactSpec)):
-        properties[name] = _hoisted(model, definitions)
+        properties[name] = _with_shared_definitions(model, definitions)
     for group, kinds in KINDS.items():
         any_kind = [_typed(kind, part, definitions) for kind, part in sorted(kinds.items())]
         properties[group] = {"type": "object", "additionalProperties": {"anyOf": any_kind}}
     properties["defaults"] = _defaults(definitions)
-    scalar = _hoisted(Scalar, definitions)
+    scalar = _with_shared_definitions(Scalar, definitions)
     properties["scalars"] = {"type": "object", "additionalProperties": scalar}
     properties["signals"] = {"type": "object", "additionalProperties": Scheduled("number").json()}
-    properties["routes"] = {"type": "object", "additionalProperties": _hoisted(Route, definitions)}
+    properties["routes"] = {"type": "object", "additionalProperties": _with_shared_definitions(Route, definitions)}
     limit = keys_json(limit_keys("pressure", "pressure"))
     properties["limits"] = {"type": "object", "additionalProperties": limit}
     properties["expect"] = properties["compare"] = {
@@ -62,7 +62,9 @@ def whole() -> dict[str, Any]:
         "properties": properties,
         "required": [group for group in GROUPS if group != "links"],
         "if": {
-            "properties": {"nodes": {"additionalProperties": {"properties": {"type": {"not": {"enum": list(ALONE)}}}}}}
+            "properties": {
+                "nodes": {"additionalProperties": {"properties": {"type": {"not": {"enum": list(LINKLESS)}}}}}
+            }
         },
         "then": {"required": ["links"]},  # without a basin or a body
         "additionalProperties": False,
@@ -70,29 +72,31 @@ def whole() -> dict[str, Any]:
     }
 
 
-def shared(full: dict[str, Any]) -> dict[str, Any]:
+def share_definitions(full: dict[str, Any]) -> dict[str, Any]:
     """Move repeated parts of a schema to `$defs`; descriptions and defaults stay beside the references."""
     times: Counter[str] = Counter()
     names: dict[str, str] = {}
 
     def count(part: Any, key: str) -> None:
-        if isinstance(part, dict) and _schema(part):
-            text = dumps(_bare(part), sort_keys=True)
+        if isinstance(part, dict) and _is_schema(part):
+            text = dumps(_without_siblings(part), sort_keys=True)
             times[text] += 1
             if times[text] > 1:  # its inner parts are counted already
                 return
             names[text] = _name(part) or key
         for word, inner in part.items() if isinstance(part, dict) else [(key, inner) for inner in part]:
             if isinstance(inner, (dict, list)):
-                count(inner, key if word in WORDS else word)
+                count(inner, key if word in SCHEMA_WORDS else word)
 
     count(full, "case")
-    names = _apart({text: names[text] for text, times_used in times.items() if times_used > 1 and len(text) > SHORT})
+    names = _numbered(
+        {text: names[text] for text, times_used in times.items() if times_used > 1 and len(text) > SHARED_LENGTH}
+    )
 
     def replaced(part: Any, whole: bool = False) -> Any:
         if isinstance(part, dict):
-            if not whole and (name := names.get(dumps(_bare(part), sort_keys=True))):
-                return {"$ref": f"#/$defs/{name}", **{key: part[key] for key in BESIDE if key in part}}
+            if not whole and (name := names.get(dumps(_without_siblings(part), sort_keys=True))):
+                return {"$ref": f"#/$defs/{name}", **{key: part[key] for key in SIBLING_WORDS if key in part}}
             return {key: replaced(inner) for key, inner in part.items()}
         return [replaced(inner) for inner in part] if isinstance(part, list) else part
 
@@ -101,16 +105,16 @@ def shared(full: dict[str, Any]) -> dict[str, Any]:
     return result
 
 
-def _bare(part: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in part.items() if key not in BESIDE}
+def _without_siblings(part: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in part.items() if key not in SIBLING_WORDS}
 
 
-def _schema(part: dict[str, Any]) -> bool:
+def _is_schema(part: dict[str, Any]) -> bool:
     """True if a dict is the schema of a value, not a table of schemas by key."""
     return any(isinstance(part.get(word), (str, list)) for word in ("type", "anyOf", "enum"))
 
 
-def _apart(names: dict[str, str]) -> dict[str, str]:
+def _numbered(names: dict[str, str]) -> dict[str, str]:
     """Number equal names."""
     counts: Counter[str] = Counter()
     for text, name in names.items():
@@ -122,7 +126,11 @@ def _apart(names: dict[str, str]) -> dict[str, str]:
 def _name(part: dict[str, Any]) -> str:
     """Name of a shared schema: its dimension, that of the values of a schedule, or the keys of a table."""
     first = next(iter(part.get("anyOf", [])), part)
-    if isinstance(first, dict) and set(first) <= {"type", "examples", "x-dimension", *BESIDE} and "anyOf" in part:
+    if (
+        isinstance(first, dict)
+        and set(first) <= {"type", "examples", "x-dimension", *SIBLING_WORDS}
+        and "anyOf" in part
+    ):
         return f"schedule-of-{first.get('x-dimension', 'number')}"
     if part.get("type") == "array" and "enum" not in part["items"]:
         least = part.get("minItems", 1)
@@ -146,7 +154,7 @@ def _without_titles(part: Any) -> Any:
     return result
 
 
-def _hoisted(model: Any, definitions: dict[str, Any]) -> dict[str, Any]:
+def _with_shared_definitions(model: Any, definitions: dict[str, Any]) -> dict[str, Any]:
     """Schema of a model; its definitions are moved to `definitions`."""
     result = _without_titles(model.model_json_schema(by_alias=True))
     definitions |= result.pop("$defs", {})
@@ -157,14 +165,14 @@ def _defaults(definitions: dict[str, Any]) -> dict[str, Any]:
     """Schema of `[defaults.KIND]`: keys of the parts, all optional."""
     result = {}
     for kind, model in defaults.KINDS.items():
-        keys = _hoisted(model, definitions)["properties"]
-        own = {key: _bare(value) for key, value in keys.items() if key not in defaults.OWN}
+        keys = _with_shared_definitions(model, definitions)["properties"]
+        own = {key: _without_siblings(value) for key, value in keys.items() if key not in defaults.NOT_DEFAULT}
         result[kind] = {"type": "object", "properties": own, "additionalProperties": False}
     return {"type": "object", "properties": result, "additionalProperties": False}
 
 
 def _typed(kind: str, model: Any, definitions: dict[str, Any]) -> dict[str, Any]:
-    result = _hoisted(model, definitions)
+    result = _with_shared_definitions(model, definitions)
     result["properties"] = {"type": {"const": kind}, **result["properties"]}
     result["required"] = ["type", *result.get("required", [])]
     return result

@@ -14,23 +14,23 @@ from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
 from fvsolve.fluid.coolprop import OILY
 from fvsolve.parts.pipe.part import LINES
-from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.table import Named, Table
+from fvsolve.parts.table_model import NamedTables, Table
+from fvsolve.parts.time_series import copy_name, find_file
 from fvsolve.parts.value import (
-    COUNTED,
+    BY_CELLS,
     PROFILE,
     SHAPE,
     VALUE,
     Choice,
     Flag,
-    Misfit,
     Number,
     Quantity,
+    ReadContext,
     Rows,
-    Setting,
     Text,
-    Usual,
+    UsualRange,
     Value,
+    ValueFault,
     Whole,
     between,
     nonnegative,
@@ -43,7 +43,7 @@ from fvsolve.steppers.tableau import BUILT_IN, method_of_file
 from fvsolve.units import show
 
 STARTS = ("steady", "equilibrium", "rest")
-CAVITY_SCHEMES = tuple(name for name, one in SCHEMES.items() if one.cavities)
+CAVITY_SCHEMES = tuple(name for name, entry in SCHEMES.items() if entry.cavities)
 
 # Defaults of [numerics] and [output], chosen in docs/accuracy-and-speed.md. Steps: Courant number with cells, error
 # control without cells.
@@ -59,23 +59,23 @@ DEFAULT_ACCURACY = 1e-2  # fraction of the largest jump
 
 
 # Ranges of liquids, after CoolProp and the CRC Handbook: liquid hydrogen to mercury, light liquids to cold heavy oil.
-TEMPERATURES = Usual(
+TEMPERATURES = UsualRange(
     60.0, 1000.0, "liquefied gases to molten salt"
 )  # for fluid "user"; other fluids have their own range
-DENSITIES = Usual(60.0, 14e3, "liquid hydrogen to mercury")
-MODULI = Usual(1e7, 4e10, "liquefied gases to mercury")
-VISCOSITIES = Usual(1e-5, 5.0, "liquefied gases to heavy fuel oil")
+DENSITIES = UsualRange(60.0, 14e3, "liquid hydrogen to mercury")
+MODULI = UsualRange(1e7, 4e10, "liquefied gases to mercury")
+VISCOSITIES = UsualRange(1e-5, 5.0, "liquefied gases to heavy fuel oil")
 
 
 class FluidSpec(Table):
     """`[fluid]`: fluid, its state and its density law; numbers here override those of CoolProp."""
 
-    name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', COUNTED)]
+    name: Annotated[str, Text('a CoolProp fluid, "ISO VG 46", "INCOMP::..." or "user"', BY_CELLS)]
     temperature: Annotated[
-        float, Quantity("temperature", positive, "temperature at which properties are evaluated [K]", changes=COUNTED)
+        float, Quantity("temperature", positive, "temperature at which properties are evaluated [K]", changes=BY_CELLS)
     ] = 293.15
     pressure: Annotated[
-        float, Quantity("pressure", positive, "pressure at which properties are evaluated [Pa]", changes=COUNTED)
+        float, Quantity("pressure", positive, "pressure at which properties are evaluated [Pa]", changes=BY_CELLS)
     ] = 101325.0
     law: Annotated[
         str,
@@ -83,9 +83,9 @@ class FluidSpec(Table):
             "density law", tuple(LAWS), "density law of the whole case; linear (with cavitation mixture) if left out"
         ),
     ] = "linear"
-    density: Annotated[float | None, Quantity("density", positive, "density [kg/m3]", DENSITIES, COUNTED)] = None
+    density: Annotated[float | None, Quantity("density", positive, "density [kg/m3]", DENSITIES, BY_CELLS)] = None
     bulk_modulus: Annotated[
-        float | None, Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, COUNTED)
+        float | None, Quantity("modulus", positive, "isentropic bulk modulus [Pa]", MODULI, BY_CELLS)
     ] = None
     viscosity: Annotated[float | None, Quantity("viscosity", nonnegative, "dynamic viscosity [Pa s]", VISCOSITIES)] = (
         None
@@ -108,15 +108,15 @@ class FluidSpec(Table):
     )
 
     @classmethod
-    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         cavities = {"law": "mixture", "air_fraction": CAVITY_AIR}
         follows = given.get("cavitation") is True and given.get("law", "mixture") == "mixture"
         return cavities | given if follows else given
 
     @classmethod
-    def wanted(cls, given: Any) -> str:
+    def expected(cls, given: Any) -> str:
         if not isinstance(given, str):
-            return super().wanted(given)
+            return super().expected(given)
         return (
             f"[fluid] with name = {show('ISO VG 46' if given.casefold() in OILY else given)}, its temperature and more"
         )
@@ -124,7 +124,7 @@ class FluidSpec(Table):
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         value, usual = self.temperature, TEMPERATURES
         if self.name == "user" and not usual.least <= value <= usual.greatest:
-            text = f"{value:g} K is outside {usual.least:g} to {usual.greatest:g} K, {usual.practice}"
+            text = f"{value:g} K is outside {usual.least:g} to {usual.greatest:g} K, {usual.source}"
             text += units.likely(value, "temperature", usual.least, usual.greatest)
             yield ("temperature",), value, usual.least if value < usual.least else usual.greatest, text
 
@@ -145,7 +145,7 @@ class MethodNames(Collection):
 class MethodChoice(Choice):
     """Method by name, or by a file that contains its tableau as text."""
 
-    def read(self, given: Any, setting: Setting) -> str:
+    def read(self, given: Any, setting: ReadContext) -> str:
         if not isinstance(given, str) or given in BUILT_IN or given == AUTO:
             return super().read(given, setting)
         if not Path(given).suffix or (given in METHODS and METHODS[given].name == given):
@@ -266,7 +266,7 @@ class Numerics(Table):
         if self.scheme is None:
             changes["scheme"] = CAVITY_SCHEME if parts else DEFAULT_SCHEME
         if self.courant is self.step is self.rtol is None:
-            by_courant = has_cells and not steps_by_error(self.method)
+            by_courant = has_cells and not uses_error_control(self.method)
             courant = CAVITY_COURANT if parts else DEFAULT_COURANT
             changes |= {"courant": courant} if by_courant else {"rtol": DEFAULT_RTOL}
         adaptive = self.rtol is not None or "rtol" in changes
@@ -276,7 +276,7 @@ class Numerics(Table):
         return self.model_copy(update=changes)
 
 
-def steps_by_error(method: str | None) -> bool:
+def uses_error_control(method: str | None) -> bool:
     """True if a method uses error control even with cells: `auto`, and adaptive implicit methods."""
     known = METHODS.get(method or "")
     return method == AUTO or (known is not None and known.adaptive and not known.explicit)
@@ -310,7 +310,7 @@ class OutputUnits(Value):
         "density",
     )
 
-    def read(self, given: Any, setting: Setting) -> dict[str, str]:
+    def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
         if not isinstance(given, dict):
             raise ValueError(f'{show(given)} is not a table; expected for example {{ pressure = "barg" }}')
         faults = []
@@ -326,7 +326,7 @@ class OutputUnits(Value):
             except ValueError as error:
                 faults.append(((quantity,), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         filled = dict(given)
         if "pressure" in given and not units.find(given["pressure"], "pressure").absolute:
             filled.setdefault("gauge_pressure", given["pressure"])
@@ -340,13 +340,13 @@ class OutputUnits(Value):
         }
 
 
-class Names(Value):
+class ProbeNames(Value):
     """List of texts; they are read as probes later, when the parts are known."""
 
     about = "recorded quantities; those of all nodes and links if left out"
     takes = "list of probes"
 
-    def read(self, given: Any, setting: Setting) -> tuple[Any, ...]:
+    def read(self, given: Any, setting: ReadContext) -> tuple[Any, ...]:
         if not isinstance(given, (list, tuple)):
             raise ValueError(f'{show(given)} is not a list; expected for example ["gate.pressure"]')
         return tuple(given)
@@ -355,7 +355,7 @@ class Names(Value):
         return {"type": "array", "items": {"type": "string"}}
 
 
-class Line(Table):
+class OutputLine(Table):
     """Line across a basin along which its fields are written with every frame."""
 
     basin: Annotated[str, Text("name of the basin", VALUE)]
@@ -383,8 +383,10 @@ class Output(Table):
     fields: Annotated[int, Whole(between(0, 10**6), "number of frames of the fields, 0 for none", VALUE)] = (
         DEFAULT_FRAMES
     )
-    probes: Annotated[Any, Names()] = None
-    lines: Annotated[Any, Named(Line, "named lines across basins: { centre = { basin, from, to, points } }")] = {}
+    probes: Annotated[Any, ProbeNames()] = None
+    lines: Annotated[
+        Any, NamedTables(OutputLine, "named lines across basins: { centre = { basin, from, to, points } }")
+    ] = {}
     units: Annotated[dict[str, str], OutputUnits()] = {}
 
     def table(self) -> dict[str, Any]:

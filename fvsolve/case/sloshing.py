@@ -19,16 +19,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fvsolve.case.bodies import point_inertia
-from fvsolve.case.cells import means, samples
+from fvsolve.case.cell_means import means, samples
 from fvsolve.parts.body.part import Body, Joint
 from fvsolve.parts.schedule import constant
 
-MANY = 3  # modes along x, and along y
-ROUND = 1e-3  # allowed deviation of the corners of a circular outline, relative to the radius
+MODES = 3  # modes along x, and along y
+ROUNDNESS = 1e-3  # allowed deviation of the corners of a circular outline, relative to the radius
 UPRIGHT = 0.9  # least cosine between the normal of the bed and the vertical: modes hold for nearly level tanks
 FLAT = 1e-9  # allowed rise of a flat bed, relative to the depth
 TERMS = 2000  # number of terms of a series
-Found = Iterator[tuple[tuple, str]]
+Faults = Iterator[tuple[tuple, str]]
 
 
 class Outline(NamedTuple):
@@ -57,8 +57,8 @@ class SloshingMode(NamedTuple):
 class Slowest(NamedTuple):
     """Slowest mode of a tank: k h, and the excess of its frequency in shallow-water theory [%]."""
 
-    deep: float
-    fast: float
+    kh: float
+    excess: float
 
 
 def slowest(basin: Any, mesh: Any) -> Slowest | None:
@@ -78,7 +78,7 @@ def outline_of(mesh: Any) -> Outline | None:
         return Outline(tuple(sides.tolist()), 0.5 * (low + high), False)
     middle = mesh.centroid
     far = np.linalg.norm(mesh.points[np.unique(mesh.ends[mesh.inner :])] - middle, axis=1)
-    if np.ptp(far) < ROUND * far.mean():
+    if np.ptp(far) < ROUNDNESS * far.mean():
         return Outline((2.0 * float(np.sqrt(area / np.pi)),) * 2, middle, True)
     return None
 
@@ -93,7 +93,7 @@ def depth_of(basin: Any, mesh: Any) -> float:
     return basin.level - bed_of(basin, mesh)
 
 
-def modes(outline: Outline, depth: float, density: float, gravity: float, count: int = MANY) -> list[SloshingMode]:
+def modes(outline: Outline, depth: float, density: float, gravity: float, count: int = MODES) -> list[SloshingMode]:
     """First `count` modes of water in a tank, alternately along x and y."""
     from scipy.special import jnp_zeros
 
@@ -118,7 +118,7 @@ def area_of(outline: Outline) -> float:
     return 0.25 * np.pi * a * a if outline.is_round else a * b
 
 
-def surface(outline: Outline, mode: SloshingMode, x: float, y: float) -> float:
+def surface_rise(outline: Outline, mode: SloshingMode, x: float, y: float) -> float:
     """Rise of the surface at a point per travel of the mass of a mode [-]."""
     from scipy.special import j1, jnp_zeros
 
@@ -131,18 +131,18 @@ def surface(outline: Outline, mode: SloshingMode, x: float, y: float) -> float:
     return float(mode.rise * j1(mode.k * r) / j1(jnp_zeros(1, mode.number)[-1]) * part)
 
 
-def under_a_lid(outline: Outline, depth: float, density: float) -> np.ndarray:
+def lid_inertia(outline: Outline, depth: float, density: float) -> np.ndarray:
     """Inertia about the centre of an ideal fluid that fills a closed box or cylinder : float64[3, 3] [kg m2]."""
     a, b = outline.sides
     if outline.is_round:
-        across = density * turned_cylinder(0.5 * a, depth)
+        across = density * cylinder_inertia(0.5 * a, depth)
         return np.diag([across, across, 0.0])
     return density * np.diag([
-        a * turned_rectangle(b, depth), b * turned_rectangle(a, depth), depth * turned_rectangle(a, b)
+        a * rectangle_inertia(b, depth), b * rectangle_inertia(a, depth), depth * rectangle_inertia(a, b)
     ])  # fmt: skip
 
 
-def turned_rectangle(a: float, b: float) -> float:
+def rectangle_inertia(a: float, b: float) -> float:
     """Polar moment of a rectangle less its torsion constant [m4]: inertia of an ideal fluid / (density height)."""
     long, short = max(a, b), min(a, b)
     odd = np.arange(1, 2 * TERMS, 2)
@@ -151,7 +151,7 @@ def turned_rectangle(a: float, b: float) -> float:
     return a * b * (a * a + b * b) / 12.0 - torsion
 
 
-def turned_cylinder(a: float, h: float) -> float:
+def cylinder_inertia(a: float, h: float) -> float:
     """Inertia of an ideal fluid in a closed cylinder about a diameter through its centre / density [m5].
 
     phi = (-r z + sum b I1(c r) sin(c z)) cos(angle), c = (2 j - 1) pi / h, has the normal velocity of all walls.
@@ -167,7 +167,7 @@ def turned_cylinder(a: float, h: float) -> float:
     return float(wall + lids)
 
 
-def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]) -> Found:
+def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]) -> Faults:
     """Faults of basins with water as modes."""
     for name, mesh in lumped.items():
         basin, key = nodes[name], ("nodes", name)
@@ -182,7 +182,7 @@ def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]
             yield (*key, "bed"), 'modes are known only over a flat bed; expected a single height, or sloshing = "cells"'
         elif not basin.level > bed[0]:
             yield (*key, "level"), f"there is no water above the bed, at {bed[0]:g} m"
-        yield from left_out(key, basin)
+        yield from unsupported_keys(key, basin)
         if (pose := poses.get(basin.on)) is not None:
             upright = float((pose.attitude @ basin.turn)[2, 2])
             if upright < UPRIGHT:
@@ -190,7 +190,7 @@ def misfits(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, Any]
                 yield (*key, "sloshing"), text + 'not valid; expected "cells" or "frozen"'
 
 
-def weightless(nodes: dict[str, Any], gravity: float | None) -> Found:
+def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
     """Fault of zero gravity with a free water surface."""
     for name, basin in nodes.items():
         if gravity == 0.0 and getattr(getattr(basin, "own", None), "sloshes", False):
@@ -202,7 +202,7 @@ def weightless(nodes: dict[str, Any], gravity: float | None) -> Found:
                 return
 
 
-def left_out(key: tuple, basin: Any) -> Found:
+def unsupported_keys(key: tuple, basin: Any) -> Faults:
     """Faults of keys that modes do not support."""
     for key_name in sorted(basin.start.model_fields_set) if basin.start is not None else ():
         yield (*key, "start", key_name), "modes start from level water at rest; leave it out"
@@ -214,26 +214,28 @@ def left_out(key: tuple, basin: Any) -> Found:
             yield (*key, key_name), "modes have no friction; leave it out"
 
 
-def ice(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
+def held_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
     """(mass [kg], centre [m], inertia about it [kg m2]) of water with a fixed surface, in axes of the basin."""
     outline, depth = outline_of(mesh), depth_of(basin, mesh)
     centre = np.array([*outline.middle, bed_of(basin, mesh) + 0.5 * depth])
-    return density * area_of(outline) * depth, centre, under_a_lid(outline, depth, density)
+    return density * area_of(outline) * depth, centre, lid_inertia(outline, depth, density)
 
 
-def sliders(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Body]:
+def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity: float) -> dict[str, Body]:
     """Bodies that slide on springs for the modes, and a fixed body of negative mass.
 
     The negative mass subtracts the modes from the water with a fixed surface. In a cylinder the two modes of a number
     share a mass: it slides along y on a massless body that slides along x.
     """
-    outline, turn, all_modes, result = outline_of(mesh), basin.turn, made(basin, mesh, density, gravity), {}
+    outline, turn, all_modes, result = outline_of(mesh), basin.turn, modes_of(basin, mesh, density, gravity), {}
     bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
     places = [bed + turn[:, 2] * item.height for item in all_modes]
     masses = np.array([item.mass for item in all_modes]) * (0.5 if outline.is_round else 1.0)
     held = masses @ np.array(places) / masses.sum()
     spread = sum(point_inertia(m, r - held) for m, r in zip(masses, places, strict=True))
-    result[f"{name} held"] = body(-float(masses.sum()), -spread, Joint.model_construct(kind="fixed", on=basin.on), held)
+    result[f"{name} held"] = hidden_body(
+        -float(masses.sum()), -spread, Joint.model_construct(kind="fixed", on=basin.on), held
+    )
     down = (pose.attitude @ turn).T @ np.array([0.0, 0.0, -gravity])
     for mode, place in zip(all_modes, places, strict=True):
         on, first = basin.on, f"{name} x{mode.number}"
@@ -244,11 +246,11 @@ def sliders(name: str, basin: Any, mesh: Any, pose: Any, density: float, gravity
             kind="prismatic", on=on, at=tuple(place.tolist()), axis=tuple(turn[:, mode.along].tolist()),
             travel=constant(float(down[mode.along] / mode.square)), stiffness=mode.mass * mode.square,
         )  # fmt: skip
-        result[slider(name, mode)] = body(carried, np.zeros((3, 3)), joint, np.zeros(3))
+        result[mode_body_name(name, mode)] = hidden_body(carried, np.zeros((3, 3)), joint, np.zeros(3))
     return result
 
 
-def reading(
+def surface_factors(
     basin: Any, mesh: Any, x: float, y: float, density: float, gravity: float
 ) -> tuple[list[SloshingMode], list[float]]:
     """Modes, and the rise of the surface at a point per travel of each mode.
@@ -256,8 +258,8 @@ def reading(
     Modes that are left out would follow the acceleration statically, like the last modelled modes. Their rise is added
     to that of the last mode along each axis, so that a surface in equilibrium is plane.
     """
-    outline, all_modes = outline_of(mesh), made(basin, mesh, density, gravity)
-    rises = [surface(outline, mode, x, y) for mode in all_modes]
+    outline, all_modes = outline_of(mesh), modes_of(basin, mesh, density, gravity)
+    rises = [surface_rise(outline, mode, x, y) for mode in all_modes]
     rest = (np.array([x, y]) - outline.middle).tolist()
     for mode, rise in zip(all_modes, rises, strict=True):
         rest[mode.along] -= gravity * rise / mode.square
@@ -268,17 +270,17 @@ def reading(
     ]
 
 
-def slider(name: str, mode: SloshingMode) -> str:
+def mode_body_name(name: str, mode: SloshingMode) -> str:
     """Name of the body of a mode."""
     return f"{name} {'xy'[mode.along]}{mode.number}"
 
 
-def made(basin: Any, mesh: Any, density: float, gravity: float) -> list[SloshingMode]:
+def modes_of(basin: Any, mesh: Any, density: float, gravity: float) -> list[SloshingMode]:
     """Modes of a basin."""
     return modes(outline_of(mesh), depth_of(basin, mesh), density, gravity)
 
 
-def body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
+def hidden_body(mass: float, inertia: np.ndarray, joint: Joint, centre: np.ndarray) -> Body:
     """Body that is not in the file; its mass may be negative."""
     return Body.model_construct(
         mass=mass, inertia=tuple(map(tuple, inertia.tolist())), joint=joint, points={},

@@ -144,10 +144,10 @@ def new(
 @app.command()
 def schema() -> None:
     """Print the JSON schema of a case file."""
-    from fvsolve.case.schema import printed
     from fvsolve.case.schema import schema as made
+    from fvsolve.case.schema import schema_text
 
-    print(printed(made()))
+    print(schema_text(made()))
 
 
 @app.command()

@@ -51,7 +51,7 @@ def import_(
         written.append(described)
     for path in written:
         print(path)
-    for text, names in [*network.notes, *([(SHORT, network.short)] if network.short else [])]:
+    for text, names in [*network.notes, *([(SHORT, network.short_pipes)] if network.short_pipes else [])]:
         print(f"{text}: {listing(names)}", file=sys.stderr)
 
 

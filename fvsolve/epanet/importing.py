@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case import text
-from fvsolve.epanet.reading import read_network, state_at
+from fvsolve.epanet.network_file import read_network, state_at
+from fvsolve.epanet.part_tables import DENSITY
 from fvsolve.epanet.translating import Translation
-from fvsolve.epanet.words import DENSITY
 from fvsolve.errors import FvsolveError, listing
 
 CELL_TIME = 0.01  # travel time of a cell in small networks [s]
@@ -32,7 +32,7 @@ class Imported:
     nodes: dict[str, str]
     links: dict[str, str]
     notes: list[tuple[str, list[str]]]
-    short: list[str]
+    short_pipes: list[str]
 
 
 def import_network(path: str | Path, hour: float = 0.0, wave_speed: float = 1200.0, shortest: float = 0.0) -> Imported:
@@ -84,7 +84,7 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
         "[numerics]",
         f'end = "{END}"',
         f'cell_time = "{1e3 * time:.10g} ms"  # pipes that are shorter get one cell',
-        'pipe_model = "auto"' + (f"  # {_short(translation, short)}" if short else ""),
+        'pipe_model = "auto"' + (f"  # {_short_pipes_comment(translation, short)}" if short else ""),
     ]
     lines += [
         "",
@@ -95,7 +95,7 @@ def _text(path: Path, network: Any, translation: Translation, hour: float, time:
     return "\n".join(lines) + "\n"
 
 
-def _short(translation: Translation, short: list[str]) -> str:
+def _short_pipes_comment(translation: Translation, short: list[str]) -> str:
     """Comment on pipes shorter than a cell."""
     first = translation.link_names.given[short[0]]
     pipes = f"{first} is" if len(short) == 1 else f"{len(short)} pipes are"

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from fvsolve.epanet import words
-from fvsolve.epanet.names import FreeNames
-from fvsolve.epanet.reading import SHUT, Hour
+from fvsolve.epanet import part_tables
+from fvsolve.epanet.free_names import FreeNames
+from fvsolve.epanet.network_file import CLOSED, HourState
 
-STALLED = 1e-7  # flow below which EPANET's pumps of constant power have stalled [m3/s]
-LEAST_REQUIRED = 0.1  # smallest required pressure of a full demand, in metres or psi as in the file
-STEEPEST = 0.99  # rise per length given to pipes for which the file has more than 1
+STALL_FLOW = 1e-7  # flow below which EPANET's pumps of constant power have stalled [m3/s]
+MIN_REQUIRED = 0.1  # smallest required pressure of a full demand, in metres or psi as in the file
+MAX_SLOPE = 0.99  # rise per length given to pipes for which the file has more than 1
 SWITCHED_OFF, ACTIVE = 2, 4  # EPANET's codes of a link
 PSI_OF_METRE = 0.4333 / 0.3048
 US_UNITS = ("CFS", "GPM", "MGD", "IMGD", "AFD")
-REGULATES = 2  # WNTR's code of a valve that is neither fixed open nor fixed closed
+REGULATING_STATUS = 2  # WNTR's code of a valve that is neither fixed open nor fixed closed
 
 
 class Translation:
@@ -26,17 +26,17 @@ class Translation:
     notes : (text, EPANET's names)
     """
 
-    def __init__(self, network: Any, hour: Hour, wave_speed: float, shortest: float) -> None:
+    def __init__(self, network: Any, hour: HourState, wave_speed: float, shortest: float) -> None:
         self.network, self.hour, self.speed, self.shortest = network, hour, wave_speed, shortest
-        self.nodes: dict[str, words.Part] = {}
-        self.links: dict[str, words.Part] = {}
+        self.nodes: dict[str, part_tables.Part] = {}
+        self.links: dict[str, part_tables.Part] = {}
         self.lengths: dict[str, float] = {}
-        self.noted: dict[str, list[str]] = {}
+        self.notes_by_text: dict[str, list[str]] = {}
         self.node_names, self.link_names = FreeNames(), FreeNames()
         hydraulic = network.options.hydraulic
         self.formula, self.multiplier = hydraulic.headloss, hydraulic.demand_multiplier
         self.gravity = hydraulic.specific_gravity  # pressures in metres refer to water, heads to the fluid
-        self.follows = hydraulic.demand_model in ("PDA", "PDD")
+        self.pressure_driven = hydraulic.demand_model in ("PDA", "PDD")
         self.clock = hour.seconds + network.options.time.pattern_start
         self.drawn = any(any(node.coordinates) for _, node in network.nodes())
         self.elevation = self.elevations()
@@ -52,14 +52,14 @@ class Translation:
                 self.note("has a different name in fvsolve", f"{name} is {ours}")
 
     def note(self, text: str, name: str) -> None:
-        names = self.noted.setdefault(text, [])
+        names = self.notes_by_text.setdefault(text, [])
         if name not in names:
             names.append(name)
 
     @property
     def notes(self) -> list[tuple[str, list[str]]]:
         """Differences from EPANET : list of (text, EPANET's names)."""
-        return list(self.noted.items())
+        return list(self.notes_by_text.items())
 
     # nodes ------------------------------------------------------------------------------------------------
 
@@ -80,22 +80,24 @@ class Translation:
                 low, high = sorted((pipe.start_node_name, pipe.end_node_name), key=result.get)
                 if result[high] - result[low] <= pipe.length:
                     continue
-                if self.feels(low) or self.feels(high):
+                if self.depends_on_pressure(low) or self.depends_on_pressure(high):
                     continue
                 if self.network.get_node(low).node_type == "Junction":
-                    name, result[low] = low, result[high] - STEEPEST * pipe.length
+                    name, result[low] = low, result[high] - MAX_SLOPE * pipe.length
                 else:
-                    name, result[high] = high, result[low] + STEEPEST * pipe.length
+                    name, result[high] = high, result[low] + MAX_SLOPE * pipe.length
                 moved = True
                 self.note("elevation changed, since a pipe cannot be shorter than its rise; heads and flows stay", name)
         return result
 
-    def feels(self, name: str) -> bool:
+    def depends_on_pressure(self, name: str) -> bool:
         """True if the outflow of a node depends on its pressure, and so on its elevation."""
         node = self.network.get_node(name)
-        return node.node_type == "Junction" and bool(node.emitter_coefficient or (self.follows and self.wanted(node)))
+        return node.node_type == "Junction" and bool(
+            node.emitter_coefficient or (self.pressure_driven and self.demand_at(node))
+        )
 
-    def wanted(self, node: Any) -> float:
+    def demand_at(self, node: Any) -> float:
         """Demand of a junction at the hour, from its patterns [m3/s]."""
         return node.demand_timeseries_list.at(self.clock, multiplier=self.multiplier)
 
@@ -103,117 +105,117 @@ class Translation:
         """Coordinates of a node; None if the file has none (WNTR then puts every node at the origin)."""
         return node.coordinates if self.drawn else None
 
-    def junction(self, name: str, node: Any) -> words.Part:
-        demand = self.wanted(node)
-        part = words.junction(self.elevation[name], demand, self.position(node))
-        if self.follows and demand > 0.0:
+    def junction(self, name: str, node: Any) -> part_tables.Part:
+        demand = self.demand_at(node)
+        part = part_tables.junction(self.elevation[name], demand, self.position(node))
+        if self.pressure_driven and demand > 0.0:
             hydraulic = self.network.options.hydraulic
-            least = LEAST_REQUIRED * (1.0 / PSI_OF_METRE if hydraulic.inpfile_units in US_UNITS else 1.0)
+            least = MIN_REQUIRED * (1.0 / PSI_OF_METRE if hydraulic.inpfile_units in US_UNITS else 1.0)
             required = max(hydraulic.required_pressure, least)
-            part |= words.follows_pressure(hydraulic.minimum_pressure, required, hydraulic.pressure_exponent)
+            part |= part_tables.pressure_demand(hydraulic.minimum_pressure, required, hydraulic.pressure_exponent)
         return part
 
-    def reservoir(self, name: str, node: Any) -> words.Part:
-        return words.reservoir(node.head_timeseries.at(self.clock), self.position(node))
+    def reservoir(self, name: str, node: Any) -> part_tables.Part:
+        return part_tables.reservoir(node.head_timeseries.at(self.clock), self.position(node))
 
-    def tank(self, name: str, node: Any) -> words.Part:
+    def tank(self, name: str, node: Any) -> part_tables.Part:
         level = node.init_level if self.hour.seconds == 0.0 else self.hour.head[name] - node.elevation
         area = math.pi / 4.0 * node.diameter**2
         if node.vol_curve is not None:
             area = curve_slope(node.vol_curve.points, level)
             self.note("volume curve: replaced by the area at its level", name)
         level = min(round(level, 6), node.max_level)  # EPANET's level may exceed it by rounding
-        return words.tank(self.elevation[name], area, level, node.max_level, self.position(node))
+        return part_tables.tank(self.elevation[name], area, level, node.max_level, self.position(node))
 
     # links ------------------------------------------------------------------------------------------------
 
     def ends(self, link: Any) -> tuple[str, str]:
         return tuple(self.node_names.given[end] for end in (link.start_node_name, link.end_node_name))
 
-    def between(self, name: str, link: Any) -> str:
+    def junction_before_end(self, name: str, link: Any) -> str:
         """Add a junction without demand before the end of a pipe; return its name."""
         end = self.network.get_node(link.end_node_name)
         start = link.start_node_name if link.end_node_name not in self.elevation else link.end_node_name
         place = self.node_names.new(f"{self.link_names.given[name]}-end")
-        self.nodes[place] = words.junction(self.elevation.get(start, 0.0), 0.0, self.position(end))
+        self.nodes[place] = part_tables.junction(self.elevation.get(start, 0.0), 0.0, self.position(end))
         return place
 
     def shut(self, name: str) -> bool:
-        return int(self.hour.status[name]) in SHUT
+        return int(self.hour.status[name]) in CLOSED
 
-    def pipe(self, name: str, link: Any) -> words.Part:
+    def pipe(self, name: str, link: Any) -> part_tables.Part:
         start, end = self.ends(link)
         if link.check_valve or self.shut(name):
-            place = self.between(name, link)
+            place = self.junction_before_end(name, link)
             ours = self.link_names.new(f"{self.link_names.given[name]}-{'check' if link.check_valve else 'shut'}")
             last = (place, end)
             self.links[ours] = (
-                words.check_valve(last, link.diameter)
+                part_tables.check_valve(last, link.diameter)
                 if link.check_valve
-                else words.valve(last, link.diameter, 0.0, opening=0.0)
+                else part_tables.valve(last, link.diameter, 0.0, opening=0.0)
             )
             reason = "check valve" if link.check_valve else "shut at this hour"
             self.note(
                 f"{reason}: a pipe and {'a check valve' if link.check_valve else 'a shut valve'} at its end", name
             )
             end = place
-        law = words.friction(self.formula, link.roughness)
+        law = part_tables.friction(self.formula, link.roughness)
         length = self.lengths[name] = self.length(link)
         if length > link.length:
             law = self.spread(name, link, length)
             self.note(f"lengthened to {length:.4g} m, with the loss of its own length", name)
-        return words.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
+        return part_tables.pipe((start, end), length, link.diameter, law, link.minor_loss, self.speed)
 
     def length(self, link: Any) -> float:
         """Length of a pipe in the case [m]: at least `shortest`, and at least its rise / `STEEPEST`."""
         low, high = sorted(self.elevation.get(end, 0.0) for end in (link.start_node_name, link.end_node_name))
         inside = {link.start_node_name, link.end_node_name} <= self.elevation.keys()
-        return max(link.length, self.shortest, (high - low) / STEEPEST if inside and high - low > link.length else 0.0)
+        return max(link.length, self.shortest, (high - low) / MAX_SLOPE if inside and high - low > link.length else 0.0)
 
-    def spread(self, name: str, link: Any, length: float) -> words.Part:
+    def spread(self, name: str, link: Any, length: float) -> part_tables.Part:
         """Friction of a lengthened pipe that gives the loss of its original length."""
         ratio = link.length / length
         if self.formula == "H-W":
-            return words.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852))
+            return part_tables.friction("H-W", link.roughness * ratio ** (-1.0 / 1.852))
         if self.formula == "C-M":
-            return words.friction("C-M", link.roughness * math.sqrt(ratio))
-        return words.darcy(ratio * self.hour.factor[name])
+            return part_tables.friction("C-M", link.roughness * math.sqrt(ratio))
+        return part_tables.darcy(ratio * self.hour.factor[name])
 
-    def pump(self, name: str, link: Any) -> words.Part:
+    def pump(self, name: str, link: Any) -> part_tables.Part:
         if int(self.hour.status[name]) == SWITCHED_OFF:
             self.note("pump is off at this hour: a shut valve", name)
-            return words.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
-        if link.pump_type == "POWER" and abs(self.hour.flow[name]) < STALLED:
+            return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
+        if link.pump_type == "POWER" and abs(self.hour.flow[name]) < STALL_FLOW:
             self.note("pump of constant power has zero flow in EPANET, which contradicts its power: a shut valve", name)
-            return words.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
+            return part_tables.valve(self.ends(link), self.bore(link), 0.0, opening=0.0)
         given = link.pump_type == "POWER"
-        law = words.power(self.gravity * link.power) if given else words.curve(link.get_pump_curve().points)
-        return words.pump(self.ends(link), law, float(self.hour.setting[name]))
+        law = part_tables.power(self.gravity * link.power) if given else part_tables.curve(link.get_pump_curve().points)
+        return part_tables.pump(self.ends(link), law, float(self.hour.setting[name]))
 
-    def valve(self, name: str, link: Any) -> words.Part:
+    def valve(self, name: str, link: Any) -> part_tables.Part:
         ends, kind, status = self.ends(link), link.valve_type, int(self.hour.status[name])
         diameter = self.size(link)
-        if kind in ("PRV", "PSV") and link.initial_status == REGULATES and self.out_of_reach(name, link):
+        if kind in ("PRV", "PSV") and link.initial_status == REGULATING_STATUS and self.set_too_high(name, link):
             self.note(f"{kind} set above every source: {'an open' if kind == 'PRV' else 'a shut'} valve", name)
-            return words.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
-        if kind in words.REGULATING and link.initial_status == REGULATES:
-            self.note(f"{kind}: EPANET has no time constant, here {words.TIME_CONSTANT}", name)
-            return words.regulating(kind, ends, diameter, self.setting(name, link), link.minor_loss)
-        if status in SHUT:
+            return part_tables.valve(ends, diameter, link.minor_loss, opening=1.0 if kind == "PRV" else 0.0)
+        if kind in part_tables.REGULATING and link.initial_status == REGULATING_STATUS:
+            self.note(f"{kind}: EPANET has no time constant, here {part_tables.TIME_CONSTANT}", name)
+            return part_tables.regulating(kind, ends, diameter, self.setting(name, link), link.minor_loss)
+        if status in CLOSED:
             self.note(f"{kind} is shut at this hour: a shut valve", name)
-            return words.valve(ends, diameter, 0.0, opening=0.0)
+            return part_tables.valve(ends, diameter, 0.0, opening=0.0)
         flow = self.hour.flow[name]
         drop = self.hour.head[link.start_node_name] - self.hour.head[link.end_node_name]
         if kind == "TCV" and status == ACTIVE:
-            return words.valve(ends, diameter, self.hour.setting[name])
+            return part_tables.valve(ends, diameter, self.hour.setting[name])
         if kind in ("PBV", "GPV") and flow * drop < 0.0:
             self.note(
                 f"{kind} raises the head along its flow, which a valve cannot do: an open valve, and heads differ", name
             )
         elif kind in ("PBV", "GPV") and flow and drop:
             self.note(f"{kind}: a valve with the constant loss coefficient of this hour", name)
-            return words.valve(ends, diameter, words.loss_of(abs(drop), flow, diameter))
-        return words.valve(ends, diameter, link.minor_loss)
+            return part_tables.valve(ends, diameter, part_tables.loss_coefficient(abs(drop), flow, diameter))
+        return part_tables.valve(ends, diameter, link.minor_loss)
 
     def bore(self, link: Any, otherwise: float = 0.1) -> float:
         """Diameter of the widest pipe next to a link [m]."""
@@ -229,7 +231,7 @@ class Translation:
         self.note("valve wider than every pipe next to it: diameter of the widest pipe", link.name)
         return widest
 
-    def out_of_reach(self, name: str, link: Any) -> bool:
+    def set_too_high(self, name: str, link: Any) -> bool:
         """True if the head set for a PRV or PSV exceeds that of all reservoirs and tanks, and there is no pump."""
         network, controlled = self.network, link.end_node_name if link.valve_type == "PRV" else link.start_node_name
         sources = [*network.reservoir_name_list, *network.tank_name_list]
@@ -253,7 +255,7 @@ class Translation:
         for name, node in self.network.junctions():
             if node.emitter_coefficient:
                 place = self.node_names.given[name]
-                leak = words.leak(place, unit * node.emitter_coefficient, exponent)
+                leak = part_tables.leak(place, unit * node.emitter_coefficient, exponent)
                 self.links[self.link_names.new(f"{place}-emitter")] = leak
 
     def options(self, hydraulic: Any) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from importlib import import_module
 
-from fvsolve.exact.solution import ExactStart, Solution, kinds_only, law_holds
+from fvsolve.exact.solution import ExactStart, Solution, law_faults, type_faults
 
-__all__ = ["NAMES", "Solution", "Start", "misfits", "solution"]
+__all__ = ["NAMES", "Solution", "Start", "find_faults", "solution"]
 
 NAMES = {  # name in the case file -> (module of this package, description)
     "rays": ("rays", "waves in frictionless pipes between reservoirs, junctions and valves, by ray tracing"),
@@ -26,14 +26,14 @@ NAMES = {  # name in the case file -> (module of this package, description)
 }
 
 
-def misfits(case) -> Iterator[tuple[tuple, str]]:
+def find_faults(case) -> Iterator[tuple[tuple, str]]:
     """(keys, message) of everything in a case that its exact solution does not cover.
 
     Parts of other types are reported first; only without them the solution checks the keys of its parts.
     """
     module = _module(case.exact.name)
-    yield from law_holds(case)
-    yield from list(kinds_only(case, module.NODES, module.LINKS)) or module.misfits(case)
+    yield from law_faults(case)
+    yield from list(type_faults(case, module.NODES, module.LINKS)) or module.misfits(case)
 
 
 def solution(case, start: ExactStart) -> Solution:

@@ -10,17 +10,17 @@ import math
 
 import numpy as np
 
-from fvsolve.exact.schedule import constant_from, value
-from fvsolve.exact.solution import ExactStart, Solution, only_one, reservoirs
+from fvsolve.exact.schedule_values import constant_from, value
+from fvsolve.exact.solution import ExactStart, Solution, count_faults, reservoirs
 
 NODES, LINKS = ("reservoir", "junction"), ("rigid-column", "valve", "orifice")
 
 
-def misfits(case):
+def find_faults(case):
     """Faults of a case that is not a single column between constant pressures."""
-    name, columns, valves = case.exact.name, *parts(case)
-    yield from only_one(case, columns, "rigid-column")
-    yield from only_one(case, valves, "valve") if len(valves) > 1 else ()
+    name, columns, valves = case.exact.name, *columns_and_valves(case)
+    yield from count_faults(case, columns, "rigid-column")
+    yield from count_faults(case, valves, "valve") if len(valves) > 1 else ()
     for node, part in case.nodes.items():
         given = part.demand if part.kind == "junction" else part.pressure or part.head
         if not constant_from(given, -math.inf) or (part.kind == "junction" and given.first != 0.0):
@@ -47,7 +47,7 @@ def misfits(case):
             yield ("links", link, "laminar_reynolds"), f'the exact solution "{name}" supports only the turbulent law'
 
 
-def parts(case) -> tuple[list, list]:
+def columns_and_valves(case) -> tuple[list, list]:
     """(columns, valves) as pairs (name, part)."""
     columns = [item for item in case.links.items() if item[1].kind == "rigid-column"]
     return columns, [item for item in case.links.items() if item[1].kind in ("valve", "orifice")]
@@ -55,14 +55,16 @@ def parts(case) -> tuple[list, list]:
 
 def solution(case, start: ExactStart) -> Solution:
     """Flow and node pressures of a case without faults."""
-    [(name, column)], valves = parts(case)
+    [(name, column)], valves = columns_and_valves(case)
     rho, t0 = case.properties.density, case.numerics.start
     area = 0.25 * math.pi * column.diameter**2
     potential = {node: law(t0) + rho * case.gravity * case.elevation(node) for node, law in reservoirs(case).items()}
     wall = ((column.friction.factor or 0.0) * column.length / column.diameter + column.minor_loss) / (2 * rho * area**2)
     valve = valves[0][1] if valves else None
     ends = [column.from_, column.to]
-    drive = sum(sign * potential[far(case, end, valve)] for sign, end in zip((1.0, -1.0), ends, strict=True))
+    drive = sum(
+        sign * potential[reservoir_beyond(case, end, valve)] for sign, end in zip((1.0, -1.0), ends, strict=True)
+    )
 
     def resistance(t):
         if valve is None:
@@ -73,26 +75,26 @@ def solution(case, start: ExactStart) -> Solution:
     pieces, m = [], start.flow[name] * rho
     for begin, end in zip([t0, *jumps], [*jumps, math.inf], strict=True):
         pieces.append((begin, m, wall + resistance(begin), resistance(begin)))
-        m = float(rise(m, drive, pieces[-1][2], area / column.length, np.array(min(end, 1e300) - begin)))
+        m = float(flow_after(m, drive, pieces[-1][2], area / column.length, np.array(min(end, 1e300) - begin)))
 
     def mass_flow(t):
-        return _by_piece(pieces, t, lambda s, piece: rise(piece[1], drive, piece[2], area / column.length, s))
+        return _piecewise(pieces, t, lambda s, piece: flow_after(piece[1], drive, piece[2], area / column.length, s))
 
     def valve_drop(t):  # in the direction of the column
         m = mass_flow(t)
-        return _by_piece(pieces, t, lambda s, piece: np.full(s.shape, piece[3])) * m * np.abs(m)
+        return _piecewise(pieces, t, lambda s, piece: np.full(s.shape, piece[3])) * m * np.abs(m)
 
     result = Solution(case, flow={name: lambda t: mass_flow(t) / rho})
     if valve is not None:
         result.flow[valves[0][0]] = lambda t: mass_flow(t) / rho * orientation(column, valve)
         node = valve.from_ if valve.from_ in ends else valve.to
         sign = 1.0 if node == column.to else -1.0
-        base = potential[far(case, node, valve)] - rho * case.gravity * case.elevation(node)
+        base = potential[reservoir_beyond(case, node, valve)] - rho * case.gravity * case.elevation(node)
         result.pressure[node] = lambda t: base + sign * valve_drop(t)
     return result
 
 
-def far(case, end: str, valve) -> str:
+def reservoir_beyond(case, end: str, valve) -> str:
     """Reservoir at an end of the column, or on the other side of the valve there."""
     if case.nodes[end].kind == "reservoir":
         return end
@@ -104,7 +106,7 @@ def orientation(column, valve) -> float:
     return 1.0 if valve.from_ == column.to or valve.to == column.from_ else -1.0
 
 
-def _by_piece(pieces, t, law):
+def _piecewise(pieces, t, law):
     t = np.asarray(t, dtype=float)
     result = np.empty(t.shape)
     index = np.clip(np.searchsorted([piece[0] for piece in pieces], t, side="right") - 1, 0, None)
@@ -113,10 +115,10 @@ def _by_piece(pieces, t, law):
     return result
 
 
-def rise(m: float, drive: float, k: float, a: float, t: np.ndarray) -> np.ndarray:
+def flow_after(m: float, drive: float, k: float, a: float, t: np.ndarray) -> np.ndarray:
     """M(t) of M' = a (drive - k |M| M), M(0) = m."""
     if drive < 0.0 or (drive == 0.0 and m < 0.0):
-        return -rise(-m, -drive, k, a, t)
+        return -flow_after(-m, -drive, k, a, t)
     if k == 0.0:
         return m + a * drive * t
     if drive == 0.0:

@@ -11,16 +11,16 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.exact import laminar_line
-from fvsolve.exact.laminar_line import LINKS, NODES, LineDeviation, of_line
+from fvsolve.exact.laminar_line import LINKS, NODES, LineDeviation, line_solution
 from fvsolve.exact.solution import ExactStart, Solution
 
-__all__ = ["LINKS", "NODES", "misfits", "solution"]
+__all__ = ["LINKS", "NODES", "find_faults", "solution"]
 
 
-def misfits(case):
+def find_faults(case):
     """Faults of a case that is not a single pipe with wall creep and a demand at its end."""
     name = case.exact.name
-    for keys, text in laminar_line.misfits(case):
+    for keys, text in laminar_line.find_faults(case):
         link = case.links[keys[1]] if keys[0] == "links" and len(keys) > 2 else None
         if link is None or keys[2] != "friction" or link.friction.model != "none" or link.minor_loss:
             yield keys, text
@@ -32,22 +32,22 @@ def misfits(case):
 def solution(case, start: ExactStart) -> Solution:
     """Pressures and flows along the pipe of a case without faults."""
     [pipe] = case.links.values()
-    return of_line(case, start, Creeping(case, pipe))
+    return line_solution(case, start, CreepDeviation(case, pipe))
 
 
-class Creeping(LineDeviation):
+class CreepDeviation(LineDeviation):
     """Deviations from the start along a pipe with wall creep."""
 
     def __init__(self, case, pipe) -> None:
         super().__init__(case, pipe)
-        self.plug = pipe.friction.model == "none"
+        self.plug_flow = pipe.friction.model == "none"
         self.elements = [(growth * self.rho * self.a**2, time) for growth, time in pipe.yielding]
 
-    def swelling(self, s):
+    def storage_ratio(self, s):
         total = np.ones(np.shape(s), dtype=complex)
         for share, time in self.elements:
             total = total + share / (1.0 + time * s)
         return total
 
     def ratio(self, s):
-        return np.ones(np.shape(s), dtype=complex) if self.plug else super().ratio(s)
+        return np.ones(np.shape(s), dtype=complex) if self.plug_flow else super().ratio(s)

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
-from fvsolve.exact.schedule import value
-from fvsolve.exact.solution import ExactStart, Solution, only_one, reservoirs
+from fvsolve.exact.schedule_values import value
+from fvsolve.exact.solution import ExactStart, Solution, count_faults, reservoirs
 
 NODES, LINKS = ("reservoir", "junction"), ("pipe",)
 LAMINAR = 2000.0  # largest Reynolds number that is certainly laminar
@@ -23,10 +23,10 @@ PERIOD, DAMPING = 2.5, 18.0  # of the Bromwich line: period / time span, and dam
 TAIL = 1e-10  # relative size at which the transform of a smooth demand is cut off
 
 
-def misfits(case):
+def find_faults(case):
     """Faults of a case that is not a single laminar pipe with a demand at its end."""
     name, pipes = case.exact.name, list(case.links.items())
-    yield from only_one(case, pipes, "pipe")
+    yield from count_faults(case, pipes, "pipe")
     for node, part in case.nodes.items():
         if part.kind == "reservoir" and not (part.pressure or part.head).constant:
             yield ("nodes", node), f'the exact solution "{name}" needs a constant pressure'
@@ -63,10 +63,10 @@ def reynolds(case, pipe) -> float:
 def solution(case, start: ExactStart) -> Solution:
     """Pressures and flows along the pipe of a case without faults."""
     [(name, pipe)] = case.links.items()
-    return of_line(case, start, LineDeviation(case, pipe))
+    return line_solution(case, start, LineDeviation(case, pipe))
 
 
-def of_line(case, start: ExactStart, line: LineDeviation) -> Solution:
+def line_solution(case, start: ExactStart, line: LineDeviation) -> Solution:
     """Pressures and flows of a case with a single pipe, from its deviations."""
     [(name, pipe)] = case.links.items()
     drop = start.pressure[pipe.to] - start.pressure[pipe.from_]
@@ -90,7 +90,7 @@ class LineDeviation:
         self.reversed = case.nodes[pipe.to].kind == "reservoir"
         self.gate = pipe.from_ if self.reversed else pipe.to
         self.demand, self.rho, self.t0 = case.nodes[self.gate].demand, case.properties.density, case.numerics.start
-        self.end, self.length, self.a = case.numerics.end, pipe.length, case.wave_speed(case_name(case))
+        self.end, self.length, self.a = case.numerics.end, pipe.length, case.wave_speed(first_link(case))
         self.area, self.viscosity = math.pi / 4.0 * pipe.diameter**2, case.properties.viscosity
         self.scale = 0.25 * pipe.diameter**2 * self.rho / (self.viscosity or 1.0)  # R^2 / nu [s]
 
@@ -98,29 +98,29 @@ class LineDeviation:
         """(pressure [Pa], mass flow [kg/s]) at distances x [m] and times t [s], arrays of equal shape."""
         t = np.minimum(t, self.end)
         if self.demand.kind == "smooth":
-            return self._smooth(x, t)
-        return self._jumps(x, t)
+            return self._smooth_response(x, t)
+        return self._jump_response(x, t)
 
     def fronts(self, t: float) -> np.ndarray:
         """Distances from `from` of the fronts of all jumps at time t [m]."""
         if self.demand.kind != "step":
             return np.zeros(0)
         places = []
-        for when, _ in self._steps():
+        for when, _ in self._demand_jumps():
             place = (t - when) * self.a % (4.0 * self.length)
             back = [self.length - place, place - self.length, 3.0 * self.length - place, place - 3.0 * self.length]
             places += [x for x in back if t > when and 0.0 <= x <= self.length]
         places = np.array(places)
         return self.length - places if self.reversed else places
 
-    def _steps(self):
+    def _demand_jumps(self):
         """(time [s], change of the mass flow of the demand [kg/s]) of every jump after the start."""
         times, values = self.demand.time, self.demand.value
         for k in range(1, len(times)):
             if times[k] >= self.t0:
                 yield float(times[k]), self.rho * float(values[k] - values[k - 1])
 
-    def swelling(self, s):
+    def storage_ratio(self, s):
         """Storage of liquid and wall relative to their instantaneous storage, C(s)."""
         return 1.0
 
@@ -133,18 +133,18 @@ class LineDeviation:
 
     # jumps: sum of reflections ---------------------------------------------------------------------------------------
 
-    def _jumps(self, x, t):
+    def _jump_response(self, x, t):
         p, m = np.zeros(x.shape), np.zeros(x.shape)
-        for when, change in self._steps() if self.demand.kind == "step" else ():
+        for when, change in self._demand_jumps() if self.demand.kind == "step" else ():
             age = t - when
             for k in range(1 + int(max(0.0, np.max(age, initial=0.0)) * self.a / (2.0 * self.length))):
                 for sign, d in ((1.0, (2 * k + 1) * self.length - x), (-1.0, (2 * k + 1) * self.length + x)):
-                    wave_p, wave_m = self._arrived(d, age - d / self.a)
+                    wave_p, wave_m = self._unit_jump(d, age - d / self.a)
                     p -= (-1) ** k * sign * change * wave_p
                     m += (-1) ** k * change * wave_m
         return p, m
 
-    def _arrived(self, d, after):
+    def _unit_jump(self, d, after):
         """(pressure, flow) of a unit jump at a distance d and a time `after` its front, by a fixed Talbot contour."""
         here = after > 0.0
         p, m = np.zeros(d.shape), np.zeros(d.shape)
@@ -156,7 +156,7 @@ class LineDeviation:
         node = np.concatenate([[1.0 + 0.0j], theta * (cot + 1j)]) * (0.4 * TALBOT)  # s tau
         weight = np.concatenate([[0.5 + 0.0j], 1.0 + 1j * (theta + (theta * cot - 1.0) * cot)]) * np.exp(node) * 0.4
         for s, w in zip(node, weight, strict=True):
-            inertia, storage = self.ratio(s / tau), self.swelling(s / tau)
+            inertia, storage = self.ratio(s / tau), self.storage_ratio(s / tau)
             ratio = inertia * storage
             root = np.sqrt(ratio)
             slow = np.exp(-(s / tau) * (d / self.a) * (ratio - 1.0) / (root + 1.0))  # without the pure delay
@@ -166,9 +166,9 @@ class LineDeviation:
 
     # smooth: Bromwich integral ---------------------------------------------------------------------------------------
 
-    def _smooth(self, x, t):
+    def _smooth_response(self, x, t):
         s, input_, step = self._input()
-        storage = self.swelling(s)
+        storage = self.storage_ratio(s)
         root = np.sqrt(self.ratio(s) * storage)
         gamma, far = s / self.a * root, np.exp(-2.0 * s / self.a * root * self.length)
         p, m = np.empty(x.size), np.empty(x.size)
@@ -192,8 +192,8 @@ class LineDeviation:
                     break
                 count *= 2
             transform[0] *= 0.5
-            self._line = s, transform, step
-        return self._line
+            self._bromwich_line = s, transform, step
+        return self._bromwich_line
 
     def _transform(self, s):
         """Transform of the change of mass flow: integral of its slope times exp(-s t), divided by s (Gauss points)."""
@@ -215,6 +215,6 @@ class LineDeviation:
         return self.rho * value(self.demand, t)
 
 
-def case_name(case) -> str:
+def first_link(case) -> str:
     """Name of the first link of a case."""
     return next(iter(case.links))

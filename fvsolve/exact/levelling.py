@@ -8,23 +8,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.exact.schedule import constant_from, value
-from fvsolve.exact.solution import ExactStart, Solution, levels_hold, only_one, reservoirs
+from fvsolve.exact.schedule_values import constant_from, value
+from fvsolve.exact.solution import ExactStart, Solution, count_faults, level_faults, reservoirs
 
 NODES, LINKS = ("reservoir", "tank", "chamber"), ("valve", "orifice")
 
 
-def misfits(case):
+def find_faults(case):
     """Faults of a case that the solution does not cover from start to end."""
-    faults = list(_misfits(case))
+    faults = list(_find_faults(case))
     yield from faults
     if not faults:
-        yield from levels_hold(solution(case, ExactStart({}, {})))
+        yield from level_faults(solution(case, ExactStart({}, {})))
 
 
-def _misfits(case):
+def _find_faults(case):
     """Faults of a case that is not a drop across a single orifice."""
-    yield from only_one(case, list(case.links), "orifice or valve")
+    yield from count_faults(case, list(case.links), "orifice or valve")
     name, start = case.exact.name, case.numerics.start
     for node, part in case.nodes.items():
         if part.kind == "tank" and hasattr(part.area, "area"):
@@ -49,8 +49,8 @@ def solution(case, start: ExactStart) -> Solution:
     (link, part), rho, t0 = next(iter(case.links.items())), case.properties.density, case.numerics.start
     ends, weight = (part.from_, part.to), rho * case.gravity
     area = part.flow_area() * float(value(part.opening, t0))
-    pressures = [first_pressure(case, node) for node in ends]
-    softness = [stiffness(case, node) for node in ends]  # pressure per volume of inflow
+    pressures = [initial_pressure(case, node) for node in ends]
+    softness = [pressure_per_volume(case, node) for node in ends]  # pressure per volume of inflow
     drop = sum(s * (p + weight * case.elevation(n)) for s, p, n in zip((1, -1), pressures, ends, strict=True))
     slope = sum(softness) * area * np.sqrt(2.0 / rho)
 
@@ -72,7 +72,7 @@ def solution(case, start: ExactStart) -> Solution:
     return result
 
 
-def first_pressure(case, node: str) -> float:
+def initial_pressure(case, node: str) -> float:
     """Stated pressure of a node at the start [Pa]."""
     part = case.nodes[node]
     if part.kind == "tank":
@@ -82,7 +82,7 @@ def first_pressure(case, node: str) -> float:
     return float(reservoirs(case)[node](np.float64(case.numerics.start)))
 
 
-def stiffness(case, node: str) -> float:
+def pressure_per_volume(case, node: str) -> float:
     """Pressure rise per volume of inflow [Pa/m3]."""
     part = case.nodes[node]
     if part.kind == "tank":

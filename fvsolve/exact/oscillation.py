@@ -9,26 +9,26 @@ import math
 
 import numpy as np
 
-from fvsolve.exact.levelling import first_pressure
-from fvsolve.exact.schedule import constant_from
-from fvsolve.exact.solution import ExactStart, Solution, levels_hold, only_one
+from fvsolve.exact.levelling import initial_pressure
+from fvsolve.exact.schedule_values import constant_from
+from fvsolve.exact.solution import ExactStart, Solution, count_faults, level_faults
 
 NODES, LINKS = ("reservoir", "tank"), ("rigid-column",)
 
 
-def misfits(case):
+def find_faults(case):
     """Faults of a case that the solution does not cover from start to end."""
-    faults = list(_misfits(case))
+    faults = list(_find_faults(case))
     yield from faults
     if not faults:
-        yield from levels_hold(
+        yield from level_faults(
             solution(case, ExactStart({}, {name: link.initial_flow or 0.0 for name, link in case.links.items()}))
         )
 
 
-def _misfits(case):
+def _find_faults(case):
     """Faults of a case that is not a single frictionless column between open tanks."""
-    yield from only_one(case, list(case.links), "rigid-column")
+    yield from count_faults(case, list(case.links), "rigid-column")
     name = case.exact.name
     for node, part in case.nodes.items():
         if part.kind == "tank" and hasattr(part.area, "area"):
@@ -52,7 +52,7 @@ def solution(case, start: ExactStart) -> Solution:
     ends = (column.from_, column.to)
     soft = [1.0 / case.nodes[n].area if case.nodes[n].kind == "tank" else 0.0 for n in ends]
     omega = math.sqrt(slope * g * sum(soft))
-    first = [first_pressure(case, node) for node in ends]
+    first = [initial_pressure(case, node) for node in ends]
     drop = first[0] - first[1] + rho * g * (case.elevation(ends[0]) - case.elevation(ends[1]))
     m0 = start.flow[name] * rho
 

@@ -10,16 +10,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.exact.schedule import kinks, value
+from fvsolve.exact.schedule_values import kinks, value
 from fvsolve.exact.solution import ExactStart, Solution, reservoirs
 
 NODES, LINKS = ("reservoir", "junction", "inflow"), ("pipe", "valve", "orifice")
-MOST_PATHS = 20000
+MAX_PATHS = 20000
 BLOCK = 400_000  # values traced together: number of times x number of paths
 MERGE = 1e-11  # sums of travel times closer than this are merged, relative to the duration of the run
 
 
-def misfits(case):
+def find_faults(case):
     """Faults of a case that ray tracing does not cover."""
     valves: dict[str, list[str]] = {}
     for name, link in case.links.items():
@@ -54,13 +54,13 @@ def misfits(case):
 
 def solution(case, start: ExactStart) -> Solution:
     """Pressures, flows and fields of a case without faults."""
-    rays = Rays(case, start)
+    rays = RayPaths(case, start)
     nodes = {name: (lambda t, n=name: rays.pressure(n, t)) for name in case.nodes}
     valves = {name: (lambda t, n=name: rays.valve_flow(n, t)) for name in rays.valves}
     return Solution(case, pressure=nodes, flow=valves, pipe=rays.inside, kinks=rays.kinks)
 
 
-class Rays:
+class RayPaths:
     """Wave paths of a case: pipes, and groups of nodes; nodes joined by a valve form a group."""
 
     def __init__(self, case, start: ExactStart) -> None:
@@ -106,7 +106,7 @@ class Rays:
                     known = place[key, other] = len(paths)
                     paths.append((when, other, {}))
                 sources[pipe, end] = known
-            if len(paths) > MOST_PATHS:
+            if len(paths) > MAX_PATHS:
                 raise OverflowError("too many reflections to trace; expected a shorter run, or fewer pipes")
         order = sorted(range(len(paths)), key=lambda k: -paths[k][0])
         rank = {old: new for new, old in enumerate(order)}
@@ -144,10 +144,10 @@ class Rays:
                 if end in sources and known[sources[end]]:
                     sent = known[sources[end]]["sent", end[0], 1 - end[1]]
                     arrived[end] = np.where(age < self.travel[end[0]], arrived[end], sent)
-            known[k] = self._answer(here, now, arrived)
+            known[k] = self._node_state(here, now, arrived)
         return known[-1]
 
-    def _answer(self, group: str, now, arrived) -> dict:
+    def _node_state(self, group: str, now, arrived) -> dict:
         """Potentials of the nodes of a group, flows of its valves and outgoing characteristics, for incoming ones."""
         result, admittance, level = {}, {}, {}
         for node in (name for name, own in self.group.items() if own == group):
@@ -163,7 +163,7 @@ class Rays:
                 continue
             i, j = valve.from_, valve.to
             slack = 1.0 / admittance[i] + 1.0 / admittance[j]  # decrease of the potential drop per flow
-            flow = flow_through(self._conductance(valve, now), slack, level[i] - level[j])
+            flow = valve_equation_flow(self._conductance(valve, now), slack, level[i] - level[j])
             result["valve", name, 0] = flow / self.rho
             level[i], level[j] = level[i] - flow / admittance[i], level[j] + flow / admittance[j]
         result |= {("node", node, 0): values for node, values in level.items()}
@@ -191,13 +191,13 @@ class Rays:
         """Pressure [Pa] and flow [m3/s] in a pipe; x : distance from its `from` end [m]."""
         x, t = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(t, dtype=float))
         link = self.pipes[pipe]
-        forward = self._sent(pipe, 0, t - x / self.speed[pipe], x)
-        backward = self._sent(pipe, 1, t - (link.length - x) / self.speed[pipe], link.length - x)
+        forward = self._outgoing(pipe, 0, t - x / self.speed[pipe], x)
+        backward = self._outgoing(pipe, 1, t - (link.length - x) / self.speed[pipe], link.length - x)
         z = self.z[link.from_] + x / link.length * (self.z[link.to] - self.z[link.from_])
         p = 0.5 * (forward + backward) - self.weight * z
         return p, 0.5 * (forward - backward) / (self.impedance[pipe] * self.rho)
 
-    def _sent(self, pipe: str, end: int, when, x):
+    def _outgoing(self, pipe: str, end: int, when, x):
         """Characteristic at a distance x from the end that it left at time `when`, or that of the initial state."""
         age = when + x / self.speed[pipe] - self.t0
         early = self.first(pipe, 1 - end, age + self.travel[pipe] - x / self.speed[pipe])
@@ -211,7 +211,7 @@ class Rays:
     def kinks(self, pipe: str, t: float) -> np.ndarray:
         """Places of kinks in a pipe at time t [m]: rays from kinks of schedules, or from an unbalanced start."""
         places, length = [np.zeros(0)], self.pipes[pipe].length
-        for group, times in self._acting().items():
+        for group, times in self._kink_times().items():
             for end in (0, 1):
                 here = self.group[self.node(pipe, end)]
                 after = np.array([s for s, own, _ in self.paths[group] if own == here])
@@ -220,7 +220,7 @@ class Rays:
                 places.append(run if end == 0 else length - run)
         return np.sort(np.concatenate(places))
 
-    def _acting(self) -> dict[str, np.ndarray]:
+    def _kink_times(self) -> dict[str, np.ndarray]:
         """Group -> times of kinks of its schedules, or of the start if it is not in equilibrium."""
         parts = [(self.group[name], node) for name, node in self.case.nodes.items()]
         parts += [(self.group[valve.to], valve) for valve in self.valves.values()]
@@ -229,11 +229,11 @@ class Rays:
             for key in ("pressure", "head", "demand", "flow", "opening"):
                 if hasattr(getattr(part, key, None), "kind"):
                     result.setdefault(group, set()).update(t for t in kinks(getattr(part, key)) if t >= self.t0)
-            if not self._rests(group):
+            if not self._is_steady(group):
                 result.setdefault(group, set()).add(self.t0)
         return {group: np.array(sorted(times)) for group, times in result.items() if times}
 
-    def _rests(self, group: str) -> bool:
+    def _is_steady(self, group: str) -> bool:
         """True if the potentials of a group do not change at the start."""
         after = self.trace(group, np.array([self.t0 + self.near]))
         return all(
@@ -243,7 +243,7 @@ class Rays:
         )  # fmt: skip
 
 
-def flow_through(conductance, slack, drop) -> np.ndarray:
+def valve_equation_flow(conductance, slack, drop) -> np.ndarray:
     """Flow M with M |M| = G (drop - slack M): closed solution of the valve equation between pipe ends."""
     b = conductance * slack
     size = np.abs(drop)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fvsolve.exact.schedule import value
+from fvsolve.exact.schedule_values import value
 
 Law = Callable[[np.ndarray], np.ndarray]  # values at times
 GAUSS = np.polynomial.legendre.leggauss(5)
@@ -53,7 +53,7 @@ class Solution:
         if name not in laws:
             return np.full(t.shape, np.nan)
         values = laws[name](t)
-        return self._counted(values, quantity, self.case.elevation(name) if quantity == "head" else 0.0)
+        return self._converted(values, quantity, self.case.elevation(name) if quantity == "head" else 0.0)
 
     def averages(self, name: str, edges: np.ndarray, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Averages of pressure [Pa] and flow [m3/s] between edges [m] of a pipe, by Gauss points between all kinks."""
@@ -76,9 +76,9 @@ class Solution:
         here = z[0] + probe.fraction * (z[1] - z[0])
         if link.profile is not None:
             here = float(link.profile.at(probe.fraction * link.length))
-        return self._counted(p, probe.quantity, here)
+        return self._converted(p, probe.quantity, here)
 
-    def _counted(self, pressure, quantity: str, z: float):
+    def _converted(self, pressure, quantity: str, z: float):
         """Convert a pressure to gauge pressure or head; other quantities are unchanged."""
         case = self.case
         if quantity == "gauge_pressure":
@@ -114,13 +114,13 @@ def reservoirs(case) -> dict[str, Law]:
     return {name: law(name, node) for name, node in case.nodes.items() if node.kind == "reservoir"}
 
 
-def law_holds(case):
+def law_faults(case):
     """Fault of a density law that is not linear."""
     if not case.law.linear:
         yield ("fluid", "law"), f'the exact solution "{case.exact.name}" holds only with the law "linear"'
 
 
-def kinds_only(case, nodes: tuple[str, ...], links: tuple[str, ...]):
+def type_faults(case, nodes: tuple[str, ...], links: tuple[str, ...]):
     """Faults of parts of other types."""
     name = case.exact.name
     for group, parts, known in (("nodes", case.nodes, nodes), ("links", case.links, links)):
@@ -132,13 +132,13 @@ def kinds_only(case, nodes: tuple[str, ...], links: tuple[str, ...]):
                 )
 
 
-def only_one(case, items: list, noun: str):
+def count_faults(case, items: list, noun: str):
     """Fault unless there is exactly one item; noun : its name in the message."""
     if len(items) != 1:
         yield ("exact", "name"), f'"{case.exact.name}" needs exactly one {noun}; the case has {len(items)}'
 
 
-def levels_hold(exact: Solution):
+def level_faults(exact: Solution):
     """Faults of tanks that run dry or overflow before the end: the solution is not valid there."""
     numerics = exact.case.numerics
     t = np.linspace(numerics.start, numerics.end, 2001)

@@ -10,15 +10,15 @@ import math
 
 import numpy as np
 
-from fvsolve.exact.schedule import constant_from
-from fvsolve.exact.solution import ExactStart, Solution, only_one
+from fvsolve.exact.schedule_values import constant_from
+from fvsolve.exact.solution import ExactStart, Solution, count_faults
 
 NODES, LINKS = ("mass", "frame", "reservoir"), ("spring", "damper", "force")
 
 
-def misfits(case):
+def find_faults(case):
     """Faults of a case that is not a single mass on springs."""
-    yield from only_one(case, [node for node in case.nodes.values() if node.kind == "mass"], "mass")
+    yield from count_faults(case, [node for node in case.nodes.values() if node.kind == "mass"], "mass")
     if not any(link.kind == "spring" for link in case.links.values()):
         yield ("links",), f'the exact solution "{case.exact.name}" needs a spring'
     for name, link in case.links.items():

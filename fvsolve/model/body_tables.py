@@ -26,14 +26,14 @@ STATES = {  # for each kind: coordinates, then velocities, each with its size of
 
 def lower_bodies(draft) -> None:
     """Fill the tables of bodies and of their freedoms, each body after its parent."""
-    nodes = draft.case.loaded
+    nodes = draft.case.nodes_with_water
     draft.body_names = list(draft.case.poses)
     table = draft.body_table = np.zeros(len(draft.body_names), rec.BODY)
     paths: list[list[int]] = []
     chains: list[list[int]] = []  # for each body, the freedoms from its root to it
     for i, (name, row) in enumerate(zip(draft.body_names, table, strict=True)):
         body = nodes[name]
-        parent_name = bodies.hangs_on(body)[0]
+        parent_name = bodies.carrier_of(body)[0]
         row["parent"] = draft.body_names.index(parent_name) if isinstance(nodes.get(parent_name), Body) else -1
         row["root"] = table[row["parent"]]["root"] if row["parent"] >= 0 else i
         fill_body(draft, name, body, row)
@@ -57,11 +57,11 @@ def fill_body(draft, name: str, body: Body, row) -> None:
     joint, t = body.joint, draft.case.numerics.start
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
     row["inertia"], row["axis"] = body.moment().ravel(), joint.unit_axis
-    row["at"], row["attitude"] = bodies.joint_place(draft.case.nodes, body), joint.attitude.rotation.ravel()
+    row["at"], row["attitude"] = bodies.joint_position(draft.case.nodes, body), joint.attitude.rotation.ravel()
     row["damping"], row["stiffness"] = joint.damping or 0.0, joint.stiffness or 0.0
     pose = draft.case.poses[name]
     row["height"] = pose.at(body.centre_of_mass)[2]
-    speed, spin = pose.moves(body.centre_of_mass), pose.attitude.T @ pose.spin
+    speed, spin = pose.velocity_at(body.centre_of_mass), pose.attitude.T @ pose.spin
     row["energy"] = 0.5 * (body.mass * speed @ speed + spin @ body.moment() @ spin)
     row["y"] = row["rate"] = row["schedule"] = -1
     if joint.driven is not None:
@@ -79,7 +79,7 @@ def fill_body(draft, name: str, body: Body, row) -> None:
     elif joint.kind == "ball":
         row["start"][0], row["speed"][:3] = 1.0, joint.turning
     else:
-        row["start"][0], row["speed"][0] = bodies.coordinate(joint, t), joint.rate or 0.0
+        row["start"][0], row["speed"][0] = bodies.joint_coordinate(joint, t), joint.rate or 0.0
 
 
 def drive_joint(draft, name: str, schedule, row) -> None:
@@ -110,7 +110,7 @@ def rate_jumps(schedule) -> list[tuple[float, bool]]:
 def point_row(draft, place: str) -> int:
     """Row of the point that a link or a probe names; added on first use."""
     if place not in draft.point_index:
-        name, position = bodies.point_of(draft.case.nodes, place)
+        name, position = bodies.body_point(draft.case.nodes, place)
         draft.point_index[place] = len(draft.points)
         draft.points.append((draft.body_names.index(name) if name != bodies.WORLD else -1, tuple(position)))
     return draft.point_index[place]
@@ -118,7 +118,7 @@ def point_row(draft, place: str) -> int:
 
 def pose_of(draft, place: str) -> bodies.Pose:
     """Stated pose of the body of a point; the world's pose for a frame."""
-    return draft.case.stated.poses.get(bodies.point_of(draft.case.nodes, place)[0], bodies.AT_REST)
+    return draft.case.as_stated.poses.get(bodies.body_point(draft.case.nodes, place)[0], bodies.AT_REST)
 
 
 def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direction=(0.0, 0.0, 0.0)) -> int:
@@ -135,7 +135,7 @@ def lower_lines(draft) -> None:
     for name, row in zip(draft.bushing_names, draft.bushing_table, strict=True):
         link = draft.case.links[name]
         row["energy"] = 0.5 * row["stiffness"] * distance_and_rate(draft, (link.from_, link.to), PLAIN_LINE)[0] ** 2
-        if draft.case.found:
+        if draft.case.equilibrium_nodes:
             row["energy"] += 2.0 * row["turn_stiffness"] * relative_turn(draft, (link.from_, link.to))
     draft.line_table = np.array(draft.lines, rec.LINE) if draft.lines else np.zeros(0, rec.LINE)
     rows = [row for table in (draft.brace_table, draft.stop_table, draft.piston_table) for row in table]
@@ -147,8 +147,8 @@ def lower_lines(draft) -> None:
 def relative_turn(draft, places: tuple[str, str]) -> float:
     """eps.eps of the deviation (56) of two bodies at the start from their stated relative attitude."""
     relative = []
-    for case in (draft.case, draft.case.stated):
-        here, there = (case.poses.get(bodies.point_of(case.nodes, place)[0], bodies.AT_REST) for place in places)
+    for case in (draft.case, draft.case.as_stated):
+        here, there = (case.poses.get(bodies.body_point(case.nodes, place)[0], bodies.AT_REST) for place in places)
         relative.append(here.attitude.T @ there.attitude)
     return 0.25 * (3.0 - float(np.sum(relative[0] * relative[1])))
 
@@ -157,13 +157,13 @@ def distance_and_rate(draft, places: tuple[str | None, str], line) -> tuple[floa
     """Distance between two points at the start [m], and its rate [m/s]."""
     ends = []
     for place in places:
-        name, position = (bodies.WORLD, np.zeros(3)) if place is None else bodies.point_of(draft.case.nodes, place)
+        name, position = (bodies.WORLD, np.zeros(3)) if place is None else bodies.body_point(draft.case.nodes, place)
         pose = draft.case.poses.get(name, bodies.AT_REST)
-        ends.append((pose.at(position), pose.moves(position), pose.spin))
+        ends.append((pose.at(position), pose.velocity_at(position), pose.spin))
     (x, u, a), (z, v, b) = ends
     _, _, _, acts, direction, _ = line
     if acts == rec.ABOUT:
-        axis = draft.case.poses[bodies.point_of(draft.case.nodes, places[1])[0]].attitude @ direction
+        axis = draft.case.poses[bodies.body_point(draft.case.nodes, places[1])[0]].attitude @ direction
         return 0.0, float(np.dot(axis, b - a))
     if acts == rec.TOWARD:
         return 0.0, float(np.dot(direction, v - u))

@@ -57,7 +57,7 @@ def build(case) -> Model:
 def build_like(case: Case, like: Model | None = None) -> Model:
     """Build a model; like : model of a case that differs in few numbers, of which unchanged tables are reused."""
     notices = []
-    if case.settles:
+    if case.needs_equilibrium:
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
         case, notices = with_equilibrium(case, tables_with_start(steady))
     if like is not None and not like.tables_before_start:
@@ -279,5 +279,5 @@ def model_of(draft: ModelDraft) -> Model:
         draft.mass_names, draft.body_names, draft.bushing_names,
         dict(case.elevations), case.probes, draft.warnings,
         draft.steady, draft.profiles, draft.devices, draft.laws, start, draft.events,
-        draft.basins, case.watched, draft.watched_start, jump_tables(draft),
+        draft.basins, case.extreme_probes, draft.watched_start, jump_tables(draft),
     )  # fmt: skip

@@ -91,7 +91,7 @@ def reason_for_cells(case, name: str, link) -> str:
         return "the acceleration of its body acts on its cells"
     if any(
         probe.quantity == "force" and (probe.part, probe.name) == ("links", name)
-        for probe in (*case.probes, *case.watched)
+        for probe in (*case.probes, *case.extreme_probes)
     ):
         return "its force is requested, which is computed from cells"
     return ""

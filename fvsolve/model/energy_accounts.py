@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.riding_networks import unfelt
+from fvsolve.case.moving_network_checks import missing_reactions
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.lowering import lowering_of, rows_in
@@ -202,7 +202,7 @@ class Accounts:
 
 def refuse_unsupported(case) -> None:
     """Raise FvsolveError if the energy of a network on a body is not booked."""
-    faults = [f"{'.'.join(place)}: {text}" for place, text in unfelt(case.nodes, case.links)]
+    faults = [f"{'.'.join(place)}: {text}" for place, text in missing_reactions(case.nodes, case.links)]
     if faults:
         raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
 

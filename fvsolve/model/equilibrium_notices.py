@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from fvsolve import attitude, units
-from fvsolve.case.bodies import coordinate
+from fvsolve.case.bodies import joint_coordinate
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.bodies_start import EQUILIBRIUM_SHARE
 from fvsolve.model.configuration import Configuration
-from fvsolve.parts.attitude import Attitude
+from fvsolve.parts.attitude_keys import Attitude
 from fvsolve.parts.schedule import constant
 
 MOVE_TOLERANCE = 1e-15  # smaller changes of a length or an angle count as none, relative
@@ -56,7 +56,7 @@ def attitude_from(rotation: np.ndarray) -> Attitude:
 
 def position_notices(case) -> Iterator[Notice]:
     """Notices of positions that differ from the stated positions."""
-    for name, node in case.found.items():
+    for name, node in case.equilibrium_nodes.items():
         before = case.nodes[name]
         if node.kind == "mass":
             yield coordinate_notice(
@@ -65,11 +65,11 @@ def position_notices(case) -> Iterator[Notice]:
         elif node.joint.kind in ("revolute", "prismatic"):
             key, dimension = ("angle", "angle") if node.joint.kind == "revolute" else ("travel", "position")
             yield coordinate_notice(
-                case, name, f"joint.{key}", *(coordinate(part.joint, 0.0) for part in (before, node)), dimension
+                case, name, f"joint.{key}", *(joint_coordinate(part.joint, 0.0) for part in (before, node)), dimension
             )
         else:
             yield from attitude_notices(
-                case, name, node.joint.kind == "free", case.poses[name], case.stated.poses[name]
+                case, name, node.joint.kind == "free", case.poses[name], case.as_stated.poses[name]
             )
 
 

@@ -40,7 +40,7 @@ def lower_masses(draft) -> None:
     draft.mass_table = np.zeros(len(draft.mass_names) + outside, rec.MASS)
     draft.mass_index |= {None: len(draft.mass_names)}
     for name, row in zip(draft.mass_names, draft.mass_table, strict=False):
-        node = case.loaded[name]
+        node = case.nodes_with_water[name]
         row["position"] = node.initial_position
         if (mass := getattr(node, "mass", None)) is not None:  # a frame is fixed
             row["velocity"], row["lightness"] = node.initial_velocity, 1.0 / mass

@@ -122,7 +122,7 @@ class ModelDraft:
     def __post_init__(self) -> None:
         case = self.case
         self.fluid, self.hydraulics = case.properties, Hydraulics(case)
-        self.warnings += case.notes
+        self.warnings += case.notices
         self.links = links_by_table(case)
         self.schedules.span = case.numerics.start, case.numerics.end
         self.node_index = {name: i for i, name in enumerate(case.places)}
@@ -141,7 +141,7 @@ class ModelDraft:
             setattr(copy, name, value)
         copy.case, copy.hydraulics = case, Hydraulics(case)
         copy.tables = rec.Tables(*(tables.get(id(table), table) for table in self.tables))
-        copy.warnings = [*case.notes, *self.warnings[len(self.case.notes) :]]
+        copy.warnings = [*case.notices, *self.warnings[len(self.case.notices) :]]
         for table, entries in self.links.items():
             copy.links[table] = [(name, case.links.get(name, link), lowering) for name, link, lowering in entries]
         return copy

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fvsolve.attitude import roll_pitch_yaw
-from fvsolve.case.basins import behind, patch_names
+from fvsolve.case.basins import boundary_cells, patch_names
 from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
@@ -136,7 +136,7 @@ def basin_facts(basin) -> dict[str, Any]:
         faces, part = mesh.patch(name), basin.part.patches.get(name)
         patches[name] = {
             "faces": faces.stop - faces.start, "length": float(mesh.length[faces].sum()),
-            "area": float(mesh.area[behind(mesh, name)].sum()),
+            "area": float(mesh.area[boundary_cells(mesh, name)].sum()),
             "reflects": 1.0 if part is None else basin.reflection(part),
         }  # fmt: skip
     return {

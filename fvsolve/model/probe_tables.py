@@ -31,7 +31,7 @@ def lower_probes(draft) -> np.ndarray:
 
 def all_probes(case) -> list:
     """All that is read after every step: probes, then quantities watched for their extremes only."""
-    return [*case.probes, *case.watched]
+    return [*case.probes, *case.extreme_probes]
 
 
 def scalar_probe(draft, row, probe) -> None:
@@ -74,10 +74,10 @@ def lower_surface(draft, row, probe) -> None:
     """Probe of depth at a point of a basin with sloshing modes."""
     case, basin = draft.case, draft.case.nodes[probe.name]
     arguments = basin, case.lumped[probe.name]
-    modes, shares = sloshing.reading(*arguments, *probe.point, case.properties.density, case.gravity)
+    modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)
     row["kind"], row["offset"] = rec.SURFACE_VALUE, sloshing.depth_of(*arguments)
     row["cell"], row["count"], row["weights"] = len(draft.integers), len(modes), len(draft.floats)
-    draft.integers += [draft.body_names.index(sloshing.slider(probe.name, mode)) for mode in modes]
+    draft.integers += [draft.body_names.index(sloshing.mode_body_name(probe.name, mode)) for mode in modes]
     draft.floats += shares
 
 
@@ -85,7 +85,7 @@ def probe_offsets(draft, start) -> None:
     """Set scale and offset of every probe, and start pressures of watched quantities along pipes, from the profile."""
     count = len(draft.case.probes)
     draft.watched_start = np.full(len(draft.probe_table) - count, np.nan)
-    for k, (row, probe) in enumerate(zip(draft.probe_table[count:], draft.case.watched, strict=True)):
+    for k, (row, probe) in enumerate(zip(draft.probe_table[count:], draft.case.extreme_probes, strict=True)):
         if probe.straight and row["kind"] == rec.PIPE_PRESSURE:
             draft.watched_start[k] = start.profile_at(int(row["index"]), probe.fraction)[0]
     for row, probe in zip(draft.probe_table, all_probes(draft.case), strict=True):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.routes import is_cut
+from fvsolve.case.pipe_routes import is_cut
 from fvsolve.errors import Notice, listing
 from fvsolve.parts.schedule import Schedule
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.cells import means, samples
+from fvsolve.case.cell_means import means, samples
 from fvsolve.kernels import dtypes as rec
 from fvsolve.steppers.built_in_methods import METHODS
 

@@ -35,7 +35,7 @@ def changed_links(before: Case, case: Case) -> list[str] | None:
     )
     if (
         not same
-        or before.settles
+        or before.needs_equilibrium
         or not same_parts(before.nodes, case.nodes)
         or before.links.keys() != case.links.keys()
     ):

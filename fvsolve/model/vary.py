@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fvsolve.case import load, located
+from fvsolve.case import load, locate_faults
 from fvsolve.errors import CaseError
 from fvsolve.model.build import build_like
 from fvsolve.model.model import Model
@@ -24,4 +24,4 @@ def vary(model: Model, set: Mapping[str, Any]) -> Model:
     try:
         return build_like(case, model)
     except CaseError as error:
-        raise located(error, case) from None
+        raise locate_faults(error, case) from None

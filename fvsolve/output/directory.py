@@ -7,7 +7,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from fvsolve.case.size import LEAST_TEXT, on_disk, size
+from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
 from fvsolve.errors import RunError
 from fvsolve.output.column import probe_columns, time_column
 from fvsolve.output.envelope import in_units, read_envelope, with_start, write_envelope
@@ -219,9 +219,9 @@ def _refuse_names(case) -> None:
 
 
 def _refuse_size(folder: Path, case) -> None:
-    least, free = on_disk(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
+    least, free = disk_size(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
     if least > free:
-        raise RunError(f"{folder}: history.csv needs at least {size(least)}, but {size(free)} are free. Expected a "
+        raise RunError(f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free. Expected a "
                        "longer [output] every, or another directory with --out DIR")  # fmt: skip
 
 

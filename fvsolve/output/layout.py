@@ -11,7 +11,7 @@ import heapq
 
 import numpy as np
 
-from fvsolve.case.routes import is_cut
+from fvsolve.case.pipe_routes import is_cut
 
 ROUNDS = 200  # iterations of the stress majorization
 DENSE = 400  # greatest number of nodes for the layout by all pairs; larger networks get a radial plan

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.routes import legs
+from fvsolve.case.pipe_routes import legs
 from fvsolve.output.column import column
 from fvsolve.output.envelope import envelope_columns
 

@@ -14,27 +14,27 @@ from fvsolve.errors import did_you_mean, listing
 from fvsolve.units import show
 
 NAMES = ("x", "y", "pi")
-FORMS = (  # allowed calls; "..." stands for any number of arguments
+CALL_FORMS = (  # allowed calls; "..." stands for any number of arguments
     "sin(a)", "cos(a)", "tan(a)", "arctan2(a, b)", "exp(a)", "log(a)", "sqrt(a)", "tanh(a)", "abs(a)",
     "min(a, b, ...)", "max(a, b, ...)", "hypot(a, b)", "where(condition, a, b)",
 )  # fmt: skip
-FUNCTIONS = {form[: form.index("(")]: form for form in FORMS}
+FUNCTIONS = {form[: form.index("(")]: form for form in CALL_FORMS}
 OPERATORS = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide, ast.Pow: np.power,
     ast.UAdd: np.positive, ast.USub: np.negative, ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater,
     ast.GtE: np.greater_equal, ast.Eq: np.equal, ast.NotEq: np.not_equal,
 }  # fmt: skip
-WANTED = "operators are + - * / ^ < <= > >= == !="
-REFUSED = {  # operators of other languages -> (sign, equivalent here)
+OPERATOR_HINT = "operators are + - * / ^ < <= > >= == !="
+UNKNOWN_OPERATORS = {  # operators of other languages -> (sign, equivalent here)
     ast.MatMult: ("@", ""), ast.Mod: ("%", ""), ast.FloorDiv: ("//", ""), ast.LShift: ("<<", ""),
     ast.RShift: (">>", ""), ast.Invert: ("~", "where(a, 0, 1)"), ast.Not: ("not", "where(a, 0, 1)"),
     ast.BitAnd: ("&", "(a)*(b)"), ast.And: ("and", "(a)*(b)"), ast.BitOr: ("|", "max(a, b)"),
     ast.Or: ("or", "max(a, b)"), ast.IfExp: ("if", "where(condition, a, b)"),
 }  # fmt: skip
 NUMBER = re.compile(r"(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
-LONGEST = 4000  # characters
-NESTED = "brackets or powers are nested too deep"
-WRONG = ("divides by zero", "is the logarithm of zero", "is not a number", "overflows")
+MAX_LENGTH = 4000  # characters
+TOO_DEEP = "brackets or powers are nested too deep"
+ERRORS = ("divides by zero", "is the logarithm of zero", "is not a number", "overflows")
 
 
 class Step(NamedTuple):
@@ -55,30 +55,30 @@ class Arithmetic:
         """otherwise : error message for a text that is not a formula at all."""
         self.text, self.source = text, text.replace("^", "**").strip()
         about = f"{show(text)} is not a formula of x and y"
-        if len(text) > LONGEST:
+        if len(text) > MAX_LENGTH:
             raise ValueError(
-                f'{about}: it has {len(text)} characters; expected at most {LONGEST}, or {{ file = "NAME.csv" }}'
+                f'{about}: it has {len(text)} characters; expected at most {MAX_LENGTH}, or {{ file = "NAME.csv" }}'
             )
         try:
             tree = ast.parse(self.source, mode="eval").body
         except (MemoryError, RecursionError):
-            raise ValueError(f"{about}: {NESTED}") from None
+            raise ValueError(f"{about}: {TOO_DEEP}") from None
         except (SyntaxError, ValueError) as error:
             if any(sign in text for sign in "*+()"):  # not a quantity
-                raise ValueError(f"{about}: {open_bracket(text) or getattr(error, 'msg', error)}") from None
+                raise ValueError(f"{about}: {bracket_fault(text) or getattr(error, 'msg', error)}") from None
             raise ValueError(otherwise or about) from None
         try:
             self.steps = list(self.read(tree))
         except RecursionError:
-            raise ValueError(f"{about}: {NESTED}") from None
+            raise ValueError(f"{about}: {TOO_DEEP}") from None
         except ValueError as error:
             raise ValueError(f"{about}: {error}") from None
 
     def read(self, node: ast.expr) -> Iterator[Step]:
         """Steps of a node of the syntax tree; the last step gives its value."""
-        part = self.written(node)
+        part = self.source_of(node)
         if isinstance(node, ast.Constant):
-            yield Step(number(part), 0, part)
+            yield Step(decimal_number(part), 0, part)
         elif isinstance(node, ast.Name):
             if node.id not in NAMES:
                 hint = f"; did you mean {FUNCTIONS[node.id]}?" if node.id in FUNCTIONS else ""
@@ -87,7 +87,7 @@ class Arithmetic:
             yield Step(node.id, 0, part)
         elif isinstance(node, ast.UnaryOp):
             yield from self.read(node.operand)
-            yield Step(operator(node.op), 1, part)
+            yield Step(operator_function(node.op), 1, part)
         elif isinstance(node, ast.BinOp):
             chain = []  # x + y + z is (x + y) + z: a loop, since recursion would limit its length
             while isinstance(node, ast.BinOp):
@@ -96,25 +96,25 @@ class Arithmetic:
             yield from self.read(node)
             for item in reversed(chain):
                 yield from self.read(item.right)
-                yield Step(operator(item.op), 2, self.written(item))
+                yield Step(operator_function(item.op), 2, self.source_of(item))
         elif isinstance(node, ast.Compare):  # 0 < x < 1 is 1 if both hold
             sides = [node.left, *node.comparators]
             for item, sign, other in zip(sides, node.ops, sides[1:], strict=False):
                 yield from self.read(item)
                 yield from self.read(other)
-                yield Step(operator(sign), 2, part)
+                yield Step(operator_function(sign), 2, part)
             if len(node.ops) > 1:
                 yield Step(np.minimum, len(node.ops), part)
         elif isinstance(node, ast.Call):
             yield from self.call(node, part)
         else:
-            operator(getattr(node, "op", node))
+            operator_function(getattr(node, "op", node))
 
     def call(self, node: ast.Call, part: str) -> Iterator[Step]:
         """Steps of a call."""
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name not in FUNCTIONS:
-            text = self.written(node.func)
+            text = self.source_of(node.func)
             raise ValueError(f"{text} is unknown{did_you_mean(text, FUNCTIONS)}; known are {listing(FUNCTIONS, 20)}")
         form, given = FUNCTIONS[name], len(node.args)
         count, endless = form.count(",") + 1 - ("..." in form), "..." in form
@@ -125,7 +125,7 @@ class Arithmetic:
             yield from self.read(argument)
         yield Step({"min": np.minimum, "max": np.maximum}.get(name) or getattr(np, name), given, part)
 
-    def written(self, node: ast.AST) -> str:
+    def source_of(self, node: ast.AST) -> str:
         """Source text of a node of the syntax tree."""
         text = ast.get_source_segment(self.source, node) or ""
         return text.replace("**", "^") if "^" in self.text else text
@@ -139,20 +139,20 @@ class Arithmetic:
                     stack.append((known.get(step.rule, step.rule), -1))
                     continue
                 values, wrongs = zip(*stack[-step.count :], strict=True)
-                stack[-step.count :] = [applied(at, step.rule, values, wrongs)]
+                stack[-step.count :] = [apply_step(at, step.rule, values, wrongs)]
         result, wrong = (np.broadcast_to(array, known["x"].shape) for array in stack[0])
         if (wrong >= 0).any():
             k = int(np.argmax(wrong >= 0))
-            at, reason = divmod(int(wrong[k]), len(WRONG))
+            at, reason = divmod(int(wrong[k]), len(ERRORS))
             part = self.steps[at].part
-            where = f"{WRONG[reason]} at x = {x[k]:.6g} m, y = {y[k]:.6g} m"
+            where = f"{ERRORS[reason]} at x = {x[k]:.6g} m, y = {y[k]:.6g} m"
             raise ValueError(
                 f"{show(self.text)} {where}" if part == self.text else f"{show(self.text)}: {part} {where}"
             )
         return np.array(result, dtype=float)
 
 
-def applied(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[np.ndarray, np.ndarray]:
+def apply_step(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[np.ndarray, np.ndarray]:
     """Apply a function to values; also return the error codes.
 
     An error code is -1 for a valid value, else len(WRONG) * step + index in `WRONG`.
@@ -165,21 +165,21 @@ def applied(at: int, rule: Callable, values: tuple, wrongs: tuple) -> tuple[np.n
     reason = np.where(np.isnan(result), 2, 3)
     for kind, zero, argument in ((0, np.divide, 1), (0, np.power, 0), (1, np.log, 0)):
         reason = np.where(np.equal(values[argument], 0.0), kind, reason) if rule is zero else reason
-    own = np.where(np.isfinite(result), -1, len(WRONG) * at + reason)
+    own = np.where(np.isfinite(result), -1, len(ERRORS) * at + reason)
     return result, reduce(lambda first, then: np.where(first >= 0, first, then), [*wrongs, own])
 
 
-def operator(node: ast.AST) -> Callable:
+def operator_function(node: ast.AST) -> Callable:
     """NumPy function of an operator. Raises ValueError for an operator that formulas do not have."""
     if type(node) in OPERATORS:
         return OPERATORS[type(node)]
-    sign, instead = REFUSED.get(type(node), ("", ""))
+    sign, instead = UNKNOWN_OPERATORS.get(type(node), ("", ""))
     if not sign:
-        raise ValueError(f"expected numbers, {listing([*NAMES, *FUNCTIONS], 20)} and arithmetic; {WANTED}")
-    raise ValueError(f"unknown operator {sign}; " + (f"did you mean {instead}?" if instead else WANTED))
+        raise ValueError(f"expected numbers, {listing([*NAMES, *FUNCTIONS], 20)} and arithmetic; {OPERATOR_HINT}")
+    raise ValueError(f"unknown operator {sign}; " + (f"did you mean {instead}?" if instead else OPERATOR_HINT))
 
 
-def number(text: str) -> float:
+def decimal_number(text: str) -> float:
     """Value of a decimal number. Raises ValueError for any other form, and for a number too large for a float."""
     if NUMBER.fullmatch(text) is None:
         raise ValueError(f"{text} is not a decimal number; expected for example 16, 0.5 or 1e-3")
@@ -188,7 +188,7 @@ def number(text: str) -> float:
     return float(text)
 
 
-def open_bracket(text: str) -> str:
+def bracket_fault(text: str) -> str:
     """Fault of the brackets of a text; "" if there is none."""
     depth = 0
     for sign in text:

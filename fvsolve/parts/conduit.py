@@ -7,31 +7,33 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve import units
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.friction import NONE, Friction
+from fvsolve.parts.friction_model import NONE, Friction
 from fvsolve.parts.link import TwoPort
-from fvsolve.parts.sizes import FITTINGS, bore, loss
+from fvsolve.parts.pipe_sizes import FITTINGS, fittings_loss, pipe_bore
 from fvsolve.parts.value import (
-    COUNTED,
+    BY_CELLS,
     PROFILE,
-    Misfit,
     Number,
     Quantity,
-    Setting,
+    ReadContext,
     Text,
-    Usual,
+    UsualRange,
     Value,
+    ValueFault,
     nonnegative,
     positive,
 )
 from fvsolve.units import show
 
-BORES = Usual(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela have 13.7 m
-LENGTH = Quantity("length", positive, "length along its axis [m]", Usual(1e-4, 1e7, "fittings to pipelines"), COUNTED)
-DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES, COUNTED)
+BORES = UsualRange(5e-5, 14.0, "capillaries to pressure tunnels")  # the tunnels of Tarbela have 13.7 m
+LENGTH = Quantity(
+    "length", positive, "length along its axis [m]", UsualRange(1e-4, 1e7, "fittings to pipelines"), BY_CELLS
+)
+DIAMETER = Quantity("length", positive, "inner diameter [m]", BORES, BY_CELLS)
 LOSS = Number(nonnegative, "loss coefficient K referred to the velocity in the pipe, distributed along its length")
 
 
-ROUGHEST = 0.05  # relative roughness, Moody 1944
+MAX_ROUGHNESS = 0.05  # relative roughness, Moody 1944
 
 
 class Fittings(Value):
@@ -41,16 +43,16 @@ class Fittings(Value):
     takes = "list of names"
     changes = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> list[str]:
+    def read(self, given: Any, setting: ReadContext) -> list[str]:
         if not isinstance(given, (list, tuple)):
-            raise Misfit([((), f'{show(given)} is not a list; expected for example ["bend-90", "gate-valve"]')])
+            raise ValueFault([((), f'{show(given)} is not a list; expected for example ["bend-90", "gate-valve"]')])
         faults = []
         for index, name in enumerate(given):
             if name not in FITTINGS:
                 near = did_you_mean(str(name), FITTINGS) or f"; fittings are {listing(list(FITTINGS))}"
                 faults.append(((index,), f"no fitting named {show(name)}{near}"))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return list(given)
 
     def json(self) -> dict[str, Any]:
@@ -64,7 +66,7 @@ class Conduit(TwoPort):
 
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("diameter", "nominal"),)
 
-    meant: ClassVar[dict[str, str]] = dict.fromkeys(
+    synonyms: ClassVar[dict[str, str]] = dict.fromkeys(
         ("roughness", "factor", "friction_factor", "darcy_factor"),
         'friction = { model = "quasi-steady", roughness = "0.1 mm" } or { model = "steady", factor = 0.02 }',
     ) | dict.fromkeys(
@@ -75,10 +77,10 @@ class Conduit(TwoPort):
     length: Annotated[float, LENGTH]
     diameter: Annotated[float, DIAMETER] = None  # nominal replaces it
     nominal: Annotated[
-        str | None, Text('nominal size, instead of diameter: "DN100", "NPS 4" or "NPS 1-1/2"', COUNTED)
+        str | None, Text('nominal size, instead of diameter: "DN100", "NPS 4" or "NPS 1-1/2"', BY_CELLS)
     ] = None
     schedule: Annotated[
-        str | None, Text('schedule of the nominal size: "40", "80", "STD", "10S"; "40" if left out', COUNTED)
+        str | None, Text('schedule of the nominal size: "40", "80", "STD", "10S"; "40" if left out', BY_CELLS)
     ] = None
     friction: Friction = NONE
     minor_loss: Annotated[float, LOSS] = 0.0
@@ -93,41 +95,43 @@ class Conduit(TwoPort):
                 f"{self.diameter:g} m is more than its length of {self.length:g} m, so the flow is not one-dimensional"
             )
             yield ("diameter",), self.diameter, self.length, text
-        rough, most = self.friction.roughness or 0.0, ROUGHEST * self.diameter
+        rough, most = self.friction.roughness or 0.0, MAX_ROUGHNESS * self.diameter
         if rough > most:
-            text = f"{rough:g} m in a bore of {self.diameter:g} m; Moody's chart is valid to {ROUGHEST:g} of the bore"
+            text = (
+                f"{rough:g} m in a bore of {self.diameter:g} m; Moody's chart is valid to {MAX_ROUGHNESS:g} of the bore"
+            )
             likely = units.likely(rough, "length", 0.0, most) if rough <= 1e3 * most else ""
             yield ("friction", "roughness"), rough, most, text + likely
 
     @classmethod
-    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """Replace names by `diameter`, wall `thickness` and `minor_loss`. Raises ValueFault for unknown names."""
         result, faults = {**given}, []
         if isinstance(given.get("nominal"), str) and "diameter" not in given:
             try:
-                result["diameter"], thickness = sized(result.pop("nominal"), result.pop("schedule", "40"))
+                result["diameter"], thickness = pipe_size(result.pop("nominal"), result.pop("schedule", "40"))
                 if isinstance(given.get("wall"), dict):
                     result["wall"] = {"thickness": thickness, **given["wall"]}
-            except Misfit as error:
+            except ValueFault as error:
                 faults += error.faults
         if "fittings" in result:
             try:
                 names = Fittings().read(result.pop("fittings"), setting)
                 own = LOSS.read(result.get("minor_loss", 0.0), setting)
-                result["minor_loss"] = own + loss(names, DIAMETER.read(result["diameter"], setting))
-            except Misfit as error:
+                result["minor_loss"] = own + fittings_loss(names, DIAMETER.read(result["diameter"], setting))
+            except ValueFault as error:
                 faults += [(("fittings", *keys), text) for keys, text in error.faults]
             except (KeyError, ValueError):  # a key that is missing or faulty: reported by itself
                 pass
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return result
 
 
-def sized(nominal: str, schedule: Any) -> tuple[float, float]:
+def pipe_size(nominal: str, schedule: Any) -> tuple[float, float]:
     """(inner diameter, wall thickness) [m] of a nominal size and schedule. Raises ValueFault with the faulty key."""
     try:
-        return bore(nominal, str(schedule))
+        return pipe_bore(nominal, str(schedule))
     except ValueError as error:
         key = "schedule" if "schedule named" in str(error) else "nominal"
-        raise Misfit([((key,), str(error))]) from None
+        raise ValueFault([((key,), str(error))]) from None

@@ -18,12 +18,12 @@ from fvsolve import units
 from fvsolve.errors import did_you_mean
 from fvsolve.units import show
 
-COMMAS = "; with decimal commas, separate columns by ; or tabs"
-MARKS = ("\t", ";", ",")
+COMMA_HINT = "; with decimal commas, separate columns by ; or tabs"
+SEPARATORS = ("\t", ";", ",")
 NUMBER = re.compile(r"[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?")
 
 
-class Misread(ValueError):
+class CsvError(ValueError):
     """Fault of a file, with its line."""
 
     def __init__(self, file: str, message: str, line: int | None = None) -> None:
@@ -46,7 +46,7 @@ class CsvRows:
     @property
     def names(self) -> list[str]:
         """Names of the columns without units."""
-        return [split(name)[0] for name in self.header]
+        return [split_header(name)[0] for name in self.header]
 
     def column(self, name: str | None, default: int) -> int:
         """Index of a column by its name, with or without unit; `default` if the name is None. Raises ValueError."""
@@ -66,7 +66,7 @@ class CsvRows:
 
     def numbers(self, column: int, dimension: str, ambient: float = 101325.0) -> np.ndarray:
         """Values of a column in SI by the unit in its header, pressures absolute : float64[n]."""
-        unit = split(self.header[column])[1]
+        unit = split_header(self.header[column])[1]
         try:
             known = units.find(unit, dimension) if unit else None
         except ValueError as error:
@@ -86,15 +86,15 @@ class CsvRows:
                 message = f"{show(text)} is not a number in column {show(self.header[column])}"
                 if k == 0 and all(number(cell) is None for cell in row):
                     message += f"; expected units in the header, for example {self.names[0]} [s]"
-                raise Misread(self.file, message, line)
+                raise CsvError(self.file, message, line)
             points = points or "." in text
             if points and "," in text:
-                raise Misread(self.file, f"{show(text)} has a decimal comma, but numbers above have points", line)
+                raise CsvError(self.file, f"{show(text)} has a decimal comma, but numbers above have points", line)
             values.append(value)
         return values
 
 
-def split(header: str) -> tuple[str, str]:
+def split_header(header: str) -> tuple[str, str]:
     """Name and unit of a header; the unit is empty if there is none."""
     match = re.fullmatch(r"(.*?)\s*\[(.*)\]", header)
     return (match[1], match[2]) if match else (header, "")
@@ -112,28 +112,32 @@ def read_rows(path: Path) -> CsvRows:
     lines = [(n, line) for n, line in enumerate(read_text(path).splitlines(), 1) if line.strip() and line[0] != "#"]
     if len(lines) < 2:
         raise ValueError(f"{path.name} is empty; expected a header and rows of numbers")
-    readings = {mark: parted(path, lines, mark) for mark in MARKS if mark in lines[0][1]} or {",": parted(path, lines)}
-    header, *rows = next((reading for reading in readings.values() if is_even(reading)), next(iter(readings.values())))
+    readings = {mark: split_lines(path, lines, mark) for mark in SEPARATORS if mark in lines[0][1]} or {
+        ",": split_lines(path, lines)
+    }
+    header, *rows = next(
+        (reading for reading in readings.values() if is_uniform(reading)), next(iter(readings.values()))
+    )
     if all(number(name) is not None for name in header):
         raise ValueError(f'{path.name} has no header; expected for example "t [s],opening [-]"')
     for (line, _), row in zip(lines[1:], rows, strict=True):
         if len(row) != len(header):
             count = f"{len(row)} cell{'' if len(row) == 1 else 's'} under {len(header)} header"
-            raise Misread(
-                path.name, f"{count}{'' if len(header) == 1 else 's'}{COMMAS * (len(row) > len(header))}", line
+            raise CsvError(
+                path.name, f"{count}{'' if len(header) == 1 else 's'}{COMMA_HINT * (len(row) > len(header))}", line
             )
         nameless = next((cell for cell, name in zip(row, header, strict=True) if cell and not name), None)
         if nameless is not None:
-            raise Misread(path.name, f"{show(nameless)} has no header{COMMAS}", line)
+            raise CsvError(path.name, f"{show(nameless)} has no header{COMMA_HINT}", line)
     return CsvRows(path.name, header, [line for line, _ in lines[1:]], rows)
 
 
-def is_even(rows: list[list[str]]) -> bool:
+def is_uniform(rows: list[list[str]]) -> bool:
     """True if all rows have the same number of cells, more than one."""
     return {len(row) for row in rows} == {len(rows[0])} and len(rows[0]) > 1
 
 
-def parted(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> list[list[str]]:
+def split_lines(path: Path, lines: list[tuple[int, str]], mark: str = ",") -> list[list[str]]:
     """Cells of each line."""
     try:
         return [[cell.strip() for cell in next(csv.reader([line], delimiter=mark))] for _, line in lines]

@@ -10,49 +10,49 @@ import numpy as np
 
 from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.parts.csv_rows import read_rows
-from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.value import PROFILE, Misfit, Quantity, Range, Setting, Value, anything
+from fvsolve.parts.time_series import copy_name, find_file
+from fvsolve.parts.value import PROFILE, Quantity, Range, ReadContext, Value, ValueFault, anything
 from fvsolve.units import show
 
-MANY = 2**16  # points per evaluation: limits the memory of intermediate values
+BLOCK = 2**16  # points per evaluation: limits the memory of intermediate values
 
 
 @dataclass(frozen=True)
-class Formula:
+class SpatialField:
     """Value at every point in SI: the text of the file, and a function of coordinates [m]."""
 
-    said: Any
+    given: Any
     rule: Any
 
     def at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Values at points : float64[n]. Raises ValueError if a value is not finite."""
         values = np.empty(np.shape(x))
-        for first in range(0, values.size, MANY):
-            part = slice(first, first + MANY)
+        for first in range(0, values.size, BLOCK):
+            part = slice(first, first + BLOCK)
             values[part] = self.rule(x[part], y[part])
         if not np.isfinite(values).all():
             k = int(np.argmax(~np.isfinite(values)))
-            raise ValueError(f"{show(self.said)} is not a number at x = {x[k]:.6g} m, y = {y[k]:.6g} m")
+            raise ValueError(f"{show(self.given)} is not a number at x = {x[k]:.6g} m, y = {y[k]:.6g} m")
         return values
 
     def table(self) -> Any:
         """Value as in a case file."""
-        return self.said
+        return self.given
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Formula) and self.said == other.said
+        return isinstance(other, SpatialField) and self.given == other.given
 
     def __hash__(self) -> int:
-        return hash(str(self.said))
+        return hash(str(self.given))
 
 
-def even(value: float) -> Formula:
+def uniform(value: float) -> SpatialField:
     """Formula of a uniform value."""
-    return Formula(value, lambda x, y: value)
+    return SpatialField(value, lambda x, y: value)
 
 
 @dataclass(frozen=True)
-class Shaped(Value):
+class SpatialFieldKey(Value):
     """Field over the plane: a quantity, a formula of x and y in SI, or { file } with columns x, y and the value."""
 
     dimension: str
@@ -60,21 +60,21 @@ class Shaped(Value):
     range: Range = anything
     changes: str = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> Formula:
-        if isinstance(given, Formula):
+    def read(self, given: Any, setting: ReadContext) -> SpatialField:
+        if isinstance(given, SpatialField):
             return given
         if isinstance(given, dict):
             return self._samples(given, setting)
         if not isinstance(given, str):
-            return even(Quantity(self.dimension, self.range).read(given, setting))
+            return uniform(Quantity(self.dimension, self.range).read(given, setting))
         try:
-            return even(Quantity(self.dimension, self.range).read(plain(given), setting))
+            return uniform(Quantity(self.dimension, self.range).read(number_or_text(given), setting))
         except ValueError as error:
             if given[:1].isdigit() and not any(sign in given for sign in "*/+-()^<>="):
                 raise
-            return Formula(given, Arithmetic(given, str(error)))
+            return SpatialField(given, Arithmetic(given, str(error)))
 
-    def _samples(self, given: dict, setting: Setting) -> Formula:
+    def _samples(self, given: dict, setting: ReadContext) -> SpatialField:
         if set(given) != {"file"} or not isinstance(given["file"], str):
             raise ValueError(
                 f'{show(given)} is not a field; expected {{ file = "NAME.csv" }} with columns x, y and the value'
@@ -83,8 +83,8 @@ class Shaped(Value):
             path = find_file(given["file"], setting)
             columns = read_points(path, self.dimension)
         except ValueError as error:
-            raise Misfit([(("file",), str(error))]) from None
-        return Formula({"file": copy_name(path, setting)}, Samples(columns))
+            raise ValueFault([(("file",), str(error))]) from None
+        return SpatialField({"file": copy_name(path, setting)}, Samples(columns))
 
     @property
     def takes(self) -> str:
@@ -118,7 +118,7 @@ class Samples:
         return np.where(np.isnan(inner), NearestNDInterpolator(places, values)(x, y), inner)
 
 
-def plain(text: str) -> Any:
+def number_or_text(text: str) -> Any:
     """Number that a text contains, else the text unchanged."""
     try:
         return float(text)

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field
 
 from fvsolve.errors import FvsolveError
-from fvsolve.parts.table import Table, keys_json, read_keys
-from fvsolve.parts.value import NEEDED, Setting, Text, Value
+from fvsolve.parts.table_model import Table, keys_json, read_keys
+from fvsolve.parts.value import NEEDED, ReadContext, Text, Value
 from fvsolve.units import show
 
 
@@ -23,7 +23,7 @@ class Link(Table):
     kind: ClassVar[str] = ""
     kinds: ClassVar[dict[str, type[Link]]] = {}
     quantities: ClassVar[dict[str, str]] = {"flow": "flow"}
-    asked: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
+    on_request: ClassVar[tuple[str, ...]] = ()  # quantities that are recorded only by explicit probes
     along: ClassVar[dict[str, str]] = {}  # quantities that also exist at a fraction of the length
     joins: ClassVar[dict[str, str]] = {}  # port -> required domain of its place
     may_lack: ClassVar[tuple[str, ...]] = ()  # ports that may join nothing
@@ -76,7 +76,7 @@ class Ports(Value):
     names: tuple[str, ...]
     about: str = "place of each port"
 
-    def read(self, given: Any, setting: Setting) -> dict[str, str]:
+    def read(self, given: Any, setting: ReadContext) -> dict[str, str]:
         if not isinstance(given, dict):
             example = ", ".join(f'{name} = "..."' for name in self.names)
             raise ValueError(f"{show(given)} is not a table; expected {{ {example} }}")

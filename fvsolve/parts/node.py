@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.errors import FvsolveError
-from fvsolve.parts.scalar import Carried
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import VALUE, Quantity, Rows, Text, Usual
+from fvsolve.parts.carried_scalar import ScalarValues
+from fvsolve.parts.table_model import Table
+from fvsolve.parts.value import VALUE, Quantity, Rows, Text, UsualRange
 from fvsolve.units import show
 
-HEIGHTS = Usual(-12e3, 9e3, "boreholes to mountains")
+USUAL_ELEVATIONS = UsualRange(-12e3, 9e3, "boreholes to mountains")
 
 
 class Node(Table):
@@ -37,14 +37,14 @@ class Node(Table):
         Quantity(
             "length",
             about="elevation above datum [m]; 0 for all nodes (reservoir with head: that of the far end) if left out",
-            usual=HEIGHTS,
+            usual=USUAL_ELEVATIONS,
         ),
     ] = None
     position: Annotated[
         tuple[float, float] | None, Rows("length", length=2, about="position [x, y] in drawings [m]", changes=VALUE)
     ] = None
     scalars: Annotated[
-        dict[str, Any], Carried("scalar values of the inflow (reservoir, inflow), or at the start (tank, chamber)")
+        dict[str, Any], ScalarValues("scalar values of the inflow (reservoir, inflow), or at the start (tank, chamber)")
     ] = {}
 
     @classmethod
@@ -75,7 +75,7 @@ class Node(Table):
             Node.kinds[kind] = cls
 
 
-class Rider(Node):
+class PlaceOnBody(Node):
     """Place that may be on a body."""
 
     on: Annotated[str | None, Text("body that carries the node; fixed in the world if left out")] = None
@@ -93,7 +93,7 @@ class Rider(Node):
         return (given["on"],) if isinstance(given.get("on"), str) else ()
 
     @property
-    def stands(self) -> dict[str, Any]:
+    def position_keys(self) -> dict[str, Any]:
         """Keys of its position."""
         return {"elevation": self.elevation, "on": self.on, "at": self.at}
 

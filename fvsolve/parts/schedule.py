@@ -9,31 +9,33 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.series import copy_name, find_file, read_columns
-from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.parts.time_series import copy_name, find_file, read_columns
 from fvsolve.parts.value import (
     NEEDED,
     PROFILE,
     ROOT,
     Choice,
-    Misfit,
     Number,
     Quantity,
     Range,
+    ReadContext,
     Rows,
-    Setting,
     Text,
-    Usual,
+    UsualRange,
     Value,
+    ValueFault,
     anything,
-    check_rising,
+    check_increasing,
     nonnegative,
     positive,
 )
 from fvsolve.units import show
 
 KINDS = ("linear", "step", "smooth")
-AMPLITUDES = {"pressure": "pressure_drop"}  # dimension of an amplitude, if the zero point of the dimension matters
+AMPLITUDE_DIMENSIONS = {
+    "pressure": "pressure_drop"
+}  # dimension of an amplitude, if the zero point of the dimension matters
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +99,10 @@ class Scheduled(Value):
     dimension: str
     range: Range = anything
     about: str = ""
-    usual: Usual | None = None
+    usual: UsualRange | None = None
     changes: str = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> Schedule:
+    def read(self, given: Any, setting: ReadContext) -> Schedule:
         if isinstance(given, Schedule):
             return given
         if not isinstance(given, dict):
@@ -129,7 +131,7 @@ class Scheduled(Value):
             },
             "wave": {
                 "mean": (Quantity(self.dimension), NEEDED),
-                "amplitude": (Quantity(AMPLITUDES.get(self.dimension, self.dimension)), NEEDED),
+                "amplitude": (Quantity(AMPLITUDE_DIMENSIONS.get(self.dimension, self.dimension)), NEEDED),
                 "period": (Quantity("time", positive), NEEDED),
                 "phase": (Quantity("angle"), 0.0),
             },
@@ -144,20 +146,20 @@ class Scheduled(Value):
     def json(self) -> dict[str, Any]:
         return {"anyOf": [Quantity(self.dimension).json(), *map(keys_json, self.forms.values())]}
 
-    def _read_table(self, given: dict[str, Any], setting: Setting) -> Schedule:
+    def _read_table(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         values = read_keys(given, self.forms["table"], setting)
         t, v, kind = values["time"], values["value"], values["kind"]
         if len(t) != len(v):
-            raise Misfit([(("value",), f"{len(v)} values for {len(t)} times; expected the same number")])
+            raise ValueFault([(("value",), f"{len(v)} values for {len(t)} times; expected the same number")])
         try:
-            check_rising(t, given["time"], "times")
+            check_increasing(t, given["time"], "times")
         except ValueError as error:
-            raise Misfit([(("time",), str(error))]) from None
+            raise ValueFault([(("time",), str(error))]) from None
         if len(v) == 1:
             return constant(v[0])
         return Schedule(kind, t, v, origin={"time": list(t), "value": list(v), "kind": kind})
 
-    def _read_ramp(self, given: dict[str, Any], setting: Setting) -> Schedule:
+    def _read_ramp(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         values = read_keys(given, self.forms["ramp"], setting)
         start, duration, v, exponent = (values[key] for key in ("start", "duration", "value", "exponent"))
         origin = {**values, "value": list(v)}
@@ -165,7 +167,7 @@ class Scheduled(Value):
             return Schedule("step", (start - 1.0 - abs(start), start), v, origin=origin)
         return Schedule("ramp", (start, start + duration), v, exponent, origin)
 
-    def _read_wave(self, given: dict[str, Any], setting: Setting) -> Schedule:
+    def _read_wave(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         values = read_keys(given, self.forms["wave"], setting)
         mean, amplitude, period, phase = (values[key] for key in ("mean", "amplitude", "period", "phase"))
         reach = mean - abs(amplitude), mean + abs(amplitude)
@@ -173,38 +175,38 @@ class Scheduled(Value):
             for bound in reach:
                 self.range.check(bound, bound)
         except ValueError as error:
-            raise Misfit([(("amplitude",), f"gives values from {reach[0]:g} to {reach[1]:g}: {error}")]) from None
+            raise ValueFault([(("amplitude",), f"gives values from {reach[0]:g} to {reach[1]:g}: {error}")]) from None
         return Schedule("harmonic", (-np.inf, np.inf), reach, 1.0, values, (mean, amplitude, period, phase))
 
-    def _read_file(self, given: dict[str, Any], setting: Setting) -> Schedule:
+    def _read_file(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
         values = read_keys(given, self.forms["file"], setting)
         kind = values["kind"]
         try:
             path = find_file(values["file"], setting)
             t, v, *headers = read_columns(path, values["time"], values["value"], self.dimension, setting)
-            check_rising(t, t.tolist(), f"{path.name}: times")
+            check_increasing(t, t.tolist(), f"{path.name}: times")
             for x in v.tolist():
                 self.range.check(x, x)
         except ValueError as error:
-            raise Misfit([(("file",), str(error))]) from None
+            raise ValueFault([(("file",), str(error))]) from None
         origin = {"file": copy_name(path, setting), "time": headers[0], "value": headers[1], "kind": kind}
         return Schedule(kind if len(v) > 1 else "constant", t, v, origin=origin)
 
-    def _read_signal(self, given: dict[str, Any], setting: Setting) -> Schedule:
-        setting.asked += 1
+    def _read_signal(self, given: dict[str, Any], setting: ReadContext) -> Schedule:
+        setting.lookups += 1
         name = read_keys(given, self.forms["signal"], setting)["signal"]
         if name not in setting.signals:
             near, names = did_you_mean(name, setting.signals), listing(setting.signals) or "none"
-            raise Misfit([(("signal",), f"no signal named {show(name)}{near}; signals are {names}")])
+            raise ValueFault([(("signal",), f"no signal named {show(name)}{near}; signals are {names}")])
         shared = setting.signals[name]
         if isinstance(shared, dict) and "signal" in shared:
-            raise Misfit([(("signal",), f"signal {show(name)} refers to another signal; expected values")])
+            raise ValueFault([(("signal",), f"signal {show(name)} refers to another signal; expected values")])
         try:
             schedule = self.read(shared, setting)
-        except Misfit as error:
-            raise Misfit([((ROOT, "signals", name, *below), text) for below, text in error.faults]) from None
+        except ValueFault as error:
+            raise ValueFault([((ROOT, "signals", name, *below), text) for below, text in error.faults]) from None
         except ValueError as error:
-            raise Misfit([((ROOT, "signals", name), str(error))]) from None
+            raise ValueFault([((ROOT, "signals", name), str(error))]) from None
         setting.used[name] = schedule.table()
         return Schedule(
             schedule.kind, schedule.time, schedule.value, schedule.exponent, {"signal": name}, schedule.wave

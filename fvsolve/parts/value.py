@@ -21,20 +21,20 @@ NEEDED = object()  # instead of a default: the key is required
 # Effect of a changed value on an existing model
 VALUE = "value"  # only numbers in its tables change; the initial state stays
 PROFILE = "profile"  # the initial state changes too; sizes, names and whole numbers of the tables stay
-COUNTED = "cells"  # as `profile`, but `shape` if a pipe states no cells: their number follows from travel times
+BY_CELLS = "cells"  # as `profile`, but `shape` if a pipe states no cells: their number follows from travel times
 SHAPE = "shape"  # a new model: cells, parts, methods
 
 
-class Misfit(ValueError):
+class ValueFault(ValueError):
     """Faults of a value: (keys below it, message); instead : values to continue with, so that more faults are found."""
 
     def __init__(self, faults: list[tuple[tuple[Any, ...], str]], instead: dict[str, Any] | None = None):
-        self.faults, self.instead = faults, instead
+        self.faults, self.replacement = faults, instead
         super().__init__("; ".join(message for _, message in faults))
 
 
 @dataclass
-class Setting:
+class ReadContext:
     """Context for reading a value: ambient pressure [Pa], folder, signals and files of the case."""
 
     ambient: float = 101325.0
@@ -42,12 +42,12 @@ class Setting:
     signals: dict[str, Any] = field(default_factory=dict)
     files: dict[str, Path] = field(default_factory=dict)
     used: dict[str, Any] = field(default_factory=dict)  # signals that parts refer to, in SI
-    asked: int = 0  # number of uses of files and signals
+    lookups: int = 0  # number of uses of files and signals
 
 
-def setting_of(info: Any) -> Setting:
+def context_of(info: Any) -> ReadContext:
     """Context that a pydantic validator was called with."""
-    return info.context if info is not None and info.context is not None else Setting()
+    return info.context if info is not None and info.context is not None else ReadContext()
 
 
 @dataclass(frozen=True)
@@ -76,12 +76,12 @@ class Range:
         return f"between {self.least:g} and {self.greatest:g}"
 
 
-class Usual(NamedTuple):
+class UsualRange(NamedTuple):
     """Usual range in practice, SI, bounds included; other values are valid, but give a notice. 0 gives no notice."""
 
     least: float
     greatest: float
-    practice: str  # source or meaning of the range
+    source: str  # source or meaning of the range
 
 
 anything = Range()
@@ -104,7 +104,7 @@ class Value:
     about: str = ""
     changes: str = SHAPE
 
-    def read(self, given: Any, setting: Setting) -> Any:
+    def read(self, given: Any, setting: ReadContext) -> Any:
         """Read a value. Raises ValueError (`ValueFault` if the fault is at a key below it)."""
         raise NotImplementedError(type(self).__name__)
 
@@ -122,7 +122,7 @@ class Value:
         return ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.with_info_plain_validator_function(lambda given, info: self.read(given, setting_of(info)))
+        return core_schema.with_info_plain_validator_function(lambda given, info: self.read(given, context_of(info)))
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
         return {**self.json(), **({"description": self.about} if self.about else {})}
@@ -131,7 +131,7 @@ class Value:
 class Anything(Value):
     """Any value: its type is unknown, since another key is faulty."""
 
-    def read(self, given: Any, setting: Setting) -> Any:
+    def read(self, given: Any, setting: ReadContext) -> Any:
         return given
 
 
@@ -142,10 +142,10 @@ class Quantity(Value):
     dimension: str
     range: Range = anything
     about: str = ""
-    usual: Usual | None = None
+    usual: UsualRange | None = None
     changes: str = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> float:
+    def read(self, given: Any, setting: ReadContext) -> float:
         value = units.parse(given, self.dimension)
         if isinstance(value, tuple):
             value = value[0] + (setting.ambient if value[1] and self.dimension == "pressure" else 0.0)
@@ -170,7 +170,9 @@ class Quantity(Value):
         return {"type": ["number", "string"], "examples": [example], "x-dimension": self.dimension}
 
 
-def Number(range: Range = anything, about: str = "", usual: Usual | None = None, changes: str = PROFILE) -> Quantity:
+def Number(
+    range: Range = anything, about: str = "", usual: UsualRange | None = None, changes: str = PROFILE
+) -> Quantity:
     """Declaration of a number without a unit."""
     return Quantity("number", range, about, usual, changes)
 
@@ -183,7 +185,7 @@ class Whole(Value):
     about: str = ""
     changes: str = SHAPE
 
-    def read(self, given: Any, setting: Setting) -> int:
+    def read(self, given: Any, setting: ReadContext) -> int:
         if isinstance(given, bool) or not isinstance(given, int):
             raise ValueError(f"{show(given)} is not a whole number; expected a whole number {self.range}")
         self.range.check(given, given)
@@ -201,23 +203,23 @@ class Whole(Value):
 class Choice(Value):
     """Choice of a word; what : noun for messages."""
 
-    what: str
+    noun: str
     words: Collection[str]
     about: str = ""
-    meant: Mapping[str, str] = field(default_factory=dict)  # words of other programs -> equivalent here
+    synonyms: Mapping[str, str] = field(default_factory=dict)  # words of other programs -> equivalent here
     changes: str = SHAPE
 
-    def read(self, given: Any, setting: Setting) -> str:
+    def read(self, given: Any, setting: ReadContext) -> str:
         if not isinstance(given, str):
             raise ValueError(f"{show(given)} is not text; expected one of {', '.join(self.words)}")
         if given not in self.words:
-            synonym = self.meant.get(given.casefold().replace("_", "-"))
+            synonym = self.synonyms.get(given.casefold().replace("_", "-"))
             hint = (
                 f"; use {synonym}"
                 if synonym
                 else did_you_mean(given, self.words) or f"; expected one of {', '.join(self.words)}"
             )
-            raise ValueError(f"no {self.what} named {show(given)}{hint}")
+            raise ValueError(f"no {self.noun} named {show(given)}{hint}")
         return given
 
     @property
@@ -236,7 +238,7 @@ class Flag(Value):
     about: str = ""
     changes: str = SHAPE
 
-    def read(self, given: Any, setting: Setting) -> bool:
+    def read(self, given: Any, setting: ReadContext) -> bool:
         if not isinstance(given, bool):
             raise ValueError(f"{show(given)} is neither true nor false")
         return given
@@ -256,7 +258,7 @@ class Text(Value):
     about: str = ""
     changes: str = SHAPE
 
-    def read(self, given: Any, setting: Setting) -> str:
+    def read(self, given: Any, setting: ReadContext) -> str:
         if not isinstance(given, str):
             raise ValueError(f"{show(given)} is not text")
         return given
@@ -278,10 +280,10 @@ class Rows(Value):
     rising: bool = False
     length: int | None = None
     about: str = ""
-    usual: Usual | None = None
+    usual: UsualRange | None = None
     changes: str = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> tuple[float, ...]:
+    def read(self, given: Any, setting: ReadContext) -> tuple[float, ...]:
         if not isinstance(given, (list, tuple)) or not given:
             raise ValueError(f"{show(given)} is not a list; expected a list of values")
         if self.length is not None and len(given) != self.length:
@@ -294,9 +296,9 @@ class Rows(Value):
             except ValueError as error:
                 faults.append(((index,), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         if self.rising:
-            check_rising(values, given)
+            check_increasing(values, given)
         return tuple(values)
 
     @property
@@ -318,19 +320,19 @@ class Matrix(Value):
     about: str = ""
     changes: str = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> tuple[tuple[float, ...], ...]:
+    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
         if not isinstance(given, (list, tuple)) or len(given) != 3:
             raise ValueError(f"{show(given)} is not a matrix; expected three rows of three")
         rows, faults = [], []
         for index, row in enumerate(given):
             try:
                 rows.append(Rows(self.dimension, length=3).read(row, setting))
-            except Misfit as error:
+            except ValueFault as error:
                 faults += [((index, *below), text) for below, text in error.faults]
             except ValueError as error:
                 faults.append(((index,), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return tuple(rows)
 
     @property
@@ -341,7 +343,7 @@ class Matrix(Value):
         return {"type": "array", "items": Rows(self.dimension, length=3).json(), "minItems": 3}
 
 
-def check_rising(values: Any, given: Any, noun: str = "values") -> None:
+def check_increasing(values: Any, given: Any, noun: str = "values") -> None:
     """Raise ValueError with the first pair that does not increase."""
     for before, after, text_before, text_after in zip(values, values[1:], given, given[1:], strict=False):
         if not after > before:

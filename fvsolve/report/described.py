@@ -7,8 +7,8 @@ from typing import Any
 from fvsolve.case.case import default_cells
 from fvsolve.case.text import inline
 from fvsolve.output.column import column
-from fvsolve.parts.table import Table as Keys
-from fvsolve.parts.table import plain
+from fvsolve.parts.table_model import Table as Keys
+from fvsolve.parts.table_model import plain_value
 from fvsolve.parts.value import Quantity
 from fvsolve.report.tables import ReportTable, worded
 from fvsolve.units import DIMENSIONS, UNITS
@@ -92,7 +92,11 @@ def walls(result) -> ReportTable | None:
 
 
 def _friction(link, case) -> str:
-    return _said(type(link).values()["friction"], plain(link.friction), case).removeprefix("(model ").removesuffix(")")
+    return (
+        _said(type(link).values()["friction"], plain_value(link.friction), case)
+        .removeprefix("(model ")
+        .removesuffix(")")
+    )
 
 
 def parts(result) -> ReportTable:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import heapq
 from typing import NamedTuple
 
-from fvsolve.case.routes import Leg, alone, is_cut, joined
-from fvsolve.case.routes import legs as legs_of
+from fvsolve.case.pipe_routes import Leg, is_cut, joined_places, pipe_leg
+from fvsolve.case.pipe_routes import legs as legs_of
 from fvsolve.run.result import not_valid
 
 MOST = 6  # greatest number of sections of a run, unless it has more routes
@@ -48,7 +48,7 @@ def ways(result) -> list[SectionWay]:
     paths = list({tuple(leg.pipe for leg in way.legs): way for way in reversed(paths)}.values())[::-1]  # no duplicates
     paths = [way for way in paths if not _within(way, paths)]
     strung = {leg.pipe for way in paths for leg in way.legs}
-    merged = joined({name: link for name, link in links.items() if _in_line(link, result.case)})
+    merged = joined_places({name: link for name, link in links.items() if _in_line(link, result.case)})
     free = [name for name in result.envelope if name in links and name not in strung]
     pipes = {name: (*(merged.get(end, end) for end in (links[name].from_, links[name].to)), links[name].length)
              for name in free}  # fmt: skip
@@ -78,7 +78,7 @@ def _chained(chain: list[tuple[str, bool, float]], result) -> SectionWay:
     """Section path of a chain, directed so that the initial head falls along it; a single pipe keeps its direction."""
     if len(chain) == 1:
         pipe = chain[0][0]
-        return _way(pipe, [alone(pipe, result.case.links)], result.case.links)
+        return _way(pipe, [pipe_leg(pipe, result.case.links)], result.case.links)
     first, last = chain[0], chain[-1]
     begins = _start_head(result, first[0], last=first[1])
     ends = _start_head(result, last[0], last=not last[1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.case.routes import Leg
+from fvsolve.case.pipe_routes import Leg
 from fvsolve.output.column import UnitColumn
 from fvsolve.report.heads import in_units
 from fvsolve.report.legs import SectionWay

@@ -72,7 +72,7 @@ def model_of(case, set: Mapping | None = None, like=None):
 
     like : a model, as for `model.build.build_like`
     """
-    from fvsolve.case import Case, load, located
+    from fvsolve.case import Case, load, locate_faults
     from fvsolve.model import Model
     from fvsolve.model.build import build_like
 
@@ -82,7 +82,7 @@ def model_of(case, set: Mapping | None = None, like=None):
         try:
             return build_like(case, like)
         except CaseError as error:
-            raise located(error, case) from None
+            raise locate_faults(error, case) from None
         except MemoryError:
             raise RunError(f"{case.name}: memory is too small for its model; expected fewer cells") from None
     if set:

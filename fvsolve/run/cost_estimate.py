@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fvsolve.case.size import on_disk, size
+from fvsolve.case.resource_checks import byte_text, disk_size
 
 LONG_RUN, LARGE_FILES = 180.0, 1e9  # [s], [B] above which an estimate is printed
 UNITS = ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"))
@@ -10,9 +10,9 @@ UNITS = ((86400.0 * 365.25, "years"), (86400.0, "days"), (3600.0, "hours"), (60.
 
 def cost_text(model) -> str:
     """Text of the expected duration and size, "" if both are small."""
-    seconds, bytes_ = model.checks["expected_seconds"] or 0.0, on_disk(model.case)
+    seconds, bytes_ = model.checks["expected_seconds"] or 0.0, disk_size(model.case)
     parts = [duration(seconds)] if seconds > LONG_RUN else []
-    parts += [f"{size(bytes_)} on disk"] if bytes_ > LARGE_FILES else []
+    parts += [f"{byte_text(bytes_)} on disk"] if bytes_ > LARGE_FILES else []
     return f"{model.case.name} will take about {' and '.join(parts)}" if parts else ""
 
 

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fvsolve.case import horizon
+from fvsolve.case import schedule_ends
+from fvsolve.case.design_limits import VACUUM
 from fvsolve.case.extent import OF_PRESSURE
-from fvsolve.case.limits import VACUUM
-from fvsolve.case.routes import Leg, alone, is_cut, legs
+from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
 from fvsolve.output.column import UnitColumn, column
 from fvsolve.run.part_extremes import PartExtremes, in_quantity, part_extremes, pressure_of
 from fvsolve.run.result import FAILS, HOLDS, OPEN
@@ -60,7 +60,7 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
     on, or if a schedule goes on after the end.
     """
     chainage = Chainages(model.case)
-    complete = bool(summary.ok and not summary.marks and not horizon.notices(model.case))
+    complete = bool(summary.ok and not summary.marks and not schedule_ends.notices(model.case))
     tables = []
     for limit in model.case.limits.values():
         extent = limit.extent
@@ -214,7 +214,7 @@ class Chainages:
     def leg(self, pipe: str, on: tuple[str, ...]) -> Leg:
         """Leg through a pipe along which chainage is measured."""
         result = next((leg for name in self.ordered(on) for leg in self.legs[name] if leg.pipe == pipe), None)
-        return alone(pipe, self.case.links) if result is None else result
+        return pipe_leg(pipe, self.case.links) if result is None else result
 
     def ordered(self, on: tuple[str, ...]) -> list[str]:
         """Names of routes: those of the limit first, those along a cut pipe last."""

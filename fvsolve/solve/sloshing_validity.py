@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fvsolve.case import sloshing
-from fvsolve.case.riding import free_joints
+from fvsolve.case.basins_on_bodies import free_joints
 from fvsolve.errors import Notice
 
 SMALL_WAVE = 0.2  # wave height up to which a wave is small, as a fraction of the depth
@@ -91,8 +91,8 @@ def rises(model, name: str) -> tuple:
     """(states of the sloshing modes, initial values, rise of each in units of the depth, True for a round tank)."""
     case = model.case
     basin, mesh = case.nodes[name], case.lumped[name]
-    modes = sloshing.made(basin, mesh, case.properties.density, case.gravity)
-    rows = [model.tables.bodies[model.body_names.index(sloshing.slider(name, mode))] for mode in modes]
+    modes = sloshing.modes_of(basin, mesh, case.properties.density, case.gravity)
+    rows = [model.tables.bodies[model.body_names.index(sloshing.mode_body_name(name, mode))] for mode in modes]
     lifts = np.zeros((2, len(modes)))
     lifts[[mode.along for mode in modes], range(len(modes))] = [mode.rise for mode in modes]
     at, start = [int(row["y"]) for row in rows], np.array([row["start"][0] for row in rows])

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case import load, shipped
-from fvsolve.case.lines import key_lines
-from fvsolve.case.raw import dotted, syntax_fault
+from fvsolve.case.raw import split_key, syntax_fault
+from fvsolve.case.toml_lines import key_lines
 from fvsolve.errors import CaseError, Fault, did_you_mean
 from fvsolve.units import show
 
@@ -79,7 +79,7 @@ def read_design(path: str | Path) -> Design:
 
 def spellings(keys: tuple) -> Iterator[tuple]:
     """Paths at which a key of a set may be in the file, most specific first: nested, quoted, then its tables."""
-    below = dotted(keys[2]) if len(keys) > 2 else ()
+    below = split_key(keys[2]) if len(keys) > 2 else ()
     for n in range(len(below), 0, -1):
         yield (*keys[:2], *below[:n])
         yield (*keys[:2], ".".join(below[:n]))
@@ -166,7 +166,7 @@ def clashes(first: dict[str, Any], second: dict[str, Any]) -> Iterator[tuple[str
     """Pairs of keys of two sets that are equal or nested, unless equal keys have equal values."""
     for key in first:
         for other_key in second:
-            a, b = dotted(key), dotted(other_key)
+            a, b = split_key(key), split_key(other_key)
             if a[: len(b)] == b[: len(a)] and not (a == b and first[key] == second[other_key]):
                 yield key, other_key
 

@@ -13,12 +13,12 @@ import numpy as np
 
 from fvsolve import units
 from fvsolve.case import Case, load
-from fvsolve.case.changes import declared
-from fvsolve.case.raw import dotted, parsed
+from fvsolve.case.changes import declaration_of
+from fvsolve.case.raw import parsed, split_key
 from fvsolve.errors import CaseError, Fault, FvsolveError
-from fvsolve.parts.csv_rows import number, read_rows, split
+from fvsolve.parts.csv_rows import number, read_rows, split_header
 from fvsolve.parts.schedule import Scheduled
-from fvsolve.parts.value import Quantity, Setting
+from fvsolve.parts.value import Quantity, ReadContext
 from fvsolve.units import show
 
 SAMPLERS = ("sobol", "lhs")
@@ -69,7 +69,7 @@ def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
     """(low, high) of a range [SI]. Raises ValueError for an invalid range."""
     if len(given) != 2:
         raise ValueError(f"{show(list(given))} is not a range. Expected two values, LOW,HIGH")
-    quantity, setting = quantity_of(case.raw, key), Setting(ambient=case.ambient_pressure)
+    quantity, setting = quantity_of(case.raw, key), ReadContext(ambient=case.ambient_pressure)
     if quantity is None:
         raise ValueError("is not a continuous quantity, so it has no range. Use a grid: --set KEY=a,b,c")
     low, high = (quantity.read(parsed(end), setting) for end in given)
@@ -81,10 +81,10 @@ def range_of(case: Case, key: str, given: Sequence[Any]) -> tuple[float, float]:
 
 def quantity_of(raw: dict[str, Any], key: str) -> Quantity | None:
     """Quantity (dimension and range) of the values of a key; None for keys of words or whole numbers."""
-    keys = dotted(key)
-    value = declared(raw, keys)
+    keys = split_key(key)
+    value = declaration_of(raw, keys)
     if isinstance(value, Scheduled):
-        within = len(keys) > 1 and isinstance(declared(raw, keys[:-1]), Scheduled)
+        within = len(keys) > 1 and isinstance(declaration_of(raw, keys[:-1]), Scheduled)
         forms = value.forms.values() if within else ()
         value = next((form[keys[-1]][0] for form in forms if keys[-1] in form), Quantity(value.dimension, value.range))
     return value if isinstance(value, Quantity) else None
@@ -118,7 +118,7 @@ def refuse_unknown(source: Any, values: Mapping[str, Any], raw: dict[str, Any]) 
 def is_known(raw: dict[str, Any], key: str) -> bool:
     """True if a key is valid for a case."""
     try:
-        declared(raw, dotted(key))
+        declaration_of(raw, split_key(key))
     except (FvsolveError, KeyError, AttributeError, TypeError):  # other types if the case itself is invalid
         return False
     return True
@@ -161,7 +161,7 @@ class Heading:
 
     @classmethod
     def of(cls, header: str, raw: dict[str, Any], faults: list[str]) -> Heading:
-        name, unit = split(header)
+        name, unit = split_header(header)
         quantity = quantity_of(raw, name) if is_known(raw, name) else None
         try:
             if unit and quantity is None:

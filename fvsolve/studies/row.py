@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fvsolve.case import Case, load
-from fvsolve.case.raw import dotted
+from fvsolve.case.raw import split_key
 from fvsolve.errors import CaseError
 from fvsolve.output.summary import plain
 from fvsolve.studies.outcome import grown, refusal
@@ -55,8 +55,8 @@ class RowMaker:
 
     def beside(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Overrides of `base` in the same tables as `values`; they must be set again, as they may conflict."""
-        tables = {("exact",), *(dotted(key)[:2] for key in values)}
-        return {key: value for key, value in self.base.items() if {dotted(key)[:1], dotted(key)[:2]} & tables}
+        tables = {("exact",), *(split_key(key)[:2] for key in values)}
+        return {key: value for key, value in self.base.items() if {split_key(key)[:1], split_key(key)[:2]} & tables}
 
     def __getstate__(self) -> dict[str, Any]:
         """State for pickling; the other process reads the case again."""

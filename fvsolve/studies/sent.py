@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fvsolve.case import Case
-from fvsolve.case.load import named
+from fvsolve.case.load import find_source
 from fvsolve.case.raw import Raw, read_raw
 from fvsolve.steppers.tableau import BUILT_IN, METHODS
 
@@ -20,7 +20,7 @@ class Sent:
         raw = self.source
         if isinstance(raw, Case):
             raw = Raw(raw.raw, raw.name, raw.path, raw.folder)
-        source = raw if isinstance(raw, Raw) else read_raw(named(raw))
+        source = raw if isinstance(raw, Raw) else read_raw(find_source(raw))
         return {"source": source, "methods": {name: method for name, method in METHODS.items() if name not in BUILT_IN}}
 
     def __setstate__(self, state: dict[str, Any]) -> None:

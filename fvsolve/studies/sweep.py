@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.case import Case, load
-from fvsolve.case.load import named
+from fvsolve.case.load import find_source
 from fvsolve.case.raw import read_raw
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
@@ -267,14 +267,14 @@ class Sweeping:
 
 def raw_of(source) -> dict[str, Any]:
     """Nested dicts of a case given as for `load`."""
-    return source.raw if isinstance(source, Case) else read_raw(named(source)).table
+    return source.raw if isinstance(source, Case) else read_raw(find_source(source)).table
 
 
 def folder_of(source) -> Path:
     """Folder of the files of a case."""
     if isinstance(source, Case):
         return source.folder or Path.cwd()
-    source = named(source)
+    source = find_source(source)
     return Path.cwd() if isinstance(source, Mapping) else Path(source).parent
 
 

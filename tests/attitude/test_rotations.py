@@ -179,5 +179,5 @@ def test_a_deviation_turns_by_w_less_the_turned_w_d_56_to_58():
 
 
 def test_it_wants_no_scipy():
-    code = "import sys, fvsolve.parts.attitude; sys.exit('scipy' in sys.modules)"
+    code = "import sys, fvsolve.parts.attitude_keys; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0

@@ -27,7 +27,7 @@ SOURCES = {
 from typing import Annotated, ClassVar
 from fvsolve.parts.basin.part import Physics
 from fvsolve.parts.formula import Formula, Shaped
-from fvsolve.parts.table import Table
+from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import Quantity, positive
 
 class Warm(Table):

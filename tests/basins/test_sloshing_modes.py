@@ -70,7 +70,7 @@ def test_masses_heights_and_the_inertia_under_a_lid_are_those_of_potential_flow(
     for square, low in ((0.5 * every[0].square, 0.4), (2.2 * every[0].square, -2.0)):
         whole = sloshing.area_of(outline) * depth
         if turns:
-            found = sloshing.under_a_lid(outline, depth, 1.0)[1, 1] + whole * (low + 0.5 * depth) ** 2
+            found = sloshing.lid_inertia(outline, depth, 1.0)[1, 1] + whole * (low + 0.5 * depth) ** 2
             still = math.pi / 4.0 * (0.5 * SIDE) ** 4 if outline.is_round else SIDE**3 / 12.0 * wide
             found -= GRAVITY * still / square  # gravity on a level surface, which is no part of the truth
             for one in every:
@@ -83,11 +83,11 @@ def test_masses_heights_and_the_inertia_under_a_lid_are_those_of_potential_flow(
 
 
 def test_water_that_is_held_is_a_disc_of_ice_when_thin_and_a_rod_when_slender():
-    thin, slender = (sloshing.under_a_lid(CYLINDER, depth, 1.0) for depth in (1e-3, 400.0))
+    thin, slender = (sloshing.lid_inertia(CYLINDER, depth, 1.0) for depth in (1e-3, 400.0))
     assert thin[0, 0] == pytest.approx(math.pi * 1e-3 / 4.0, rel=1e-5)
     assert slender[0, 0] == pytest.approx(math.pi * 400.0**3 / 12.0, rel=1e-4)
     assert thin[2, 2] == slender[2, 2] == 0.0
-    square = sloshing.under_a_lid(sloshing.Outline((1.0, 1.0), np.zeros(2), False), 1.0, 1.0)
+    square = sloshing.lid_inertia(sloshing.Outline((1.0, 1.0), np.zeros(2), False), 1.0, 1.0)
     assert np.diag(square) == pytest.approx(1.0 / 6.0 - 0.140577, abs=1e-6)  # less the torsion constant
 
 

@@ -15,8 +15,8 @@ from reference import folders
 
 from fvsolve.case import Case, FluidSpec, Numerics, Output, load, schema
 from fvsolve.case import sections as defaults
-from fvsolve.case.claims import COMPARE_KEYS, expect_keys
-from fvsolve.case.schema import printed, whole
+from fvsolve.case.expectations import COMPARE_KEYS, expect_keys
+from fvsolve.case.schema import full_schema, schema_text
 from fvsolve.errors import CaseError
 from fvsolve.parts import KINDS, Friction, Wall
 
@@ -381,7 +381,7 @@ def test_every_size_of_a_valve_passes_the_flow_it_names(size, flow):
 
 def test_what_the_schema_refers_to_is_what_it_says_unshared():
     """Every reference is known, what it stands for is what stood there, and lists in a line are the same lists."""
-    made, defs, unshared = schema(), schema()["$defs"], whole()
+    made, defs, unshared = schema(), schema()["$defs"], full_schema()
 
     def expanded(part):
         if isinstance(part, dict):
@@ -393,9 +393,11 @@ def test_what_the_schema_refers_to_is_what_it_says_unshared():
         return [expanded(inner) for inner in part] if isinstance(part, list) else part
 
     assert expanded({**made, "$defs": {name: defs[name] for name in unshared["$defs"]}}) == unshared
-    assert json.loads(printed(made)) == made
+    assert json.loads(schema_text(made)) == made
     keys = sum(len([*model.keys()]) for group in KINDS.values() for model in group.values())
-    assert len(printed(made).splitlines()) < 10.1 * keys and len(printed(made)) < 0.7 * len(printed(unshared))
+    assert len(schema_text(made).splitlines()) < 10.1 * keys and len(schema_text(made)) < 0.7 * len(
+        schema_text(unshared)
+    )
 
 
 def test_a_parts_key_is_documented_with_its_unit():

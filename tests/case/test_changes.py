@@ -10,7 +10,7 @@ from reference.folders import CASES
 from reference.scenes import pipe, reservoir, scene
 
 import fvsolve
-from fvsolve.case.changes import CLASSES, changes, declared
+from fvsolve.case.changes import CLASSES, changes, declaration_of
 from fvsolve.errors import FvsolveError
 from fvsolve.parts.value import SHAPE, Choice
 
@@ -117,7 +117,7 @@ class Trial:
         before, often = fvsolve.build(case), Counter()
         for keys, _ in leaves(table):
             words = tuple(key for key in keys if isinstance(key, str))
-            value = declared(table, words)
+            value = declaration_of(table, words)
             self.values.append(value)
             often[id(value)] += 1
             several = self.every and name not in LARGE and often[id(value)] == 1 and self.cases[id(value)] < 4

@@ -323,7 +323,7 @@ def test_a_route_runs_through_pumps_and_valves_and_against_its_pipes() -> None:
     case["links"] |= {"tap": valve("gate", "far", 1.0), "last": pipe("end", "far", 40.0, DIAMETER, SPEED, 2)}
     case["routes"] = {"line": {"pipes": ["low", "high", "last"]}, "home": {"pipes": ["last", "high", "low"]}}
     case["limits"] = {"end": {"on": "line", "quantity": "head", "maximum": 0.0}}
-    from fvsolve.case.routes import legs
+    from fvsolve.case.pipe_routes import legs
 
     found = fvsolve.load(case)
     assert [(leg.begin, leg.end, leg.backwards) for leg in legs(found.routes["line"], found.links)] == [

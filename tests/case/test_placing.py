@@ -145,7 +145,7 @@ def test_every_part_stands_where_it_was_put(change: dict, turned: bool, unit: st
     assert [one.length for one in found] == pytest.approx([3.0, 17.0, 1931.0, 1046.5, 2.5], abs=1e-6)
     size = LENGTH / main.get("cells", LENGTH / 50.0)
     assert [one.cells for one in found] == [max(1, int(one.length / size + 0.5)) for one in found]
-    assert not [note for note in made.notes if note.key == "at"]
+    assert not [note for note in made.notices if note.key == "at"]
 
 
 def test_steps_are_hardly_shorter_where_parts_stand_between_cells() -> None:

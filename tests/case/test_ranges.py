@@ -13,8 +13,8 @@ from reference import scenes
 
 from fvsolve import run
 from fvsolve.case import load
-from fvsolve.case.ranges import notices
 from fvsolve.case.sections import FluidSpec
+from fvsolve.case.usual_ranges import notices
 from fvsolve.errors import listing
 from fvsolve.parts import KINDS
 from fvsolve.run import model_of
@@ -94,7 +94,7 @@ SLIPS = {  # settings -> (place, key, value, limit, what the text says)
 @pytest.mark.parametrize("name", SLIPS)
 def test_a_slip_of_units_is_noted_once_with_the_likely_unit(name):
     settings, place, key, value, limit, says = SLIPS[name]
-    (note,) = load(tomllib.loads(SCENE), settings).notes
+    (note,) = load(tomllib.loads(SCENE), settings).notices
     assert (note.kind, note.place, note.key, note.ok) == ("range", place, key, True)
     assert (note.value, note.limit) == (pytest.approx(value), pytest.approx(limit))
     assert says in note.text and (f"{place}.{key}" if place else key) in note.text
@@ -146,7 +146,7 @@ def test_examples_of_the_docs_are_within_what_practice_knows(name):
     ],
 )
 def test_hoses_capillaries_penstocks_and_their_liquids_are_within(settings):
-    assert not load(tomllib.loads(SCENE), settings).notes
+    assert not load(tomllib.loads(SCENE), settings).notices
 
 
 def main(flow: float, viscosity: float = 1e-3, density: float = 1000.0, **pipe) -> dict:

@@ -9,7 +9,7 @@ from reference.fork import branched
 from reference.scenes import still
 
 import fvsolve
-from fvsolve.case.size import free_memory, on_disk
+from fvsolve.case.resource_checks import disk_size, free_memory
 from fvsolve.errors import CaseError, RunError
 from fvsolve.run.cost_estimate import cost_text, duration
 
@@ -61,7 +61,7 @@ def test_the_estimate_of_the_disk_is_near_what_is_written(tmp_path):
     case = branched(fields=50)
     fvsolve.run(case, {"output.every": "1 ms"}, tmp_path / "run")
     files = [tmp_path / "run" / "history.csv", *(tmp_path / "run" / "fields").iterdir()]
-    found = on_disk(fvsolve.load(case, {"output.every": "1 ms", "output.fields": 0}))
+    found = disk_size(fvsolve.load(case, {"output.every": "1 ms", "output.fields": 0}))
     assert 0.5 < found / files[0].stat().st_size < 2.0
 
 

@@ -192,8 +192,11 @@ def test_every_pipe_is_as_long_as_in_epanet_and_those_shorter_than_a_cell_are_sa
     lengths = {pipe: link.length for pipe, link in network.pipes()}
     found = {pipe: case.links[made.links[pipe]].length for pipe in lengths}
     assert found == {pipe: pytest.approx(length, rel=1e-9) for pipe, length in lengths.items()}
-    assert made.short == [pipe for pipe in sorted(lengths, key=lengths.get) if lengths[pipe] < 12.0] != []
-    assert f"{len(made.short)} pipes are shorter than a cell" in made.text and made.links[made.short[0]] in made.text
+    assert made.short_pipes == [pipe for pipe in sorted(lengths, key=lengths.get) if lengths[pipe] < 12.0] != []
+    assert (
+        f"{len(made.short_pipes)} pipes are shorter than a cell" in made.text
+        and made.links[made.short_pipes[0]] in made.text
+    )
 
 
 def test_short_pipes_set_no_step_and_keep_their_own_loss(tmp_path):
@@ -201,7 +204,7 @@ def test_short_pipes_set_no_step_and_keep_their_own_loss(tmp_path):
     path.parent.mkdir()
     path.write_text(SMALL.format(r=110, formula="H-W").replace("p3 b c 350", "p3 b c 0.5"))
     lost, off, made = differences(path, 0, tmp_path)
-    assert lost < 1e-3 and off < 1e-3 and made.short == ["p3"]
+    assert lost < 1e-3 and off < 1e-3 and made.short_pipes == ["p3"]
     steps = {
         line: build(load(tomllib.loads(made.text), {"numerics.pipe_model": line})).checks["step"]
         for line in ("auto", "finite-volume")

@@ -72,7 +72,7 @@ def test_random_trees_on_springs_balance_where_pinocchio_has_their_gravity(seed)
     stiff = np.array([bodies[name]["joint"]["stiffness"] for name in bodies])
     left = pin.computeGeneralizedGravity(peer, data, q) + stiff * q
     assert np.max(np.abs(left)) < 1e-10 * np.max(stiff * np.abs(q))
-    assert len(model.case.found) == 8 and model.steady["moving"] == []
+    assert len(model.case.equilibrium_nodes) == 8 and model.steady["moving"] == []
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -131,7 +131,7 @@ def test_a_rod_on_a_ball_joint_points_along_its_weight_and_what_pulls_it():
     resultant = pull - [0, 0, 2.0 * GRAVITY]
     assert -model.case.poses["rod"].attitude[:, 2] == approx(resultant / np.linalg.norm(resultant), abs=1e-13)
     # nothing turns it about itself, so the way there is the shortest: about an axis at right angles to both
-    turn = model.case.poses["rod"].attitude @ model.case.stated.poses["rod"].attitude.T
+    turn = model.case.poses["rod"].attitude @ model.case.as_stated.poses["rod"].attitude.T
     axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     assert axis @ resultant == approx(0.0, abs=0.05 * np.linalg.norm(axis) * np.linalg.norm(resultant))
 
@@ -318,7 +318,7 @@ def test_what_stands_in_balance_stays(scene, method):
 def by_hand(nodes: dict, model) -> dict:
     """The scene with the angles that were found, said by hand."""
     again = {name: {**node} for name, node in nodes.items()}
-    for name, node in model.case.found.items():
+    for name, node in model.case.equilibrium_nodes.items():
         joint = again[name]["joint"]
         if node.joint.kind == "revolute":
             again[name]["joint"] = {**joint, "angle": node.joint.angle.first}
@@ -334,7 +334,7 @@ def test_a_balance_is_the_same_scene_with_the_found_places_written_by_hand(scene
     nodes, links = SCENES[scene]()
     case = balanced(nodes, links)
     model = built(case)
-    assert model.case.found
+    assert model.case.equilibrium_nodes
     other = built(
         {**case, "nodes": by_hand(case["nodes"], model), "numerics": {**case["numerics"], "initial": initial}}
     )
@@ -399,7 +399,7 @@ def test_a_boom_on_shut_chambers_stays_where_it_is_stated_and_what_hangs_on_it_s
                                                                           "angle": 0.5, "on": "boom.tip"}}}  # fmt: skip
     case = balanced(nodes, links, ["boom.angle", "load.angle"])
     model = built(case)
-    assert angles(model) == approx([0.2, -0.2], abs=1e-14) and "boom" not in model.case.found
+    assert angles(model) == approx([0.2, -0.2], abs=1e-14) and "boom" not in model.case.equilibrium_nodes
     weight = GRAVITY * (120.0 * 0.5 + 2.0) * math.cos(0.2)
     eye = 0.25 * np.array([math.cos(0.2), math.sin(0.2)])
     rope = eye + [0.0, 0.25]
@@ -414,7 +414,7 @@ def test_a_pendulum_that_stands_stays_and_is_told_so():
     model = built(balanced({"arm": pendulum(math.pi)}))
     (told,) = [one for one in model.warnings if one.key == "stability"]
     assert "equilibrium is unstable" in told.text and told.value == approx(math.sqrt(GRAVITY / 0.7), rel=1e-8)
-    assert not model.case.found
+    assert not model.case.equilibrium_nodes
     assert angles(built(balanced({"arm": pendulum(3.0)}))) == approx([0.0], abs=1e-15)
     assert angles(built(balanced({"arm": pendulum(3.14159)}))) == approx([math.pi], abs=1e-15)
 
@@ -442,7 +442,7 @@ def test_shut_oil_holds_a_boom_that_open_valves_do_not(shut, law):
         links |= {"a": valve("high", "lift.A", 1e-5), "b": valve("low", "lift.B", 1e-5)}
     model = built(balanced(nodes, links), fluid={**WATER, "law": law})
     grows = force * (lever(0.9 + 1e-5)[0] - lever(0.9 - 1e-5)[0]) / 2e-5 + weight * math.sin(0.9)
-    assert grows > 0.0 and not model.case.found
+    assert grows > 0.0 and not model.case.equilibrium_nodes
     told = [one.value for one in model.warnings if one.key == "stability"]
     assert told == ([] if shut else [approx(math.sqrt(grows / crane.inertia), rel=1e-6)])
 

@@ -10,7 +10,7 @@ from case.test_changes import DYED, LARGE, OTHERS, leaves, others, raw_case, spo
 from reference.folders import CASES
 
 import fvsolve
-from fvsolve.case.changes import declared
+from fvsolve.case.changes import declaration_of
 from fvsolve.errors import CaseError, FvsolveError
 
 
@@ -64,7 +64,7 @@ def compare(name: str, table: dict, done: set, every: bool, turn: int = 0) -> li
     """
     model, wrong = fvsolve.build(fvsolve.load(table)), []
     for keys, _ in leaves(table):
-        value = declared(table, tuple(key for key in keys if isinstance(key, str)))
+        value = declaration_of(table, tuple(key for key in keys if isinstance(key, str)))
         kind = (name if every else "", str(type(value)), getattr(value, "about", ""), keys[-1])
         if kind in done:
             continue

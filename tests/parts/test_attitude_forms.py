@@ -13,14 +13,14 @@ from scipy.spatial.transform import Rotation
 
 from fvsolve import load
 from fvsolve.errors import CaseError
-from fvsolve.parts.attitude import Attitude
-from fvsolve.parts.table import Inside, Table, misfits
+from fvsolve.parts.attitude_keys import Attitude
+from fvsolve.parts.table_model import Nested, Table, faults_of_error
 
 QUARTER = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
 
 
 class Stand(Table):
-    attitude: Annotated[Attitude | None, Inside(Attitude, "of a stand")] = None
+    attitude: Annotated[Attitude | None, Nested(Attitude, "of a stand")] = None
 
 
 def read(**given) -> Attitude:
@@ -30,7 +30,7 @@ def read(**given) -> Attitude:
 def faults(**given) -> dict[str, str]:
     with pytest.raises(ValidationError) as found:
         read(**given)
-    return {".".join(map(str, keys)): text for keys, text in misfits(found.value, ["attitude"])}
+    return {".".join(map(str, keys)): text for keys, text in faults_of_error(found.value, ["attitude"])}
 
 
 def notes(one: Attitude) -> list[tuple[str, str]]:
@@ -163,7 +163,9 @@ def test_a_case_has_its_notes_and_faults_with_their_places():
         ("nodes.arm.joint.attitude.axis", "needs angle too")
     ]
     body["joint"]["attitude"]["angle"] = 30
-    assert [(one.key, one.value, one.text.split(": ")[1]) for one in load(scene({"arm": body}, {}, 1.0, {})).notes] == [
+    assert [
+        (one.key, one.value, one.text.split(": ")[1]) for one in load(scene({"arm": body}, {}, 1.0, {})).notices
+    ] == [
         (
             "joint.attitude.angle",
             30.0,

@@ -11,14 +11,14 @@ from reference.scenes import scene
 
 import fvsolve
 from fvsolve.errors import CaseError
-from fvsolve.parts.formula import Shaped
-from fvsolve.parts.value import Setting
+from fvsolve.parts.formula import SpatialFieldKey
+from fvsolve.parts.value import ReadContext
 
 X, Y = np.array([0.0, 1.0, 3.5]), np.array([2.0, 1.0, -0.5])
 
 
 def values(text: str) -> np.ndarray:
-    return Shaped("length").read(text, Setting()).at(X, Y)
+    return SpatialFieldKey("length").read(text, ReadContext()).at(X, Y)
 
 
 def of_points(rule) -> list[float]:
@@ -96,7 +96,7 @@ def test_what_formulas_do_not_have_is_refused_with_the_nearest_form(text):
 ], ids=["sum", "difference", "product"])  # fmt: skip
 def test_a_formula_of_many_terms_is_read(text, rule):
     x = np.array([1.0, 2.0, 0.5])
-    assert Shaped("length").read(text, Setting()).at(x, x) == approx(rule(x), rel=1e-13)
+    assert SpatialFieldKey("length").read(text, ReadContext()).at(x, x) == approx(rule(x), rel=1e-13)
 
 
 NOWHERE = {

@@ -11,16 +11,16 @@ import fvsolve
 from fvsolve.basins.transport.lower_velocity import face_flows
 from fvsolve.errors import CaseError, MeshError
 from fvsolve.mesh import rectangle
-from fvsolve.parts.formula import Shaped
-from fvsolve.parts.series import read_columns
-from fvsolve.parts.value import Setting
+from fvsolve.parts.formula import SpatialFieldKey
+from fvsolve.parts.time_series import read_columns
+from fvsolve.parts.value import ReadContext
 
 T, H = [0.0, 0.5, 1.25], [45.7, -46.1, 1234.5]
 
 
 def columns(path, text, encoding="utf-8"):
     path.write_bytes(text.encode(encoding))
-    return read_columns(path, None, None, "head", Setting())[:2]
+    return read_columns(path, None, None, "head", ReadContext())[:2]
 
 
 def refusal(path, text, encoding="utf-8"):
@@ -88,14 +88,14 @@ def test_what_may_be_misread_is_refused_with_its_line(text, words, tmp_path):
     else:
         (tmp_path / "rig.csv").write_text(text)
         with pytest.raises(ValueError, match='has 2 columns "H"'):
-            read_columns(tmp_path / "rig.csv", "t", "H", "head", Setting())
+            read_columns(tmp_path / "rig.csv", "t", "H", "head", ReadContext())
 
 
 def test_bytes_that_are_no_text_are_named(tmp_path):
     assert "rig.csv is not UTF-8 or UTF-16 text" in refusal(tmp_path / "rig.csv", "t,Hö\n0,1\n", "latin-1")
     (tmp_path / "rig.csv").write_bytes(b"PK\x03\x04\x00\x00\x00\x00\x12\x00\x00\x00\n1\n")
     with pytest.raises(ValueError, match="not UTF-8 or UTF-16 text"):
-        read_columns(tmp_path / "rig.csv", None, None, "head", Setting())
+        read_columns(tmp_path / "rig.csv", None, None, "head", ReadContext())
 
 
 def test_a_measured_series_with_decimal_commas_is_compared_as_measured(tmp_path):
@@ -116,11 +116,11 @@ def test_a_measured_series_with_decimal_commas_is_compared_as_measured(tmp_path)
 ])  # fmt: skip
 def test_points_of_a_bed_are_read_in_their_units(text, tmp_path):
     (tmp_path / "bed.csv").write_text(text)
-    bed = Shaped("length").read({"file": "bed.csv"}, Setting(folder=tmp_path))
+    bed = SpatialFieldKey("length").read({"file": "bed.csv"}, ReadContext(folder=tmp_path))
     assert bed.at(np.array([1.0, 9.0, 30.0]), np.array([1.0, 0.5, 30.0])) == approx([1.5] * 3)
     (tmp_path / "bed.csv").write_text("x,y,bed\n0,0,1,5\n")
     with pytest.raises(ValueError, match="line 2: 4 cells under 3 headers; with decimal commas"):
-        Shaped("length").read({"file": "bed.csv"}, Setting(folder=tmp_path))
+        SpatialFieldKey("length").read({"file": "bed.csv"}, ReadContext(folder=tmp_path))
 
 
 @pytest.mark.parametrize("text", [

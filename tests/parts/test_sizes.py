@@ -13,7 +13,7 @@ from reference.scenes import AMBIENT, WATER, reservoir, scene
 
 import fvsolve
 from fvsolve.errors import CaseError
-from fvsolve.parts.sizes import FITTINGS, bore, loss
+from fvsolve.parts.pipe_sizes import FITTINGS, fittings_loss, pipe_bore
 
 # ASME B36.10M: outer diameter and wall [mm]
 PRINTED = {
@@ -36,28 +36,28 @@ CRANE = {  # TP-410, pages A-27 to A-30: L / D
 @pytest.mark.parametrize("size, schedule", PRINTED)
 def test_nominal_sizes_are_those_of_the_printed_table(size, schedule):
     outer, wall = PRINTED[size, schedule]
-    inner, thickness = bore(size, schedule)
+    inner, thickness = pipe_bore(size, schedule)
     assert thickness == approx(wall * 1e-3, abs=2e-5)
     assert inner == approx((outer - 2 * wall) * 1e-3, abs=1e-4)
 
 
 def test_dn_and_nps_are_two_names_of_one_size():
     for dn, nps in (("DN 100", "NPS 4"), ("dn32", "nps 1.25"), ("DN600", "NPS 24")):
-        assert bore(dn, "40") == bore(nps, "40")
-    assert bore("NPS 4", "80")[0] == nearest_pipe(NPS=4, schedule="80")[1]
+        assert pipe_bore(dn, "40") == pipe_bore(nps, "40")
+    assert pipe_bore("NPS 4", "80")[0] == nearest_pipe(NPS=4, schedule="80")[1]
 
 
 @pytest.mark.parametrize("name", FITTINGS)
 def test_fittings_lose_what_crane_prints(name):
     d = 0.10226
     if name == "entrance":
-        assert loss([name], d) == 0.5
+        assert fittings_loss([name], d) == 0.5
     elif name == "bend-45":  # K = (n - 1)(0.25 pi f_T r/d + 0.5 K) + K with n = 1/2 and K = 14 f_T at r/d = 1.5
-        assert loss([name], d) == approx((14 - 0.5 * (0.25 * math.pi * 1.5 + 7)) * ft_Crane(d), rel=1e-2)
+        assert fittings_loss([name], d) == approx((14 - 0.5 * (0.25 * math.pi * 1.5 + 7)) * ft_Crane(d), rel=1e-2)
     else:
-        assert loss([name], d) == approx(CRANE[name] * ft_Crane(d), rel=1e-2)
+        assert fittings_loss([name], d) == approx(CRANE[name] * ft_Crane(d), rel=1e-2)
     assert ft_Crane(d) == approx(0.017, abs=1e-3)  # page A-26, NPS 4
-    assert loss([name, name], d) == approx(2 * loss([name], d))
+    assert fittings_loss([name, name], d) == approx(2 * fittings_loss([name], d))
 
 
 def line(**keys) -> dict:
@@ -71,7 +71,7 @@ def test_a_line_with_fittings_carries_what_their_losses_let_through(tmp_path):
     """q = A sqrt(2 dp / (rho K)); the resolved case says the numbers and runs again."""
     case = line(nominal="DN100", fittings=["entrance", "elbow-90", "elbow-90", "globe-valve"], minor_loss=1.0)
     result = fvsolve.run(case, out=tmp_path / "out")
-    d = bore("DN100", "40")[0]
+    d = pipe_bore("DN100", "40")[0]
     k = 1.0 + 0.5 + 400.0 * ft_Crane(d)
     assert result["line.flow"][0] == approx(math.pi / 4 * d**2 * math.sqrt(2 * 2e4 / (WATER["density"] * k)), rel=1e-9)
     said = tomllib.loads((tmp_path / "out" / "case.toml").read_text(encoding="utf-8"))["links"]["line"]
@@ -87,7 +87,7 @@ def test_the_wall_of_a_nominal_size_makes_its_wave_speed():
             "wall": {"youngs_modulus": "200 GPa"}}  # fmt: skip
     case = fvsolve.load({**line(diameter=1.0), "nodes": {"up": reservoir(2e5), "down": reservoir(2e5)},
                          "links": {"line": pipe}})  # fmt: skip
-    d, e = bore("DN100", "40")
+    d, e = pipe_bore("DN100", "40")
     softness = 1 / WATER["bulk_modulus"] + d / (200e9 * e)
     assert fvsolve.build(case).pipes[0].wave_speed == approx(1 / math.sqrt(softness * WATER["density"]), rel=1e-12)
 
@@ -121,7 +121,7 @@ FRACTIONS = {
 
 @pytest.mark.parametrize("said", FRACTIONS)
 def test_a_fraction_names_the_size_that_its_decimal_does(said):
-    assert bore(f"NPS {said}", "40") == bore(f"nps{FRACTIONS[said]}", "40") == nearest(FRACTIONS[said])
+    assert pipe_bore(f"NPS {said}", "40") == pipe_bore(f"nps{FRACTIONS[said]}", "40") == nearest(FRACTIONS[said])
 
 
 def nearest(inches: str) -> tuple[float, float]:
@@ -132,4 +132,4 @@ def nearest(inches: str) -> tuple[float, float]:
 @pytest.mark.parametrize("said", ["NPS 1/0", "NPS 1/", "NPS /2", "NPS 1--1/2", "NPS 1/2/4", "NPS 1-1.5", "NPS -1/2"])
 def test_what_is_no_fraction_is_no_size(said):
     with pytest.raises(ValueError, match="is not a nominal size"):
-        bore(said, "40")
+        pipe_bore(said, "40")

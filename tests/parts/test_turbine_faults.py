@@ -16,7 +16,7 @@ from fvsolve.errors import CaseError
 from fvsolve.parts.turbine import law_chart
 from fvsolve.parts.turbine.hill_chart import HillChartValue
 from fvsolve.parts.turbine.lower_chart import chart_numbers
-from fvsolve.parts.value import Setting
+from fvsolve.parts.value import ReadContext
 
 HALF = {"opening": 0.5, "unit_speed": [40, 60, 90], "unit_flow": [0.52, 0.5, 0.41], "efficiency": [0.7, 0.85, 0.6]}
 FULL = {"opening": 1.0, "unit_speed": [45, 95], "unit_flow": [0.95, 0.8], "unit_torque": [1500, 700]}
@@ -149,7 +149,7 @@ def test_at_any_speed_flow_and_opening_it_loses_power_and_nothing_jumps():
     draw, tried = np.random.default_rng(5), 0
     for _ in range(80):
         try:
-            chart = HillChartValue().read(random_chart(draw), Setting())
+            chart = HillChartValue().read(random_chart(draw), ReadContext())
             fvsolve.load(case(chart.table()))
         except (CaseError, ValueError):
             continue

@@ -10,7 +10,7 @@ import pytest
 from reference import folders
 from reference.lines import printed_otherwise, python_of
 
-from fvsolve.parts.attitude import Attitude
+from fvsolve.parts.attitude_keys import Attitude
 
 PAGE = folders.page("attitudes")
 FORMS = re.findall(r"^attitude = .*$", PAGE, re.MULTILINE)

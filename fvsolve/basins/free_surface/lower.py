@@ -14,8 +14,8 @@ from fvsolve.basins.free_surface.observe import DEPTH
 from fvsolve.basins.free_surface.rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.basins.lower_pieces import MARKED, TURNING
-from fvsolve.case.cells import means, samples
-from fvsolve.case.riding import free_joints
+from fvsolve.case.basins_on_bodies import free_joints
+from fvsolve.case.cell_means import means, samples
 from fvsolve.errors import Notice
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms

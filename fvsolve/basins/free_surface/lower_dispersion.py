@@ -117,10 +117,10 @@ def watches(basin, y: np.ndarray) -> list[Watch]:
 def deep(basin) -> list[Notice]:
     """Notice if water in a basin on a body is too deep for shallow-water theory, with the better model."""
     mode = slowest(basin.part, basin.mesh) if basin.part.on else None
-    if mode is None or mode.fast <= 100.0 * WRONG:
+    if mode is None or mode.excess <= 100.0 * WRONG:
         return []
     text = (
-        f"{basin.name}: in shallow-water theory the slowest wave is {mode.fast:.2g} % too fast "
-        f'(k h = {mode.deep:.2g}); sloshing = "modes" is correct for small waves'
+        f"{basin.name}: in shallow-water theory the slowest wave is {mode.excess:.2g} % too fast "
+        f'(k h = {mode.kh:.2g}); sloshing = "modes" is correct for small waves'
     )
-    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * mode.fast, WRONG)]
+    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * mode.excess, WRONG)]

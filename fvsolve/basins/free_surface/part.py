@@ -7,14 +7,16 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.parts.basin.part import MOVES, MovingStart, Physics
-from fvsolve.parts.formula import Formula, Shaped
-from fvsolve.parts.value import VALUE, Quantity, Usual, anything, nonnegative
+from fvsolve.parts.formula import SpatialField, SpatialFieldKey
+from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, nonnegative
 
 
 class SurfaceStart(MovingStart):
     """Start of water that is not at rest."""
 
-    level: Annotated[Formula | None, Shaped("length", "level of the free surface above the elevation [m]")] = None
+    level: Annotated[
+        SpatialField | None, SpatialFieldKey("length", "level of the free surface above the elevation [m]")
+    ] = None
 
 
 class FreeSurface(Physics, name="free-surface"):
@@ -37,20 +39,21 @@ class FreeSurface(Physics, name="free-surface"):
         Quantity("level", anything, "level of the water at rest above the elevation [m]; required for a free surface"),
     ]
     bed: Annotated[
-        Formula | None, Shaped("length", "height of the bed above the elevation [m], free surface; default 0")
+        SpatialField | None,
+        SpatialFieldKey("length", "height of the bed above the elevation [m], free surface; default 0"),
     ] = None
     manning: Annotated[
         float | None,
         Quantity(
             "number", nonnegative, "Manning's n [s/m^(1/3)], free surface; default: no friction",
-            Usual(0.005, 0.5, "glass to dense brush"), VALUE,
+            UsualRange(0.005, 0.5, "glass to dense brush"), VALUE,
         ),
     ] = None  # fmt: skip
     factor: Annotated[
         float | None,
         Quantity(
             "number", nonnegative, "Darcy friction factor, instead of manning [-], free surface; default: no friction",
-            Usual(0.002, 3.0, "glass to boulders"), VALUE,
+            UsualRange(0.002, 3.0, "glass to boulders"), VALUE,
         ),
     ] = None  # fmt: skip
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.basin.part import MOVES, MovingStart, Physics
-from fvsolve.parts.formula import Formula, Shaped
+from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.value import Quantity, positive
 
 
@@ -13,7 +13,7 @@ class LiquidStart(MovingStart):
     """Start of a liquid that is not at rest."""
 
     pressure: Annotated[
-        Formula | None, Shaped("pressure_drop", "pressure of a liquid above the pressure at rest [Pa]")
+        SpatialField | None, SpatialFieldKey("pressure_drop", "pressure of a liquid above the pressure at rest [Pa]")
     ] = None
 
 

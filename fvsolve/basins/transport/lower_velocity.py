@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fvsolve.errors import Fault, MeshError, did_you_mean, listing
-from fvsolve.parts.csv_rows import Misread, read_rows
+from fvsolve.parts.csv_rows import CsvError, read_rows
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
@@ -168,9 +168,9 @@ def _columns(path: Path) -> dict[str, np.ndarray]:
     try:
         rows = read_rows(path)
         if set(rows.names) not in map(set, COLUMNS) or len(rows.names) not in map(len, COLUMNS):
-            raise Misread(path.name, f"its header is {', '.join(rows.header)}; expected x, y, u, v or x, y, psi", 1)
+            raise CsvError(path.name, f"its header is {', '.join(rows.header)}; expected x, y, u, v or x, y, psi", 1)
         columns = {name: rows.numbers(k, DIMENSIONS[name]) for k, name in enumerate(rows.names)}
-    except Misread as error:
+    except CsvError as error:
         raise MeshError([Fault("", error.message, error.line)], str(path)) from None
     except ValueError as error:
         raise MeshError([Fault("", str(error))], str(path)) from None

@@ -10,9 +10,9 @@ import numpy as np
 
 from fvsolve.errors import listing
 from fvsolve.parts.basin.part import File, Physics
-from fvsolve.parts.formula import Formula, Shaped
-from fvsolve.parts.table import read_keys
-from fvsolve.parts.value import PROFILE, Misfit, Quantity, Rows, Setting, Text, Value, positive
+from fvsolve.parts.formula import SpatialField, SpatialFieldKey
+from fvsolve.parts.table_model import read_keys
+from fvsolve.parts.value import PROFILE, Quantity, ReadContext, Rows, Text, Value, ValueFault, positive
 from fvsolve.units import show
 
 
@@ -55,7 +55,7 @@ class Flowing(Value):
     takes = "`{ u, v }`, `{ stream }`, `{ expression, ... }` or `{ file }`, and `period`"
     changes = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> Velocity:
+    def read(self, given: Any, setting: ReadContext) -> Velocity:
         if isinstance(given, Velocity):
             return given
         forms = [way for way in ("u", "v", "stream", "expression", "file") if isinstance(given, dict) and way in given]
@@ -74,10 +74,10 @@ class Flowing(Value):
         known = {"u, v": ("u", "v"), "stream": ("stream",), "file": ("file",)}.get(way, tuple(keys))
         faults = [((key,), f"unknown key; expected {listing([*known, 'period'])}") for key in keys if key not in known]
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         if way in ("u, v", "stream"):
             of = "number" if way == "stream" else "velocity"
-            keys = {key: Shaped(of).read(keys.get(key, 0.0), setting) for key in known}
+            keys = {key: SpatialFieldKey(of).read(keys.get(key, 0.0), setting) for key in known}
         elif way == "expression":
             own = {key: entry for key, entry in keys.items() if key in PARAMETERS}
             keys |= read_keys(own, {key: (PARAMETERS[key], None) for key in own}, setting)
@@ -99,7 +99,7 @@ class Transport(Physics, name="transport"):
     ] = None
 
     @classmethod
-    def shapes(cls, basin, mesh) -> Iterator[tuple[tuple[str, ...], Formula, np.ndarray]]:
+    def shapes(cls, basin, mesh) -> Iterator[tuple[tuple[str, ...], SpatialField, np.ndarray]]:
         for key, formula in basin.velocity.given.items():
-            if isinstance(formula, Formula):
+            if isinstance(formula, SpatialField):
                 yield ("velocity", key), formula, mesh.points if key == "stream" else mesh.middle

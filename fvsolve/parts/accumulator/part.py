@@ -6,17 +6,17 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.accumulator.shape import LEVELS, UPRIGHT, Compressor, height_of
-from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.connection.part import Connection, Joined, joined
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
-from fvsolve.parts.table import Inside, at_least_one
+from fvsolve.parts.table_model import Nested, at_least_one
 from fvsolve.parts.tank.part import Surface
-from fvsolve.parts.value import Number, Quantity, Range, Usual, nonnegative, positive
+from fvsolve.parts.value import Number, Quantity, Range, UsualRange, nonnegative, positive
 
-VOLUMES = Usual(1e-7, 1e5, "pilot accumulators to air cushions in rock")
-GAS = Usual(1e4, 2e8, "vacuum to test rigs")
-EXPONENTS = Usual(1.0, 2.0, "isothermal to adiabatic real gases")
+VOLUMES = UsualRange(1e-7, 1e5, "pilot accumulators to air cushions in rock")
+GAS = UsualRange(1e4, 2e8, "vacuum to test rigs")
+EXPONENTS = UsualRange(1.0, 2.0, "isothermal to adiabatic real gases")
 FORMS = ("diameter", "area")  # keys that define a shape
 OF_SHAPE = ("level", "slope", "bottom", "compressor")  # keys that have no effect without a shape
 START = ("precharge", "gas_volume", "level")  # keys that determine the amount of gas
@@ -37,7 +37,7 @@ class Accumulator(Node, kind="accumulator"):
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (START, FORMS)
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
     fixes_pressure: ClassVar[bool] = True
-    meant: ClassVar[dict[str, str]] = {
+    synonyms: ClassVar[dict[str, str]] = {
         "height": "volume, from which it follows", "length": "volume, from which it follows", "inclination": "slope",
         "base": "bottom", "initial_level": "level", "liquid_level": "level", "gas_exponent": "exponent",
     }  # fmt: skip
@@ -72,21 +72,21 @@ class Accumulator(Node, kind="accumulator"):
     diameter: Annotated[
         float | None,
         Quantity("length", positive, "diameter of a cylinder with flat ends, whose length follows from volume [m]",
-                 Usual(0.01, 10.0, "pilot vessels to field-built ones")),
+                 UsualRange(0.01, 10.0, "pilot vessels to field-built ones")),
     ] = None  # fmt: skip
     slope: Annotated[
         float | None,
         Quantity("angle", nonnegative, "angle of the axis above the horizontal [rad]; upright if left out",
-                 Usual(0.0, UPRIGHT, "horizontal to upright")),
+                 UsualRange(0.0, UPRIGHT, "horizontal to upright")),
     ] = None  # fmt: skip
     area: Annotated[Any, Surface()] = None
     bottom: Annotated[
         float | None,
         Quantity("length", about="height of the lowest point above the elevation of the node [m]; 0 if left out",
-                 usual=Usual(-50.0, 50.0, "below or above the line")),
+                 usual=UsualRange(-50.0, 50.0, "below or above the line")),
     ] = None  # fmt: skip
     compressor: Annotated[
-        Compressor | None, Inside(Compressor, "compressor that adds gas at a high level; none if left out")
+        Compressor | None, Nested(Compressor, "compressor that adds gas at a high level; none if left out")
     ] = None
     exponent: Annotated[
         float, Number(Range(1.0), "polytropic exponent n in p V^n: 1 isothermal, 1.4 adiabatic air", EXPONENTS)
@@ -125,11 +125,11 @@ class Accumulator(Node, kind="accumulator"):
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
         return joined(name, self, Junction.model_construct(elevation=self.elevation))
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if (self.gas_volume or 0.0) > self.volume:
             yield ("gas_volume",), f"{self.gas_volume:g} m3 is greater than volume, {self.volume:g} m3"
         if self.initial_pressure is not None:
-            yield from around.vacuum("nodes", name, "initial_pressure", [self.initial_pressure])
+            yield from around.boiling_faults("nodes", name, "initial_pressure", [self.initial_pressure])
         if not self.shaped:
             return
         if self.slope is not None and self.slope > UPRIGHT:

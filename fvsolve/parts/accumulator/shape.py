@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any
 
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import Quantity, Usual, nonnegative, positive
+from fvsolve.parts.table_model import Table
+from fvsolve.parts.value import Quantity, UsualRange, nonnegative, positive
 
-LEVELS = Usual(0.0, 50.0, "pilot vessels to towers")
+LEVELS = UsualRange(0.0, 50.0, "pilot vessels to towers")
 UPRIGHT = 0.5 * math.pi
 
 
@@ -23,7 +23,7 @@ class Compressor(Table):
         float,
         Quantity(
             "flow", positive, "flow of free air, at ambient pressure and the initial temperature of the gas [m3/s]",
-            Usual(1e-5, 10.0, "workshops to stations"),
+            UsualRange(1e-5, 10.0, "workshops to stations"),
         ),
     ]  # fmt: skip
 

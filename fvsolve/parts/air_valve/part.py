@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.connection.part import Connection, behind
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
-from fvsolve.parts.value import Number, Quantity, Usual, between, positive
+from fvsolve.parts.value import Number, Quantity, UsualRange, between, positive
 
 BORE = between(0, 1, open=True)  # m; a plain 50 would be in mm
 BODY = 3.0  # diameter and length of the float chamber if its volume is not given, in inlet diameters
@@ -43,7 +43,7 @@ class AirValve(Node, kind="air-valve"):
             "pressure_drop",
             positive,
             "gauge pressure of the air above which it leaves through throttled_outlet instead of outlet",
-            Usual(100.0, 1e5, "anti-slam discs"),
+            UsualRange(100.0, 1e5, "anti-slam discs"),
         ),
     ] = None
     switch_velocity: Annotated[
@@ -52,7 +52,7 @@ class AirValve(Node, kind="air-valve"):
             "velocity",
             positive,
             "fluid velocity towards the valve above which air leaves through throttled_outlet, instead of switch [m/s]",
-            Usual(0.01, 20.0, "anti-slam discs"),
+            UsualRange(0.01, 20.0, "anti-slam discs"),
         ),
     ] = None
     throttled_outlet: Annotated[
@@ -75,7 +75,10 @@ class AirValve(Node, kind="air-valve"):
     temperature: Annotated[
         float,
         Quantity(
-            "temperature", positive, "constant temperature of the air [K]", Usual(220.0, 370.0, "outdoors to hot rooms")
+            "temperature",
+            positive,
+            "constant temperature of the air [K]",
+            UsualRange(220.0, 370.0, "outdoors to hot rooms"),
         ),
     ] = 293.15
 
@@ -92,7 +95,7 @@ class AirValve(Node, kind="air-valve"):
             faults.append((("throttled_outlet",), text))
         return faults
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if self.throttled_outlet is not None and not self.throttled_outlet < self.outlet:
             text = f"{self.throttled_outlet:g} m does not throttle; expected less than outlet, {self.outlet:g} m"
             yield ("throttled_outlet",), text

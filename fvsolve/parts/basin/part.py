@@ -12,20 +12,20 @@ import numpy as np
 from pydantic.fields import FieldInfo
 
 from fvsolve.errors import FvsolveError, listing
-from fvsolve.parts.attitude import Attitude
-from fvsolve.parts.formula import Formula, Shaped, even
-from fvsolve.parts.node import Node, Rider
-from fvsolve.parts.scalar import Carried
+from fvsolve.parts.attitude_keys import Attitude
+from fvsolve.parts.carried_scalar import ScalarValues
+from fvsolve.parts.formula import SpatialField, SpatialFieldKey, uniform
+from fvsolve.parts.node import Node, PlaceOnBody
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.table import Inside, Named, Table
+from fvsolve.parts.table_model import NamedTables, Nested, Table
+from fvsolve.parts.time_series import copy_name, find_file
 from fvsolve.parts.value import (
     SHAPE,
     VALUE,
     Choice,
     Quantity,
+    ReadContext,
     Rows,
-    Setting,
     Text,
     Value,
     nonnegative,
@@ -78,7 +78,7 @@ class Patch(Table):
         ),
     ] = None  # fmt: skip
     scalars: Annotated[
-        dict[str, Any], Carried("scalar values of the inflow, for a given velocity or an open boundary")
+        dict[str, Any], ScalarValues("scalar values of the inflow, for a given velocity or an open boundary")
     ] = {}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("boundary", "impedance"), ("body", "travel"))
 
@@ -94,7 +94,7 @@ class Cells(Value):
     about = "numbers of cells along x and y; a mesh is needed if left out"
     takes = "[whole number, whole number]"
 
-    def read(self, given: Any, setting: Setting) -> tuple[int, int]:
+    def read(self, given: Any, setting: ReadContext) -> tuple[int, int]:
         is_pair = isinstance(given, (list, tuple)) and len(given) == 2 and all(type(n) is int and n > 0 for n in given)
         if not is_pair:
             raise ValueError(f"{show(given)} is not a pair of cell numbers; expected for example [64, 32]")
@@ -107,7 +107,7 @@ class Holes(Value):
     about = "rectangles cut out of the basin, on grid lines"
     takes = "list of [x0, y0, x1, y1], m"
 
-    def read(self, given: Any, setting: Setting) -> tuple[tuple[float, ...], ...]:
+    def read(self, given: Any, setting: ReadContext) -> tuple[tuple[float, ...], ...]:
         if not isinstance(given, (list, tuple)) or (given and not isinstance(given[0], (list, tuple))):
             raise ValueError(f"{show(given)} is not a list of holes; expected [[x0, y0, x1, y1], ...]")
         return tuple(Rows("length", length=4).read(hole, setting) for hole in given)
@@ -119,7 +119,7 @@ class File(Value):
     def __init__(self, about: str) -> None:
         self.about = about
 
-    def read(self, given: Any, setting: Setting) -> str:
+    def read(self, given: Any, setting: ReadContext) -> str:
         return copy_name(find_file(Text().read(given, setting), setting), setting)
 
     def json(self) -> dict[str, Any]:
@@ -136,15 +136,15 @@ class MeshFile(Table):
 class MovingStart(Table):
     """Initial velocities of a physics that has them."""
 
-    u: Annotated[Formula, Shaped("velocity", "velocity along x [m/s]")] = even(0.0)
-    v: Annotated[Formula, Shaped("velocity", "velocity along y [m/s]")] = even(0.0)
+    u: Annotated[SpatialField, SpatialFieldKey("velocity", "velocity along x [m/s]")] = uniform(0.0)
+    v: Annotated[SpatialField, SpatialFieldKey("velocity", "velocity along y [m/s]")] = uniform(0.0)
 
 
 class StartOfFields(Table):
     """Initial fields of a basin that is not at rest; the keys are those of its physics."""
 
 
-class Place(Rider):
+class Place(PlaceOnBody):
     """A patch as a node: pressure of the cells behind it, flow into them."""
 
     fixes_pressure: ClassVar[bool] = True
@@ -237,7 +237,7 @@ class Physics(Table):
     def shapes(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
         """Formulas of its own keys: (keys, formula, points of evaluation, None for the means over all cells)."""
         for key in cls.model_fields:
-            if isinstance(shape := getattr(basin, key), Formula):
+            if isinstance(shape := getattr(basin, key), SpatialField):
                 yield (key,), shape, None
 
     @classmethod
@@ -257,7 +257,7 @@ class Physics(Table):
         return law in (cls.laws or (law,))
 
 
-class Basin(Rider, kind="basin"):
+class Basin(PlaceOnBody, kind="basin"):
     """Fields in the plane between walls, joined to the network by patches."""
 
     fixes_pressure: ClassVar[bool] = True
@@ -284,22 +284,22 @@ class Basin(Rider, kind="basin"):
     holes: Annotated[Any, Holes()] = None
     mesh: Annotated[
         MeshFile | None,
-        Inside(MeshFile, "mesh file (any format of meshio) and the unit of its coordinates, instead of a rectangle"),
+        Nested(MeshFile, "mesh file (any format of meshio) and the unit of its coordinates, instead of a rectangle"),
     ] = None
-    patches: Annotated[Any, Named(Patch, "named parts of the boundary: { outlet = { side, span } }")] = {}
+    patches: Annotated[Any, NamedTables(Patch, "named parts of the boundary: { outlet = { side, span } }")] = {}
     start: Annotated[
         StartOfFields | None,
-        Inside(
+        Nested(
             StartOfFields, "initial level, or pressure above the pressure at rest, and velocities; at rest if left out"
         ),
     ] = None
 
-    attitude: Annotated[Attitude | None, Inside(Attitude, "attitude of its axes relative to those of its body")] = None
+    attitude: Annotated[Attitude | None, Nested(Attitude, "attitude of its axes relative to those of its body")] = None
     sloshing: Annotated[
         str, Choice("sloshing", SLOSHING, "model of the water on a body: frozen (rigid), linear modes, or cells")
     ] = "cells"
     scalars: Annotated[
-        dict[str, Any], Carried("scalar values at the start, formulas of x and y", Shaped("number"))
+        dict[str, Any], ScalarValues("scalar values at the start, formulas of x and y", SpatialFieldKey("number"))
     ] = {}
 
     @property

@@ -7,21 +7,21 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.attitude import Attitude, no_direction, uneven
+from fvsolve.parts.attitude_keys import Attitude, is_zero_vector, length_notices
 from fvsolve.parts.body.points import Inertia, PlacesByName
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
-from fvsolve.parts.table import Inside, Table
+from fvsolve.parts.table_model import Nested, Table
 from fvsolve.parts.value import (
     PROFILE,
     Choice,
-    Misfit,
     Quantity,
+    ReadContext,
     Rows,
-    Setting,
     Text,
-    Usual,
+    UsualRange,
     Value,
+    ValueFault,
     nonnegative,
     positive,
 )
@@ -57,7 +57,7 @@ class OfJoint(Value):
     def __init__(self, dimension: str, about: str) -> None:
         self.dimension, self.about = dimension, about
 
-    def read(self, given: Any, setting: Setting) -> float | tuple[float, ...]:
+    def read(self, given: Any, setting: ReadContext) -> float | tuple[float, ...]:
         if isinstance(given, (list, tuple)):
             return Rows(self.dimension, length=3).read(given, setting)
         return Quantity(self.dimension).read(given, setting)
@@ -83,7 +83,7 @@ class Joint(Table):
         tuple[float, ...] | None,
         Rows("position", length=3, about="position of the joint in the axes of `on` [m]; 0 if left out"),
     ] = None
-    attitude: Annotated[Attitude, Inside(Attitude, "attitude of the joint axes relative to those of `on`")] = Attitude()
+    attitude: Annotated[Attitude, Nested(Attitude, "attitude of the joint axes relative to those of `on`")] = Attitude()
     axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of motion in the joint axes")] = None
     angle: Annotated[
         Schedule | None,
@@ -130,7 +130,7 @@ class Joint(Table):
         if kind == "free" and "on" in given:
             faults.append((("on",), "is not valid for a free joint, which has no carrier; remove it"))
         if isinstance(given.get("axis"), (list, tuple)) and len(given["axis"]) == 3:
-            if all(isinstance(x, (int, float)) for x in given["axis"]) and no_direction(given["axis"]):
+            if all(isinstance(x, (int, float)) for x in given["axis"]) and is_zero_vector(given["axis"]):
                 faults.append((("axis",), "is all zeros; expected a direction, for example [0, 1, 0]"))
         if "at" in given and isinstance(given.get("on"), str) and "." in given["on"]:
             faults.append(
@@ -139,7 +139,7 @@ class Joint(Table):
         return faults
 
     @classmethod
-    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """The table with rate, damping and stiffness read in the units of its kind of joint."""
         kind, result, faults = given.get("kind", "free"), dict(given), []
         rate, damping, stiffness = SLIDING if kind == "prismatic" else TURNING
@@ -150,7 +150,7 @@ class Joint(Table):
             try:
                 if key in given:
                     result[key] = value.read(given[key], setting)
-            except Misfit as error:
+            except ValueFault as error:
                 faults += [((key, *below), text) for below, text in error.faults]
             except ValueError as error:
                 faults.append(((key,), str(error)))
@@ -159,11 +159,11 @@ class Joint(Table):
             if key in given:
                 faults.append(((key,), f"has no effect, because {driven[0]} is driven by a schedule; remove it"))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return result
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        yield from uneven("axis", self.axis)
+        yield from length_notices("axis", self.axis)
 
     @property
     def driven(self) -> Schedule | None:
@@ -210,13 +210,13 @@ class Body(Node, kind="body"):
     }  # fmt: skip
 
     mass: Annotated[float, Quantity("mass", positive, "mass of the body and all that is fixed to it [kg]",
-                                    Usual(1e-6, 1e9, "poppets to ships"))]  # fmt: skip
+                                    UsualRange(1e-6, 1e9, "poppets to ships"))]  # fmt: skip
     inertia: Annotated[Any, Inertia()]
     centre_of_mass: Annotated[
         tuple[float, ...], Rows("position", length=3, about="centre of mass in the axes of the body [m]")
     ] = (0.0, 0.0, 0.0)
     points: Annotated[dict[str, tuple[float, ...]], PlacesByName()] = {}
-    joint: Annotated[Joint, Inside(Joint, "joint to another body or the world")] = Joint()
+    joint: Annotated[Joint, Nested(Joint, "joint to another body or the world")] = Joint()
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:

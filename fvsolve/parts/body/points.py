@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.parts.value import Matrix, Misfit, Rows, Setting, Value, nonnegative
+from fvsolve.parts.value import Matrix, ReadContext, Rows, Value, ValueFault, nonnegative
 from fvsolve.units import show
 
 SLACK = 1e-6  # share of the largest moment: tolerance of the triangle inequality for numbers of six digits
@@ -21,7 +21,7 @@ class PlacesByName(Value):
     def __init__(self, about: str = "points for links, in the axes of the body [m]") -> None:
         self.about = about
 
-    def read(self, given: Any, setting: Setting) -> dict[str, tuple[float, ...]]:
+    def read(self, given: Any, setting: ReadContext) -> dict[str, tuple[float, ...]]:
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table; expected {{ NAME = [x, y, z] }}")
         points, faults = {}, []
@@ -30,12 +30,12 @@ class PlacesByName(Value):
                 faults.append(((name,), f"{show(name)} is not a valid name; a name has letters, digits, _ and -"))
             try:
                 points[name] = Rows("position", length=3).read(place, setting)
-            except Misfit as error:
+            except ValueFault as error:
                 faults += [((name, *below), text) for below, text in error.faults]
             except ValueError as error:
                 faults.append(((name,), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return points
 
     def below(self, key: str) -> Value:
@@ -52,7 +52,7 @@ class Inertia(Value):
     takes = "[kg m2, kg m2, kg m2], or three such rows"
     changes = "profile"
 
-    def read(self, given: Any, setting: Setting) -> tuple:
+    def read(self, given: Any, setting: ReadContext) -> tuple:
         if not isinstance(given, (list, tuple)) or len(given) != 3:
             raise ValueError(
                 f"{show(given)} is not an inertia; expected moments about x, y and z, or three rows of three"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import VALUE, Quantity, nonnegative
 
@@ -20,7 +20,7 @@ class Bushing(TwoPort, kind="bushing"):
     joins: ClassVar[dict[str, str]] = {"from": "spatial", "to": "spatial"}
     quantities: ClassVar[dict[str, str]] = {"gap": "length", "force": "force", "torque": "torque"}
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if not any((self.stiffness, self.damping, self.rotational_stiffness, self.rotational_damping)):
             yield (
                 ("stiffness",),

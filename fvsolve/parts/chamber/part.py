@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.node import Rider
-from fvsolve.parts.value import VALUE, Quantity, Usual, positive
+from fvsolve.parts.context import CaseContext, Faults
+from fvsolve.parts.node import PlaceOnBody
+from fvsolve.parts.value import VALUE, Quantity, UsualRange, positive
 
 
-class Chamber(Rider, kind="chamber"):
+class Chamber(PlaceOnBody, kind="chamber"):
     """A rigid vessel full of fluid, (V / beta) dp/dt = net flow into it (80).
 
     Ports: any number. Stored energy, p from ambient: V p^2 / (2 beta) [J] under the linear law,
@@ -20,12 +20,13 @@ class Chamber(Rider, kind="chamber"):
     fixes_pressure: ClassVar[bool] = True
 
     volume: Annotated[
-        float, Quantity("volume", positive, "volume of fluid [m3]", Usual(1e-10, 1e5, "cylinders to caverns"), VALUE)
+        float,
+        Quantity("volume", positive, "volume of fluid [m3]", UsualRange(1e-10, 1e5, "cylinders to caverns"), VALUE),
     ]
     initial_pressure: Annotated[
         float | None, Quantity("pressure", about="pressure at the start [Pa]; in equilibrium if left out")
     ] = None
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if self.initial_pressure is not None:
-            yield from around.vacuum("nodes", name, "initial_pressure", [self.initial_pressure])
+            yield from around.boiling_faults("nodes", name, "initial_pressure", [self.initial_pressure])

@@ -8,8 +8,18 @@ from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.disc.part import DROPS, Disc
 from fvsolve.parts.link import TwoPort
-from fvsolve.parts.table import keys_json, read_keys
-from fvsolve.parts.value import NEEDED, Misfit, Quantity, Rows, Setting, Value, check_rising, nonnegative, positive
+from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.parts.value import (
+    NEEDED,
+    Quantity,
+    ReadContext,
+    Rows,
+    Value,
+    ValueFault,
+    check_increasing,
+    nonnegative,
+    positive,
+)
 from fvsolve.parts.valve.part import Sized
 
 
@@ -38,7 +48,7 @@ class Slams(Value):
         "reverse_velocity": (Rows("velocity", nonnegative), NEEDED),
     }
 
-    def read(self, given: Any, setting: Setting) -> SlamCurve:
+    def read(self, given: Any, setting: ReadContext) -> SlamCurve:
         if isinstance(given, SlamCurve):
             return given
         if not isinstance(given, dict):
@@ -50,11 +60,11 @@ class Slams(Value):
                 (("reverse_velocity",), f"{len(velocity)} values for {len(rate)} rates; expected equal numbers")
             )
         try:
-            check_rising(rate, given["rate"], "rates")
+            check_increasing(rate, given["rate"], "rates")
         except ValueError as error:
             faults.append((("rate",), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return SlamCurve(rate, velocity)
 
     def json(self) -> dict[str, Any]:

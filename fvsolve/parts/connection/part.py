@@ -6,8 +6,8 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.link import TwoPort
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import SHAPE, Number, Quantity, Setting, Usual, Value, positive
+from fvsolve.parts.table_model import Table
+from fvsolve.parts.value import SHAPE, Number, Quantity, ReadContext, UsualRange, Value, positive
 from fvsolve.units import show
 
 
@@ -18,11 +18,12 @@ class Connection(Table):
     needs: ClassVar[tuple[tuple[str, ...], ...]] = (("area", "diameter"),)
 
     area: Annotated[
-        float | None, Quantity("area", positive, "area of the throat [m2]", Usual(1e-9, 200.0, "capillaries to shafts"))
+        float | None,
+        Quantity("area", positive, "area of the throat [m2]", UsualRange(1e-9, 200.0, "capillaries to shafts")),
     ] = None
     diameter: Annotated[
         float | None,
-        Quantity("length", positive, "diameter of the throat [m]", Usual(5e-5, 14.0, "capillaries to shafts")),
+        Quantity("length", positive, "diameter of the throat [m]", UsualRange(5e-5, 14.0, "capillaries to shafts")),
     ] = None
     # shape: with equal losses a pipe end has other roots
     loss_in: Annotated[
@@ -40,7 +41,7 @@ class Joined(Value):
     about = "throat with a loss for each flow direction; joined without loss if left out"
     takes = "[connection](#connection)"
 
-    def read(self, given: Any, setting: Setting) -> Connection:
+    def read(self, given: Any, setting: ReadContext) -> Connection:
         if isinstance(given, Connection):
             return given
         if not isinstance(given, dict):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.chamber.part import Chamber
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Link, Ports
-from fvsolve.parts.value import PROFILE, VALUE, Quantity, Usual, nonnegative, positive
+from fvsolve.parts.value import PROFILE, VALUE, Quantity, UsualRange, nonnegative, positive
 
-SIZES = Usual(5e-4, 30.0, "micro-hydraulics to ship lifts")
-AREAS = Usual(1e-7, 30.0, "micro-hydraulics to presses")
+SIZES = UsualRange(5e-4, 30.0, "micro-hydraulics to ship lifts")
+AREAS = UsualRange(1e-7, 30.0, "micro-hydraulics to presses")
 
 
 class Cylinder(Link, kind="cylinder"):
@@ -90,11 +90,11 @@ class Cylinder(Link, kind="cylinder"):
             faults.append((("rod_diameter",), "needs piston_diameter; with area_A give area_B instead"))
         return faults
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         for place, pressure in (("A", self.initial_pressure_A), ("B", self.initial_pressure_B)):
             if pressure is not None:
-                yield from around.vacuum("links", name, f"initial_pressure_{place}", [pressure])
-        if (distance := around.ahead(self, "case", "rod")) is None:
+                yield from around.boiling_faults("links", name, f"initial_pressure_{place}", [pressure])
+        if (distance := around.separation(self, "case", "rod")) is None:
             return
         x, (rod, case) = distance - self.closed_length, (self.ports["rod"], self.ports["case"])
         if not 0.0 <= x <= self.stroke:

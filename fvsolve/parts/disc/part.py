@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fvsolve.parts.table import Table, at_most_one
-from fvsolve.parts.value import VALUE, Number, Quantity, Usual, nonnegative, positive
+from fvsolve.parts.table_model import Table, at_most_one
+from fvsolve.parts.value import VALUE, Number, Quantity, UsualRange, nonnegative, positive
 
-DROPS = Usual(20.0, 1e8, "millimetres of water to the springs of test rigs")
+DROPS = UsualRange(20.0, 1e8, "millimetres of water to the springs of test rigs")
 
 
 class Disc(Table):
@@ -22,7 +22,7 @@ class Disc(Table):
             "time",
             positive,
             "time constant of its disc, damping over stiffness [s]; no delay if left out",
-            Usual(1e-6, 300.0, "poppets to damped flaps"),
+            UsualRange(1e-6, 300.0, "poppets to damped flaps"),
             VALUE,
         ),
     ] = None
@@ -32,7 +32,7 @@ class Disc(Table):
             "frequency",
             positive,
             "undamped natural frequency of its disc, instead of time_constant [Hz]",
-            Usual(1e-2, 2e4, "flaps to poppets"),
+            UsualRange(1e-2, 2e4, "flaps to poppets"),
             VALUE,
         ),
     ] = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Coupling
 from fvsolve.parts.value import VALUE, Quantity, nonnegative, positive
 
@@ -27,6 +27,6 @@ class EndStop(Coupling, kind="end-stop"):
         float | None, Quantity("position", about="x_to - x_from above which the stop acts [m]", changes=VALUE)
     ] = None
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if None not in (self.minimum, self.maximum) and self.minimum >= self.maximum:
             yield ("maximum",), f"{self.maximum:g} m is not above minimum, {self.minimum:g} m"

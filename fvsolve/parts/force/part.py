@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.attitude import no_direction, uneven
+from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Coupling
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Rows, Text
@@ -37,8 +37,8 @@ class Force(Coupling, kind="force"):
         """Port name -> place."""
         return {"to": self.to} if self.from_ is None else super().ports
 
-    def faults(self, name: str, around: Around) -> Faults:
-        if no_direction(self.direction):
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        if is_zero_vector(self.direction):
             yield ("direction",), "is all zeros; expected for example [0, 0, -1]"
         if around.spatial(self.to) and self.from_ is None and self.direction is None:
             yield (
@@ -52,4 +52,4 @@ class Force(Coupling, kind="force"):
             )
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        yield from uneven("direction", self.direction)
+        yield from length_notices("direction", self.direction)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.node import Rider
+from fvsolve.parts.node import PlaceOnBody
 from fvsolve.parts.schedule import Schedule, Scheduled
 
 
-class Inflow(Rider, kind="inflow"):
+class Inflow(PlaceOnBody, kind="inflow"):
     """A node without volume that supplies `flow(t)` to its links.
 
     Ports: any number. Stored energy: none. Dissipated energy: none; it supplies p times flow [W].

@@ -6,14 +6,14 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.node import Rider
+from fvsolve.parts.context import CaseContext, Faults
+from fvsolve.parts.node import PlaceOnBody
 from fvsolve.parts.outlet.part import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import Number, Quantity, between
 
 
-class Junction(Rider, kind="junction"):
+class Junction(PlaceOnBody, kind="junction"):
     """A node without volume: the flows into its links and its demand sum to zero.
 
     Ports: any number. Stored energy: none. Dissipated energy: none; the demand removes p demand [W].
@@ -52,7 +52,7 @@ class Junction(Rider, kind="junction"):
         places, links = out_of(f"{name}.demand", name, **law)
         return {name: self.model_copy(update={"demand": constant(0.0), "required_pressure": None}), **places}, links
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         least = around.ambient if self.minimum_pressure is None else self.minimum_pressure
         if self.required_pressure is None:
             if self.minimum_pressure is not None:

@@ -6,11 +6,11 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Link
 from fvsolve.parts.outlet.part import out_of
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.value import Number, Text, Usual, between, positive
+from fvsolve.parts.value import Number, Text, UsualRange, between, positive
 
 
 class Leak(Link, kind="leak"):
@@ -24,7 +24,7 @@ class Leak(Link, kind="leak"):
 
     from_: Annotated[str, Text("place of the leak"), Field(alias="from")]
     coefficient: Annotated[
-        float, Number(positive, "flow in m3/s at a drop of 1 Pa", Usual(1e-15, 0.1, "seeping to a main torn off"))
+        float, Number(positive, "flow in m3/s at a drop of 1 Pa", UsualRange(1e-15, 0.1, "seeping to a main torn off"))
     ]
     exponent: Annotated[
         float, Number(between(0, 3, open=True), "exponent of the drop, 0.5 for a hole of fixed size")
@@ -42,7 +42,7 @@ class Leak(Link, kind="leak"):
         law = {"flow": self.coefficient * 1e5**self.exponent, "exponent": self.exponent, "opening": self.opening}
         return out_of(name, self.from_, **law)
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
             text = "is a reservoir, whose pressure a leak cannot change; expected a junction, a tank or another place"
             yield ("from",), f"{self.from_} {text}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 from fvsolve.parts.node import Node
-from fvsolve.parts.value import VALUE, Quantity, Usual, positive
+from fvsolve.parts.value import VALUE, Quantity, UsualRange, positive
 
 
 class Mass(Node, kind="mass"):
@@ -19,7 +19,7 @@ class Mass(Node, kind="mass"):
 
     mass: Annotated[
         float,
-        Quantity("mass", positive, "total moving mass [kg]", Usual(1e-6, 1e9, "poppets to ships"), VALUE),
+        Quantity("mass", positive, "total moving mass [kg]", UsualRange(1e-6, 1e9, "poppets to ships"), VALUE),
     ]
     initial_position: Annotated[
         float, Quantity("position", about="position at the start, along the common axis [m]")

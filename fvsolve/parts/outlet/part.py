@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Link, TwoPort
 from fvsolve.parts.node import Node
 from fvsolve.parts.value import Text
@@ -72,7 +72,7 @@ class Relieving(Sized, Link):
         place = f"{name}.outside"
         return {place: Outside.model_construct(level_of=self.from_)}, {name: self.model_copy(update={"to": place})}
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if self.to is None and getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":
             text = f"is a reservoir; a {self.kind} cannot relieve it. Expected a junction, a tank or another place"
             yield ("from",), f"{self.from_} {text}"

@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.attitude import no_direction, uneven
+from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.value import VALUE, Quantity, Rows, positive
 
@@ -35,12 +35,12 @@ class Pin(TwoPort, kind="pin"):
         float, Quantity("rate", positive, "rate at which a gap closes (Baumgarte stabilisation) [1/s]", changes=VALUE)
     ] = 10.0
 
-    def faults(self, name: str, around: Around) -> Faults:
-        if no_direction(self.axis):
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        if is_zero_vector(self.axis):
             yield ("axis",), "is all zeros; expected for example [0, 1, 0]"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        yield from uneven("axis", self.axis)
+        yield from length_notices("axis", self.axis)
 
     def directions(self) -> np.ndarray:
         """Constrained directions in the axes of `from` : float64[rows, 3]."""

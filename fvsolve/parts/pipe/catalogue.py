@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from fvsolve.parts.conduit import sized
-from fvsolve.parts.friction import DARCY, KEYS
+from fvsolve.parts.conduit import pipe_size
+from fvsolve.parts.friction_model import DARCY, KEYS_OF_MODEL
 from fvsolve.parts.pipe.classes import SCHEDULE, NoSize, no_class, rated
 from fvsolve.parts.pipe.materials import Material, materials
-from fvsolve.parts.value import Misfit
+from fvsolve.parts.value import ValueFault
 from fvsolve.units import parse, show
 
 STEELS = ("steel", "stainless-steel", "hydraulic-tube")
@@ -27,7 +27,7 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
     table, sources = {**given}, []
     if name is not None and material is None:  # reported where the key is read; nothing can be derived from it
         if isinstance(table.get("class"), str) and (text := no_class(table["class"])) is not None:
-            raise Misfit([(("class",), text)])
+            raise ValueFault([(("class",), text)])
         return {key: value for key, value in stood_in(table).items() if key not in ("class", "nominal")}
     if not all(isinstance(table.get(key, ""), str) for key in ("class", "nominal")):
         return stood_in(table)  # reported where the keys are read
@@ -51,7 +51,7 @@ def stood_in(given: dict[str, Any]) -> dict[str, Any]:
     if isinstance(given.get("wall"), dict):
         table["wall"] = {OF_WALL[0]: 1e11, "thickness": 0.01, **given["wall"]}
     friction = given.get("friction")
-    if isinstance(friction, dict) and DARCY[0] in KEYS.get(str(friction.get("model")), ()):
+    if isinstance(friction, dict) and DARCY[0] in KEYS_OF_MODEL.get(str(friction.get("model")), ()):
         table["friction"] = friction if any(key in friction for key in DARCY) else {**friction, DARCY[0]: 1e-4}
     return table
 
@@ -64,11 +64,11 @@ def _add_class(table: dict[str, Any], sources: list[str], material: str | None) 
         table["schedule"] = schedule[1]
         return
     if not isinstance(nominal, str):
-        raise Misfit([(("class",), f'{show(name)} needs a nominal size; give one, for example nominal = "DN300"')])
+        raise ValueFault([(("class",), f'{show(name)} needs a nominal size; give one, for example nominal = "DN300"')])
     try:
         size = rated(name, nominal, material)
     except ValueError as error:
-        raise Misfit([(("nominal" if isinstance(error, NoSize) else "class",), str(error))]) from None
+        raise ValueFault([(("nominal" if isinstance(error, NoSize) else "class",), str(error))]) from None
     del table["class"], table["nominal"]
     _size(table, size.diameter, size.thickness)
     if size.pressure is not None:
@@ -79,10 +79,10 @@ def _add_class(table: dict[str, Any], sources: list[str], material: str | None) 
 def _add_schedule(table: dict[str, Any], material: Material | None) -> None:
     """Add bore and wall of a steel pipe from its nominal size."""
     if material is not None and material.name not in STEELS:
-        raise Misfit([(("nominal",), f"is a steel size without class; expected a class for {material.name}")])
+        raise ValueFault([(("nominal",), f"is a steel size without class; expected a class for {material.name}")])
     try:
-        bore, thickness = sized(table["nominal"], table.get("schedule", "40"))
-    except Misfit:
+        bore, thickness = pipe_size(table["nominal"], table.get("schedule", "40"))
+    except ValueFault:
         return  # reported where the key is read
     del table["nominal"]
     table.pop("schedule", None)
@@ -109,7 +109,7 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
     if "thickness" not in wall:
         text = (f'wall thickness of {material.name} is missing. Give a class or schedule with nominal, wall = '
                 '{ thickness = "8 mm" }, or wave_speed')  # fmt: skip
-        raise Misfit([(("material",), text)])
+        raise ValueFault([(("material",), text)])
     table["wall"] = {**wall}
     for key in OF_WALL:
         if key not in wall and (figure := material.figures.get(key)) is not None:
@@ -123,7 +123,7 @@ def _add_roughness(table: dict[str, Any], sources: list[str], material: Material
     if not isinstance(friction, dict) or "lining" in table or any(key in friction for key in DARCY):
         return
     model = friction.get("model")
-    if isinstance(model, str) and DARCY[0] in KEYS.get(model, ()) and "roughness" in material.figures:
+    if isinstance(model, str) and DARCY[0] in KEYS_OF_MODEL.get(model, ()) and "roughness" in material.figures:
         figure = material.figures["roughness"]
         table["friction"] = {**friction, "roughness": figure.used}
         sources.append(figure.said)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fvsolve.parts.table import keys_json, read_keys
-from fvsolve.parts.value import NEEDED, SHAPE, VALUE, Setting, Value, positive
+from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.parts.value import NEEDED, SHAPE, VALUE, ReadContext, Value, positive
 from fvsolve.units import parse, show
 
 
@@ -32,7 +32,7 @@ class Positives(Value):
     dimension: str
     changes: str = VALUE
 
-    def read(self, given: Any, setting: Setting) -> tuple[float, ...]:
+    def read(self, given: Any, setting: ReadContext) -> tuple[float, ...]:
         if not isinstance(given, (list, tuple)) or not given:
             raise ValueError(f"{show(given)} is not a list of numbers; expected one number for each element")
         values = tuple(float(parse(raw, self.dimension)) for raw in given)
@@ -54,7 +54,7 @@ class Elements(Value):
     takes = "`{ compliance, time }`, lists of 1/Pa and s"
     changes = SHAPE
 
-    def read(self, given: Any, setting: Setting) -> Creep:
+    def read(self, given: Any, setting: ReadContext) -> Creep:
         if isinstance(given, Creep):
             return given
         if not isinstance(given, dict):

@@ -7,24 +7,24 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.carried_scalar import ScalarValues
 from fvsolve.parts.conduit import LENGTH, Conduit
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.pipe.profile import Profile, ProfileValue
 from fvsolve.parts.pipe.wall import MODULI, Lining, OfCatalogue, Restraint, Wall, WallOrRigid, wall_faults, yielding
-from fvsolve.parts.scalar import Carried
-from fvsolve.parts.table import Inside
+from fvsolve.parts.table_model import Nested
 from fvsolve.parts.value import (
-    COUNTED,
+    BY_CELLS,
     SHAPE,
     VALUE,
     Choice,
-    Misfit,
     Number,
     Quantity,
+    ReadContext,
     Rows,
-    Setting,
     Text,
-    Usual,
+    UsualRange,
+    ValueFault,
     Whole,
     between,
     positive,
@@ -38,7 +38,9 @@ ENDS = {"from": "begins", "to": "ends"}
 LINES = ("finite-volume", "delay-line", "auto")  # numerical methods for waves in a pipe
 
 
-WAVES = Usual(30.0, 2000.0, "soft hoses to stiff pipes")  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
+WAVES = UsualRange(
+    30.0, 2000.0, "soft hoses to stiff pipes"
+)  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
 SOFT = (  # (modulus [Pa], least wall over bore of such a pipe, text); the thinnest plastics are SDR 26
     (2e8, 0.1, "softer than any plastic, as rubber is"),
     (4e8, 0.04, "soft as low-density polyethylene"),
@@ -54,7 +56,7 @@ class Pipe(Conduit, kind="pipe"):
     """
 
     quantities: ClassVar[dict[str, str]] = {"flow": "flow", "force": "force"}
-    asked: ClassVar[tuple[str, ...]] = ("force",)
+    on_request: ClassVar[tuple[str, ...]] = ("force",)
     own_scalars: ClassVar[str] = "along"
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
         *Conduit.alternatives, ("wave_speed", "wall"), ("diameter", "class"), ("schedule", "class"),
@@ -74,7 +76,7 @@ class Pipe(Conduit, kind="pipe"):
         Rows("length", rising=True, about="chainages of bends, which divide the pipe into legs", changes=SHAPE),
     ] = None
     wave_speed: Annotated[
-        float | None, Quantity("velocity", positive, "wave speed, instead of wall [m/s]", WAVES, COUNTED)
+        float | None, Quantity("velocity", positive, "wave speed, instead of wall [m/s]", WAVES, BY_CELLS)
     ] = None
     wall: Annotated[Wall | Literal["rigid"] | None, WallOrRigid()] = None
     material: Annotated[str | None, OfCatalogue()] = None
@@ -83,12 +85,12 @@ class Pipe(Conduit, kind="pipe"):
         Text(
             'pressure class or schedule: "K9", "C40", "SDR11", "PN16", "schedule 40"; with nominal it sets bore, '
             "wall and allowable pressure",
-            COUNTED,
+            BY_CELLS,
         ),
         Field(alias="class"),
     ] = None
     restraint: Annotated[str | float | None, Restraint()] = None
-    lining: Annotated[Lining | None, Inside(Lining, "inner layer of the wall; diameter is the bore inside it")] = None
+    lining: Annotated[Lining | None, Nested(Lining, "inner layer of the wall; diameter is the bore inside it")] = None
     allowable_pressure: Annotated[
         float | None,
         Quantity(
@@ -114,7 +116,7 @@ class Pipe(Conduit, kind="pipe"):
             "(a delay line where its error bound is below numerics.delay_tolerance); numerics.pipe_model if left out",
         ),
     ] = None
-    scalars: Annotated[dict[str, Any], Carried("scalar values in the pipe at the start", Number())] = {}
+    scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the pipe at the start", Number())] = {}
 
     @property
     def yielding(self) -> tuple[tuple[float, float], ...]:
@@ -127,7 +129,7 @@ class Pipe(Conduit, kind="pipe"):
         return super().key_faults({"nominal": "", **given} if sized else given)
 
     @classmethod
-    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """Keys with names of catalogue and sizes replaced by numbers; Misfit for an unknown name."""
         faults, values = [], given
         if not CATALOGUE.isdisjoint(given):
@@ -135,23 +137,23 @@ class Pipe(Conduit, kind="pipe"):
 
             try:
                 values = from_catalogue(given)
-            except Misfit as error:
+            except ValueFault as error:
                 faults, values = error.faults, stood_in(given)
                 values = {key: value for key, value in values.items() if key not in ("nominal", "schedule", "class")}
-        for read in (super().in_numbers, along_profile):
+        for read in (super().resolve_keys, along_profile):
             try:
                 values = read(values, setting)
-            except Misfit as error:
+            except ValueFault as error:
                 faults = faults + error.faults
         if faults:
-            raise Misfit(faults, values)
+            raise ValueFault(faults, values)
         return values
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         yield from wall_faults(self)
         yield from self.profile_faults(around)
 
-    def profile_faults(self, around: Around) -> Faults:
+    def profile_faults(self, around: CaseContext) -> Faults:
         """Faults of the profile with respect to length and nodes."""
         if self.profile is None:
             return
@@ -180,14 +182,14 @@ class Pipe(Conduit, kind="pipe"):
                 return
 
 
-def along_profile(given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+def along_profile(given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
     """Add the length of the profile where none is given; Misfit with the faults of the profile."""
     if "profile" not in given:
         return given
     try:
         profile = ProfileValue().read(given["profile"], setting)
-    except Misfit as error:
-        raise Misfit([(("profile", *below), text) for below, text in error.faults]) from None
+    except ValueFault as error:
+        raise ValueFault([(("profile", *below), text) for below, text in error.faults]) from None
     except ValueError as error:
-        raise Misfit([(("profile",), str(error))]) from None
+        raise ValueFault([(("profile",), str(error))]) from None
     return {"length": profile.length, **given, "profile": profile}

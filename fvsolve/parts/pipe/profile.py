@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from fvsolve.parts.csv_rows import read_rows
-from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.value import Misfit, Rows, Setting, Value, check_rising
+from fvsolve.parts.time_series import copy_name, find_file
+from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault, check_increasing
 from fvsolve.units import show
 
 FORMS = (("chainage", "elevation"), ("x", "y", "z"))
@@ -72,7 +72,7 @@ class ProfileValue(Value):
     about = "elevation along the axis, linear between points; straight from end to end if left out"
     takes = "`{ chainage, elevation }` or `{ x, y, z }`, lists of m, or `{ file }` with such columns"
 
-    def read(self, given: Any, setting: Setting) -> Profile:
+    def read(self, given: Any, setting: ReadContext) -> Profile:
         if isinstance(given, Profile):
             return given
         if not isinstance(given, dict):
@@ -106,14 +106,14 @@ def steep(profile: Profile) -> None:
         raise ValueError(f"{text}; chainage counts along the axis")
 
 
-def from_lists(given: dict[str, Any], setting: Setting) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Columns [m] from lists of equal length, and the table of the case file."""
     keys = form_of(list(given), "keys")
     columns, faults = {}, [((key,), f"unknown key; expected {' and '.join(keys)}") for key in given if key not in keys]
     for key in keys:
         try:
             columns[key] = Rows("length", rising=key == "chainage").read(given[key], setting)
-        except Misfit as error:
+        except ValueFault as error:
             faults += [((key, *below), text) for below, text in error.faults]
         except ValueError as error:
             faults.append(((key,), str(error)))
@@ -123,19 +123,19 @@ def from_lists(given: dict[str, Any], setting: Setting) -> tuple[dict[str, np.nd
     if not faults and len(columns[keys[0]]) < 2:
         faults.append(((), "has one point; expected at least two"))
     if faults:
-        raise Misfit(faults)
+        raise ValueFault(faults)
     return {key: np.array(values) for key, values in columns.items()}, {
         key: list(values) for key, values in columns.items()
     }
 
 
-def from_file(given: dict[str, Any], setting: Setting) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Columns [m] of a CSV file by header, and the table of the case file."""
     unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown:
-        raise Misfit(unknown)
+        raise ValueFault(unknown)
     if not isinstance(given["file"], str):
-        raise Misfit([(("file",), f"{show(given['file'])} is not a file name in quotes")])
+        raise ValueFault([(("file",), f"{show(given['file'])} is not a file name in quotes")])
     try:
         path = find_file(given["file"], setting)
         rows = read_rows(path)
@@ -145,10 +145,10 @@ def from_file(given: dict[str, Any], setting: Setting) -> tuple[dict[str, np.nda
         if len(columns[keys[0]]) < 2:
             raise ValueError(f"{path.name} has one point; expected at least two")
         if "chainage" in columns:
-            check_rising(columns["chainage"].tolist(), [f"{value:g}" for value in columns["chainage"]],
+            check_increasing(columns["chainage"].tolist(), [f"{value:g}" for value in columns["chainage"]],
                          f"{path.name}: chainages")  # fmt: skip
     except ValueError as error:
-        raise Misfit([(("file",), str(error))]) from None
+        raise ValueFault([(("file",), str(error))]) from None
     return columns, {"file": copy_name(path, setting)}
 
 

@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 from fvsolve.errors import did_you_mean
 from fvsolve.parts.pipe.creep import Creep, Elements
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import COUNTED, Number, Quantity, Setting, Usual, Value, between, positive
+from fvsolve.parts.table_model import Table
+from fvsolve.parts.value import BY_CELLS, Number, Quantity, ReadContext, UsualRange, Value, between, positive
 from fvsolve.units import parse, show
 
-MODULI = Usual(1e5, 1.2e12, "soft rubber to diamond")
-THICKNESS = Usual(1e-6, 2.0, "foils to lined rock")
+MODULI = UsualRange(1e5, 1.2e12, "soft rubber to diamond")
+THICKNESS = UsualRange(1e-6, 2.0, "foils to lined rock")
 THIN = 25.0  # least bore over wall of a thin wall, Wylie, Streeter and Suo 1993
 RESTRAINTS = ("joints", "upstream", "anchored")
 POISSON = "poisson_ratio"
@@ -21,10 +21,12 @@ POISSON = "poisson_ratio"
 class Wall(Table):
     """An elastic wall: 1/K = 1/beta + c diameter / (youngs_modulus thickness), c the factor of `restraint`."""
 
-    youngs_modulus: Annotated[float, Quantity("modulus", positive, "Young's modulus of the wall [Pa]", MODULI, COUNTED)]
-    thickness: Annotated[float, Quantity("length", positive, "wall thickness [m]", THICKNESS, COUNTED)]
+    youngs_modulus: Annotated[
+        float, Quantity("modulus", positive, "Young's modulus of the wall [Pa]", MODULI, BY_CELLS)
+    ]
+    thickness: Annotated[float, Quantity("length", positive, "wall thickness [m]", THICKNESS, BY_CELLS)]
     poisson_ratio: Annotated[
-        float | None, Number(between(0.0, 0.5), "Poisson's ratio of the wall, for restraint", changes=COUNTED)
+        float | None, Number(between(0.0, 0.5), "Poisson's ratio of the wall, for restraint", changes=BY_CELLS)
     ] = None
     creep: Annotated[Creep | None, Elements()] = None
 
@@ -33,16 +35,16 @@ class Lining(Table):
     """An inner layer of the wall, such as cement mortar, with the same hoop strain: E e + E' e' instead of E e."""
 
     youngs_modulus: Annotated[
-        float, Quantity("modulus", positive, "Young's modulus of the lining [Pa]", MODULI, COUNTED)
+        float, Quantity("modulus", positive, "Young's modulus of the lining [Pa]", MODULI, BY_CELLS)
     ]
-    thickness: Annotated[float, Quantity("length", positive, "thickness of the lining [m]", THICKNESS, COUNTED)]
+    thickness: Annotated[float, Quantity("length", positive, "thickness of the lining [m]", THICKNESS, BY_CELLS)]
 
 
 class OfCatalogue(Value):
     """Name of a material of the catalogue."""
 
     about = "material of the wall: sets modulus, Poisson's ratio and roughness, where a source is known"
-    changes = COUNTED
+    changes = BY_CELLS
 
     @property
     def names(self) -> list[str]:
@@ -50,7 +52,7 @@ class OfCatalogue(Value):
 
         return list(materials())
 
-    def read(self, given: Any, setting: Setting) -> str:
+    def read(self, given: Any, setting: ReadContext) -> str:
         from fvsolve.parts.pipe.materials import UNREAD
 
         if isinstance(given, str) and given in self.names:
@@ -76,9 +78,9 @@ class WallOrRigid(Value):
 
     about = 'wall, elastic or rigid; "rigid" if left out'
     takes = '`"rigid"`, or `{ youngs_modulus, thickness, poisson_ratio, creep }`, Pa and m'
-    changes = COUNTED
+    changes = BY_CELLS
 
-    def read(self, given: Any, setting: Setting) -> Wall | str:
+    def read(self, given: Any, setting: ReadContext) -> Wall | str:
         if isinstance(given, Wall) or given == "rigid":
             return given
         if not isinstance(given, dict):
@@ -99,9 +101,9 @@ class Restraint(Value):
 
     about = "axial restraint; 1 (thin wall between expansion joints) if left out"
     takes = "`joints`, `upstream`, `anchored`, or a number, above 0"
-    changes = COUNTED
+    changes = BY_CELLS
 
-    def read(self, given: Any, setting: Setting) -> str | float:
+    def read(self, given: Any, setting: ReadContext) -> str | float:
         if isinstance(given, str):
             if given in RESTRAINTS:
                 return given

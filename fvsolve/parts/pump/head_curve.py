@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 
 from fvsolve.parts.pump.suter_tables import SUTER_TABLES
-from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
     PROFILE,
     Choice,
-    Misfit,
     Number,
     Quantity,
+    ReadContext,
     Rows,
-    Setting,
     Value,
+    ValueFault,
     between,
-    check_rising,
+    check_increasing,
     nonnegative,
     positive,
 )
@@ -49,7 +49,7 @@ class CurvePoints:
 
 
 def points(
-    given: dict[str, Any], word: str, dimension: str, setting: Setting, range=nonnegative, faults_of=lambda *_: []
+    given: dict[str, Any], word: str, dimension: str, setting: ReadContext, range=nonnegative, faults_of=lambda *_: []
 ) -> CurvePoints:
     """Points of a table { flow, WORD }; Misfit if flows do not rise, lengths differ, or `faults_of` finds faults."""
     lists = read_keys(given, keys_of(word, dimension, range), setting)
@@ -58,11 +58,11 @@ def points(
     if len(flow) != len(value):
         faults.append(((word,), f"{len(value)} values for {len(flow)} flows; expected equal numbers"))
     try:
-        check_rising(flow, given["flow"], "flows")
+        check_increasing(flow, given["flow"], "flows")
     except ValueError as error:
         faults.append((("flow",), str(error)))
     if faults:
-        raise Misfit(faults)
+        raise ValueFault(faults)
     return CurvePoints(flow, value, word)
 
 
@@ -77,7 +77,7 @@ class HeadCurve(Value):
     takes = "`{ flow = [...], head = [...] }`, or `{ coefficients = [...] }`"
     polynomial = {"coefficients": (Rows("number"), NEEDED)}
 
-    def read(self, given: Any, setting: Setting) -> CurvePoints:
+    def read(self, given: Any, setting: ReadContext) -> CurvePoints:
         if isinstance(given, CurvePoints):
             return given
         if not isinstance(given, dict):
@@ -105,13 +105,13 @@ class HeadCurve(Value):
         """Misfit if the head never falls to zero, or rises before that flow."""
         end = first_root(coefficients)
         if coefficients[0] <= 0.0 or end is None:
-            raise Misfit([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
+            raise ValueFault([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
                                               "[60.0, 0.0, -900.0], 60 m less 900 m at 1 m3/s")])  # fmt: skip
         slope = np.polynomial.polynomial.polyder(coefficients)
         flows = np.linspace(0.0, end, 1001)
         rises = np.flatnonzero(np.polynomial.polynomial.polyval(flows, slope) > 0.0)
         if rises.size:
-            raise Misfit([(("coefficients",), f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; it must fall "
+            raise ValueFault([(("coefficients",), f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; it must fall "
                                               "as the flow rises")])  # fmt: skip
 
     def json(self) -> dict[str, Any]:
@@ -133,13 +133,13 @@ class Efficiency(Value):
     changes = PROFILE
     number = Number(between(0, 1, open=True))
 
-    def read(self, given: Any, setting: Setting) -> float | CurvePoints:
+    def read(self, given: Any, setting: ReadContext) -> float | CurvePoints:
         if isinstance(given, CurvePoints):
             return given
         if isinstance(given, dict):
             curve = points(given, "efficiency", "number", setting, between(0, 1))
             if not any(q > 0.0 and eta > 0.0 for q, eta in zip(curve.flow, curve.value, strict=True)):
-                raise Misfit([(("efficiency",), "expected a value above 0 at a flow above 0")])
+                raise ValueFault([(("efficiency",), "expected a value above 0 at a flow above 0")])
             return curve
         return self.number.read(given, setting)
 
@@ -154,7 +154,7 @@ class ShaftPower(Value):
     takes = "`{ flow = [...], power = [...] }`"
     changes = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> CurvePoints:
+    def read(self, given: Any, setting: ReadContext) -> CurvePoints:
         if isinstance(given, CurvePoints):
             return given
         if not isinstance(given, dict):
@@ -199,7 +199,7 @@ class Suter(Value):
         "torque": (Rows("number"), ()),
     }
 
-    def read(self, given: Any, setting: Setting) -> SuterTable:
+    def read(self, given: Any, setting: ReadContext) -> SuterTable:
         if isinstance(given, SuterTable):
             return given
         if not isinstance(given, dict):
@@ -207,14 +207,14 @@ class Suter(Value):
         values = read_keys(given, self.keys, setting)
         table = values.pop("table")
         if table is not None and ("head" in given or "torque" in given):
-            raise Misfit([(("table",), "gives head and torque; remove table, or head and torque")])
+            raise ValueFault([(("table",), "gives head and torque; remove table, or head and torque")])
         if table is not None:
             values["head"], values["torque"] = SUTER_TABLES[table]
         head, torque, faults = values["head"], values["torque"], []
         if len(head) != len(torque):
             faults.append((("torque",), f"{len(torque)} values for {len(head)} of head; expected equal numbers"))
         if not head and not torque:
-            raise Misfit([((), f"table, or head and torque, is missing; tables are {', '.join(SUTER_TABLES)}")])
+            raise ValueFault([((), f"table, or head and torque, is missing; tables are {', '.join(SUTER_TABLES)}")])
         for key, series in (("head", head), ("torque", torque)):
             if len(series) < 9:
                 faults.append(((key,), f"{len(series)} values; expected at least 9, from x = 0 to x = 2 pi"))
@@ -226,7 +226,7 @@ class Suter(Value):
                     )
                 )
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         values["head"], values["torque"] = ((*series[:-1], series[0]) for series in (head, torque))
         return SuterTable(**values)
 

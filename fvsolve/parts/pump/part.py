@@ -9,10 +9,10 @@ from pydantic import Field
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.pump.head_curve import CurvePoints, Efficiency, HeadCurve, ShaftPower, Suter, SuterTable
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.value import PROFILE, VALUE, Choice, Flag, Quantity, Usual, nonnegative, positive
+from fvsolve.parts.value import PROFILE, VALUE, Choice, Flag, Quantity, UsualRange, nonnegative, positive
 
 EFFICIENCY = 0.75
-SPEEDS = Usual(2.0, 1400.0, "20 rpm of great tidal pumps to 13 000 rpm of small ones")
+SPEEDS = UsualRange(2.0, 1400.0, "20 rpm of great tidal pumps to 13 000 rpm of small ones")
 
 
 class Pump(TwoPort, kind="pump"):
@@ -50,7 +50,10 @@ class Pump(TwoPort, kind="pump"):
     speed: Annotated[
         Schedule,
         Scheduled(
-            "number", nonnegative, "relative speed, 1 at the speed of the curve", Usual(0.0, 2.5, "of the rated speed")
+            "number",
+            nonnegative,
+            "relative speed, 1 at the speed of the curve",
+            UsualRange(0.0, 2.5, "of the rated speed"),
         ),
     ] = Field(default_factory=lambda: constant(1.0))
     rated_speed: Annotated[

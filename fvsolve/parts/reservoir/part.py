@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Annotated, ClassVar
 
 from fvsolve import units
-from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.node import Rider
+from fvsolve.parts.context import CaseContext, Faults
+from fvsolve.parts.node import PlaceOnBody
 from fvsolve.parts.schedule import Schedule, Scheduled
 
 
-class Reservoir(Rider, kind="reservoir"):
+class Reservoir(PlaceOnBody, kind="reservoir"):
     """A place of given pressure, p = pressure(t) or p = ambient + rho g (head(t) - elevation) [Pa].
 
     Ports: any number, with any flow. Stored energy: none; energy through its ports is work done on the network in the
@@ -28,9 +28,9 @@ class Reservoir(Rider, kind="reservoir"):
         None
     )
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if self.pressure is not None:
-            yield from around.vacuum("nodes", name, "pressure", self.pressure.value.tolist())
+            yield from around.boiling_faults("nodes", name, "pressure", self.pressure.value.tolist())
         if self.head is None or around.gravity is None or around.fluid is None:
             return
         head, boiling, height = float(self.head.value.min()), around.fluid.vapor_pressure, self.elevation or 0.0

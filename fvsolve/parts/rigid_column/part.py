@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.conduit import Conduit
-from fvsolve.parts.value import Misfit, Rows, Setting, Value
+from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault
 from fvsolve.units import show
 
 
@@ -17,19 +17,19 @@ class Way(Value):
     def __init__(self, about: str) -> None:
         self.about = about
 
-    def read(self, given: Any, setting: Setting) -> list[tuple[float, ...]]:
+    def read(self, given: Any, setting: ReadContext) -> list[tuple[float, ...]]:
         if not isinstance(given, (list, tuple)):
             raise ValueError(f"{show(given)} is not a list of points; expected [[x, y, z], ...]")
         points, faults = [], []
         for index, point in enumerate(given):
             try:
                 points.append(Rows("position", length=3).read(point, setting))
-            except Misfit as error:
+            except ValueFault as error:
                 faults += [((index, *below), text) for below, text in error.faults]
             except ValueError as error:
                 faults.append(((index,), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return points
 
     def json(self) -> dict[str, Any]:

@@ -16,5 +16,5 @@ class SpringRows(PushLowering, kind="spring"):
         x, row["speed"] = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["schedule"], row["stiffness"] = -1, link.stiffness
         row["force"] = -link.stiffness * (x - link.free_length) if link.preload is None else link.preload
-        if link.preload is not None and draft.case.found:
-            row["force"] -= link.stiffness * (x - draft.case.stated.ahead(link.from_, link.to))
+        if link.preload is not None and draft.case.equilibrium_nodes:
+            row["force"] -= link.stiffness * (x - draft.case.as_stated.separation(link.from_, link.to))

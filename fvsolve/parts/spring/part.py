@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Coupling
 from fvsolve.parts.value import VALUE, Quantity, nonnegative, positive
 
@@ -32,7 +32,7 @@ class Spring(Coupling, kind="spring"):
         if self.free_length is self.preload is None:
             object.__setattr__(self, "free_length", 0.0)
 
-    def faults(self, name: str, around: Around) -> Faults:
-        distance = around.ahead(self, "from", "to")
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        distance = around.separation(self, "from", "to")
         if distance is not None and distance < 0.0 and (self.free_length or self.preload):
             yield ("to",), f"{self.to} is behind {self.from_} at the start; exchange from and to"

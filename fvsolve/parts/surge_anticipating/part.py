@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.outlet.part import Relieving
 from fvsolve.parts.regulating.part import STROKES
 from fvsolve.parts.value import Quantity, Text, nonnegative, positive
@@ -48,7 +48,7 @@ class SurgeAnticipating(Relieving, kind="surge-anticipating"):
             faults.append(((), "nothing opens it; expected low_set, high_set or trip"))
         return faults
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         yield from super().faults(name, around)
         if self.low_set is not None and self.high_set is not None and not self.low_set < self.high_set:
             yield ("high_set",), f"{self.high_set:.6g} Pa is not above low_set, {self.low_set:.6g} Pa; set it higher"

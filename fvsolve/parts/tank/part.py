@@ -7,28 +7,28 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.around import Around, Faults
 from fvsolve.parts.connection.part import Connection, Joined, joined
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.junction.part import Junction
-from fvsolve.parts.node import Rider
+from fvsolve.parts.node import PlaceOnBody
 from fvsolve.parts.schedule import constant
-from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
     PROFILE,
     VALUE,
-    Misfit,
     Quantity,
+    ReadContext,
     Rows,
-    Setting,
-    Usual,
+    UsualRange,
     Value,
-    check_rising,
+    ValueFault,
+    check_increasing,
     nonnegative,
     positive,
 )
 
-LEVELS = Usual(0.0, 2000.0, "tanks to lakes and shafts")
+LEVELS = UsualRange(0.0, 2000.0, "tanks to lakes and shafts")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +57,12 @@ class Surface(Value):
 
     about = "area of the free surface, linear between levels and constant above the last level [m2]"
     takes = "m2, or `{ level = [0, ...], area = [...] }`"
-    usual = Usual(1e-6, 1e10, "tubes to lakes")
+    usual = UsualRange(1e-6, 1e10, "tubes to lakes")
     dimension = "area"
     changes = PROFILE
     keys = {"level": (Rows("level", nonnegative), NEEDED), "area": (Rows("area", positive), NEEDED)}
 
-    def read(self, given: Any, setting: Setting) -> float | AreaTable:
+    def read(self, given: Any, setting: ReadContext) -> float | AreaTable:
         if isinstance(given, AreaTable):
             return given
         if not isinstance(given, dict):
@@ -75,18 +75,18 @@ class Surface(Value):
         if level[0] != 0:
             faults.append((("level",), "levels are measured from the bottom; the first must be 0"))
         try:
-            check_rising(level, given["level"], "levels")
+            check_increasing(level, given["level"], "levels")
         except ValueError as error:
             faults.append((("level",), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return AreaTable(np.array(level), np.array(area))
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [Quantity("area").json(), keys_json(self.keys)]}
 
 
-class Tank(Rider, kind="tank"):
+class Tank(PlaceOnBody, kind="tank"):
     """An open tank, d(level)/dt = net flow / area(level), p = ambient + rho g level at the bottom.
 
     Ports: any number, all at the bottom, or outside its `connection` (the throttle of a surge tank). Stored
@@ -95,7 +95,7 @@ class Tank(Rider, kind="tank"):
     """
 
     own_scalars: ClassVar[str] = "start"
-    quantities: ClassVar[dict[str, str]] = {**Rider.quantities, "level": "level"}
+    quantities: ClassVar[dict[str, str]] = {**PlaceOnBody.quantities, "level": "level"}
     fixes_pressure: ClassVar[bool] = True
 
     area: Annotated[Any, Surface()]
@@ -109,8 +109,8 @@ class Tank(Rider, kind="tank"):
     connection: Annotated[Connection | None, Joined()] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        return joined(name, self, Junction.model_construct(**self.stands, demand=constant(0.0)))
+        return joined(name, self, Junction.model_construct(**self.position_keys, demand=constant(0.0)))
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if self.height is not None and self.level > self.height:
             yield ("level",), f"{self.level:g} m is above its height of {self.height:g} m"

@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.attitude import no_direction, uneven
+from fvsolve.parts.attitude_keys import is_zero_vector, length_notices
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Link
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Rows, Text
@@ -43,8 +43,8 @@ class Torque(Link, kind="torque"):
         """Port name -> place."""
         return {"to": self.to} if self.from_ is None else {"from": self.from_, "to": self.to}
 
-    def faults(self, name: str, around: Around) -> Faults:
-        if no_direction(self.axis):
+    def faults(self, name: str, around: CaseContext) -> Faults:
+        if is_zero_vector(self.axis):
             yield ("axis",), "is all zeros; expected for example [0, 1, 0]"
         turned = around.links.get(self.to.removesuffix(".shaft"))
         if around.spatial(self.to) and self.axis is None:
@@ -64,4 +64,4 @@ class Torque(Link, kind="torque"):
             yield ("to",), f"{self.to} {text}"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        yield from uneven("axis", self.axis)
+        yield from length_notices("axis", self.axis)

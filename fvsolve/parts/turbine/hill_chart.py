@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from fvsolve.parts.csv_rows import Misread, read_rows, split
-from fvsolve.parts.series import copy_name, find_file
-from fvsolve.parts.table import keys_json, read_keys
+from fvsolve.parts.csv_rows import CsvError, read_rows, split_header
+from fvsolve.parts.table_model import keys_json, read_keys
+from fvsolve.parts.time_series import copy_name, find_file
 from fvsolve.parts.turbine.points import EFFICIENCY, FLOW, SPEED, TORQUE, faults_of_curve, faults_of_still
-from fvsolve.parts.value import NEEDED, Misfit, Number, Rows, Setting, Value, between
+from fvsolve.parts.value import NEEDED, Number, ReadContext, Rows, Value, ValueFault, between
 from fvsolve.units import show
 
 WITHIN = between(-1e4, 1e4)  # n11 and Q11 of any machine
@@ -72,7 +72,7 @@ class HillChartValue(Value):
         EFFICIENCY: (Rows("number", between(0, 1)), None), TORQUE: (Rows("number", between(-1e8, 1e8)), None),
     }  # fmt: skip
 
-    def read(self, given: Any, setting: Setting) -> HillChart:
+    def read(self, given: Any, setting: ReadContext) -> HillChart:
         if isinstance(given, HillChart):
             return given
         if isinstance(given, dict) and "file" in given:
@@ -83,14 +83,14 @@ class HillChartValue(Value):
         for k, entry in enumerate(given):
             try:
                 curves[k] = self.curve(entry, setting)
-            except Misfit as error:
+            except ValueFault as error:
                 faults += [((k, *below), text) for below, text in error.faults]
             except ValueError as error:
                 faults.append(((k,), str(error)))
         places = {k: (k,) for k in curves}
         return chart_of(curves, places, faults, [entry.table() for entry in curves.values()])
 
-    def curve(self, given: Any, setting: Setting) -> OpeningCurve:
+    def curve(self, given: Any, setting: ReadContext) -> OpeningCurve:
         """Read the curve of an opening."""
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table; expected for example {EXAMPLE}")
@@ -98,23 +98,23 @@ class HillChartValue(Value):
         words = [word for word in (EFFICIENCY, TORQUE) if keys[word] is not None]
         if len(words) != 1:
             text = f"{EFFICIENCY} and {TORQUE} are given; keep one" if words else f"{EFFICIENCY} or {TORQUE} is missing"
-            raise Misfit([(tuple(words[1:]), text)])
+            raise ValueFault([(tuple(words[1:]), text)])
         return OpeningCurve(keys["opening"], keys[SPEED], keys[FLOW], keys[words[0]], words[0])
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [{"type": "array", "items": keys_json(self.keys), "minItems": 1}, {"type": "object"}]}
 
 
-def from_file(given: dict[str, Any], setting: Setting) -> HillChart:
+def from_file(given: dict[str, Any], setting: ReadContext) -> HillChart:
     """Chart from CSV columns opening, unit_speed, unit_flow and efficiency or unit_torque, points in order."""
     unknown = [((key,), "unknown key; expected only file") for key in given if key != "file"]
     if unknown or not isinstance(given["file"], str):
-        raise Misfit(unknown or [(("file",), f"{show(given['file'])} is not a file name in quotes")])
+        raise ValueFault(unknown or [(("file",), f"{show(given['file'])} is not a file name in quotes")])
     try:
         path = find_file(given["file"], setting)
         columns, word = columns_of(read_rows(path))
     except ValueError as error:
-        raise Misfit([(("file",), str(error))]) from None
+        raise ValueFault([(("file",), str(error))]) from None
     points: dict[float, list] = {}
     for opening, *point in zip(*columns, strict=True):
         points.setdefault(opening, []).append(point)
@@ -123,7 +123,7 @@ def from_file(given: dict[str, Any], setting: Setting) -> HillChart:
         try:
             given = dict(zip((SPEED, FLOW, word), map(list, zip(*rows, strict=True)), strict=True))
             curves[opening] = HillChartValue().curve({"opening": opening, **given}, setting)
-        except Misfit as error:
+        except ValueFault as error:
             faults += [
                 (("file",), f"{path.name}, opening {opening:g}: {below[0]}: {text}") for below, text in error.faults
             ]
@@ -140,9 +140,9 @@ def columns_of(rows) -> tuple[list, str]:
     columns = []
     for name in ("opening", SPEED, FLOW, words[0]):
         column = rows.column(name, 0)
-        unit = split(rows.header[column])[1]
+        unit = split_header(rows.header[column])[1]
         if name in UNITS and unit not in ("", UNITS[name]):
-            raise Misread(rows.file, f"column {show(rows.header[column])}: expected {name} in {UNITS[name]}")
+            raise CsvError(rows.file, f"column {show(rows.header[column])}: expected {name} in {UNITS[name]}")
         columns.append(rows.plain(column) if name in UNITS else rows.numbers(column, "number").tolist())
     return columns, words[0]
 
@@ -167,6 +167,6 @@ def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = 
     if not open_curves and not faults:
         faults.append(((), "has no curve of an opening above 0"))
     if faults:
-        raise Misfit(faults)
+        raise ValueFault(faults)
     shut_point = next(((curve.speed[0], curve.value[0]) for curve in curves.values() if curve.opening == 0.0), None)
     return HillChart(tuple(open_curves), shut_point, source)

@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from fvsolve.parts.around import Around, Faults
+from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.turbine.hill_chart import HillChart, HillChartValue, OpeningCurve
-from fvsolve.parts.value import VALUE, Quantity, Usual, anything, between, positive
+from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, between, positive
 
-RUNNERS = Usual(0.05, 12.0, "pico turbines to great Kaplan runners")
+RUNNERS = UsualRange(0.05, 12.0, "pico turbines to great Kaplan runners")
 ROUNDING = 1e-9  # tolerance, over the power of the water
 
 
@@ -59,7 +59,7 @@ class Turbine(TwoPort, kind="turbine"):
             faults.append((("trip",), "needs inertia, that of all rotating masses"))
         return faults
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         if around.fluid is None or around.gravity is None:
             return
         weight = around.fluid.density * around.gravity

@@ -11,25 +11,25 @@ from pydantic import Field
 
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
-from fvsolve.parts.table import Table, keys_json, read_keys
+from fvsolve.parts.table_model import Table, keys_json, read_keys
 from fvsolve.parts.value import (
     NEEDED,
     Choice,
-    Misfit,
     Number,
     Quantity,
+    ReadContext,
     Rows,
-    Setting,
-    Usual,
+    UsualRange,
     Value,
+    ValueFault,
     between,
-    check_rising,
+    check_increasing,
     positive,
 )
 
 DISCHARGE_COEFFICIENT = 0.61  # sharp edge
 GALLON, PSI, MINUTE = 3.785411784e-3, 6894.757293168361, 60.0
-COEFFICIENTS = Usual(1e-6, 1e6, "metering valves to butterfly valves of dams")
+COEFFICIENTS = UsualRange(1e-6, 1e6, "metering valves to butterfly valves of dams")
 WATER_15, WATER_60F = 1000.0, 999.016  # densities for which Kv and Cv are defined [kg/m3]
 
 
@@ -65,7 +65,7 @@ class Trim(Value):
         "flow_area": (Rows("number", between(0, 1)), NEEDED),
     }
 
-    def read(self, given: Any, setting: Setting) -> str | Characteristic:
+    def read(self, given: Any, setting: ReadContext) -> str | Characteristic:
         if isinstance(given, Characteristic):
             return given
         if not isinstance(given, dict):
@@ -82,11 +82,11 @@ class Trim(Value):
         if flow_area[0] != 0:
             faults.append((("flow_area",), "opening 0 is shut: the first flow area must be 0"))
         try:
-            check_rising(opening, given["opening"], "openings")
+            check_increasing(opening, given["opening"], "openings")
         except ValueError as error:
             faults.append((("opening",), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return Characteristic(np.array(opening), np.array(flow_area))
 
     def json(self) -> dict[str, Any]:
@@ -124,11 +124,12 @@ class Sized(Table):
             "area",
             positive,
             "area of the opening [m2]; needed unless diameter, Kv or Cv is given",
-            Usual(1e-12, 200.0, "leaks to sluices"),
+            UsualRange(1e-12, 200.0, "leaks to sluices"),
         ),
     ] = None
     diameter: Annotated[
-        float | None, Quantity("length", positive, "diameter of the opening [m]", Usual(1e-6, 14.0, "leaks to sluices"))
+        float | None,
+        Quantity("length", positive, "diameter of the opening [m]", UsualRange(1e-6, 14.0, "leaks to sluices")),
     ] = None
     laminar_reynolds: Annotated[float | None, Number(positive, "Reynolds number below which the flow is laminar")] = (
         None
@@ -176,7 +177,7 @@ class Valve(Sized, TwoPort, kind="valve"):
     power: dp q [W].
     """
 
-    meant: ClassVar[dict[str, str]] = dict.fromkeys(
+    synonyms: ClassVar[dict[str, str]] = dict.fromkeys(
         ("closing_time", "closure_time", "close_time", "closing", "opening_time", "stroke_time", "schedule"), CLOSURE
     )
 

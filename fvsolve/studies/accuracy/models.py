@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.placing import bent, placed
+from fvsolve.case.chainage import add_bends, placed
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.fluid import LAWS
@@ -162,7 +162,7 @@ def whole_pipes(case):
     """Return the case; if parts placed along pipes divide these, with the pieces as its pipes."""
     from fvsolve.case import load
 
-    return load(case.table()) if placed(bent(case.raw)) else case
+    return load(case.table()) if placed(add_bends(case.raw)) else case
 
 
 def ladder(
@@ -319,10 +319,12 @@ def said_of_tanks(case, target: float) -> Iterator[str]:
         mesh = {**case.meshes, **case.lumped}[name]
         if (mode := slowest(basin, mesh)) is not None:
             text = (
-                f"{name}: its slowest wave, with k h = {mode.deep:.2g}, is {mode.fast:.2g} % too fast in shallow water"
+                f"{name}: its slowest wave, with k h = {mode.kh:.2g}, is {mode.excess:.2g} % too fast in shallow water"
             )
             yield (
-                f"{text}, more than the target: modes are more accurate for small waves" if mode.fast > share else text
+                f"{text}, more than the target: modes are more accurate for small waves"
+                if mode.excess > share
+                else text
             )
 
 

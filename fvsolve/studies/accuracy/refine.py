@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.case.defaults import link_said
+from fvsolve.case.defaults import raw_link
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import (
@@ -79,7 +79,7 @@ def resolutions(case) -> dict[str, str]:
 
 def by_cell_time(case) -> list[str]:
     """Names of pipes that do not state their cells."""
-    return [name for name in in_cells(case) if "cells" not in link_said(case.raw, name)]
+    return [name for name in in_cells(case) if "cells" not in raw_link(case.raw, name)]
 
 
 def plan(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.defaults import link_said
+from fvsolve.case.defaults import raw_link
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
 from fvsolve.model.delay_line_selection import reason_for_cells
@@ -119,7 +119,7 @@ def _survives(probe, pipes: dict) -> bool:
 def column(case, name: str) -> dict[str, Any]:
     """Table of a pipe as a rigid column."""
     names = ("from", "to", "length", "diameter", "friction", "minor_loss", "initial_flow")
-    raw = {"diameter": case.links[name].diameter, **link_said(case.raw, name)}
+    raw = {"diameter": case.links[name].diameter, **raw_link(case.raw, name)}
     table = {"type": "rigid-column", **{key: raw[key] for key in names if key in raw}}
     if table.get("friction", {}).get("model") == "unsteady":  # a rigid column has no unsteady friction
         friction = {key: value for key, value in table["friction"].items() if key in ("roughness", "factor")}
@@ -137,7 +137,7 @@ def resistance(case, model, name: str) -> dict[str, Any]:
     zeta = float(scale * (drag(*law, flow) / (abs(flow) * flow) if flow else row["loss"]))
     if not zeta > 0.0:
         raise Unsayable(f"{name} has no friction, so there is no resistance between two volumes")
-    raw = {"diameter": case.links[name].diameter, **link_said(case.raw, name)}
+    raw = {"diameter": case.links[name].diameter, **raw_link(case.raw, name)}
     return {"type": "orifice", "from": raw["from"], "to": raw["to"], "diameter": raw["diameter"],
             "loss_coefficient": zeta}  # fmt: skip
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fvsolve.case.case import Case
-from fvsolve.case.defaults import link_said
-from fvsolve.case.sections import DEFAULT_COURANT, steps_by_error
+from fvsolve.case.defaults import raw_link
+from fvsolve.case.sections import DEFAULT_COURANT, uses_error_control
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.studies.accuracy.cells import basins, counts, in_cells, keys, scaled
 
@@ -70,7 +70,7 @@ def cell_keys(case: Case, cells: int) -> dict:
     if main_cells is not None:
         return keys(scaled(counts(case), cells / main_cells))
     pipes = in_cells(case)
-    stated = {name for name in pipes if link_said(case.raw, name).get("cells") is not None}
+    stated = {name for name in pipes if raw_link(case.raw, name).get("cells") is not None}
     factor = cells / pipes[main_part].cells
     changed = {f"links.{name}.cells": max(1, round(pipes[name].cells * factor)) for name in stated}
     if main_part not in stated:
@@ -87,7 +87,7 @@ def with_cells(case: Case, scheme: str, method: str, cells: int) -> MethodSettin
 
     Adaptive implicit methods use a tolerance instead.
     """
-    by_error = steps_by_error(method)
+    by_error = uses_error_control(method)
     control = "rtol" if by_error else "courant"
     size = TOLERANCE if by_error else 1.0 if (scheme, method) == ("upwind", "euler") else DEFAULT_COURANT
     settings = {"numerics.scheme": scheme, "numerics.method": method, f"numerics.{control}": size}

@@ -1,6 +1,6 @@
 """Synonyms: engineering terms for parts that have another name here."""
 
-MEANT = {
+SYNONYMS = {
     "hose": 'a "pipe" with a low wave_speed, or wall = { youngs_modulus, thickness }',
     "tube": 'a "pipe"',
     "line": 'a "pipe"',

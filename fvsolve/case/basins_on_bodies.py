@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 
 from fvsolve.case import sloshing
-from fvsolve.case.bodies import hangs_on, point_inertia, poses
-from fvsolve.case.cells import means, samples
+from fvsolve.case.bodies import carrier_of, point_inertia, poses
+from fvsolve.case.cell_means import means, samples
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts.basin.part import Physics
 from fvsolve.parts.body.part import Body
-from fvsolve.parts.node import Rider
+from fvsolve.parts.node import PlaceOnBody
 from fvsolve.units import show
 
-Found = Iterator[tuple[tuple, str]]
+Faults = Iterator[tuple[tuple, str]]
 
 
-def misfits(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Found:
+def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Faults:
     """Faults of a basin on a body."""
     key = ("nodes", name)
     yield from place_faults(name, basin, nodes, named)
@@ -53,7 +53,7 @@ def misfits(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Found:
             yield (*key, "patches", patch, opened), text
 
 
-def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any) -> Found:
+def place_faults(name: str, node: PlaceOnBody, nodes: dict[str, Any], named: Any) -> Faults:
     """Faults of the place of a node on a body."""
     key = ("nodes", name)
     if node.on is None:
@@ -67,7 +67,7 @@ def place_faults(name: str, node: Rider, nodes: dict[str, Any], named: Any) -> F
         yield (*key, "elevation"), f"the node is on {node.on}; give its place with at, in the axes of that body"
 
 
-def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Found:
+def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
     """Faults of water on fixed joints whose bed is overturned: gravity never presses it on the bed."""
     for name, node in nodes.items():
         on = getattr(node, "on", None)
@@ -104,10 +104,12 @@ def carriers(on: str, nodes: dict[str, Any]) -> Iterator[str]:
     while isinstance(nodes.get(on), Body) and on not in seen:
         seen.add(on)
         yield on
-        on = hangs_on(nodes[on])[0]
+        on = carrier_of(nodes[on])[0]
 
 
-def loaded(nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravity: float, t: float) -> dict[str, Any]:
+def nodes_with_water(
+    nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravity: float, t: float
+) -> dict[str, Any]:
     """Nodes with lumped water: its mass, centre and inertia are added to bodies, its modes are extra bodies.
 
     lumped : meshes of basins without cells; density [kg/m3]; gravity [m/s2]; t : start time [s]
@@ -115,7 +117,7 @@ def loaded(nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravit
     result = dict(nodes)
     for name, mesh in lumped.items():
         basin, body = nodes[name], result[nodes[name].on]
-        mass_of = as_mass if basin.sloshing == "frozen" else sloshing.ice
+        mass_of = frozen_water if basin.sloshing == "frozen" else sloshing.held_water
         mass, centre, inertia = mass_of(basin, mesh, density)
         turn = basin.turn
         centre = np.array(basin.place) + turn @ centre
@@ -132,11 +134,11 @@ def loaded(nodes: dict[str, Any], lumped: dict[str, Any], density: float, gravit
     swinging = {name: mesh for name, mesh in lumped.items() if nodes[name].sloshing == "modes"}
     stand = poses(result, t) if swinging else {}
     for name, mesh in swinging.items():
-        result |= sloshing.sliders(name, nodes[name], mesh, stand[nodes[name].on], density, gravity)
+        result |= sloshing.mode_bodies(name, nodes[name], mesh, stand[nodes[name].on], density, gravity)
     return result
 
 
-def as_mass(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
+def frozen_water(basin: Any, mesh: Any, density: float) -> tuple[float, np.ndarray, np.ndarray]:
     """(mass [kg], centre [m], inertia about it [kg m2]) of water at rest as prisms on cells, in axes of the basin."""
     bed = means(samples(basin.bed, mesh))
     depth = np.maximum(basin.level - bed, 0.0)

@@ -8,13 +8,13 @@ import numpy as np
 
 from fvsolve.errors import did_you_mean
 from fvsolve.parts.csv_rows import read_rows
-from fvsolve.parts.value import Setting
+from fvsolve.parts.value import ReadContext
 from fvsolve.units import show
 
 
-def find_file(name: str, setting: Setting) -> Path:
+def find_file(name: str, setting: ReadContext) -> Path:
     """Path of a file named relative to the case; it is added to the files of the context. Raises ValueError."""
-    setting.asked += 1
+    setting.lookups += 1
     path = Path(name)
     if not path.is_absolute():
         path = (setting.folder or Path.cwd()) / path
@@ -29,7 +29,7 @@ def find_file(name: str, setting: Setting) -> Path:
     return path
 
 
-def copy_name(path: Path, setting: Setting) -> str:
+def copy_name(path: Path, setting: ReadContext) -> str:
     """Name of the copy of a file beside the resolved case: its own name, numbered if another file has it."""
     name, number = path.name, 2
     while setting.files.get(name, path) != path:
@@ -38,7 +38,7 @@ def copy_name(path: Path, setting: Setting) -> str:
 
 
 def read_columns(
-    path: Path, time: str | None, value: str | None, dimension: str, setting: Setting
+    path: Path, time: str | None, value: str | None, dimension: str, setting: ReadContext
 ) -> tuple[np.ndarray, np.ndarray, str, str]:
     """Time [s] and value [SI, pressures absolute] : float64[n] and their headers.
 

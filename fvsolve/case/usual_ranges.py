@@ -9,20 +9,20 @@ from fvsolve import units
 from fvsolve.case import defaults
 from fvsolve.errors import Notice
 from fvsolve.parts.schedule import Schedule
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import Quantity, Usual
+from fvsolve.parts.table_model import Table
+from fvsolve.parts.value import Quantity, UsualRange
 from fvsolve.units import DIMENSIONS
 
-SHARES = 3.0  # largest plausible limit, as a multiple of the pressure class
-MOST_LOOKED = 10_000  # cached parts
-LOOKED: dict[int, tuple[Table, Any, list]] = {}  # id -> part, its raw table, its unusual values
-TWO = (
+MAX_CLASS_FRACTION = 3.0  # largest plausible limit, as a multiple of the pressure class
+MAX_CACHED = 10_000  # cached parts
+CACHE: dict[int, tuple[Table, Any, list]] = {}  # id -> part, its raw table, its unusual values
+TWO_ENTRIES = (
     "smooth through two entries is a straight line; for zero slope at both ends, add an entry with the first value "
     "before the first entry, and an entry with the last value after the last entry"
 )
 TOP = {  # keys outside tables
-    "ambient_pressure": Quantity("pressure", usual=Usual(3e4, 2e6, "mountains to deep caissons")),
-    "gravity": Quantity("acceleration", usual=Usual(1.0, 30.0, "the Moon to Jupiter")),
+    "ambient_pressure": Quantity("pressure", usual=UsualRange(3e4, 2e6, "mountains to deep caissons")),
+    "gravity": Quantity("acceleration", usual=UsualRange(1.0, 30.0, "the Moon to Jupiter")),
 }
 
 
@@ -33,11 +33,11 @@ def notices(case: Any) -> list[Notice]:
     result = [_notice((), (key,), case, *odd) for key, value in TOP.items()
              if (odd := _beyond(value, getattr(case, key), case.raw.get(key)))]  # fmt: skip
     result += [_notice(place, *odd[:1], case, *odd[1:]) for place, part in parts.items()
-              for odd in _of_part(part, _said(case.raw, place))]  # fmt: skip
-    result += [_notice(("limits", name), ("class_fraction",), case, limit.class_fraction, SHARES,
+              for odd in _of_part(part, _raw_value(case.raw, place))]  # fmt: skip
+    result += [_notice(("limits", name), ("class_fraction",), case, limit.class_fraction, MAX_CLASS_FRACTION,
                       f"{limit.class_fraction:g} times the pressure class; 1 is the class itself")
-              for name, limit in case.limits.items() if (limit.class_fraction or 0.0) > SHARES]  # fmt: skip
-    result += [_notice(("links", defaults.whole(case.raw, name)), ("wave_speed",), case, *odd)
+              for name, limit in case.limits.items() if (limit.class_fraction or 0.0) > MAX_CLASS_FRACTION]  # fmt: skip
+    result += [_notice(("links", defaults.pipe_of_piece(case.raw, name)), ("wave_speed",), case, *odd)
               for name, link in case.links.items() if (odd := _wave_speed(case, name, link))]  # fmt: skip
     return list({(notice.place, notice.text): notice for notice in result}.values())
 
@@ -46,18 +46,18 @@ def _wave_speed(case: Any, name: str, link: Any) -> tuple[float, float, str] | N
     """(value, limit, text) of a wave speed that contradicts the stated material; None if there is none."""
     if getattr(link, "wave_speed", None) is None or link.material is None:
         return None
-    from fvsolve.case.waves import at_odds  # late import: few pipes state both
+    from fvsolve.case.wave_speed_check import wave_speed_mismatch  # late import: few pipes state both
 
-    return at_odds(case, name)
+    return wave_speed_mismatch(case, name)
 
 
 def _of_part(part: Table, raw: Any) -> list[tuple[tuple[Any, ...], float, float, str]]:
     """Unusual values of a part, cached while the part and its raw table are the same objects."""
-    known = LOOKED.get(id(part))
+    known = CACHE.get(id(part))
     if known is None or known[0] is not part or known[1] is not raw:
-        if len(LOOKED) >= MOST_LOOKED:
-            LOOKED.clear()
-        known = LOOKED[id(part)] = part, raw, [*_of_table(part, raw)]
+        if len(CACHE) >= MAX_CACHED:
+            CACHE.clear()
+        known = CACHE[id(part)] = part, raw, [*_of_table(part, raw)]
     return known[2]
 
 
@@ -65,7 +65,7 @@ def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, 
     """(keys, value, limit, text) of each unusual value of a table and of its inner tables."""
     for name, info in type(table).model_fields.items():
         key, value = info.alias or name, getattr(table, name)
-        given = _said(raw, (key,))
+        given = _raw_value(raw, (key,))
         if isinstance(value, Table):
             yield from (((key, *keys), *rest) for keys, *rest in _of_table(value, given))
         for declaration in info.metadata:
@@ -73,7 +73,7 @@ def _of_table(table: Table, raw: Any) -> Iterator[tuple[tuple[Any, ...], float, 
             if odd:
                 yield (key,), *odd
         if isinstance(value, Schedule) and value.kind == "smooth" and len(value.time) == 2:
-            yield (key,), 2.0, 3.0, TWO
+            yield (key,), 2.0, 3.0, TWO_ENTRIES
     yield from table.unusual()
 
 
@@ -85,7 +85,7 @@ def _beyond(declared: Any, value: Any, given: Any) -> tuple[float, float, str] |
             continue
         unit = "" if declared.dimension == "number" else f" {DIMENSIONS[declared.dimension].si}"
         given = f"{x:g}{unit}" if not isinstance(given, str) else given
-        span = f"{usual.least:g} to {usual.greatest:g}{unit}, {usual.practice}"
+        span = f"{usual.least:g} to {usual.greatest:g}{unit}, {usual.source}"
         hint = units.likely(given, declared.dimension, usual.least, usual.greatest)
         return x, usual.least if x < usual.least else usual.greatest, f"{given} is outside {span}{hint}"
     return None
@@ -97,13 +97,13 @@ def _numbers(value: Any) -> list[float]:
     return [float(x) for x in (value if hasattr(value, "__len__") else [value])]
 
 
-def _said(raw: Any, keys: tuple[Any, ...]) -> Any:
+def _raw_value(raw: Any, keys: tuple[Any, ...]) -> Any:
     for key in keys:
         raw = raw.get(key) if isinstance(raw, dict) else None
     return raw
 
 
 def _notice(place: tuple, keys: tuple, case: Any, value: float, limit: float, text: str) -> Notice:
-    path = defaults.place(case.raw, (*place, *keys))
+    path = defaults.default_place(case.raw, (*place, *keys))
     where, key = ".".join(path[: len(place)]), ".".join(map(str, keys))
     return Notice("range", where, f"{f'{where}.{key}' if where else key}: {text}", key, value, limit)

@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.riding import free_joints, place_faults
+from fvsolve.case.basins_on_bodies import free_joints, place_faults
 from fvsolve.parts.basin.part import Basin
-from fvsolve.parts.node import Node, Rider
+from fvsolve.parts.node import Node, PlaceOnBody
 from fvsolve.units import show
 
-Found = Iterator[tuple[tuple, str]]
-PIPE_THERE = "expected a pipe there, or a chamber"
-CLOSE = 1e-6  # relative tolerance of a length, and tolerance of zero distance [m]: typed places have few digits
+Faults = Iterator[tuple[tuple, str]]
+USE_PIPE = "expected a pipe there, or a chamber"
+LENGTH_TOLERANCE = (
+    1e-6  # relative tolerance of a length, and tolerance of zero distance [m]: typed places have few digits
+)
 
 
-def standing(node: Node, poses: dict[str, Any]) -> Node:
+def with_elevation(node: Node, poses: dict[str, Any]) -> Node:
     """Node with its elevation at the start, if it is on a body; else the node itself."""
     pose = poses.get(getattr(node, "on", None))
     if pose is None or isinstance(node, Basin):
@@ -25,16 +27,16 @@ def standing(node: Node, poses: dict[str, Any]) -> Node:
     return node.model_copy(update={"elevation": float(pose.at(node.place)[2])})
 
 
-def has_height(node: Node, poses: dict[str, Any]) -> bool:
+def has_elevation(node: Node, poses: dict[str, Any]) -> bool:
     """True if a node has a single known elevation: not a basin on a body, nor a node on an unknown body."""
     on = getattr(node, "on", None)
     return on is None or (on in poses and not isinstance(node, Basin))
 
 
-def misfits(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Found:
+def find_faults(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any], named: Any) -> Faults:
     """Faults of places on bodies, and of links that join them; patches : those of basins on bodies, by full name."""
     for name, node in nodes.items():
-        if isinstance(node, Basin) or not isinstance(node, Rider):
+        if isinstance(node, Basin) or not isinstance(node, PlaceOnBody):
             continue
         yield from place_faults(name, node, nodes, named)
         if node.on is not None and getattr(node, "head", None) is not None:
@@ -45,15 +47,15 @@ def misfits(nodes: dict[str, Any], links: dict[str, Any], patches: dict[str, Any
     for name, link in links.items():
         ends = [place for port, place in link.ports.items() if link.joins.get(port) == "hydraulic"]
         yield from ((("links", name, *key), text) for key, text in link_faults(link, ends, nodes, patches))
-    for place, text in unfelt(nodes, links, free=True):
+    for place, text in missing_reactions(nodes, links, free=True):
         yield place, f"{text}, or a driven joint instead of a free one"
 
 
-def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> Found:
+def missing_reactions(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> Faults:
     """Faults of networks whose reaction on their bodies is not modelled; free : only of bodies that move freely."""
 
     def on_body(name: str) -> bool:
-        on = getattr(whose(name, nodes), "on", None)
+        on = getattr(node_of(name, nodes), "on", None)
         return on is not None and (not free or any(free_joints(on, nodes)))
 
     tanks = [name for name, node in nodes.items() if node.kind == "tank" and on_body(name)]
@@ -68,7 +70,7 @@ def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> 
         if not any(map(on_body, ends)):
             continue
         key = ("links", name)
-        for end in dict.fromkeys(end for end in ends if isinstance(whose(end, nodes), Basin)):
+        for end in dict.fromkeys(end for end in ends if isinstance(node_of(end, nodes), Basin)):
             yield (
                 key,
                 f"the reaction of the flow through {end} is not modelled yet; expected a tank instead of the basin",
@@ -77,10 +79,10 @@ def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> 
             yield key, "the reaction of the leak on the body is not modelled yet; expected a valve to a reservoir"
         elif link.kind == "rigid-column":
             for end in ends:
-                if end in nodes and led(end, nodes, links):
+                if end in nodes and set_by_columns(end, nodes, links):
                     yield (
                         key,
-                        f"at {end} it joins only valves and columns, whose reaction is not modelled yet; {PIPE_THERE}",
+                        f"at {end} it joins only valves and columns, whose reaction is not modelled yet; {USE_PIPE}",
                     )
         elif link.kind != "pipe" or free:
             for end in dict.fromkeys(end for end in ends if end in tanks):
@@ -91,20 +93,20 @@ def unfelt(nodes: dict[str, Any], links: dict[str, Any], free: bool = False) -> 
                 )
 
 
-def led(end: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
+def set_by_columns(end: str, nodes: dict[str, Any], links: dict[str, Any]) -> bool:
     """True if only rigid columns and restrictions set the pressure of a place."""
     kinds = {link.kind for link in links.values() if end in link.ports.values()}
     return nodes[end].kind in ("junction", "inflow") and "pipe" not in kinds
 
 
-def whose(place: str, nodes: dict[str, Any]) -> Any:
+def node_of(place: str, nodes: dict[str, Any]) -> Any:
     """Node at a place, or the basin that has it as a patch."""
     return nodes.get(place, nodes.get(place.rpartition(".")[0]))
 
 
-def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]) -> Found:
+def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict[str, Any]) -> Faults:
     """Faults of a link with at least one end on a body."""
-    stand = [whose(place, nodes) for place in ends]
+    stand = [node_of(place, nodes) for place in ends]
     on = [getattr(node, "on", None) for node in stand]
     if None in stand or any(body is not None and body not in nodes for body in on):
         return  # an end is faulty
@@ -117,7 +119,7 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
         words = " and ".join(f"{end}, on {body}" if body else f"{end}, which is fixed" for end, body in each)
         yield (), f"joins {words}: this would be a flexible hose, which is not supported yet"
         return
-    unable = [*dict.fromkeys(words for end, node in zip(ends, stand, strict=True) for words in shut(end, node))]
+    unable = [*dict.fromkeys(words for end, node in zip(ends, stand, strict=True) for words in patch_faults(end, node))]
     yield from (((), text) for text in unable)
     where = [patches.get(end, node) for end, node in zip(ends, stand, strict=True)]
     if unable or any(isinstance(node, Basin) for node in where):
@@ -125,14 +127,17 @@ def link_faults(link: Any, ends: list[str], nodes: dict[str, Any], patches: dict
     length = getattr(link, "length", None)
     points = np.array([where[0].place, *getattr(link, "route", []), where[-1].place])
     way = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-    if length is None and way > CLOSE:
-        text = f"its ends lie {way:g} m apart{said_of(ends, patches)}, and a {link.kind} has no length"
+    if length is None and way > LENGTH_TOLERANCE:
+        text = f"its ends lie {way:g} m apart{position_text(ends, patches)}, and a {link.kind} has no length"
         yield (), f"{text}; expected both ends at one place, and a pipe or rigid-column to the other place"
-    elif length is not None and way > length * (1.0 + CLOSE):
-        yield ("length",), f"{length:g} m is too short: its route on {on[0]} is {way:g} m long{said_of(ends, patches)}"
+    elif length is not None and way > length * (1.0 + LENGTH_TOLERANCE):
+        yield (
+            ("length",),
+            f"{length:g} m is too short: its route on {on[0]} is {way:g} m long{position_text(ends, patches)}",
+        )
 
 
-def shut(end: str, node: Any) -> Iterator[str]:
+def patch_faults(end: str, node: Any) -> Iterator[str]:
     """Reasons why no link can join a patch of a basin on a body."""
     if not isinstance(node, Basin):
         return
@@ -143,7 +148,7 @@ def shut(end: str, node: Any) -> Iterator[str]:
         yield f'joins {end}, a patch without cells; expected sloshing = "cells"'
 
 
-def said_of(ends: list[str], patches: dict[str, Any]) -> str:
+def position_text(ends: list[str], patches: dict[str, Any]) -> str:
     """Text of the computed positions of patches."""
     texts = [
         f"{end} at [{', '.join(f'{coordinate:.7g}' for coordinate in patches[end].at)}]"

@@ -15,12 +15,12 @@ from typing import Any
 from fvsolve.errors import FvsolveError
 
 ACCURACY, TRIALS = 1e-5, 200  # of EPANET's iteration; EPANET accepts no accuracy below 1e-5
-SHUT = (0, 1, 2)  # status codes of closed links: pump beyond its head, full or empty tank, closed by a control
-LISTING = 60.0  # time limit for EPANET to list the faults of a file [s]
+CLOSED = (0, 1, 2)  # status codes of closed links: pump beyond its head, full or empty tank, closed by a control
+LISTING_TIME = 60.0  # time limit for EPANET to list the faults of a file [s]
 
 
 @dataclass(frozen=True)
-class Hour:
+class HourState:
     """EPANET's solution at a time of its own run; name -> value, SI.
 
     head [m], demand and flow [m3/s]
@@ -65,14 +65,14 @@ def read_network(path: Path) -> Any:
             warnings.simplefilter("ignore")
             network, faults = package.network.WaterNetworkModel(str(path)), []
     except Exception as error:  # WNTR raises any exception of its parser
-        faults = [_innermost(error)]
-    listed = _listed(package, path)  # also faults that WNTR ignores, for example an undefined pattern
+        faults = [_root_cause(error)]
+    listed = _listed_faults(package, path)  # also faults that WNTR ignores, for example an undefined pattern
     if faults or listed:
-        raise FvsolveError(_said(path, listed or faults, "EPANET" if listed else "WNTR"))
+        raise FvsolveError(_fault_message(path, listed or faults, "EPANET" if listed else "WNTR"))
     return network
 
 
-def state_at(network: Any, hour: float) -> Hour:
+def state_at(network: Any, hour: float) -> HourState:
     """Run EPANET on a network up to an hour, with all controls and rules; return its state at that hour.
 
     Raises FvsolveError if EPANET rejects the network or finds no solution.
@@ -90,8 +90,8 @@ def state_at(network: Any, hour: float) -> Hour:
             results = simulator.run_sim(file_prefix=str(Path(folder) / "net"), convergence_error=True)
         except Exception as error:
             report = Path(folder) / "net.rpt"
-            messages = _complaints(report) or [_innermost(error)]
-            raise FvsolveError(_said(Path(network.name), messages, "EPANET")) from None
+            messages = _report_errors(report) or [_root_cause(error)]
+            raise FvsolveError(_fault_message(Path(network.name), messages, "EPANET")) from None
     if seconds not in results.node["head"].index:
         raise FvsolveError(f"{network.name}: EPANET's run has no results at hour {hour:g}")
     rows = [
@@ -99,10 +99,10 @@ def state_at(network: Any, hour: float) -> Hour:
         results.node["demand"],
         *(results.link[key] for key in ("flowrate", "status", "setting", "friction_factor")),
     ]
-    return Hour(float(seconds), *({str(k): v for k, v in row.loc[seconds].items()} for row in rows))
+    return HourState(float(seconds), *({str(k): v for k, v in row.loc[seconds].items()} for row in rows))
 
 
-def _innermost(error: BaseException) -> str:
+def _root_cause(error: BaseException) -> str:
     """Readable text of the first cause in a chain of exceptions."""
     chain = [error]
     while chain[-1].__cause__ is not None:
@@ -121,27 +121,37 @@ def _innermost(error: BaseException) -> str:
     return re.sub(r"\s+", " ", re.sub(r"^\(Error \d+\) ", "", text)).strip()
 
 
-def _said(path: Path, faults: list[str], source: str) -> str:
+def _fault_message(path: Path, faults: list[str], source: str) -> str:
     """Message that lists every fault once; source : program that reported the faults."""
     faults = list(dict.fromkeys(faults))
     head = f"{path.name}: {len(faults)} fault{'' if len(faults) == 1 else 's'}, reported by {source}"
     return "\n".join([head, *(f"  {fault}" for fault in faults)])
 
 
-def _listed(package: Any, path: Path) -> list[str]:
+def _listed_faults(package: Any, path: Path) -> list[str]:
     """Faults that EPANET itself lists; it runs in a second process, since a faulty file can crash its library."""
     library = package.epanet.toolkit.ENepanet(version=2.2).ENlib._name
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "net.rpt"
-        call = [sys.executable, "-I", "-S", "-c", _OPEN, library, str(path), str(report), str(Path(folder) / "net.bin")]
+        call = [
+            sys.executable,
+            "-I",
+            "-S",
+            "-c",
+            _OPEN_SCRIPT,
+            library,
+            str(path),
+            str(report),
+            str(Path(folder) / "net.bin"),
+        ]
         try:
-            subprocess.run(call, capture_output=True, timeout=LISTING, check=False)
+            subprocess.run(call, capture_output=True, timeout=LISTING_TIME, check=False)
         except (OSError, subprocess.SubprocessError):
             return []
-        return _complaints(report)
+        return _report_errors(report)
 
 
-_OPEN = """
+_OPEN_SCRIPT = """
 import ctypes, os, sys
 engine = ctypes.CDLL(sys.argv[1])
 engine.ENopen(*(os.fsencode(name) for name in sys.argv[2:]))
@@ -149,7 +159,7 @@ engine.ENclose()
 """
 
 
-def _complaints(report: Path) -> list[str]:
+def _report_errors(report: Path) -> list[str]:
     """Texts such as `undefined curve c9 in [PUMPS] section: q r b HEAD c9` of the errors in EPANET's report."""
     text = report.read_text(encoding="utf-8", errors="replace") if report.is_file() else ""
     matches = re.findall(r"^ *Error \d+: (.*(?:\n +\S.*)?)", text, re.MULTILINE)

@@ -10,7 +10,7 @@ import numpy as np
 from fvsolve.errors import Notice
 from fvsolve.parts.schedule import Schedule
 
-MOST = 20  # entries of a hand-written schedule; longer schedules are records, of which a run may use a part
+MAX_ENTRIES = 20  # entries of a hand-written schedule; longer schedules are records, of which a run may use a part
 
 
 def notices(case: Any) -> list[Notice]:
@@ -18,7 +18,7 @@ def notices(case: Any) -> list[Notice]:
     end, result = case.numerics.end, []
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
-            for key, time in later(part, end):
+            for key, time in starts_after_end(part, end):
                 place = f"{group}.{name}"
                 late, last = (case.amount(t, "time", 6) for t in (time, end))
                 text = f"{place}.{key}: continues to {late}, after the end of the run at {last}"
@@ -26,7 +26,7 @@ def notices(case: Any) -> list[Notice]:
     return result
 
 
-def later(part: Any, end: float) -> Iterator[tuple[str, float]]:
+def starts_after_end(part: Any, end: float) -> Iterator[tuple[str, float]]:
     """Yield (key, time [s]) of schedules and trips of a part that continue after `end`.
 
     A wave has no end: its first period counts.
@@ -37,7 +37,7 @@ def later(part: Any, end: float) -> Iterator[tuple[str, float]]:
             if (period := value.wave[2]) > end:
                 yield info.alias or name, float(period)
         elif isinstance(value, Schedule):
-            changes = len(value.time) and len(value.time) <= MOST and value.time[-1] > end
+            changes = len(value.time) and len(value.time) <= MAX_ENTRIES and value.time[-1] > end
             if changes and np.ptp(value.value[max(np.searchsorted(value.time, end, "right") - 1, 0) :]) > 0.0:
                 yield info.alias or name, float(value.time[-1])
         elif name == "trip" and value is not None and value > end:

@@ -17,8 +17,8 @@ from fvsolve.units import show
 from fvsolve.validation import PATH, validated
 
 GROUP = "fvsolve.parts"
-NAMED = "FVSOLVE_PARTS"  # environment variable with the folders of registered parts, for other processes
-HOME = "fvsolve_parts"  # package in which registered folders appear
+VARIABLE = "FVSOLVE_PARTS"  # environment variable with the folders of registered parts, for other processes
+PLUGIN_PACKAGE = "fvsolve_parts"  # package in which registered folders appear
 
 
 @validated(folder=PATH)
@@ -32,8 +32,8 @@ def register_part(folder: str | os.PathLike) -> None:
     path = Path(folder).resolve()
     if not (path / "part.py").is_file():
         raise FvsolveError(f"register_part: {show(str(folder))} has no part.py; expected the folder of a part")
-    package = f"{HOME}.{path.name}"
-    for name, places in ((HOME, []), (package, [str(path)])):
+    package = f"{PLUGIN_PACKAGE}.{path.name}"
+    for name, places in ((PLUGIN_PACKAGE, []), (package, [str(path)])):
         if name not in sys.modules:
             spec = ModuleSpec(name, None, is_package=True)
             spec.submodule_search_locations = places
@@ -41,12 +41,12 @@ def register_part(folder: str | os.PathLike) -> None:
     if sys.modules[package].__path__ != [str(path)]:
         raise FvsolveError(f"register_part: a part in a folder {show(path.name)} exists already; expected another name")
     declare(package)
-    os.environ[NAMED] = os.pathsep.join(dict.fromkeys([*named(), str(path)]))
+    os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*registered_folders(), str(path)]))
 
 
-def named() -> list[str]:
+def registered_folders() -> list[str]:
     """Folders of parts in the environment variable."""
-    return [folder for folder in os.environ.get(NAMED, "").split(os.pathsep) if folder]
+    return [folder for folder in os.environ.get(VARIABLE, "").split(os.pathsep) if folder]
 
 
 def declare(package: str) -> None:
@@ -56,12 +56,12 @@ def declare(package: str) -> None:
     import_module(f"{package}.part")
 
 
-def declare_offered() -> None:
+def declare_installed() -> None:
     """Declare parts of installed packages and of the environment variable; warn of unreadable parts."""
     offered = [
         (f"{entry.name} of the entry points {GROUP}", declare, entry.value) for entry in entry_points(group=GROUP)
     ]
-    for source, read, place in [*offered, *((NAMED, register_part, folder) for folder in named())]:
+    for source, read, place in [*offered, *((VARIABLE, register_part, folder) for folder in registered_folders())]:
         try:
             read(place)
         except Exception as error:

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.case.cells import means, samples
+from fvsolve.case.cell_means import means, samples
 
-ENOUGH = 200  # bisections
+BISECTIONS = 200  # bisections
 
 
 def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) -> dict[str, Any]:
@@ -50,7 +50,7 @@ def level_over(drawn: np.ndarray, tilt: np.ndarray, area: np.ndarray, volume: fl
     if not np.ptp(ground - drawn) > 0.0:
         return 0.0
     low, high = float(ground.min()), float(ground.max()) + volume / float(area.sum())
-    for _ in range(ENOUGH):
+    for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
         full = float(np.sum(area * np.maximum(middle - ground, 0.0))) > volume
         low, high = (low, middle) if full else (middle, high)

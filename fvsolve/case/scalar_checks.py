@@ -6,38 +6,38 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from fvsolve.case.size import LONGEST_NAME
+from fvsolve.case.resource_checks import LONGEST_NAME
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.fluid.laws import LAWS, named
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.basin.part import MOVES, Physics
 from fvsolve.units import show
 
-Found = Iterator[tuple[tuple, str]]
+Faults = Iterator[tuple[tuple, str]]
 
-TAKEN = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "min_pressure", "max_pressure"}
+RESERVED = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "min_pressure", "max_pressure"}
 
 
-def taken() -> set[str]:
+def reserved_names() -> set[str]:
     """Reserved names: columns of output files, quantities of parts, and fields of basins except velocities."""
     kinds = [kind for group in KINDS.values() for kind in group.values()]
     fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in MOVES}
-    return TAKEN | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
+    return RESERVED | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 
 
-def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Found:
+def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any], fluid: Any) -> Faults:
     """Faults of names, of values that parts cannot have, and of parts that do not support scalars yet."""
     for name in scalars:
         if len(name) > LONGEST_NAME:
             yield ("scalars", name), f"has {len(name)} letters; expected at most {LONGEST_NAME}"
         if not re.fullmatch(r"[\w-]+", name):
             yield ("scalars", name), f"{show(name)} is not a valid name; a name has only letters, digits, _ and -"
-        elif name in taken():
+        elif name in reserved_names():
             yield ("scalars", name), f"{show(name)} is a reserved name; expected another name"
     for group, parts in (("nodes", nodes), ("links", links)):
         for name, part in parts.items():
             for scalar, value in getattr(part, "scalars", {}).items():
-                if (text := _wrong(scalar, value, part, scalars)) is not None:
+                if (text := _value_fault(scalar, value, part, scalars)) is not None:
                     yield (group, name, "scalars", scalar), text
             if scalars and isinstance(part, Basin) and not part.own.carries:
                 text = f"is a basin of {part.physics}, which does not support scalars; expected a free surface"
@@ -64,7 +64,7 @@ def misfits(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str, Any
         )
 
 
-def _wrong(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:
+def _value_fault(scalar: str, value: Any, part: Any, scalars: dict[str, Any]) -> str | None:
     """Fault of the value of a scalar that a part states; None if it is valid."""
     if scalar not in scalars:
         return _unknown(scalar, scalars)

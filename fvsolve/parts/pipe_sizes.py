@@ -53,14 +53,14 @@ FITTINGS: dict[str, Callable[[Any, float, float], float]] = {
 WHOLE, MIXED = r"\d+(?:\.\d+)?", r"(?:\d+(?:\s+|\s*-\s*))?[1-9]\d*\s*/\s*[1-9]\d*"  # 1.5; 1/2, 1-1/2, 1 1/2
 
 
-def inches(text: str) -> float:
+def parse_inches(text: str) -> float:
     """Number of a text such as "1.5", "1/2", "1-1/2" or "1 1/2"."""
     *whole, last = re.split(r"\s*-\s*|(?<!/)(?<!/ )\s+(?!/)", text)
     top, _, bottom = last.partition("/")
     return sum(map(float, whole)) + float(top) / float(bottom or 1)
 
 
-def bore(nominal: str, schedule: str) -> tuple[float, float]:
+def pipe_bore(nominal: str, schedule: str) -> tuple[float, float]:
     """(inner diameter, wall thickness) [m] of "DN100" or "NPS 4" in a schedule. Raises ValueError for unknown sizes."""
     from fluids.piping import nearest_pipe, schedule_lookup
 
@@ -70,7 +70,7 @@ def bore(nominal: str, schedule: str) -> tuple[float, float]:
     if schedule not in schedule_lookup:
         near = did_you_mean(schedule, schedule_lookup) or f"; schedules are {listing(schedule_lookup)}"
         raise ValueError(f"no schedule named {show(schedule)}{near}")
-    number = inches(match[2])
+    number = parse_inches(match[2])
     if match[1].upper() == "DN":
         number = DN_NPS.get(number, number / 25.0)
     sizes = schedule_lookup[schedule][0]
@@ -81,7 +81,7 @@ def bore(nominal: str, schedule: str) -> tuple[float, float]:
     return inner, wall
 
 
-def loss(names: list[str], diameter: float) -> float:
+def fittings_loss(names: list[str], diameter: float) -> float:
     """Sum of the loss coefficients of fittings in a pipe; diameter : inner [m]."""
     from fluids import fittings
     from fluids.friction import ft_Crane

@@ -13,9 +13,9 @@ import numpy as np
 from fvsolve.case.extent import ALL, Extent, read_extent
 from fvsolve.case.probe import Kinds, Probe, read_probe
 from fvsolve.errors import did_you_mean
-from fvsolve.parts.series import copy_name, find_file, read_columns
-from fvsolve.parts.table import read_keys
-from fvsolve.parts.value import NEEDED, VALUE, Anything, Misfit, Number, Quantity, Setting, Text, nonnegative
+from fvsolve.parts.table_model import read_keys
+from fvsolve.parts.time_series import copy_name, find_file, read_columns
+from fvsolve.parts.value import NEEDED, VALUE, Anything, Number, Quantity, ReadContext, Text, ValueFault, nonnegative
 from fvsolve.units import show
 
 FUNCTIONS = ("max", "min", "mean", "final", "at")
@@ -65,7 +65,7 @@ class Compare:
         return {"file": self.file, "time": self.time, "value": self.value, "shift": self.shift}
 
 
-def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: Setting) -> Expect | None:
+def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext) -> Expect | None:
     """Read one entry of `[expect]`; None if the part of its probe is faulty. Raises ValueFault."""
     faults, named = [], (None, None, None, None)
     try:
@@ -84,14 +84,14 @@ def read_expect(claim: str, given: Any, kinds: Kinds, routes: Mapping[str, Any],
             faults.append(((), "tolerance is missing; expected rtol, atol or both"))
         values = read_keys(given, keys, setting)
     except ValueError as error:
-        raise Misfit(faults + getattr(error, "faults", [((), str(error))])) from None
+        raise ValueFault(faults + getattr(error, "faults", [((), str(error))])) from None
     if faults:
-        raise Misfit(faults)
+        raise ValueFault(faults)
     return None if target is None else Expect(claim, function, probe, extent, time, **values)
 
 
 def read_claim(
-    claim: str, kinds: Kinds, routes: Mapping[str, Any], setting: Setting
+    claim: str, kinds: Kinds, routes: Mapping[str, Any], setting: ReadContext
 ) -> tuple[str, Probe | None, Extent | None, float | None]:
     """Return (function, probe, extent, time [s]) of a claim; probe and extent are None if the part is faulty."""
     match = _CLAIM.fullmatch(claim)
@@ -143,7 +143,7 @@ COMPARE_KEYS = {
 }
 
 
-def read_compare(probe: Probe | None, given: Any, setting: Setting) -> Compare | None:
+def read_compare(probe: Probe | None, given: Any, setting: ReadContext) -> Compare | None:
     """Read one entry of `[compare]`; None if its probe is faulty. Raises ValueError."""
     if not isinstance(given, dict):
         raise ValueError(f'{show(given)} is not a table; expected for example {{ file = "rig.csv" }}')
@@ -154,5 +154,5 @@ def read_compare(probe: Probe | None, given: Any, setting: Setting) -> Compare |
             return None
         t, v, *headers = read_columns(path, values["time"], values["value"], probe.dimension, setting)
     except ValueError as error:
-        raise Misfit([(("file",), str(error))]) from None
+        raise ValueFault([(("file",), str(error))]) from None
     return Compare(probe, copy_name(path, setting), path, *headers, values["shift"], t, v)

@@ -8,27 +8,27 @@ from typing import Any, ClassVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.parts.around import Around, Faults
-from fvsolve.parts.value import NEEDED, Misfit, Setting, Value, setting_of
+from fvsolve.parts.context import CaseContext, Faults
+from fvsolve.parts.value import NEEDED, ReadContext, Value, ValueFault, context_of
 from fvsolve.units import show
 
 
-def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: Setting) -> dict[str, Any]:
+def read_keys(given: dict[str, Any], keys: dict[str, tuple[Value, Any]], setting: ReadContext) -> dict[str, Any]:
     """Read a table by its keys, each with a declaration and a default. Raises ValueFault with all faults."""
     result = {key: default for key, (_, default) in keys.items()}
-    faults = [((key,), f"unknown key{_near(str(key), list(keys))}") for key in given if key not in keys]
+    faults = [((key,), f"unknown key{_key_hint(str(key), list(keys))}") for key in given if key not in keys]
     for key, (value, default) in keys.items():
         try:
             if key in given:
                 result[key] = value.read(given[key], setting)
             elif default is NEEDED:
                 faults.append(((), f"{key} is missing"))
-        except Misfit as error:
+        except ValueFault as error:
             faults += [((key, *below), message) for below, message in error.faults]
         except ValueError as error:
             faults.append(((key,), str(error)))
     if faults:
-        raise Misfit(faults)
+        raise ValueFault(faults)
     return result
 
 
@@ -42,7 +42,7 @@ def keys_json(keys: dict[str, tuple[Value, Any]]) -> dict[str, Any]:
     }
 
 
-def _near(name: str, keys: list[str]) -> str:
+def _key_hint(name: str, keys: list[str]) -> str:
     return did_you_mean(name, keys) or f"; keys are {listing(keys)}"
 
 
@@ -56,7 +56,7 @@ class Table(BaseModel):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys, of which at most one is given
     needs: ClassVar[tuple[tuple[str, ...], ...]] = ()  # groups of keys, of which at least one is given
-    meant: ClassVar[dict[str, str]] = {}  # keys of other programs -> equivalent here
+    synonyms: ClassVar[dict[str, str]] = {}  # keys of other programs -> equivalent here
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
@@ -65,29 +65,29 @@ class Table(BaseModel):
         return too_many + [fault for keys in cls.needs for fault in at_least_one(given, keys)]
 
     @classmethod
-    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """Replace keys that stand for other keys. Raises ValueFault for meaningless values."""
         return given
 
     @model_validator(mode="wrap")
     @classmethod
-    def _all_at_once(cls, given: Any, handler: Any, info: Any) -> Any:
+    def _validate(cls, given: Any, handler: Any, info: Any) -> Any:
         if isinstance(given, cls):
             return given
         if not isinstance(given, dict):
-            raise Misfit([((), f"{show(given)} is not a table; expected {cls.wanted(given)}")])
+            raise ValueFault([((), f"{show(given)} is not a table; expected {cls.expected(given)}")])
         faults = cls.key_faults(given)
         try:
-            given = cls.in_numbers(given, setting_of(info))
-        except Misfit as error:
+            given = cls.resolve_keys(given, context_of(info))
+        except ValueFault as error:
             faults += error.faults
-            given = given if error.instead is None else error.instead
+            given = given if error.replacement is None else error.replacement
         try:
             table = handler(given)
         except ValidationError as error:
-            raise Misfit(faults + misfits(error, cls.keys(), cls.meant)) from None
+            raise ValueFault(faults + faults_of_error(error, cls.keys(), cls.synonyms)) from None
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return table
 
     @classmethod
@@ -99,15 +99,15 @@ class Table(BaseModel):
     def values(cls) -> dict[str, Value]:
         """Declaration of each key."""
         declared = {info.alias or name: (info.metadata, info.annotation) for name, info in cls.model_fields.items()}
-        return {key: next((value for value in metadata if isinstance(value, Value)), Inside(model))
+        return {key: next((value for value in metadata if isinstance(value, Value)), Nested(model))
                 for key, (metadata, model) in declared.items()}  # fmt: skip
 
     @classmethod
-    def wanted(cls, given: Any) -> str:
+    def expected(cls, given: Any) -> str:
         """Text of the expected table, for a value that is not a table."""
         return f"keys of {listing(cls.keys())}"
 
-    def faults(self, name: str, around: Around) -> Faults:
+    def faults(self, name: str, around: CaseContext) -> Faults:
         """Faults of the part in the context of its case: (keys, text)."""
         yield from ()
 
@@ -119,19 +119,19 @@ class Table(BaseModel):
         """Table that reads back as this object: SI numbers, defaults filled in, missing keys left out."""
         result = {}
         for name, info in type(self).model_fields.items():
-            value = plain(getattr(self, name))
+            value = plain_value(getattr(self, name))
             if value is not None:
                 result[info.alias or name] = value
         return result
 
 
-class Inside(Value):
+class Nested(Value):
     """Nested table."""
 
     def __init__(self, model: type[Table], about: str = "") -> None:
         self.model, self.about = model, about
 
-    def read(self, given: Any, setting: Setting) -> Table:
+    def read(self, given: Any, setting: ReadContext) -> Table:
         if isinstance(given, list) and len(given) > 1 and all(isinstance(item, dict) for item in given):
             raise ValueError(
                 f"is a list of {len(given)} tables; expected a single table{', ' * bool(self.about)}{self.about}"
@@ -153,13 +153,13 @@ class Inside(Value):
         return keys_json(keys)
 
 
-class Named(Value):
+class NamedTables(Value):
     """Tables of the same type by name."""
 
     def __init__(self, model: type[Table], about: str) -> None:
         self.model, self.about = model, about
 
-    def read(self, given: Any, setting: Setting) -> dict[str, Any]:
+    def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table of tables by name; expected {self.about}")
         result, faults = {}, []
@@ -168,16 +168,16 @@ class Named(Value):
                 result[name] = (
                     item if isinstance(item, self.model) else self.model.model_validate(item, context=setting)
                 )
-            except Misfit as error:
+            except ValueFault as error:
                 faults += [((name, *below), message) for below, message in error.faults]
             except ValueError as error:
-                faults += [((name, *below), message) for below, message in misfits(error, self.model.keys())]
+                faults += [((name, *below), message) for below, message in faults_of_error(error, self.model.keys())]
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return result
 
     def below(self, key: str) -> Value | None:
-        return Inside(self.model)
+        return Nested(self.model)
 
     @property
     def takes(self) -> str:
@@ -187,14 +187,14 @@ class Named(Value):
         return {"type": "object", "additionalProperties": {"type": "object"}}
 
 
-def plain(value: Any) -> Any:
+def plain_value(value: Any) -> Any:
     """Value of a field as in a case file."""
     if hasattr(value, "table"):
         return value.table()
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [plain_value(item) for item in value]
     if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
+        return {key: plain_value(item) for key, item in value.items()}
     return value
 
 
@@ -211,7 +211,7 @@ def at_least_one(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tup
     return [((), f"expected one of {', '.join(keys)}" if len(keys) > 1 else f"{keys[0]} is missing")]
 
 
-def misfits(
+def faults_of_error(
     error: ValidationError,
     keys: list[str],
     synonyms: dict[str, str] = {},  # noqa: B006
@@ -220,13 +220,13 @@ def misfits(
     result = []
     for entry in error.errors(include_url=False):
         place, cause = tuple(entry["loc"]), entry.get("ctx", {}).get("error")
-        if isinstance(cause, Misfit):
+        if isinstance(cause, ValueFault):
             result += [(place + below, message) for below, message in cause.faults]
         elif entry["type"] == "missing":
             result.append((place[:-1], f"{place[-1]} is missing"))
         elif entry["type"] == "extra_forbidden":
             hint = synonyms.get(str(place[-1]).casefold().replace("-", "_"))
-            result.append((place, f"unknown key{f'; use {hint}' if hint else _near(str(place[-1]), keys)}"))
+            result.append((place, f"unknown key{f'; use {hint}' if hint else _key_hint(str(place[-1]), keys)}"))
         else:
             result.append((place, str(cause) if cause else entry["msg"]))
     return result

@@ -10,7 +10,7 @@ Faults = Iterator[tuple[tuple[Any, ...], str]]  # (keys below the part, text of 
 
 
 @dataclass(frozen=True)
-class Around:
+class CaseContext:
     """Parts and properties of a case after its parts are read.
 
     ambient : ambient pressure [Pa]
@@ -25,8 +25,8 @@ class Around:
     ambient: float
     gravity: float | None
     fluid: Any
-    vacuum: Callable[[str, str, str, list[float]], Faults]
-    between: Callable[[str, str], float | None]
+    boiling_faults: Callable[[str, str, str, list[float]], Faults]
+    place_distance: Callable[[str, str], float | None]
 
     def spatial(self, place: str | None) -> bool:
         """True if a place is a body, or a point of a body or of the world."""
@@ -34,10 +34,10 @@ class Around:
         node = self.nodes.get(name)
         return getattr(node, "domain", "") == "spatial" or bool(point) and point in getattr(node, "points", {})
 
-    def ahead(self, link: Any, first: str, second: str) -> float | None:
+    def separation(self, link: Any, first: str, second: str) -> float | None:
         """Distance from the place at port `first` to that at port `second` at the start [m]; None if unknown.
 
         It is a difference of positions (signed) for masses on the axis, and a distance for points in space.
         """
         ends = [link.ports.get(port) for port in (first, second)]
-        return None if None in ends else self.between(*ends)
+        return None if None in ends else self.place_distance(*ends)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fvsolve.parts.schedule import Scheduled
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import PROFILE, VALUE, Misfit, Number, Quantity, Setting, Text, Value, nonnegative
+from fvsolve.parts.table_model import Table
+from fvsolve.parts.value import PROFILE, VALUE, Number, Quantity, ReadContext, Text, Value, ValueFault, nonnegative
 from fvsolve.units import show
 
 
@@ -24,26 +24,26 @@ class Scalar(Table):
 
 
 @dataclass(frozen=True)
-class Carried(Value):
+class ScalarValues(Value):
     """Values of scalars by name: numbers or schedules."""
 
     about: str = "value of each scalar, by its name"
     value: Value = Scheduled("number")
     changes: str = PROFILE
 
-    def read(self, given: Any, setting: Setting) -> dict[str, Any]:
+    def read(self, given: Any, setting: ReadContext) -> dict[str, Any]:
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table of scalars; expected {{ NAME = VALUE }}")
         values, faults = {}, []
         for name, item in given.items():
             try:
                 values[name] = self.value.read(item, setting)
-            except Misfit as error:
+            except ValueFault as error:
                 faults += [((name, *below), message) for below, message in error.faults]
             except ValueError as error:
                 faults.append(((name,), str(error)))
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return values
 
     def below(self, key: str) -> Value | None:

@@ -14,13 +14,13 @@ DENSITY = 999.563  # EPANET's density of water: 550 ft lbf/s / 8.814 per hp / gr
 GRAVITY = 9.80665
 
 
-def quantity(value: float, unit: str) -> str:
+def quantity_text(value: float, unit: str) -> str:
     """Text of a value [SI] in a unit, with ten digits: `304.8 mm`."""
     factor = {"m": 1.0, "mm": 1e3, "l/s": 1e3, "m/s": 1.0, "m2": 1.0}[unit]
     return f"{value * factor:.10g} {unit}".replace("-0 ", "0 ")
 
 
-def number(value: float) -> float | int:
+def rounded_number(value: float) -> float | int:
     """Number rounded to ten digits; an integer if it is whole."""
     short = float(f"{value:.10g}")
     return int(short) if short.is_integer() else short
@@ -28,76 +28,76 @@ def number(value: float) -> float | int:
 
 def junction(elevation: float, demand: float, position: Any) -> Part:
     """Junction with a demand [m3/s]."""
-    part = {"type": "junction", "elevation": quantity(elevation, "m")}
+    part = {"type": "junction", "elevation": quantity_text(elevation, "m")}
     if demand:
-        part["demand"] = quantity(demand, "l/s")
+        part["demand"] = quantity_text(demand, "l/s")
     return part | _position(position)
 
 
-def follows_pressure(minimum: float, required: float, exponent: float) -> Part:
+def pressure_demand(minimum: float, required: float, exponent: float) -> Part:
     """Keys of a demand that grows from zero at the `minimum` to full at the `required` pressure, heads of water [m]."""
-    part = {"required_pressure": gauge(required)}
+    part = {"required_pressure": gauge_pressure(required)}
     if minimum:
-        part["minimum_pressure"] = gauge(minimum)
-    return part if exponent == 0.5 else part | {"demand_exponent": number(exponent)}
+        part["minimum_pressure"] = gauge_pressure(minimum)
+    return part if exponent == 0.5 else part | {"demand_exponent": rounded_number(exponent)}
 
 
-def gauge(head: float) -> str:
+def gauge_pressure(head: float) -> str:
     """Text of the gauge pressure of a head of water [m]."""
     return f"{DENSITY * GRAVITY * head * 1e-5:.10g} barg"
 
 
 def reservoir(head: float, position: Any) -> Part:
     """Reservoir of given head [m]."""
-    return {"type": "reservoir", "head": quantity(head, "m")} | _position(position)
+    return {"type": "reservoir", "head": quantity_text(head, "m")} | _position(position)
 
 
 def tank(elevation: float, area: float, level: float, height: float, position: Any) -> Part:
     """Tank with its area [m2], level and largest level above its bottom [m]."""
-    part = {"type": "tank", "elevation": quantity(elevation, "m"), "area": quantity(area, "m2")}
-    part |= {"level": quantity(level, "m"), "height": quantity(height, "m")}
+    part = {"type": "tank", "elevation": quantity_text(elevation, "m"), "area": quantity_text(area, "m2")}
+    part |= {"level": quantity_text(level, "m"), "height": quantity_text(height, "m")}
     return part | _position(position)
 
 
 def pipe(ends: tuple[str, str], length: float, diameter: float, friction: Part, minor: float, speed: float) -> Part:
     """Pipe with its length [m], diameter [m], minor loss and wave speed [m/s]."""
-    part = _link("pipe", ends) | {"length": quantity(length, "m"), "diameter": quantity(diameter, "mm")}
+    part = _link("pipe", ends) | {"length": quantity_text(length, "m"), "diameter": quantity_text(diameter, "mm")}
     part |= {"friction": friction}
     if minor:
-        part["minor_loss"] = number(minor)
-    return part | {"wave_speed": quantity(speed, "m/s")}
+        part["minor_loss"] = rounded_number(minor)
+    return part | {"wave_speed": quantity_text(speed, "m/s")}
 
 
 def friction(formula: str, roughness: float) -> Part:
     """Friction by EPANET's formula; roughness : C [-], height [m], or n [s/m^(1/3)]."""
     if formula == "H-W":
-        return {"model": "hazen-williams", "coefficient": number(roughness)}
+        return {"model": "hazen-williams", "coefficient": rounded_number(roughness)}
     if formula == "C-M":
-        return {"model": "chezy-manning", "coefficient": number(roughness)}
-    return {"model": "quasi-steady", "roughness": quantity(roughness, "mm")}
+        return {"model": "chezy-manning", "coefficient": rounded_number(roughness)}
+    return {"model": "quasi-steady", "roughness": quantity_text(roughness, "mm")}
 
 
 def darcy(factor: float) -> Part:
     """Friction by the Darcy factor."""
-    return {"model": "steady", "factor": number(factor)}
+    return {"model": "steady", "factor": rounded_number(factor)}
 
 
 def valve(ends: tuple[str, str], diameter: float, loss: float, opening: float = 1.0) -> Part:
     """Valve with its loss coefficient on the velocity in its diameter."""
-    part = _link("valve", ends) | {"diameter": quantity(diameter, "mm")}
-    part["loss_coefficient"] = number(loss or NO_LOSS)
+    part = _link("valve", ends) | {"diameter": quantity_text(diameter, "mm")}
+    part["loss_coefficient"] = rounded_number(loss or NO_LOSS)
     return part if opening == 1.0 else part | {"opening": opening}
 
 
 def pump(ends: tuple[str, str], law: Part, speed: float) -> Part:
     """Pump with its law at full speed, and a check valve: EPANET's pumps have no reverse flow."""
-    return _link("pump", ends) | law | {"speed": number(speed), "check_valve": True}
+    return _link("pump", ends) | law | {"speed": rounded_number(speed), "check_valve": True}
 
 
 def curve(points: list[tuple[float, float]]) -> Part:
     """Pump curve by points of flow [m3/s] and head [m]; case and EPANET interpret the points equally."""
     flow, head = zip(*points, strict=True)
-    return {"curve": {"flow": [quantity(q, "l/s") for q in flow], "head": [quantity(h, "m") for h in head]}}
+    return {"curve": {"flow": [quantity_text(q, "l/s") for q in flow], "head": [quantity_text(h, "m") for h in head]}}
 
 
 def power(watts: float) -> Part:
@@ -107,27 +107,32 @@ def power(watts: float) -> Part:
 
 def check_valve(ends: tuple[str, str], diameter: float) -> Part:
     """Check valve."""
-    return _link("check-valve", ends) | {"diameter": quantity(diameter, "mm"), "loss_coefficient": NO_LOSS}
+    return _link("check-valve", ends) | {"diameter": quantity_text(diameter, "mm"), "loss_coefficient": NO_LOSS}
 
 
 def regulating(kind: str, ends: tuple[str, str], diameter: float, setting: float, loss: float) -> Part:
     """Valve that controls a head of water above its end ("PRV", "PSV") [m] or a flow ("FCV") [m3/s]."""
     part = _link(REGULATING[kind], ends)
     if kind == "FCV":
-        part["set_flow"] = quantity(setting, "l/s")
+        part["set_flow"] = quantity_text(setting, "l/s")
     else:
-        part["set_pressure"] = gauge(setting)
-    part |= {"time_constant": TIME_CONSTANT, "diameter": quantity(diameter, "mm")}
-    return part | {"loss_coefficient": number(loss or NO_LOSS)}
+        part["set_pressure"] = gauge_pressure(setting)
+    part |= {"time_constant": TIME_CONSTANT, "diameter": quantity_text(diameter, "mm")}
+    return part | {"loss_coefficient": rounded_number(loss or NO_LOSS)}
 
 
 def leak(place: str, coefficient: float, exponent: float) -> Part:
     """Leak for an emitter: flow [m3/s] = coefficient * (head of water [m])^exponent, converted to pressure in Pa."""
     per_pascal = coefficient / (DENSITY * GRAVITY) ** exponent
-    return {"type": "leak", "from": place, "coefficient": number(per_pascal), "exponent": number(exponent)}
+    return {
+        "type": "leak",
+        "from": place,
+        "coefficient": rounded_number(per_pascal),
+        "exponent": rounded_number(exponent),
+    }
 
 
-def loss_of(drop: float, flow: float, diameter: float) -> float:
+def loss_coefficient(drop: float, flow: float, diameter: float) -> float:
     """Loss coefficient on the velocity in a diameter for a head loss [m] at a flow [m3/s]."""
     velocity = flow / (math.pi / 4.0 * diameter**2)
     return 2.0 * GRAVITY * drop / velocity**2
@@ -138,4 +143,4 @@ def _link(kind: str, ends: tuple[str, str]) -> Part:
 
 
 def _position(position: Any) -> Part:
-    return {} if position is None else {"position": [number(x) for x in position]}
+    return {} if position is None else {"position": [rounded_number(x) for x in position]}

@@ -16,15 +16,25 @@ from typing import Any
 import numpy as np
 
 from fvsolve import units
-from fvsolve.case.raw import dotted
+from fvsolve.case.raw import split_key
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS, Pipe
 from fvsolve.units import show
 
-WHERE = ("on", "at")
+CHAINAGE_KEYS = ("on", "at")
 TIE = 1e-6  # rounding bias [cells]: a pipe drawn in the other direction gets the same cells
-OWN = ("length", "cells", "minor_loss", "fittings", "profile", "from", "to", "pieces", "bends")  # keys of each piece
-Say = Callable[[tuple, str], None]
+PIECE_KEYS = (
+    "length",
+    "cells",
+    "minor_loss",
+    "fittings",
+    "profile",
+    "from",
+    "to",
+    "pieces",
+    "bends",
+)  # keys of each piece
+Report = Callable[[tuple, str], None]
 
 
 @dataclass
@@ -33,19 +43,19 @@ class Placed:
 
     group: str
     name: str
-    said: dict[str, Any]
+    given: dict[str, Any]
     distance: float = 0.0
 
     @property
     def fits(self) -> bool:
         """True if a part of this type may be placed on a pipe."""
-        return kind_of(self.group, self.said) is not None and unfit(self.group, self.said) is None
+        return kind_of(self.group, self.given) is not None and unfit_reason(self.group, self.given) is None
 
     @property
     def inline(self) -> bool:
         """True if the part is a link that lies in the pipe."""
-        kind = kind_of(self.group, self.said)
-        return self.fits and self.group == "links" and "to" in kind.joins and "to" not in (*self.said, *kind.may_lack)
+        kind = kind_of(self.group, self.given)
+        return self.fits and self.group == "links" and "to" in kind.joins and "to" not in (*self.given, *kind.may_lack)
 
     @property
     def joins(self) -> tuple[str, str]:
@@ -56,7 +66,7 @@ class Placed:
 
 
 @dataclass
-class Cutting:
+class CutTable:
     """Table of a case with its pipes cut.
 
     pieces : cut pipe -> names of its pieces
@@ -70,9 +80,9 @@ class Cutting:
     named: frozenset[str]  # links of the file
     pieces: dict[str, list[str]] = field(default_factory=dict)
     origin: dict[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
-    lost: set[tuple[str, str]] = field(default_factory=set)
-    wholes: dict[str, Pipe] = field(default_factory=dict)
-    known: bool = True
+    unreadable: set[tuple[str, str]] = field(default_factory=set)
+    uncut: dict[str, Pipe] = field(default_factory=dict)
+    connections_known: bool = True
 
 
 def placed(table: dict[str, Any]) -> list[tuple[str, str, dict[str, Any]]]:
@@ -103,7 +113,7 @@ def kind_of(group: str, part: dict[str, Any]) -> Any:
     return KINDS[group].get(str(part.get("type")))
 
 
-def unfit(group: str, part: dict[str, Any]) -> str | None:
+def unfit_reason(group: str, part: dict[str, Any]) -> str | None:
     """Reason why a part of a known type cannot be placed on a pipe; None if it can."""
     kind = kind_of(group, part)
     if group == "nodes" and (kind.domain != "hydraulic" or kind.own_places(part) is not None):
@@ -113,7 +123,7 @@ def unfit(group: str, part: dict[str, Any]) -> str | None:
     return "a pipe has a length; place a junction on the pipe and join to it" if kind is Pipe else None
 
 
-def bent(table: dict[str, Any]) -> dict[str, Any]:
+def add_bends(table: dict[str, Any]) -> dict[str, Any]:
     """Add to a table a junction at every bend of a pipe."""
     nodes, links = table.get("nodes"), table.get("links")
     result: dict[str, Any] = {}
@@ -127,7 +137,7 @@ def bent(table: dict[str, Any]) -> dict[str, Any]:
 def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
     """Cut pipe -> names of the pieces that `cut` makes of it."""
     counts: dict[str, int] = {}
-    for _, _, part in placed(bent(table)):
+    for _, _, part in placed(add_bends(table)):
         if isinstance(part.get("on"), str):
             counts[part["on"]] = counts.get(part["on"], 1) + 1
     return {name: [f"{name}-{k + 1}" for k in range(count)] for name, count in counts.items()}
@@ -135,11 +145,11 @@ def pieces_of(table: dict[str, Any]) -> dict[str, list[str]]:
 
 def settings(table: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """Settings by dotted keys; keys of a piece become those under `pieces` in the table before cutting."""
-    return {".".join(own) if (own := own_keys(table, keys := dotted(str(key)))) != keys else key: value
+    return {".".join(own) if (own := original_keys(table, keys := split_key(str(key)))) != keys else key: value
             for key, value in given.items()}  # fmt: skip
 
 
-def own_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ...]:
+def original_keys(table: dict[str, Any], keys: tuple[str, ...]) -> tuple[str, ...]:
     """Key path of a piece's key in the table before cutting; other key paths are returned unchanged."""
     match = re.fullmatch(r"(.+)-\d+", keys[1]) if len(keys) > 2 and keys[0] == "links" else None
     if match and keys[1] not in table.get("links", {}) and keys[1] in pieces_of(table).get(match[1], ()):
@@ -162,19 +172,21 @@ def faults(table: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
             yield key, f"at is missing; expected the chainage along {on}"
         if kind_of(group, part) is None:
             continue
-        if (reason := unfit(group, part)) is not None:
+        if (reason := unfit_reason(group, part)) is not None:
             yield (*key, "on"), reason
         elif "from" in part:
             yield (*key, "from"), "on and at place it on a pipe, so it starts there; remove from, or on and at"
 
 
-def cut(table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int], faulty: set, report: Say) -> Cutting:
+def cut(
+    table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int], faulty: set, report: Report
+) -> CutTable:
     """Cut the pipes of a table at the parts placed on them.
 
     read_pipes : pipes without faults, as read; cells : number of cells of each; faulty : (group, name) of parts with a
     faulty place; report : function of the keys and the text of a fault
     """
-    result = Cutting({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
+    result = CutTable({**table, "nodes": dict(table["nodes"]), "links": {}, "routes": dict(table.get("routes", {}))},
                    frozenset(table["links"]))  # fmt: skip
     pipes = [name for name, item in table["links"].items() if is_pipe(item)]
     by_pipe: dict[str, list[Placed]] = {}
@@ -182,14 +194,14 @@ def cut(table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int
     for group, name, part in placed(table):
         item = Placed(group, name, part)
         on = part["on"] if part.get("on") in pipes else next(iter(pipes), None)
-        result.known = result.known and on is not None
+        result.connections_known = result.connections_known and on is not None
         stands = "at" in part and read_distance(item, on, read_pipes.get(on), report)
         if (group, name) in faulty or not item.fits or on not in read_pipes or not stands:
             lost.add(on)
         if not item.fits:
-            result.lost.add((group, name))
+            result.unreadable.add((group, name))
         by_pipe.setdefault(on, []).append(item)
-        rest = {key: value for key, value in part.items() if key not in WHERE}
+        rest = {key: value for key, value in part.items() if key not in CHAINAGE_KEYS}
         if group == "nodes":
             result.table["nodes"][name] = rest
         else:
@@ -202,41 +214,41 @@ def cut(table: dict[str, Any], read_pipes: dict[str, Pipe], cells: dict[str, int
             result.table["links"][name] = links.get(name, part)
             continue
         on_it, pipe = by_pipe[name], read_pipes.get(name)
-        if pipe is not None and name not in lost and are_apart(on_it, report):
-            cut_one(result, name, part, pipe, on_it, cells[name], report)
+        if pipe is not None and name not in lost and sort_parts(on_it, report):
+            cut_pipe(result, name, part, pipe, on_it, cells[name], report)
         else:
-            result.wholes |= {} if pipe is None else {name: pipe}
-            lose(result, name, part, on_it, report)
+            result.uncut |= {} if pipe is None else {name: pipe}
+            add_unknown_pieces(result, name, part, on_it, report)
     return result
 
 
-def lose(result: Cutting, name: str, given: dict[str, Any], parts: list[Placed], report: Say) -> None:
+def add_unknown_pieces(result: CutTable, name: str, given: dict[str, Any], parts: list[Placed], report: Report) -> None:
     """Add to the table pieces of a faulty pipe, of which only the connections are known."""
     names = result.pieces[name] = [f"{name}-{k + 1}" for k in range(len(parts) + 1)]
-    taken(result, name, given, parts, names, report)
+    name_faults(result, name, given, parts, names, report)
     starts = [given.get("from"), *(part.joins[1] for part in parts)]
     ends = [*(part.joins[0] for part in parts), given.get("to")]
     for own, first, last in zip(names, starts, ends, strict=True):
         # with a profile, since inherited elevations depend on it
         result.table["links"][own] = {"type": "pipe", "from": first, "to": last, "profile": None}
         result.origin["links", own] = ("links", name)
-        result.lost.add(("links", own))
-    for part in parts if result.known else ():
+        result.unreadable.add(("links", own))
+    for part in parts if result.connections_known else ():
         for place in part.joins if part.group == "links" else ():
             result.table["nodes"][place] = {"type": "junction"}
             result.origin["nodes", place] = ("links", part.name)
     result.table["routes"].setdefault(name, {"pipes": names})
 
 
-def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Say) -> bool:
+def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Report) -> bool:
     """Set the distance of a part along its pipe; False, with a report, if its chainage is faulty."""
-    key, given = (part.group, part.name, "at"), part.said["at"]
+    key, given = (part.group, part.name, "at"), part.given["at"]
     try:
         chainage = units.parse(given, "length")
     except ValueError as error:
         report(key, str(error))
         return False
-    if pipe is None or on != part.said.get("on"):
+    if pipe is None or on != part.given.get("on"):
         return True
     begin = 0.0 if pipe.profile is None else float(pipe.profile.chainage[0])
     part.distance = chainage - begin
@@ -250,7 +262,7 @@ def read_distance(part: Placed, on: str | None, pipe: Pipe | None, report: Say) 
     return True
 
 
-def are_apart(parts: list[Placed], report: Say) -> bool:
+def sort_parts(parts: list[Placed], report: Report) -> bool:
     """Sort parts by distance; False, with a report, if two parts have the same distance."""
     parts.sort(key=lambda part: part.distance)
     pairs = [(part, other) for part, other in zip(parts, parts[1:], strict=False) if part.distance == other.distance]
@@ -259,7 +271,9 @@ def are_apart(parts: list[Placed], report: Say) -> bool:
     return not pairs
 
 
-def cut_one(result: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, report: Say) -> None:
+def cut_pipe(
+    result: CutTable, name: str, given: dict, whole: Pipe, parts: list[Placed], cells: int, report: Report
+) -> None:
     """Add the pieces of a pipe, their nodes and their route to the table.
 
     parts : sorted by distance. A piece has the number of cells nearest to its share of the pipe's cells, at least 1.
@@ -268,16 +282,18 @@ def cut_one(result: Cutting, name: str, given: dict, whole: Pipe, parts: list[Pl
     counts = np.maximum(1, np.floor(np.diff(edges) / whole.length * cells + 0.5 + TIE).astype(int))
     names = result.pieces[name] = [f"{name}-{k + 1}" for k in range(len(parts) + 1)]
     begin = 0.0 if whole.profile is None else float(whole.profile.chainage[0])
-    taken(result, name, given, parts, names, report)
-    lay(result, name, given, whole, parts, edges, counts.tolist())
+    name_faults(result, name, given, parts, names, report)
+    write_pieces(result, name, given, whole, parts, edges, counts.tolist())
     result.table["routes"][name] = {"pipes": names, "start": begin}
 
 
-def taken(result: Cutting, name: str, given: dict, parts: list[Placed], names: list[str], report: Say) -> None:
+def name_faults(
+    result: CutTable, name: str, given: dict, parts: list[Placed], names: list[str], report: Report
+) -> None:
     """Report names that cutting a pipe would give twice, and keys of unknown pieces."""
     for item in names:
         if item in result.named:
-            result.known = False
+            result.connections_known = False
             report(
                 ("links", item), f"{name} is cut, and {show(item)} is the name of one of its pieces; rename this link"
             )
@@ -286,9 +302,9 @@ def taken(result: Cutting, name: str, given: dict, parts: list[Placed], names: l
     for item in parts:
         for place in dict.fromkeys(item.joins) if item.group == "links" else ():
             if place in result.table["nodes"]:
-                result.known = False
+                result.connections_known = False
                 report(
-                    ("nodes", place), f"{item.name} joins {item.said['on']} at a place of that name; rename this node"
+                    ("nodes", place), f"{item.name} joins {item.given['on']} at a place of that name; rename this node"
                 )
     own = given.get("pieces", {})
     if not isinstance(own, dict) or not all(isinstance(item, dict) for item in own.values()):
@@ -301,12 +317,12 @@ def taken(result: Cutting, name: str, given: dict, parts: list[Placed], names: l
             )
 
 
-def lay(
-    result: Cutting, name: str, given: dict, whole: Pipe, parts: list[Placed], edges: np.ndarray, counts: list[int]
+def write_pieces(
+    result: CutTable, name: str, given: dict, whole: Pipe, parts: list[Placed], edges: np.ndarray, counts: list[int]
 ):
     """Add the pieces of a pipe, the nodes between them and the elevations of these nodes."""
     links, nodes = result.table["links"], result.table["nodes"]
-    rest = {key: value for key, value in given.items() if key not in OWN}
+    rest = {key: value for key, value in given.items() if key not in PIECE_KEYS}
     joins = [item.joins for item in parts]
     starts, ends = [whole.from_, *(last for _, last in joins)], [*(first for first, _ in joins), whole.to]
     for k, (low, high) in enumerate(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)):
@@ -318,9 +334,9 @@ def lay(
             piece["profile"] = part.said
             piece["length"] = part.length
         own = f"{name}-{k + 1}"
-        links[own] = piece | dict(own_of(given, own))
+        links[own] = piece | dict(keys_of_piece(given, own))
         result.origin["links", own] = ("links", name)
-    heights = [height(nodes.get(end)) for end in (whole.from_, whole.to)]
+    heights = [stated_elevation(nodes.get(end)) for end in (whole.from_, whole.to)]
     for item, at, (first, last) in zip(parts, edges[1:-1].tolist(), joins, strict=True):
         z = {}
         if whole.profile is None and None not in heights:
@@ -333,14 +349,14 @@ def lay(
                 result.origin["nodes", place] = ("links", item.name)
 
 
-def own_of(given: dict, piece: str) -> Any:
+def keys_of_piece(given: dict, piece: str) -> Any:
     """Keys that a cut pipe states for one piece."""
     own = given.get("pieces")
     values = own.get(piece) if isinstance(own, dict) else None
     return values if isinstance(values, dict) else {}
 
 
-def height(node: Any) -> float | None:
+def stated_elevation(node: Any) -> float | None:
     """Stated elevation of a raw node [m]; None if it is missing or unreadable."""
     try:
         return float(units.parse(node["elevation"], "length"))

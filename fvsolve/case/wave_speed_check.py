@@ -10,19 +10,21 @@ from fvsolve.parts import Pipe
 from fvsolve.parts.pipe.wall import softness
 
 # Allowed ratio. Anchoring changes the wave speed of a plastic pipe by 12 %, the spread of moduli by as much.
-APART = 1.2
-NAMED = ("diameter", "nominal", "schedule", "class", "material", "lining")  # keys that define a wall
+ALLOWED_RATIO = 1.2
+WALL_KEYS = ("diameter", "nominal", "schedule", "class", "material", "lining")  # keys that define a wall
 
 
-def at_odds(case: Any, name: str) -> tuple[float, float, str] | None:
+def wave_speed_mismatch(case: Any, name: str) -> tuple[float, float, str] | None:
     """Return (value, limit, text) if the stated wave speed is far from that of the stated wall, else None."""
-    pipe, keys = case.links[name], defaults.link_said(case.raw, name)
+    pipe, keys = case.links[name], defaults.raw_link(case.raw, name)
     try:
-        wall = Pipe.model_validate({"from": "a", "to": "b", "length": 1.0, **{k: keys[k] for k in NAMED if k in keys}})
+        wall = Pipe.model_validate(
+            {"from": "a", "to": "b", "length": 1.0, **{k: keys[k] for k in WALL_KEYS if k in keys}}
+        )
     except ValueError:  # a material without a wall thickness
         return None
     speed = math.sqrt(1.0 / (1.0 / case.properties.bulk_modulus + softness(wall)) / case.properties.density)
-    if speed / APART <= pipe.wave_speed <= speed * APART:
+    if speed / ALLOWED_RATIO <= pipe.wave_speed <= speed * ALLOWED_RATIO:
         return None
     size = " ".join(str(keys[key]) for key in ("material", "class", "nominal") if key in keys)
     text = (f"{case.amount(pipe.wave_speed, 'velocity')} is stated, but the wall of {size} gives "

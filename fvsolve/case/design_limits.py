@@ -10,8 +10,19 @@ from typing import Any
 from fvsolve.case.extent import OF_PRESSURE, Extent, only_dimension, read_extent
 from fvsolve.case.probe import Kinds
 from fvsolve.errors import did_you_mean
-from fvsolve.parts.table import read_keys
-from fvsolve.parts.value import NEEDED, VALUE, Anything, Misfit, Number, Quantity, Setting, Text, Value, positive
+from fvsolve.parts.table_model import read_keys
+from fvsolve.parts.value import (
+    NEEDED,
+    VALUE,
+    Anything,
+    Number,
+    Quantity,
+    ReadContext,
+    Text,
+    Value,
+    ValueFault,
+    positive,
+)
 from fvsolve.units import show
 
 VACUUM, VAPOR = "vacuum", "vapor"
@@ -27,7 +38,7 @@ class Bound(Value):
     def __init__(self, dimension: str, named: bool) -> None:
         self.item, self.named = Quantity(dimension, changes=VALUE), named
 
-    def read(self, given: Any, setting: Setting) -> float | str:
+    def read(self, given: Any, setting: ReadContext) -> float | str:
         if isinstance(given, str) and given.casefold() in NAMED:
             if self.named:
                 return NAMED[given.casefold()]
@@ -47,7 +58,7 @@ class On(Value):
 
     changes = VALUE
 
-    def read(self, given: Any, setting: Setting) -> Any:
+    def read(self, given: Any, setting: ReadContext) -> Any:
         return tuple(given) if isinstance(given, list) else given
 
     def json(self) -> dict[str, Any]:
@@ -88,7 +99,7 @@ def limit_keys(quantity: str, dimension: str) -> dict[str, tuple[Value, Any]]:
 
 
 def read_limit(
-    name: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], links: Mapping[str, Any], setting: Setting
+    name: str, given: Any, kinds: Kinds, routes: Mapping[str, Any], links: Mapping[str, Any], setting: ReadContext
 ) -> DesignLimit | None:
     """Read one table of `[limits]`; None if its parts are faulty. Raises ValueError, ValueFault."""
     if not isinstance(given, dict):
@@ -101,7 +112,7 @@ def read_limit(
         try:
             extent = read_extent(given["on"], quantity, kinds, routes)
         except ValueError as error:
-            key = "quantity" if isinstance(error, Misfit) and "quantity" in given else "on"
+            key = "quantity" if isinstance(error, ValueFault) and "quantity" in given else "on"
             faults.append(((key,), str(error)))
     dimension = (
         extent.dimension if extent is not None else only_dimension(quantity) if isinstance(quantity, str) else None
@@ -112,7 +123,7 @@ def read_limit(
     bounds = dict.fromkeys(BOUNDS)
     try:
         read_keys(given, keys, setting)
-    except Misfit as error:
+    except ValueFault as error:
         faults += error.faults
     for key in BOUNDS:
         with suppress(KeyError, ValueError):
@@ -125,9 +136,9 @@ def read_limit(
     if dimension is not None and isinstance(minimum, float) and isinstance(maximum, float) and not minimum < maximum:
         faults.append((("minimum",), f"{show(given['minimum'])} is not below maximum, {show(given['maximum'])}"))
     if extent is not None and bounds["class_fraction"] is not None:
-        faults += list(unclassed(extent, links))
+        faults += list(pipes_without_class(extent, links))
     if faults:
-        raise Misfit(faults)
+        raise ValueFault(faults)
     return None if extent is None else DesignLimit(name, extent, **bounds)
 
 
@@ -145,7 +156,7 @@ def limit_faults(limit: DesignLimit | None, fluid: Any, gravity: float) -> Itera
             yield (key,), 'the fluid has no vapour pressure; expected vapor_pressure above 0 under [fluid], or "vacuum"'
 
 
-def unclassed(extent: Extent, links: Mapping[str, Any]):
+def pipes_without_class(extent: Extent, links: Mapping[str, Any]):
     """Faults of `class_fraction` on quantities or parts without a pressure class."""
     if extent.quantity not in OF_PRESSURE or extent.quantity == "head":
         yield ("class_fraction",), f"a class limits pressure, not {extent.quantity}; leave quantity out"

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.exact.schedule import value
-from fvsolve.parts.formula import Formula
+from fvsolve.exact.schedule_values import value
+from fvsolve.parts.formula import SpatialField
 from fvsolve.units import show
 
 SAMPLES = 1001  # number of samples of a travel
@@ -17,14 +17,14 @@ NEAR = 1e-9  # tolerance of a length or of a normal, relative
 FLAT = 1e-12  # tolerance of the elevation of a bed, relative
 
 
-def moving(basin: Any) -> dict[str, Any]:
+def moving_walls(basin: Any) -> dict[str, Any]:
     """Patches of a basin that are moving walls, by name."""
     return {patch: options for patch, options in basin.patches.items() if options.moves}
 
 
 def axis_of(basin: Any, mesh: Any) -> int:
     """Axis along which the walls of a basin move: 0 for x, 1 for y."""
-    return outward(mesh, next(iter(moving(basin))))[0]
+    return outward(mesh, next(iter(moving_walls(basin))))[0]
 
 
 def outward(mesh: Any, patch: str) -> tuple[int, float]:
@@ -42,7 +42,7 @@ def weights(basin: Any, mesh: Any, patch: str, at: np.ndarray) -> np.ndarray:
     return np.clip(1.0 - (high - at if side > 0.0 else at - low) / zone, 0.0, 1.0)
 
 
-def widened(mesh: Any, axis: int, share: np.ndarray) -> np.ndarray:
+def area_growth(mesh: Any, axis: int, share: np.ndarray) -> np.ndarray:
     """Growth of cell areas per travel, relative to the areas as drawn : float64[n] [1/m].
 
     share : float64[p]  share of the wall's travel at the points of the mesh
@@ -53,7 +53,7 @@ def widened(mesh: Any, axis: int, share: np.ndarray) -> np.ndarray:
     return (result - np.bincount(mesh.right[:inner], swept[:inner], mesh.area.size)) / mesh.area
 
 
-def misfits(
+def find_faults(
     name: str,
     basin: Any,
     mesh: Any,
@@ -67,7 +67,7 @@ def misfits(
     for patch, options in basin.patches.items():
         if options.zone is not None and not options.moves:
             yield (*key, patch, "zone"), "applies only to a moving wall; give body or travel too"
-    walls = {patch: options for patch, options in moving(basin).items() if patch in mesh.patches[:-1]}
+    walls = {patch: options for patch, options in moving_walls(basin).items() if patch in mesh.patches[:-1]}
     for patch, options in walls.items():
         yield from (
             ((*key, patch, *below), text)
@@ -115,9 +115,9 @@ def wall_faults(
     if zone > size * (1.0 + 1e-9):
         yield ("zone",), f"{zone:g} m is more than the length of the basin along {'xy'[axis]}, {size:g} m"
     if options.travel is not None:
-        per = widened(mesh, axis, weights(basin, mesh, patch, at))
+        per = area_growth(mesh, axis, weights(basin, mesh, patch, at))
         yield from ((("travel",), text) for text in travel_faults(options.travel, side, zone, times, mesh, per))
-    if isinstance(getattr(basin, "bed", None), Formula):
+    if isinstance(getattr(basin, "bed", None), SpatialField):
         yield from bed_faults(basin, mesh, patch)
     yield from outline_faults(basin, mesh, patch)
 
@@ -140,11 +140,11 @@ def slider_faults(name: str, node: Any, nodes: dict[str, Any], axis: int) -> Ite
     up = nodes.get((node.joint.on or "").partition(".")[0])
     if node.joint.kind != "prismatic" or getattr(up, "kind", "frame") != "frame":
         yield f"{name} does not slide on the world; expected a prismatic joint on the world, or travel instead of body"
-    elif abs(direction(node)[axis]) < 1.0 - 1e-9:
+    elif abs(slide_direction(node)[axis]) < 1.0 - 1e-9:
         yield f"{name} does not slide along {'xy'[axis]}, the axis of the wall; change the axis of its joint"
 
 
-def direction(body: Any) -> np.ndarray:
+def slide_direction(body: Any) -> np.ndarray:
     """Direction in the world along which a body on a prismatic joint slides : float64[3]."""
     return body.joint.attitude.rotation @ body.joint.unit_axis
 
@@ -225,7 +225,7 @@ def crossing_faults(basin: Any, mesh: Any, walls: dict[str, Any], times: tuple) 
     for k, (patch, travel) in enumerate(driven.items()):
         axis, _ = outward(mesh, patch)
         places = value(travel, at)
-        grown = np.outer(widened(mesh, axis, weights(basin, mesh, patch, mesh.points[:, axis])), places - places[0])
+        grown = np.outer(area_growth(mesh, axis, weights(basin, mesh, patch, mesh.points[:, axis])), places - places[0])
         wide += grown
         alone[k] = grown.min() > -1.0
     if alone.all() and wide.min() <= 0.0:

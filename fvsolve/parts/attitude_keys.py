@@ -9,19 +9,19 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve import attitude
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import Matrix, Misfit, Quantity, Rows, Setting, Usual
+from fvsolve.parts.table_model import Table
+from fvsolve.parts.value import Matrix, Quantity, ReadContext, Rows, UsualRange, ValueFault
 
-TURNS = Usual(-6.3, 6.3, "one turn in either direction")
-TYPED = 1e-6  # rounding of numbers typed with six digits; larger deviations give a notice
-LOOSE = 1e-3  # R'R - I of a matrix typed with three digits, and [rad] between forms; larger deviations are faults
+USUAL_ANGLES = UsualRange(-6.3, 6.3, "one turn in either direction")
+ROUNDING = 1e-6  # rounding of numbers typed with six digits; larger deviations give a notice
+TOLERANCE = 1e-3  # R'R - I of a matrix typed with three digits, and [rad] between forms; larger deviations are faults
 SHORTEST = 1e-100  # smallest length of an axis
 ANGLES = ("roll", "pitch", "yaw")
 
 
 def Angle(about: str) -> Quantity:
     """Declaration of an angle of an attitude."""
-    return Quantity("angle", about=about, usual=TURNS)
+    return Quantity("angle", about=about, usual=USUAL_ANGLES)
 
 
 class Attitude(Table):
@@ -31,17 +31,25 @@ class Attitude(Table):
     """
 
     roll: Annotated[
-        float | None, Quantity("angle", about="angle about x, the last rotation [rad]; 0 if left out", usual=TURNS)
+        float | None,
+        Quantity("angle", about="angle about x, the last rotation [rad]; 0 if left out", usual=USUAL_ANGLES),
     ] = None
     pitch: Annotated[
-        float | None, Quantity("angle", about="angle about y, the second rotation [rad]; 0 if left out", usual=TURNS)
+        float | None,
+        Quantity("angle", about="angle about y, the second rotation [rad]; 0 if left out", usual=USUAL_ANGLES),
     ] = None
     yaw: Annotated[
-        float | None, Quantity("angle", about="angle about z, the first rotation [rad]; 0 if left out", usual=TURNS)
+        float | None,
+        Quantity("angle", about="angle about z, the first rotation [rad]; 0 if left out", usual=USUAL_ANGLES),
     ] = None
     zyz: Annotated[
         tuple[float, ...] | None,
-        Rows("angle", length=3, about="classical Euler angles [psi, theta, phi] about z, y and z [rad]", usual=TURNS),
+        Rows(
+            "angle",
+            length=3,
+            about="classical Euler angles [psi, theta, phi] about z, y and z [rad]",
+            usual=USUAL_ANGLES,
+        ),
     ] = None
     axis: Annotated[tuple[float, ...] | None, Rows("number", length=3, about="axis of a single rotation by angle")] = (
         None
@@ -54,7 +62,7 @@ class Attitude(Table):
         tuple | None, Matrix("number", about="rotation matrix; its columns are the rotated axes in the reference axes")
     ] = None
 
-    meant: ClassVar[dict[str, str]] = {
+    synonyms: ClassVar[dict[str, str]] = {
         "rpy": "roll, pitch, yaw", "heel": "roll", "trim": "pitch", "heading": "yaw", "rotation": "matrix",
         "quaternion": "euler_parameters = [eta, e1, e2, e3]", "euler_angles": "zyz, or roll, pitch, yaw",
     }  # fmt: skip
@@ -83,28 +91,35 @@ class Attitude(Table):
         return super().key_faults(given) + [((key,), f"needs {other} too") for key, other in alone]
 
     @classmethod
-    def in_numbers(cls, given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+    def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """Return the table unchanged. Raises ValueFault if a form is not a rotation, or differs from the first form."""
-        values = readable(cls, given, setting)
-        faults = dict([*_no_length(values), *_no_rotation(values)])
+        values = valid_values(cls, given, setting)
+        faults = dict([*_zero_length_faults(values), *_rotation_faults(values)])
         complete = [
             keys for keys in cls.forms if all(item in values and item not in faults for item in keys if item in given)
         ]
         sound = cls.model_construct(**{key: values[key] for keys in complete for key in keys if key in values})
-        faults |= {key: f"{text}; expected the same rotation" for key, text, apart in sound._apart() if apart > LOOSE}
+        faults |= {
+            key: f"{text}; expected the same rotation" for key, text, apart in sound._deviations() if apart > TOLERANCE
+        }
         if faults:
-            raise Misfit([((key,), text) for key, text in faults.items()])
+            raise ValueFault([((key,), text) for key, text in faults.items()])
         return given
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
-        yield from uneven("axis", self.axis)
-        yield from uneven("euler_parameters", self.euler_parameters)
+        yield from length_notices("axis", self.axis)
+        yield from length_notices("euler_parameters", self.euler_parameters)
         off = attitude.defect(np.array(self.matrix))[0] if self.matrix else 0.0
-        if off > TYPED:
-            yield ("matrix",), off, TYPED, f"R'R differs from the identity by {off:.2g}; the nearest rotation is used"
-        for key, text, apart in self._apart():
-            if apart > TYPED:
-                yield (key,), apart, TYPED, f"{text}; the latter is used"
+        if off > ROUNDING:
+            yield (
+                ("matrix",),
+                off,
+                ROUNDING,
+                f"R'R differs from the identity by {off:.2g}; the nearest rotation is used",
+            )
+        for key, text, apart in self._deviations():
+            if apart > ROUNDING:
+                yield (key,), apart, ROUNDING, f"{text}; the latter is used"
 
     def _rotations(self) -> dict[str, np.ndarray]:
         """Rotation of each given form, by its first key."""
@@ -117,7 +132,7 @@ class Attitude(Table):
                 result["roll" if keys == ANGLES else keys[0]] = form(*values)
         return result
 
-    def _apart(self) -> Iterator[tuple[str, str, float]]:
+    def _deviations(self) -> Iterator[tuple[str, str, float]]:
         """(key, text, deviation [rad]) of every form except the first."""
         (first, rotation), *others = self._rotations().items() or [("", None)]
         for key, other in others:
@@ -130,7 +145,7 @@ class Attitude(Table):
             )
 
 
-def readable(table: type[Table], given: dict[str, Any], setting: Setting) -> dict[str, Any]:
+def valid_values(table: type[Table], given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
     """Values of the valid keys; the table itself reports faults of the other keys."""
     result = {}
     for key, value in table.values().items():
@@ -142,29 +157,29 @@ def readable(table: type[Table], given: dict[str, Any], setting: Setting) -> dic
     return result
 
 
-def uneven(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
+def length_notices(key: str, given: tuple[float, ...] | None) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
     """Notice of a direction or Euler parameters of a length other than 1; they are divided by it."""
     length = math.hypot(*given) if given else 1.0
-    if abs(length - 1.0) > TYPED:
+    if abs(length - 1.0) > ROUNDING:
         yield (key,), length, 1.0, f"its length is {length:.6g}, not 1; it is divided by it"
 
 
-def no_direction(given: tuple[float, ...] | None) -> bool:
+def is_zero_vector(given: tuple[float, ...] | None) -> bool:
     """True if a vector is given with zero length, or too short to be squared."""
     return given is not None and math.hypot(*given) < SHORTEST
 
 
-def _no_length(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
+def _zero_length_faults(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
     for key, example in (("axis", "[0, 0, 1]"), ("euler_parameters", "[1, 0, 0, 0], the identity")):
-        if no_direction(values.get(key)):
+        if is_zero_vector(values.get(key)):
             yield key, f"has zero length; expected a length of 1, for example {example}"
 
 
-def _no_rotation(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
+def _rotation_faults(values: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if "matrix" not in values:
         return
     off, determinant = attitude.defect(np.array(values["matrix"]))
-    if off > LOOSE:
+    if off > TOLERANCE:
         yield (
             "matrix",
             f"is not a rotation: R'R differs from the identity by {off:.3g}; expected orthogonal columns of length 1",

@@ -18,11 +18,13 @@ LONGEST_NAME = 60  # letters; names are parts of file names, which may have 255 
 CELL, IMPLICIT_CELL, BASIN_CELL = 500, 3000, 600  # memory of a cell [B]
 NUMBER = 8  # memory of a number of a row [B]; rows are copied once
 TEXT, LEAST_TEXT = 18, 4  # size of a number in history.csv, usual and smallest [B]
-LITTLE = 1e7  # memory that every machine has [B]
+ALWAYS_FREE = 1e7  # memory that every machine has [B]
 FRAME_CELL = 60  # size of a cell of a frame on disk [B]
 
 
-def misfits(numerics: Any, output: Any, links: dict[str, Any], meshes: dict[str, Any]) -> Iterator[tuple[tuple, str]]:
+def find_faults(
+    numerics: Any, output: Any, links: dict[str, Any], meshes: dict[str, Any]
+) -> Iterator[tuple[tuple, str]]:
     """Faults of counts that do not fit into memory, and of output intervals below the rounding of the time."""
     pipes = {name: link for name, link in links.items() if isinstance(link, Pipe)}
     method, span = METHODS.get(numerics.method), numerics.end - numerics.start
@@ -33,9 +35,7 @@ def misfits(numerics: Any, output: Any, links: dict[str, Any], meshes: dict[str,
     )
     if pipes and not fits(memory):
         worst = max(pipes, key=lambda name: pipes[name].cells or 0)
-        text = (
-            f"{cells:.3g} cells take about {size(memory)} of memory, and {size(free_memory())} are free; expected fewer"
-        )
+        text = f"{cells:.3g} cells take about {byte_text(memory)} of memory, and {byte_text(free_memory())} are free; expected fewer"
         yield ("links", worst, "cells"), text
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if output.every is not None and not output.every > least:
@@ -47,11 +47,11 @@ def misfits(numerics: Any, output: Any, links: dict[str, Any], meshes: dict[str,
         rows, columns = span / output.every, 1 + len(output.probes)
         if not fits(2 * NUMBER * rows * columns):
             text = f"{output.every:g} s gives {rows:.3g} rows of {columns} numbers, about "
-            text += f"{size(2 * NUMBER * rows * columns)} to read back, and {size(free_memory())} of memory are free"
+            text += f"{byte_text(2 * NUMBER * rows * columns)} to read back, and {byte_text(free_memory())} of memory are free"
             yield ("output", "every"), f"{text}; expected a longer interval or fewer probes"
 
 
-def standstill(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str]]:
+def rounding_faults(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str]]:
     """Faults of a Courant number whose steps are below the rounding of the time.
 
     crossing : shortest travel time of a wave through a cell [s]
@@ -64,7 +64,7 @@ def standstill(numerics: Any, crossing: float) -> Iterator[tuple[tuple, str]]:
         yield ("numerics", "courant"), f"{text}; expected more than {least / crossing:.2g}"
 
 
-def on_disk(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:
+def disk_size(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:
     """Estimated size of history.csv and the frames [B]."""
     numerics, output = case.numerics, case.output
     cells = sum(link.cells for link in case.links.values() if isinstance(link, Pipe))
@@ -73,7 +73,7 @@ def on_disk(case: Any, text: int = TEXT, frame_cell: int = FRAME_CELL) -> float:
     return text * rows * (1 + len(case.probes)) + frame_cell * output.fields * cells
 
 
-def size(count: float) -> str:
+def byte_text(count: float) -> str:
     """Text of a number of bytes, with a decimal prefix."""
     for unit in ("B", "kB", "MB", "GB"):
         if count < 1000.0:
@@ -84,7 +84,7 @@ def size(count: float) -> str:
 
 def fits(count: float) -> bool:
     """True if `count` bytes are free; small counts are accepted without a query."""
-    return count <= LITTLE or count <= free_memory()
+    return count <= ALWAYS_FREE or count <= free_memory()
 
 
 def free_memory() -> float:

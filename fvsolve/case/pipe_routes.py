@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import KINDS
-from fvsolve.parts.table import Table
-from fvsolve.parts.value import VALUE, Misfit, Quantity, Setting, Value
+from fvsolve.parts.table_model import Table
+from fvsolve.parts.value import VALUE, Quantity, ReadContext, Value, ValueFault
 from fvsolve.units import show
 
 
@@ -21,13 +21,13 @@ class PipeNames(Value):
     takes = "list of names"
     changes = VALUE
 
-    def read(self, given: Any, setting: Setting) -> tuple[str, ...]:
+    def read(self, given: Any, setting: ReadContext) -> tuple[str, ...]:
         if not isinstance(given, (list, tuple)) or not given:
             raise ValueError(f'{show(given)} is not a list; expected for example ["suction", "main"]')
         faults = [((k,), f"{show(item)} is not a name") for k, item in enumerate(given) if not isinstance(item, str)]
         faults += [((k,), f"{show(item)} is given twice") for k, item in enumerate(given) if item in given[:k]]
         if faults:
-            raise Misfit(faults)
+            raise ValueFault(faults)
         return tuple(given)
 
     def json(self) -> dict[str, Any]:
@@ -72,14 +72,14 @@ def is_cut(name: str, pipes: Sequence[str]) -> bool:
     return list(pipes) == [f"{name}-{k + 1}" for k in range(len(pipes))]
 
 
-def alone(pipe: str, links: dict[str, Any]) -> Leg:
+def pipe_leg(pipe: str, links: dict[str, Any]) -> Leg:
     """Leg of a single pipe from `from` to `to`, with the chainages of its profile if it has one."""
     profile = links[pipe].profile
     begin = 0.0 if profile is None else float(profile.chainage[0])
     return Leg(pipe, begin, begin + links[pipe].length, False)
 
 
-def spread(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) -> Route:
+def expand_pieces(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) -> Route:
     """Replace cut pipes of a route by their pieces, in the direction of the route."""
     cut = [name for name in route.pipes if name in pieces]
     options = []
@@ -87,7 +87,7 @@ def spread(route: Route, pieces: dict[str, list[str]], links: dict[str, Any]) ->
         ways_of = dict(zip(cut, turned, strict=True))
         names = [pieces[name][:: ways_of[name]] if name in ways_of else [name] for name in route.pipes]
         options.append(route.model_copy(update={"pipes": tuple(itertools.chain(*names))}))
-        if not cut or (all(pipe in links for pipe in options[-1].pipes) and broken(options[-1], links) is None):
+        if not cut or (all(pipe in links for pipe in options[-1].pipes) and first_gap(options[-1], links) is None):
             return options[-1]
     return options[0]
 
@@ -97,26 +97,28 @@ def is_pipe(given: Any) -> bool:
     return isinstance(given, dict) and given.get("type") == "pipe"
 
 
-def is_known(given: Any) -> bool:
+def has_known_type(given: Any) -> bool:
     """True if a raw link has a known type."""
     return isinstance(given, dict) and str(given.get("type")) in KINDS["links"]
 
 
-def misfits(
+def find_faults(
     routes: dict[str, Route | None], links: dict[str, Any], named: dict[str, Any], pieces: dict[str, list[str]]
 ) -> Iterator[tuple]:
     """Faults of routes: names that are not pipes, and pipes that are not consecutive.
 
     named : raw links, also faulty ones; pieces : cut pipe -> names of its pieces
     """
-    pipes = [item for item, given in named.items() if item not in links and (is_pipe(given) or not is_known(given))]
+    pipes = [
+        item for item, given in named.items() if item not in links and (is_pipe(given) or not has_known_type(given))
+    ]
     pipes += [item for item, link in links.items() if link.kind == "pipe"]
     for name, route in routes.items():
         if route is None:
             continue
         unknown = False
         for k, pipe in enumerate(route.pipes):
-            place = ("routes", name, "pipes", as_said(route, pieces, k))
+            place = ("routes", name, "pipes", index_in_file(route, pieces, k))
             if pipe in pipes:
                 unknown = unknown or pipe not in links
                 continue
@@ -129,22 +131,22 @@ def misfits(
                 yield place, f"no pipe named {show(pipe)}{near}"
         if unknown:
             continue
-        k = broken(route, links, named)
+        k = first_gap(route, links, named)
         if k is not None:
             pairs = [(pipe, links[pipe]) for pipe in route.pipes[k - 1 : k + 1]]
             ends = " and ".join(f"{pipe} joins {item.from_} and {item.to}" for pipe, item in pairs)
             text = f"{route.pipes[k]} does not join the previous pipe: {ends}, and no link without length lies between"
-            yield ("routes", name, "pipes", as_said(route, pieces, k)), text
+            yield ("routes", name, "pipes", index_in_file(route, pieces, k)), text
 
 
-def as_said(route: Route, pieces: dict[str, list[str]], k: int) -> int:
+def index_in_file(route: Route, pieces: dict[str, list[str]], k: int) -> int:
     """Index in the file of the name that pipe k of a route came from; pieces of a pipe share a name."""
     cut_pipe = {piece: name for name, own in pieces.items() for piece in own}
     names = [cut_pipe.get(pipe, pipe) for pipe in route.pipes[: k + 1]]
     return sum(following != before for following, before in itertools.pairwise(names))
 
 
-def joined(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:  # noqa: B006
+def joined_places(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:  # noqa: B006
     """Place -> representative of all places joined to it by links without length, also by faulty links."""
     root: dict[str, str] = {}
 
@@ -163,12 +165,12 @@ def joined(links: dict[str, Any], named: dict[str, Any] = {}) -> dict[str, str]:
     return {name: find(name) for name in list(root)}
 
 
-def ways(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
+def directions(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> list[list[tuple[int, bool]]]:  # noqa: B006
     """Possible directions of each pipe of a route: (index of the choice for the previous pipe, backwards).
 
     The first entry is a start before the first pipe. The list ends with an empty entry at the first gap.
     """
-    root = joined(links, named)
+    root = joined_places(links, named)
     ends = [[root.get(place, place) for place in (links[pipe].from_, links[pipe].to)] for pipe in route.pipes]
     result: list[list[tuple[int, bool]]] = [[(-1, False), (-1, True)]]
     for k in range(1, len(ends)):
@@ -183,15 +185,15 @@ def ways(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> lis
     return result
 
 
-def broken(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> int | None:  # noqa: B006
+def first_gap(route: Route, links: dict[str, Any], named: dict[str, Any] = {}) -> int | None:  # noqa: B006
     """Index of the first pipe of a route that is not connected to the previous pipe; None if there is no gap."""
-    result = ways(route, links, named)
+    result = directions(route, links, named)
     return None if result[-1] else len(result) - 1
 
 
 def legs(route: Route, links: dict[str, Any]) -> list[Leg]:
     """Legs of a route: its pipes with chainages and directions."""
-    choices = ways(route, links)
+    choices = directions(route, links)
     turned, at = [], 0
     for options in reversed(choices):
         before, backwards = options[at]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 
-def lent(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, Any]:
+def inherit_elevations(nodes: dict[str, Any], links: dict[str, Any]) -> dict[str, Any]:
     """Fill in missing elevations and positions of nodes from the first pipe profile that begins or ends there.
 
     The position is that of the profile point, if the profile has x and y.

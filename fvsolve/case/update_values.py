@@ -6,24 +6,29 @@ import functools
 from dataclasses import replace
 from typing import Any
 
-from fvsolve.case import check, heights
+from fvsolve.case import check, inherited_elevations
 from fvsolve.case.case import Case
-from fvsolve.case.placing import bent, placed
+from fvsolve.case.chainage import add_bends, placed
 from fvsolve.parts import KINDS, Basin
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.value import Quantity
 
 GROUPS = ("nodes", "links")
-SEEN = ("required_pressure",)  # keys whose presence alone changes the case
+PRESENCE_KEYS = ("required_pressure",)  # keys whose presence alone changes the case
 
 
-def moved(reader: Any) -> Case | None:
+def update_values(reader: Any) -> Case | None:
     """Update the case before with new numbers of parts; None if more than numbers may change, or for any fault.
 
     Names, types, connections, probes, claims and every other table stay as they were.
     """
     before, raw = reader.before, reader.raw
-    if before is None or reader.faults or not whole(before) or not all(number(raw, keys) for keys in raw.overridden):
+    if (
+        before is None
+        or reader.faults
+        or not is_self_contained(before)
+        or not all(is_number_key(raw, keys) for keys in raw.overridden)
+    ):
         return None
     setting = reader.setting
     setting.ambient, reader.read = before.ambient_pressure, dict(before.read)
@@ -41,11 +46,11 @@ def moved(reader: Any) -> Case | None:
                     return None
                 reader.read[group, name] = known
             parts[group][name] = known[1]
-    nodes, numerics = heights.lent(**parts), before.numerics
+    nodes, numerics = inherited_elevations.inherit_elevations(**parts), before.numerics
     about = before.ambient_pressure, before.gravity, before.properties, raw
     reader.add(check.parts(nodes, parts["links"], *about, numerics.start, {}, {}))
     links = reader.cells(parts["links"], before.properties, numerics)
-    if setting.asked or reader.faults:
+    if setting.lookups or reader.faults:
         return None
     reader.add(reader.sizes(numerics, before.output, links, {}, before.properties))
     if reader.faults:
@@ -62,25 +67,30 @@ def read_before(given: dict[str, Any], before: dict[str, Any], part: Any) -> dic
     return {**given, **same}
 
 
-def whole(case: Case) -> bool:
+def is_self_contained(case: Case) -> bool:
     """True if a case uses no files or signals, and only parts depend on the numbers of parts."""
     no_outer_input = not (
-        placed(bent(case.raw)) or case.signals or case.scalars or case.compare or case.copies or case.found
+        placed(add_bends(case.raw))
+        or case.signals
+        or case.scalars
+        or case.compare
+        or case.copies
+        or case.equilibrium_nodes
     )
     exact_in_file = case.exact is None or "exact" in case.raw
     return no_outer_input and exact_in_file and not any(isinstance(node, Basin) for node in case.nodes.values())
 
 
-def number(raw: Any, keys: tuple) -> bool:
+def is_number_key(raw: Any, keys: tuple) -> bool:
     """True if a key path is a number or a schedule of a part."""
-    if len(keys) < 3 or keys[0] not in GROUPS or keys[2] in SEEN:
+    if len(keys) < 3 or keys[0] not in GROUPS or keys[2] in PRESENCE_KEYS:
         return False
     part = raw.get(keys[:2])
-    return isinstance(part, dict) and keys[2] in numbers(KINDS[keys[0]].get(part.get("type")))
+    return isinstance(part, dict) and keys[2] in number_keys(KINDS[keys[0]].get(part.get("type")))
 
 
 @functools.cache
-def numbers(kind: type | None) -> frozenset[str]:
+def number_keys(kind: type | None) -> frozenset[str]:
     """Keys of a type of part that are numbers or schedules."""
     values = {} if kind is None else kind.values()
     return frozenset(key for key, value in values.items() if isinstance(value, (Quantity, Scheduled)))

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.table import Table, at_least_one
-from fvsolve.parts.value import SHAPE, Choice, Number, Quantity, Usual, between, nonnegative, positive
+from fvsolve.parts.table_model import Table, at_least_one
+from fvsolve.parts.value import SHAPE, Choice, Number, Quantity, UsualRange, between, nonnegative, positive
 
 MODELS = ("none", "steady", "quasi-steady", "unsteady", "hazen-williams", "chezy-manning")
 WEIGHTINGS = ("zielke", "vardy-brown")
 DARCY = ("roughness", "factor")
 DARCY_WEISBACH = '"quasi-steady" or "steady" with a roughness, whose factor is Colebrook\'s'
-MEANT = dict.fromkeys(
+SYNONYMS = dict.fromkeys(
     ("colebrook", "colebrook-white", "swamee-jain", "moody", "haaland", "darcy", "darcy-weisbach", "d-w", "dw"),
     DARCY_WEISBACH,
 ) | {"h-w": '"hazen-williams"', "hw": '"hazen-williams"', "manning": '"chezy-manning"', "c-m": '"chezy-manning"'}
-KEYS = {  # keys of each model; at least one of the Darcy pair, or the coefficient, is needed
+KEYS_OF_MODEL = {  # keys of each model; at least one of the Darcy pair, or the coefficient, is needed
     "none": (),
     "steady": DARCY,
     "quasi-steady": DARCY,
@@ -26,11 +26,11 @@ KEYS = {  # keys of each model; at least one of the Darcy pair, or the coefficie
 }
 
 
-FACTORS = Usual(0.004, 0.5, "Moody's chart and slow laminar flow")  # the chart spans 0.008 to 0.1
+FACTORS = UsualRange(0.004, 0.5, "Moody's chart and slow laminar flow")  # the chart spans 0.008 to 0.1
 COEFFICIENTS = {  # usual coefficients by model, from textbooks and the EPANET manual
     # plastic has 155; more if an import lengthened a pipe
-    "hazen-williams": Usual(40.0, 500.0, "C of tuberculated iron to plastic"),
-    "chezy-manning": Usual(0.006, 0.06, "n of glass to unlined rock"),
+    "hazen-williams": UsualRange(40.0, 500.0, "C of tuberculated iron to plastic"),
+    "chezy-manning": UsualRange(0.006, 0.06, "n of glass to unlined rock"),
 }
 
 
@@ -45,7 +45,7 @@ class Friction(Table):
 
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("roughness", "factor"),)
 
-    model: Annotated[str, Choice("friction model", MODELS, "model of the wall friction", MEANT)]
+    model: Annotated[str, Choice("friction model", MODELS, "model of the wall friction", SYNONYMS)]
     roughness: Annotated[
         float | None,
         Quantity("length", nonnegative, "roughness of the wall [m], models steady, quasi-steady and unsteady"),
@@ -78,7 +78,7 @@ class Friction(Table):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         model = given.get("model")
-        allowed = KEYS.get(model if isinstance(model, str) else "")
+        allowed = KEYS_OF_MODEL.get(model if isinstance(model, str) else "")
         faults = super().key_faults(given)
         if allowed is None:
             return faults
@@ -90,7 +90,7 @@ class Friction(Table):
         usual, c = COEFFICIENTS.get(self.model), self.coefficient
         if usual is None or usual.least <= c <= usual.greatest:
             return
-        text = f"{c:g} is outside {usual.least:g} to {usual.greatest:g}, {usual.practice}"
+        text = f"{c:g} is outside {usual.least:g} to {usual.greatest:g}, {usual.source}"
         other = next((m for m, span in COEFFICIENTS.items() if span.least <= c <= span.greatest), None)
         text += f'; did you mean model = "{other}"?' if other else ""
         yield ("coefficient",), c, usual.least if c < usual.least else usual.greatest, text

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fvsolve.parts.formula import Formula
+from fvsolve.parts.formula import SpatialField
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
@@ -21,7 +21,7 @@ def is_grid(mesh: Mesh) -> bool:
     return mesh.grid is not None and len(mesh.cells) == mesh.grid.nx * mesh.grid.ny
 
 
-def samples(shape: Formula | None, mesh: Mesh) -> np.ndarray:
+def samples(shape: SpatialField | None, mesh: Mesh) -> np.ndarray:
     """Values of a formula in the cells : float64[points, n].
 
     On grids there are nine Gauss points a cell, the centre first; on other meshes only the centre.
