@@ -17,8 +17,8 @@ from measure import agree, parser
 
 from fvsolve.case import shipped
 from fvsolve.studies.accuracy.chart import Chart, chart
-from fvsolve.studies.accuracy.files import write
-from fvsolve.studies.accuracy.pareto import crossing
+from fvsolve.studies.accuracy.chart_files import write_chart
+from fvsolve.studies.accuracy.pareto import find_crossing
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES, POINTS = ROOT / "docs" / "charts", ROOT / "build" / "charts"
@@ -49,7 +49,7 @@ def made(name: str, points: Path, pictures: Path, **few) -> Chart:
     case, keys, about = SCENES[name]
     found = chart(shipped.find(case), keys, out=points / name, **few)
     pictures.mkdir(parents=True, exist_ok=True)
-    picture = write(found, points / name, title=f"{name}: {about}", dpi=80)[1]
+    picture = write_chart(found, points / name, title=f"{name}: {about}", dpi=80)[1]
     (pictures / picture.with_stem(name).name).write_bytes(picture.read_bytes())
     return found
 
@@ -59,7 +59,7 @@ def costs(found: Chart, target: float, cost: str = "seconds") -> dict[str, float
     met, floor = {}, found.floor["trajectory"]
     for name, points in found.curves().items():
         errors = [max(one.trajectory, floor) if one.ok else float("inf") for one in points]
-        where = crossing(errors, [getattr(one, cost) for one in points], target) if target >= floor else None
+        where = find_crossing(errors, [getattr(one, cost) for one in points], target) if target >= floor else None
         if where is not None:
             met[name] = where.cost
     return met

@@ -15,8 +15,8 @@ import numpy as np
 from measure import agree, parser
 
 from fvsolve.run import model_of, run
-from fvsolve.studies.levels import finer
-from fvsolve.studies.peaks import SIDES, peak_errors
+from fvsolve.studies.peak_error import SIDES, peak_errors
+from fvsolve.studies.refinement import refined_keys
 
 WATER = {"name": "user", "density": 1000, "bulk_modulus": 2.2e9, "viscosity": 1e-3, "vapor_pressure": 2000}
 FRICTIONS = (
@@ -67,7 +67,7 @@ def bands(given: dict) -> list[tuple[str, float, float]]:
     case = model_of(given).case
     said = peak_errors(run(given, pictures=False), case)
     every = {"output.every": case.output.every / 8.0}
-    fine = run(given, set=finer(case, 8.0) | every, pictures=False).summary["extremes"]
+    fine = run(given, set=refined_keys(case, 8.0) | every, pictures=False).summary["extremes"]
     return [(f"{side} {probe}", math.inf if one[side]["error"] is None else one[side]["error"],
              abs(fine[probe][side] - one[side]["value"]))
             for probe, one in said["peaks"].items() for side in SIDES]  # fmt: skip

@@ -21,8 +21,8 @@ from random_mains import limits_near, random_main
 from fvsolve.case import load, shipped
 from fvsolve.errors import FvsolveError
 from fvsolve.run import run
-from fvsolve.studies.levels import finer
-from fvsolve.studies.peaks import LEAST, SIDES, peak_errors
+from fvsolve.studies.peak_error import RELATIVE_FLOOR, SIDES, peak_errors
+from fvsolve.studies.refinement import refined_keys
 
 QUIET = {"output.fields": 0, "output.lines": {}}
 
@@ -52,7 +52,7 @@ def of_shipped(name: str) -> list[Row]:
     case = load(name)
     times = 2.0 if case.meshes else 4.0
     said = peak_errors(run(case, set=QUIET), case)
-    fine = run(case, set=finer(case, times) | QUIET | {"output.every": case.output.every / times}).summary
+    fine = run(case, set=refined_keys(case, times) | QUIET | {"output.every": case.output.every / times}).summary
     return rows_of(name, said, fine)
 
 
@@ -62,7 +62,7 @@ def of_main(seed: int) -> tuple[list[Row], list[Row], list[str]]:
     parts = {name: whole(run(case, pictures=False), name) for name in ("end", "j", "a", "b")}
     case = load(random_main(seed) | {"limits": limits_near(parts, seed)})
     said = peak_errors(run(case, pictures=False), case)
-    fine = run(case, set=finer(case, 8.0) | {"output.every": case.output.every / 8.0}, pictures=False).summary
+    fine = run(case, set=refined_keys(case, 8.0) | {"output.every": case.output.every / 8.0}, pictures=False).summary
     limits = list(zip(said["verdicts"], fine["verdicts"], strict=True))
     rows = [Row(f"{seed} {one['name']}", one["error"], one["value"], other["value"]) for one, other in limits]
     turned = [f"{seed} {one['name']}: {one['state']}, margin {one['margin']:.4g} within {one['error']}, "
@@ -86,7 +86,7 @@ def tell(rows: list[Row], what: str) -> int:
     misses = [row for row in known if row.off > row.band]
     for row in misses:
         print(f"outside: {row.name}: off by {row.off:.3g}, band {row.band:.3g} of {row.value:.4g}")
-    wide = [row.band / row.off for row in known if row.off > LEAST * abs(row.value)]
+    wide = [row.band / row.off for row in known if row.off > RELATIVE_FLOOR * abs(row.value)]
     quarters = " ".join(f"{one:.3g}" for one in np.quantile(wide, [0.25, 0.5, 0.75])) if wide else "-"
     share = 100.0 * len(misses) / max(len(known), 1)
     print(f"{what}: {len(rows)}, {len(rows) - len(known)} without a band, {len(misses)} outside ({share:.2g} %)")

@@ -11,8 +11,8 @@ from price import front, price
 from fvsolve.case import load
 from fvsolve.solve.solve import Run
 from fvsolve.steppers.built_in_methods import METHODS
-from fvsolve.studies.accuracy.timing import Capped
-from fvsolve.studies.outcome import Outcome, outcome, prepared
+from fvsolve.studies.accuracy.timing import CappedRun
+from fvsolve.studies.outcome import Outcome, outcome, study_model
 
 HERE = Path(__file__).resolve().parent
 SCENES = ("cylinder-servo", "hydraulic-drive", "chamber-chain", "pipe-tiny-chamber", "temperature-front", "servo-arm")
@@ -57,7 +57,7 @@ def series(case, method: str, tolerances, truth: Outcome, models: dict) -> dict[
     """(CPU time [s], error) of a method by tolerance, the widest first."""
     found = {}
     for rtol in tolerances:
-        models[method, rtol] = model = prepared(case, {"numerics.method": method, "numerics.rtol": float(rtol)})
+        models[method, rtol] = model = study_model(case, {"numerics.method": method, "numerics.rtol": float(rtol)})
         run = outcome(model, run=limited)
         if not run.ok:
             break
@@ -67,8 +67,8 @@ def series(case, method: str, tolerances, truth: Outcome, models: dict) -> dict[
 
 def limited(model, state, sink, progress) -> Run:
     """A run of SLOW seconds at most."""
-    made = Capped(model, state, sink, progress)
-    made.most_seconds = SLOW
+    made = CappedRun(model, state, sink, progress)
+    made.max_seconds = SLOW
     return made
 
 

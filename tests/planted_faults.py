@@ -78,24 +78,26 @@ FAULTS = [
     Fault("case/sloshing.py", "return 0.25 * np.pi * a * a if", "return 0.2525 * np.pi * a * a if"),
     Fault("fluid/oils.py", "(hot - cold)) - 0.7)", "(hot - cold)) - 0.707)"),
     Fault(
-        "studies/peaks.py",
+        "studies/peak_error.py",
         "v[position - 1] - 2.0 * v[position] + v[position + 1]",
         "v[position - 1] + 2.0 * v[position] + v[position + 1]",
     ),
     Fault(
-        "studies/energy/booking.py",
+        "studies/energy/step_energy.py",
         "change[self.supplied].sum() - change[self.rates].sum()",
         "change[self.supplied].sum() + change[self.rates].sum()",
     ),
     Fault(
-        "studies/failure/verdict.py", "turns = change[1:] * change[:-1] < 0.0", "turns = change[1:] * change[:-1] > 0.0"
+        "studies/failure/run_verdict.py",
+        "turns = change[1:] * change[:-1] < 0.0",
+        "turns = change[1:] * change[:-1] > 0.0",
     ),
     Fault(
         "studies/accuracy/fit.py",
         "np.log(e[:-1] / e[1:]) / np.log(h[:-1] / h[1:])",
         "np.log(e[:-1] / e[1:]) / np.log(1.01 * h[:-1] / h[1:])",
     ),
-    Fault("studies/stability/carried.py", "scaled @ result + x * v", "scaled @ result - x * v"),
+    Fault("studies/stability/vector_growth.py", "scaled @ result + x * v", "scaled @ result - x * v"),
     Fault(
         "studies/linear/linearise.py",
         "(value - input_.offset) / input_.scale",
@@ -107,7 +109,9 @@ FAULTS = [
         'self.along("u", fields), self.along("v", fields)',
         'self.along("u", fields), self.along("u", fields)',
     ),
-    Fault("cli/models.py", "gain = richest.seconds / cheapest.seconds", "gain = cheapest.seconds / richest.seconds"),
+    Fault(
+        "cli/models_output.py", "gain = richest.seconds / cheapest.seconds", "gain = cheapest.seconds / richest.seconds"
+    ),
     Fault("basins/frames_load.py", "spin + f1 - p1 * z", "spin + f1 + p1 * z"),
     Fault(
         "basins/liquid/faces.py",

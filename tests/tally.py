@@ -25,7 +25,7 @@ class Tally:
         Integrator.__init__ = self._after(
             Integrator.__init__, lambda stepper, method, *_: self._add("method", method.name)
         )
-        cli._wanted = self._after(cli._wanted, lambda command: self._add("command", *command))
+        cli._modules_for = self._after(cli._modules_for, lambda command: self._add("command", *command))
 
     def add(self, plain: dict[str, list[str]]) -> None:
         for kind, names in plain.items():

@@ -29,7 +29,7 @@ COMMANDS = (
     "sweep",
     "warm",
 )
-PLAIN = ("run", "check", "list", "new", "schema", "methods", "compare", "view")  # commands of `commands`
+BASIC_COMMANDS = ("run", "check", "list", "new", "schema", "methods", "compare", "view")  # commands of `commands`
 
 
 def main() -> None:
@@ -42,41 +42,41 @@ def main() -> None:
             stream.reconfigure(errors="backslashreplace")  # a terminal with a small character set must not end a run
     before, warnings.formatwarning = warnings.formatwarning, lambda message, *_, **__: f"{visible(str(message))}\n"
     try:
-        for module in _wanted(sys.argv[1:2]):
+        for module in _modules_for(sys.argv[1:2]):
             import_module(f"fvsolve.cli.{module}")
         from fvsolve.cli.app import app
 
         app(prog_name="fvsolve")
     except FvsolveError as error:
-        _leave(str(error), 2)
+        _exit_with(str(error), 2)
     except KeyboardInterrupt:
-        _leave("interrupted", 130)
+        _exit_with("interrupted", 130)
     except BrokenPipeError:
         sys.stderr.close()  # the reader of the output is gone: no message can reach it
         sys.exit(0)
     except OSError as error:
-        _leave(f"{error.filename or 'fvsolve'}: {error.strerror or error}", 2)
+        _exit_with(f"{error.filename or 'fvsolve'}: {error.strerror or error}", 2)
     except MemoryError:
-        _leave("out of memory. Try fewer cells, fewer probes, or a longer output interval ([output] every)", 1)
+        _exit_with("out of memory. Try fewer cells, fewer probes, or a longer output interval ([output] every)", 1)
     except Exception as error:  # a defect of fvsolve: print its location, so that it can be reported
-        _leave(f"internal error in {_where(error)}: {type(error).__name__}: {error}; please report it", 1)
+        _exit_with(f"internal error in {_location(error)}: {type(error).__name__}: {error}; please report it", 1)
     finally:
         warnings.formatwarning = before
 
 
-def _wanted(command: list[str]) -> tuple[str, ...]:
+def _modules_for(command: list[str]) -> tuple[str, ...]:
     """Modules to import for a command line: `commands` for a basic command, otherwise all modules."""
-    if command and command[0] in PLAIN:
+    if command and command[0] in BASIC_COMMANDS:
         return COMMANDS[:1]
     return COMMANDS
 
 
-def _leave(message: str, code: int) -> None:
+def _exit_with(message: str, code: int) -> None:
     print(visible(message), file=sys.stderr)
     sys.exit(code)
 
 
-def _where(error: Exception) -> str:
+def _location(error: Exception) -> str:
     trace = error.__traceback__
     while trace.tb_next is not None:
         trace = trace.tb_next

@@ -38,7 +38,7 @@ def all_commands(
 
 
 Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-One = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
+OneCase = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override of a key: links.main.cells=400")]
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output instead of text")]
 
@@ -52,14 +52,14 @@ def load_case(name: str, overrides: list[str], scheme: str | None = None, method
     from fvsolve.case import load, shipped
 
     path = shipped.find(name)
-    _tell_of_compiling()
+    _announce_compilation()
     settings, faults = _overrides(overrides)
     try:
         case = load(path, settings)
     except CaseError as error:
-        from fvsolve.cli.studying import listed, methods_of
+        from fvsolve.cli.study_options import comma_list, method_names
 
-        given = {"scheme": listed(scheme), "method": methods_of(method)}
+        given = {"scheme": comma_list(scheme), "method": method_names(method)}
         first = {f"numerics.{key}": names[0] for key, names in given.items() if names}
         if first and not faults:
             try:
@@ -73,7 +73,7 @@ def load_case(name: str, overrides: list[str], scheme: str | None = None, method
 
 
 @functools.cache
-def _tell_of_compiling() -> None:
+def _announce_compilation() -> None:
     from fvsolve.jit import is_cold, other_caches
 
     if is_cold():

@@ -7,15 +7,15 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Dask, Jobs, Out, folder_of, listed, methods_of, told
+from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.study_options import Dask, Jobs, Out, comma_list, folder_of, method_names, progress_line
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.sheet import Column, Sheet
+from fvsolve.studies.result_table import Column, ResultTable
 
 
 @app.command()
 def chart(
-    case: One,
+    case: OneCase,
     scheme: Annotated[
         str | None, typer.Option(metavar="LIST", help="schemes to compare (default upwind,muscl,upwind5,weno5)")
     ] = None,
@@ -54,7 +54,7 @@ def chart(
 ) -> None:
     """Error against CPU time and work over schemes, methods and resolution; the cheapest setting for each error."""
     from fvsolve.studies.accuracy.chart import chart as study
-    from fvsolve.studies.accuracy.files import write
+    from fvsolve.studies.accuracy.chart_files import write_chart
 
     loaded = load_case(case, set, scheme, method)
     if target is not None and not 0.0 < target < 1.0:
@@ -64,16 +64,16 @@ def chart(
     if models:
         several_jobs = None if jobs == 1 else jobs
         _refuse(scheme=scheme, method=method, cells=cells, rtol=rtol, step=step, jobs=several_jobs, dask=dask, out=out)
-        from fvsolve.cli.models import show_models
-        from fvsolve.studies.accuracy.models import TARGET
+        from fvsolve.cli.models_output import show_models
+        from fvsolve.studies.accuracy.model_hierarchy import DEFAULT_TARGET
 
-        return show_models(loaded, target or TARGET, as_json)
+        return show_models(loaded, target or DEFAULT_TARGET, as_json)
     folder = folder_of(loaded, "chart", out)
     sizes = [_numbers(name, text) for name, text in (("cells", cells), ("rtol", rtol), ("step", step))]
-    with told() as progress:
-        result = study(loaded, None, listed(scheme, "--scheme"), methods_of(method), *sizes, target, folder, progress,
+    with progress_line() as progress:
+        result = study(loaded, None, comma_list(scheme, "--scheme"), method_names(method), *sizes, target, folder, progress,
                      jobs, dask)  # fmt: skip
-    paths = write(result, folder)
+    paths = write_chart(result, folder)
     if as_json:
         print_json(result.plain() | {"files": paths})
     else:
@@ -93,7 +93,7 @@ def _refuse(**options) -> None:
 def _numbers(name: str, text: str | None) -> list | None:
     """Convert `50,100` to numbers; raises FvsolveError for a word that is not a positive number."""
     numbers = []
-    for word in listed(text) or ():
+    for word in comma_list(text) or ():
         try:
             value = int(word) if name == "cells" else float(word)
         except ValueError:
@@ -106,7 +106,7 @@ def _numbers(name: str, text: str | None) -> list | None:
 
 
 def _show(result, paths) -> None:
-    from fvsolve.cli.terminal import console, line, sheet
+    from fvsolve.cli.terminal import console, line, print_sheet
 
     terminal = console()
     floor = result.floor["trajectory"]
@@ -114,7 +114,7 @@ def _show(result, paths) -> None:
         terminal,
         f"{result.case}: error over the trajectory (mean over time, of the probe with the largest relative error)",
     )
-    sheet(Sheet(FRONT, [vars(row) for row in result.front]), terminal)
+    print_sheet(ResultTable(FRONT, [vars(row) for row in result.front]), terminal)
     own = result.stands
     line(terminal, f"default: {result.default}; times and updates are interpolated between the runs of a curve")
     if own is not None:
@@ -135,7 +135,7 @@ def _show(result, paths) -> None:
          + (f"; {result.reused} points were reused from earlier runs" if result.reused else ""))  # fmt: skip
     line(terminal, "wrote " + ", ".join(str(path) for path in paths))
     if result.aim is not None:
-        _show_aim(terminal, result)
+        _show_target(terminal, result)
 
 
 def _ms(key: str) -> Callable[[Mapping], str]:
@@ -162,7 +162,7 @@ FRONT = (
 )
 
 
-def _show_aim(terminal, result) -> None:
+def _show_target(terminal, result) -> None:
     from fvsolve.cli.terminal import line
 
     point = result.aim.point
@@ -171,5 +171,5 @@ def _show_aim(terminal, result) -> None:
         f"\n# error {point.trajectory:.2g} (target {result.aim.target:g}), {point.seconds * 1e3:.3g} ms; use in",
     )
     line(terminal, "# [numerics] in place of scheme, method, courant, step, rtol and cell_time")
-    for text in result.aim.lines():
+    for text in result.aim.toml_lines():
         line(terminal, text)

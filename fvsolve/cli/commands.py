@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Cases, Json, One, Set, app, load_case, print_json, value_of
+from fvsolve.cli.app import Cases, Json, OneCase, Set, app, load_case, print_json, value_of
 from fvsolve.errors import FvsolveError, visible
 
 
@@ -36,7 +36,7 @@ def run(
 
     results = []
     with Painter(beside=not no_pictures) as painter:  # its process starts before other modules are imported
-        from fvsolve.cli import report
+        from fvsolve.cli import printing
         from fvsolve.run import model_of, mpi_run
 
         if mpi_run.is_other_rank():
@@ -57,37 +57,37 @@ def run(
     if as_json:
         summaries = [result.summary | {"directory": str(result.directory)} for result in results]
         print_json(summaries[0] if len(cases) == 1 else {"runs": summaries})
-    sys.exit(max(report.exit_code(result) for result in results))
+    sys.exit(max(printing.exit_code(result) for result in results))
 
 
 def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, quiet: bool, error: bool):
     """Solve a case, print its results, then draw them."""
-    from fvsolve.cli import report
-    from fvsolve.cli.progress import watched
+    from fvsolve.cli import printing
+    from fvsolve.cli.progress import run_progress
     from fvsolve.run import draw, sink_of, solved
     from fvsolve.run.cost_estimate import cost_text
 
     if text := cost_text(model):
         print(visible(text), file=sys.stderr, flush=True)
     with closing(sink_of(model, place, force, resume, threads)) as sink:
-        with watched(model.case) as progress:
+        with run_progress(model.case) as progress:
             result = solved(model, sink, progress, threads)
         if error:
             _judge(result, model.case)
         if not quiet:
-            report.result(result)
+            printing.print_result(result)
             sys.stdout.flush()
         if painter is not None:
             draw(result, painter)
     if not quiet:
-        report.files(result)
+        printing.print_files(result)
     return result
 
 
 def _judge(result, case) -> None:
     """Estimate the error of the peaks of a run and write it into the summary."""
     from fvsolve.output.summary import write_summary
-    from fvsolve.studies.peaks import peak_errors
+    from fvsolve.studies.peak_error import peak_errors
 
     peak_errors(result, case, lambda text: print(f"{case.name} again: {text}", file=sys.stderr, flush=True))
     write_summary(result.directory / "summary.json", result.summary)
@@ -95,13 +95,13 @@ def _judge(result, case) -> None:
 
 @app.command()
 def check(
-    case: One,
+    case: OneCase,
     set: Set = [],  # noqa: B006
     every: Annotated[bool, typer.Option("--all", help="print all rows of long tables")] = False,
     as_json: Json = False,
 ) -> None:
     """Print the contents of a case as read, its initial state and its expected cost."""
-    from fvsolve.cli import report
+    from fvsolve.cli import printing
     from fvsolve.run import model_of
     from fvsolve.solve.partition import divisible_rows
     from fvsolve.step_limits.step_notices import step_limits
@@ -113,20 +113,20 @@ def check(
     if as_json:
         print_json(report_data)
     else:
-        report.checks(model.case, report_data, every)
+        printing.print_checks(model.case, report_data, every)
 
 
 @app.command("list")
 def list_cases(as_json: Json = False) -> None:
     """List the shipped cases."""
     from fvsolve.case import shipped
-    from fvsolve.cli import report
+    from fvsolve.cli import printing
 
     titles = shipped.titles()
     if as_json:
         print_json(titles)
     else:
-        report.titles(titles)
+        printing.print_titles(titles)
 
 
 @app.command()
@@ -163,7 +163,7 @@ def methods(
 
     if name is None and out is not None:
         raise FvsolveError("--out is valid for a single method only. Add the NAME of the method")
-    output = methods.table() if name is None else methods.one(name, out)
+    output = methods.table_output() if name is None else methods.method_output(name, out)
     if as_json:
         print_json(output.plain)
     else:
@@ -177,7 +177,7 @@ def compare(
     as_json: Json = False,
 ) -> None:
     """Compare two runs: differences of each probe that both have."""
-    from fvsolve.cli import report
+    from fvsolve.cli import printing
     from fvsolve.run import open_run
     from fvsolve.run.comparison import differences
 
@@ -186,7 +186,7 @@ def compare(
     if as_json:
         print_json(result)
     else:
-        report.differences(result, first.summary)
+        printing.print_differences(result, first.summary)
 
 
 @app.command()

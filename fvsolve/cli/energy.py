@@ -12,11 +12,19 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, cleared, folder_of, listed, methods_of, replaced, told
+from fvsolve.cli.study_options import (
+    Out,
+    clear_files,
+    comma_list,
+    folder_of,
+    method_names,
+    progress_line,
+    warn_replaced,
+)
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.sheet import Column, Sheet, text
+from fvsolve.studies.result_table import Column, ResultTable, cell_text
 
-Asked = Annotated[
+OptionalCase = Annotated[
     str | None, typer.Argument(metavar="[CASE]", help="case to run (without a case: schemes and methods are judged)")
 ]
 Port = Annotated[
@@ -31,7 +39,7 @@ Methods = Annotated[
     typer.Option(metavar="M,M,...", help="methods to run or, without a case, to judge (default that of the case; all)"),
 ]
 LINES = 12  # greatest number of lines of a kind on the terminal; energy.csv has all
-AGAIN = "the same command starts from the beginning"
+RESTARTS = "the same command starts from the beginning"
 FILES = ("energy.csv", "energy.png", "energy.svg")
 
 
@@ -54,7 +62,7 @@ METHOD = (
 
 @app.command()
 def energy(
-    case: Asked = None,
+    case: OptionalCase = None,
     port: Port = None,
     scheme: Schemes = None,
     method: Methods = None,
@@ -63,17 +71,17 @@ def energy(
     as_json: Json = False,
 ) -> None:
     """Print the energy ledger of a run: energy supplied, stored, dissipated, and changed by the numerical method."""
-    schemes, methods = listed(scheme, "--scheme"), methods_of(method)
+    schemes, methods = comma_list(scheme, "--scheme"), method_names(method)
     if case is None:
-        refuse({"--port": port, "--out": out, "--set": set})
-        claims(schemes, methods, as_json)
+        refuse_without_case({"--port": port, "--out": out, "--set": set})
+        print_claims(schemes, methods, as_json)
     elif schemes or methods:
-        pairs(load_case(case, set), schemes, methods, port, out, as_json)
+        compare_pairs(load_case(case, set), schemes, methods, port, out, as_json)
     else:
         ledger(load_case(case, set), port, out, as_json)
 
 
-def refuse(options: dict) -> None:
+def refuse_without_case(options: dict) -> None:
     """Raise FvsolveError for options that need a run if there is no case."""
     given = [name for name, value in options.items() if value]
     if given:
@@ -82,7 +90,7 @@ def refuse(options: dict) -> None:
 
 
 @contextmanager
-def leaving(words: str) -> Iterator[None]:
+def interrupt_message(words: str) -> Iterator[None]:
     """Context manager: at Ctrl-C print `words` and exit with code 130."""
     try:
         yield
@@ -93,18 +101,18 @@ def leaving(words: str) -> Iterator[None]:
 
 def ledger(case, port, out, as_json: bool) -> None:
     """Run a case, write its energy ledger and picture, and print them with the passivity verdict at the port."""
-    from fvsolve.cli.progress import watched
+    from fvsolve.cli.progress import run_progress
     from fvsolve.draw.energy import energy_figure
     from fvsolve.output.column import column, time_column
-    from fvsolve.studies.energy.energy import energy as study
-    from fvsolve.studies.energy.energy import write_table
+    from fvsolve.studies.energy.energy_balance import energy as study
+    from fvsolve.studies.energy.energy_balance import write_table
 
     folder = folder_of(case, "energy", out)
-    replaced(folder, FILES[0])
-    with leaving(f"interrupted: no ledger is written, {folder} may lack files; {AGAIN}"):
-        with watched(case) as progress:
+    warn_replaced(folder, FILES[0])
+    with interrupt_message(f"interrupted: no ledger is written, {folder} may lack files; {RESTARTS}"):
+        with run_progress(case) as progress:
             result = study(case, port=port, progress=progress)
-        write_table(result, cleared(folder, *FILES) / FILES[0])
+        write_table(result, clear_files(folder, *FILES) / FILES[0])
         at_port = None if result.port is None else (result.port.node, result.port.course, result.port.bound)
         clock, own = time_column(case), column("", "energy", case)
         units = clock.unit, None if own.plain else (own.to_si(1.0), own.unit)
@@ -126,7 +134,7 @@ def _ledger(result, case, folder) -> None:
     terminal, rows, joules = console(), [], column("energy", "energy", case)
 
     def amount(value: float) -> list[str]:
-        share = f"{100.0 * value / result.through:.4g}" if result.through > 0.0 else "-"
+        share = f"{100.0 * value / result.throughput:.4g}" if result.throughput > 0.0 else "-"
         return [f"{joules.from_si(value):.6g}", share]
 
     for kind in ("supplied", "stored", "dissipated"):
@@ -142,7 +150,7 @@ def _ledger(result, case, folder) -> None:
     text, left = f"remainder {case.amount(result.remainder[-1], 'energy')}", result.newton_counts
     if left:
         text += f"; of it Newton residuals cause {case.amount(result.newton[-1], 'energy')}; the rest is"
-    passed = case.amount(result.through, "energy", 6)
+    passed = case.amount(result.throughput, "energy", 6)
     line(
         terminal,
         f"{text}{'' if left else ','} {result.relative:.3g} of the energy throughput {passed}: {result.verdict}",
@@ -153,29 +161,29 @@ def _ledger(result, case, folder) -> None:
         line(terminal, mark, "yellow")
     cut = result.reason == "interrupted"
     ended = f"{result.reason} at t = {case.amount(result.t[-1], 'time', 6)}" if result.ok or cut else result.reason
-    line(terminal, f"{ended}; {result.steps} steps{f': the ledger ends at this time, {AGAIN}' if cut else ''}",
+    line(terminal, f"{ended}; {result.steps} steps{f': the ledger ends at this time, {RESTARTS}' if cut else ''}",
          None if result.ok else "bold red")  # fmt: skip
     line(terminal, f"{folder}: {', '.join(FILES)}")
 
 
-def pairs(case, schemes, methods, port, out, as_json: bool) -> None:
+def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
     """Run a case with several schemes and methods, and print the energy that each pair creates."""
-    from fvsolve.cli.progress import stoppable
-    from fvsolve.cli.terminal import console, line, sheet
-    from fvsolve.studies.energy.pairs import PAIR, measured
-    from fvsolve.studies.points import Points
+    from fvsolve.cli.progress import interruptible
+    from fvsolve.cli.terminal import console, line, print_sheet
+    from fvsolve.studies.energy.energy_of_pairs import PAIR_COLUMNS, measure_pairs
+    from fvsolve.studies.result_cache import ResultCache
 
     folder = folder_of(case, "energy", out)
-    with told() as progress, stoppable() as watch, Points(folder) as points:
-        rows = measured(case, schemes, methods, port, progress, points, watch)
-    Sheet(PAIR, rows).write(folder / "pairs.csv")
+    with progress_line() as progress, interruptible() as watch, ResultCache(folder) as points:
+        rows = measure_pairs(case, schemes, methods, port, progress, points, watch)
+    ResultTable(PAIR_COLUMNS, rows).write(folder / "pairs.csv")
     if as_json:
         print_json({"pairs": rows, "directory": str(folder), "files": ["pairs.csv"]})
         sys.exit(2 if all(row["creates"] is None for row in rows) else 0)
     terminal = console()
-    heads = [_in_unit(column, case) for column in PAIR if port or column.key not in ("relative", "margin")]
-    sheet(Sheet(heads, rows), terminal)
-    refused = _outcome(case, rows, terminal)
+    heads = [_in_unit(column, case) for column in PAIR_COLUMNS if port or column.key not in ("relative", "margin")]
+    print_sheet(ResultTable(heads, rows), terminal)
+    refused = _print_outcome(case, rows, terminal)
     line(terminal, f"{folder}: pairs.csv, points.jsonl")
     if len(refused) == len(rows):
         sys.exit(2)
@@ -190,12 +198,12 @@ def _in_unit(heading: Column, case) -> Column:
     own = column(heading.head.removesuffix(" [J]"), "energy", case)
 
     def words(row: Mapping) -> str:
-        return text(None if row[heading.key] is None else own.from_si(row[heading.key]), heading.words)
+        return cell_text(None if row[heading.key] is None else own.from_si(row[heading.key]), heading.words)
 
     return replace(heading, head=own.header, words=words)
 
 
-def _outcome(case, rows, terminal) -> list[dict]:
+def _print_outcome(case, rows, terminal) -> list[dict]:
     """Print the pairs that create energy, and the refused pairs with reason and remedy; returns the refused pairs."""
     from fvsolve.cli.terminal import line
 
@@ -234,12 +242,12 @@ def _pair(row) -> str:
     return f"{row['scheme']} with {row['method']}"
 
 
-def claims(schemes, methods, as_json: bool) -> None:
+def print_claims(schemes, methods, as_json: bool) -> None:
     """Print the passivity of schemes and methods that follows from their coefficients."""
-    from fvsolve.cli.terminal import console, line, sheet
+    from fvsolve.cli.terminal import console, line, print_sheet
     from fvsolve.studies.energy.passivity import CELLS, passivity
 
-    with told() as progress, leaving(f"interrupted: no results are saved; {AGAIN}"):
+    with progress_line() as progress, interrupt_message(f"interrupted: no results are saved; {RESTARTS}"):
         result = passivity(schemes, methods, progress)
     if as_json:
         print_json(result.plain())
@@ -247,7 +255,7 @@ def claims(schemes, methods, as_json: bool) -> None:
     terminal = console()
     known = [entry for entry in result.schemes if entry.passive is not None]
     line(terminal, f"Schemes: energy of a closed pipe of {CELLS} cells, continuous in time", "bold")
-    sheet(Sheet(SCHEME, [vars(entry) for entry in known]), terminal)
+    print_sheet(ResultTable(SCHEME, [vars(entry) for entry in known]), terminal)
     for entry in result.schemes:
         if entry.passive is None:
             line(terminal, f"{entry.scheme} is limited (nonlinear) and has no matrix. Check it with a case")
@@ -260,7 +268,7 @@ def claims(schemes, methods, as_json: bool) -> None:
     good = [entry.scheme for entry in known if entry.passive]
     limit = {(entry.scheme, entry.method): entry.courant for entry in result.pairs}
     rows = [vars(entry) | {name: limit[name, entry.method] for name in good} for entry in result.methods]
-    sheet(Sheet([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows), terminal)
+    print_sheet(ResultTable([*METHOD, *(Column(name, f"{name}: C", _limit(name)) for name in good)], rows), terminal)
     bad = [entry.scheme for entry in known if not entry.passive]
     if bad:
         line(terminal, f"{', '.join(bad)}: create energy at pipe ends with every method, up to the gain above")

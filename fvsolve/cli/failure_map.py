@@ -7,16 +7,16 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, One, Set, app, load_case, print_json, value_of
-from fvsolve.cli.studying import Dask, Jobs, Out, cleared, folder_of, listed, methods_of, told
+from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json, value_of
+from fvsolve.cli.study_options import Dask, Jobs, Out, clear_files, comma_list, folder_of, method_names, progress_line
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.sheet import Column, Sheet
+from fvsolve.studies.result_table import Column, ResultTable
 from fvsolve.units import parse
 
 
 @app.command("failure-map")
 def failure_map(
-    case: One,
+    case: OneCase,
     scheme: Annotated[
         str | None,
         typer.Option(metavar="A,B", help="schemes, one panel for each (default upwind and that of the case)"),
@@ -44,18 +44,18 @@ def failure_map(
 ) -> None:
     """Map failures: methods against steps or a key, each square by a run: stable, ringing, wrong, blown up ..."""
     from fvsolve.studies.failure.failure_map import failure_map as study
-    from fvsolve.studies.plans import headed
-    from fvsolve.studies.points import Points
+    from fvsolve.studies.result_cache import ResultCache
+    from fvsolve.studies.sampling import key_with_unit
 
     read_case = load_case(case, set, scheme, method)
     folder = folder_of(read_case, "map", out)
-    with told() as progress, Points(folder) as points:
+    with progress_line() as progress, ResultCache(folder) as points:
         result = study(
-            read_case, listed(scheme, "--scheme"), methods_of(method), _numbers("--courant", courant),
+            read_case, comma_list(scheme, "--scheme"), method_names(method), _numbers("--courant", courant),
             _steps(step), _key(key), tolerance, points, progress, jobs=jobs, dask=dask,
         )  # fmt: skip
-    head = result.key if result.key == "step" else headed(read_case.raw, result.key, result.values)
-    files = _written(result, folder, head)
+    head = result.key if result.key == "step" else key_with_unit(read_case.raw, result.key, result.values)
+    files = _write_files(result, folder, head)
     if as_json:
         print_json(result.plain() | {"files": [str(file) for file in files]})
     else:
@@ -64,7 +64,7 @@ def failure_map(
 
 def _numbers(option: str, text: str | None) -> list[float] | None:
     try:
-        return None if text is None else [float(word) for word in listed(text)]
+        return None if text is None else [float(word) for word in comma_list(text)]
     except ValueError:
         raise FvsolveError(
             f"{option} {text}: not a list of numbers. Expected numbers with commas, for example {option} 0.5,0.9,1"
@@ -75,7 +75,7 @@ def _steps(text: str | None) -> list[float] | None:
     if text is None:
         return None
     try:
-        return [parse(value_of(word), "time") for word in listed(text)]
+        return [parse(value_of(word), "time") for word in comma_list(text)]
     except ValueError as error:
         raise FvsolveError(f"--step {text}: {error}") from None
 
@@ -86,15 +86,15 @@ def _key(text: str | None) -> tuple[str, list] | None:
     name, equals, values = text.partition("=")
     if not equals or not name.strip():
         raise FvsolveError(f"--key {text}: expected KEY=A,B, for example nodes.body.volume=1e-6,1e-5")
-    return name.strip(), [value_of(word) for word in listed(values)]
+    return name.strip(), [value_of(word) for word in comma_list(values)]
 
 
-def _written(result, folder: Path, head: str) -> list[Path]:
+def _write_files(result, folder: Path, head: str) -> list[Path]:
     from fvsolve.draw.failure_map import failure_map_figure
 
     rows = [{"value": result.values[row["column"]]} | row for row in result.plain()["squares"]]
-    table = Sheet([Column(key) for key in rows[0]], rows).write(
-        cleared(folder, "map.csv", "map.png", "map.svg") / "map.csv"
+    table = ResultTable([Column(key) for key in rows[0]], rows).write(
+        clear_files(folder, "map.csv", "map.png", "map.svg") / "map.csv"
     )
     figure = failure_map_figure(result, f"{result.case}: where methods fail", head)
     pictures = [folder / f"map.{kind}" for kind in ("png", "svg")]
@@ -106,7 +106,7 @@ def _written(result, folder: Path, head: str) -> list[Path]:
 def _show(result, files: list[Path], head: str) -> None:
     from fvsolve.cli import terminal
     from fvsolve.draw.failure_map import column_labels
-    from fvsolve.studies.failure.verdict import VERDICTS
+    from fvsolve.studies.failure.run_verdict import VERDICT_TEXTS
 
     console = terminal.console()
     for scheme in result.schemes:
@@ -128,9 +128,9 @@ def _show(result, files: list[Path], head: str) -> None:
         terminal.table(heads, rows, console)
         terminal.line(console, "")
     present = {square.verdict: None for square in result.squares}
-    for word in VERDICTS:
+    for word in VERDICT_TEXTS:
         if word in present:
-            terminal.line(console, f"{word}: {VERDICTS[word]}")
+            terminal.line(console, f"{word}: {VERDICT_TEXTS[word]}")
     terminal.line(console, f"tolerance: {result.tolerance:g} of a probe's range, mean over the run, worst probe")
     terminal.line(console, f"reference: {result.reference}; its error is at most {result.doubt:.2g}")
     terminal.line(console, "predicted limit: first step at which an eigenvalue grows by 1000 within the run (13)")

@@ -8,14 +8,16 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Out, cleared, folder_of, listed, replaced
-from fvsolve.studies.sheet import Sheet, write
+from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.study_options import Out, clear_files, comma_list, folder_of, warn_replaced
+from fvsolve.studies.result_table import ResultTable, write_csv
 
 SHOWN = 24  # greatest number of poles on the terminal; poles.csv has all
 
-At = Annotated[str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms` (default start)")]
-Before = Annotated[bool, typer.Option("--left-limit", help="use the state just before a kink or jump of a schedule")]
+AtTime = Annotated[str | None, typer.Option(metavar="T", help="time of the state: seconds, or `20 ms` (default start)")]
+BeforeJump = Annotated[
+    bool, typer.Option("--left-limit", help="use the state just before a kink or jump of a schedule")
+]
 
 
 def time_of(text: str | None) -> float | None:
@@ -32,15 +34,15 @@ def time_of(text: str | None) -> float | None:
 
 @app.command()
 def linearise(
-    case: One,
+    case: OneCase,
     inputs: Annotated[
         str | None, typer.Option(metavar="A,B", help="inputs, such as valve.opening,lake.pressure (default none)")
     ] = None,
     outputs: Annotated[
         str | None, typer.Option(metavar="A,B", help="probes used as outputs (default probes of the case)")
     ] = None,
-    at: At = None,
-    before: Before = False,
+    at: AtTime = None,
+    before: BeforeJump = False,
     scheme: Annotated[
         str | None, typer.Option(metavar="NAME", help="linear scheme (default scheme of the case)")
     ] = None,
@@ -50,13 +52,13 @@ def linearise(
 ) -> None:
     """Linearise a case about a state: matrices A, B, C, D and poles."""
     from fvsolve.model.energy_norm import energy_form
+    from fvsolve.studies.linear.eigenvalues import POLES, poles_of
     from fvsolve.studies.linear.linearise import linearise as ask
-    from fvsolve.studies.linear.spectrum import POLES, poles_of
 
     system = ask(
         load_case(case, set),
-        listed(inputs, "--inputs") or (),
-        listed(outputs, "--outputs"),
+        comma_list(inputs, "--inputs") or (),
+        comma_list(outputs, "--outputs"),
         time_of(at),
         before,
         scheme,
@@ -64,15 +66,15 @@ def linearise(
     values = poles_of(system.a, energy_form(system.at.model, system.at.y))
     poles = values.poles()
     folder = folder_of(system.at.model.case, "linearise", out)
-    replaced(folder, "linear.npz")
-    cleared(folder, "A.csv", "A-sparse.csv")  # only one of the two files is written
-    Sheet(POLES, poles).write(folder / "poles.csv")
+    warn_replaced(folder, "linear.npz")
+    clear_files(folder, "A.csv", "A-sparse.csv")  # only one of the two files is written
+    ResultTable(POLES, poles).write(folder / "poles.csv")
     write_matrices(folder, system)
-    result = system.plain() | {"poles": poles, "poles_are": values.said, "directory": str(folder)}
+    result = system.plain() | {"poles": poles, "poles_are": values.description, "directory": str(folder)}
     if as_json:
         print_json(result)
     else:
-        say(system, values, poles, folder)
+        print_system(system, values, poles, folder)
 
 
 def write_matrices(folder: Path, system) -> None:
@@ -92,23 +94,23 @@ def write_matrices(folder: Path, system) -> None:
     if system.sparse:
         entries = a.tocoo()
         rows = zip((rates[i] for i in entries.row), (names[j] for j in entries.col), entries.data.tolist(), strict=True)
-        write(folder / "A-sparse.csv", ["rate", "state", "value"], rows)
+        write_csv(folder / "A-sparse.csv", ["rate", "state", "value"], rows)
     else:
-        write(folder / "A.csv", ["", *names], labelled(rates, a))
-    write(folder / "B.csv", ["", *system.inputs], labelled(rates, system.b))
-    write(folder / "C.csv", ["", *names], labelled(system.outputs, system.c))
-    write(folder / "D.csv", ["", *system.inputs], labelled(system.outputs, system.d))
+        write_csv(folder / "A.csv", ["", *names], with_names(rates, a))
+    write_csv(folder / "B.csv", ["", *system.inputs], with_names(rates, system.b))
+    write_csv(folder / "C.csv", ["", *names], with_names(system.outputs, system.c))
+    write_csv(folder / "D.csv", ["", *system.inputs], with_names(system.outputs, system.d))
 
 
-def labelled(names, matrix):
+def with_names(names, matrix):
     """Rows of a matrix, each preceded by its name."""
     return ([name, *row] for name, row in zip(names, matrix.tolist(), strict=True))
 
 
-def say(system, values, poles: list[dict], folder: Path) -> None:
+def print_system(system, values, poles: list[dict], folder: Path) -> None:
     """Print the state, the accuracy of the differences and the slowest poles."""
     from fvsolve.cli import terminal
-    from fvsolve.studies.linear.spectrum import POLES
+    from fvsolve.studies.linear.eigenvalues import POLES
 
     output = terminal.console()
     moving = np.abs(system.at.rate) / system.at.model.scale
@@ -119,9 +121,11 @@ def say(system, values, poles: list[dict], folder: Path) -> None:
                               "schedules are held at their values of that time")  # fmt: skip
     worst = max(system.error.values())
     terminal.line(output, f"  derivatives by two difference steps agree to {worst:.1e}, relative to each row")
-    terminal.sheet(Sheet([column for column in POLES if column.key != "pair"], poles[:SHOWN]), output)
+    terminal.print_sheet(ResultTable([column for column in POLES if column.key != "pair"], poles[:SHOWN]), output)
     more = len(poles) - SHOWN
-    terminal.line(output, f"poles: {values.said}" + (f"; {more} faster poles are in poles.csv" if more > 0 else ""))
+    terminal.line(
+        output, f"poles: {values.description}" + (f"; {more} faster poles are in poles.csv" if more > 0 else "")
+    )
     terminal.line(
         output, f"{folder}: linear.npz, {'A-sparse' if system.sparse else 'A'}.csv, B.csv, C.csv, D.csv, poles.csv"
     )

@@ -9,36 +9,36 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fvsolve.cli import terminal
-from fvsolve.cli.studying import method_from
+from fvsolve.cli.study_options import method_name
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers import METHODS, Facts, Method, analyse, method_named
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 
 PICTURES = (".png", ".svg", ".pdf")
-LONG = 28  # greatest length of a tableau entry that is printed in full, in characters
-SHORT = 14  # digits printed of a longer entry
-TERM = 40  # greatest length of a coefficient of R that is printed exactly, in characters
+MAX_ENTRY = 28  # greatest length of a tableau entry that is printed in full, in characters
+SHORT_DIGITS = 14  # digits printed of a longer entry
+MAX_COEFFICIENT = 40  # greatest length of a coefficient of R that is printed exactly, in characters
 
 
 @dataclass(frozen=True)
-class Said:
+class Output:
     """Output in two forms: plain values for JSON, and a function that prints text."""
 
     plain: dict
     show: Callable[[], None]
 
 
-def table() -> Said:
+def table_output() -> Output:
     """Table of all methods, explicit methods first."""
     all_facts = {name: analyse(method) for name, method in METHODS.items()}
-    return Said({name: facts.plain() for name, facts in all_facts.items()}, lambda: _table(all_facts))
+    return Output({name: facts.plain() for name, facts in all_facts.items()}, lambda: _table(all_facts))
 
 
-def one(name: str, out: Path | None) -> Said:
+def method_output(name: str, out: Path | None) -> Output:
     """Tableau, stability function R(s) and properties of a method; writes a picture of its stability region."""
     from fvsolve.draw.region import region_figure
 
-    name = method_from(name)
+    name = method_name(name)
     method = method_named(name)
     facts = analyse(method)
     path = out or Path(f"{name}.png")
@@ -47,7 +47,7 @@ def one(name: str, out: Path | None) -> Said:
     path.parent.mkdir(parents=True, exist_ok=True)
     region_figure(facts.stability_function, f"{method.name}: |R(hλ)| ≤ 1").savefig(path)
     array = {"a": method.a, "b": method.b, "c": method.c, "error": method.error, "start_error": method.start_error}
-    return Said(facts.plain() | array | {"picture": str(path)}, lambda: _show(method, facts, path))
+    return Output(facts.plain() | array | {"picture": str(path)}, lambda: _show(method, facts, path))
 
 
 def _table(all_facts: dict[str, Facts]) -> None:
@@ -77,7 +77,7 @@ def _show(method: Method, facts: Facts, path: Path) -> None:
     console = terminal.console()
     terminal.line(console, f"{method.name} ({method.source})", "bold")
     terminal.line(console, "")
-    for text in [*_array(method), *_given(method)]:
+    for text in [*_tableau_lines(method), *_entry_notes(method)]:
         terminal.line(console, text)
     terminal.line(console, "")
     terminal.line(console, f"R(s) = {_quotient(facts)}")
@@ -97,8 +97,8 @@ def _sentences(facts: Facts) -> list[str]:
         ", ".join(kind),
         f"A-stable: {_yes(facts.a_stable)}; L-stable: {_yes(facts.l_stable)}; "
         f"I-stable: {_yes(facts.i_stable)}; {sector}",
-        f"stable on the real axis {_reach(facts.real_interval, '-', '')}, on the imaginary axis "
-        f"{_reach(facts.imaginary_interval, '', 'i')}; SSP radius {_length(facts.ssp_radius, 13)}",
+        f"stable on the real axis {_interval_text(facts.real_interval, '-', '')}, on the imaginary axis "
+        f"{_interval_text(facts.imaginary_interval, '', 'i')}; SSP radius {_length(facts.ssp_radius, 13)}",
         f"R(s) - e^s = {facts.error_constant:.6g} s^{facts.stability_function.error_constant[0] + 1} + ...",
     ]
     if facts.pade:
@@ -108,11 +108,11 @@ def _sentences(facts: Facts) -> list[str]:
     return sentences
 
 
-def _reach(value: float, before: str, after: str) -> str:
+def _interval_text(value: float, before: str, after: str) -> str:
     return "everywhere" if math.isinf(value) else "nowhere" if value == 0 else f"to {before}{value:.13g}{after}"
 
 
-def _array(method: Method) -> list[str]:
+def _tableau_lines(method: Method) -> list[str]:
     """Lines of the tableau in the notation of its source, in aligned columns; long decimals are cut."""
     rows, width = [], method.stages
     for text in method.text.strip().splitlines():
@@ -130,7 +130,7 @@ def _array(method: Method) -> list[str]:
     return lines
 
 
-def _given(method: Method) -> list[str]:
+def _entry_notes(method: Method) -> list[str]:
     """Notes on the tableau: values of its algebraic numbers, and the weight of f(t, y) in the embedded solution."""
     notes = [f"{name} = {near:.10g}, a root of {polynomial}" for name, (polynomial, near) in method.numbers.items()]
     if method.start_weight is not None:
@@ -139,8 +139,8 @@ def _given(method: Method) -> list[str]:
 
 
 def _entry(text: str) -> str:
-    if len(text) > LONG and re.fullmatch(r"-?[\d.]+", text):
-        return text[: SHORT + 2] + "..."
+    if len(text) > MAX_ENTRY and re.fullmatch(r"-?[\d.]+", text):
+        return text[: SHORT_DIGITS + 2] + "..."
     return text
 
 
@@ -165,7 +165,7 @@ def _polynomial(p: Polynomial) -> str:
 
 def _number(x) -> str:
     text = str(x)
-    if len(text) > TERM:
+    if len(text) > MAX_COEFFICIENT:
         return f"{float(x):.15g}"
     return f"({text})" if re.search(r".[-+]", text) else text
 

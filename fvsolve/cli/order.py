@@ -9,11 +9,11 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli import terminal
-from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Dask, Jobs, Out, cleared, folder_of, listed, methods_of, told
+from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.study_options import Dask, Jobs, Out, clear_files, comma_list, folder_of, method_names, progress_line
 from fvsolve.output.summary import plain
-from fvsolve.studies.accuracy.picture import NORMS, SHOWN, title, unit
-from fvsolve.studies.sheet import Column, Sheet, columns
+from fvsolve.studies.accuracy.order_picture import NORMS, SHOWN_VARIABLES, study_title, variable_unit
+from fvsolve.studies.result_table import Column, ResultTable, columns
 
 FILE = columns(
     scheme="scheme", method="method", reference="reference", variable="variable", unit="unit", norm="norm",
@@ -30,7 +30,7 @@ TABLE = (
 
 @app.command()
 def order(
-    case: One,
+    case: OneCase,
     overrides: Set = [],  # noqa: B006
     refine: Annotated[
         str | None,
@@ -60,17 +60,19 @@ def order(
 ) -> None:
     """Measure the order of convergence of a case under refinement: a table, order.csv and order.png."""
     from fvsolve.studies.accuracy.order import order as study
-    from fvsolve.studies.points import Points
+    from fvsolve.studies.result_cache import ResultCache
 
     loaded = load_case(case, overrides, scheme, method)
     folder = folder_of(loaded, "order", out)
-    with told() as progress, Points(folder) as points:
-        studies = study(loaded, refine=refine, key=key, levels=levels, cells=cells, schemes=listed(scheme, "--scheme"),
-                      methods=methods_of(method), against=reference, out=points, progress=progress,
+    with progress_line() as progress, ResultCache(folder) as points:
+        studies = study(loaded, refine=refine, key=key, levels=levels, cells=cells, schemes=comma_list(scheme, "--scheme"),
+                      methods=method_names(method), against=reference, out=points, progress=progress,
                       jobs=jobs, dask=dask)  # fmt: skip
     studies = studies if isinstance(studies, list) else [studies]
     files = [
-        Sheet(FILE, [*lines(studies)]).write(cleared(folder, "order.csv", "order.png", "order-*.png") / "order.csv"),
+        ResultTable(FILE, [*file_rows(studies)]).write(
+            clear_files(folder, "order.csv", "order.png", "order-*.png") / "order.csv"
+        ),
         *draw(folder, studies),
     ]
     if as_json:
@@ -78,7 +80,7 @@ def order(
                     "reused": points.reused})  # fmt: skip
         return
     for result in studies:
-        say(result)
+        print_study(result)
     terminal.line(terminal.console(), f"files: {', '.join(str(file) for file in files)}")
 
 
@@ -92,13 +94,13 @@ def draw(folder: Path, studies) -> list[Path]:
     return files
 
 
-def lines(studies) -> Iterator[dict]:
+def file_rows(studies) -> Iterator[dict]:
     """Rows of order.csv: a row for each level of each study, variable and norm, in SI."""
     for result in studies:
         head = {"scheme": result.scheme, "method": result.method, "reference": result.kind}
         for variable, fits in result.fits.items():
             for norm in NORMS:
-                labels = {"variable": variable, "unit": unit(variable, result.units), "norm": norm}
+                labels = {"variable": variable, "unit": variable_unit(variable, result.units), "norm": norm}
                 pairs = zip(result.rows, [None, *fits[norm].pairwise], fits[norm].marks, strict=True)
                 for row, pairwise, mark in pairs:
                     yield head | labels | vars(fits[norm]) | vars(row) | vars(row.level) | {
@@ -107,26 +109,26 @@ def lines(studies) -> Iterator[dict]:
                     }  # fmt: skip
 
 
-def say(result) -> None:
+def print_study(result) -> None:
     """Print the tables, fitted orders and notes of a study."""
     console = terminal.console()
-    terminal.line(console, f"{result.case}: {title(result)}", "bold")
+    terminal.line(console, f"{result.case}: {study_title(result)}", "bold")
     terminal.line(console, f"errors against: {result.words}")
-    for variable in result.variables[:SHOWN]:
+    for variable in result.variables[:SHOWN_VARIABLES]:
         terminal.line(console, "")
         place = " at the end, all pipes" if variable in ("pressure", "flow") else ""
-        terminal.line(console, f"{variable} [{result.told(variable)[1]}]{place}")
-        terminal.sheet(rows_of(result, variable), console)
+        terminal.line(console, f"{variable} [{result.error_unit(variable)[1]}]{place}")
+        terminal.print_sheet(rows_of(result, variable), console)
     terminal.line(console, "")
-    terminal.table(["fitted order of", "L1", "L2", "max"], fitted(result), console)
-    for text in dict.fromkeys([*reasons(result), *result.notes]):
+    terminal.table(["fitted order of", "L1", "L2", "max"], fit_rows(result), console)
+    for text in dict.fromkeys([*reason_lines(result), *result.notes]):
         terminal.line(console, text)
     terminal.line(console, "")
 
 
-def rows_of(result, variable: str) -> Sheet:
+def rows_of(result, variable: str) -> ResultTable:
     """Table of a variable: errors and pairwise orders of all levels."""
-    fits, rows, size = result.fits[variable], [], result.told(variable)[0]
+    fits, rows, size = result.fits[variable], [], result.error_unit(variable)[0]
     for k, row in enumerate(result.rows):
         step = f"rtol {row.level.size:g}" if result.plan.measure == "rtol" else row.level.step
         cells = {"cells": row.level.cells or None, "step": step, "rhs": row.rhs, "seconds": row.seconds}
@@ -136,15 +138,15 @@ def rows_of(result, variable: str) -> Sheet:
         same = len(set(marks.values())) == 1
         mark_text = marks["L1"] if same else ", ".join(f"{text} ({norm})" for norm, text in marks.items() if text)
         rows.append(plain(cells | {"mark": mark_text}))
-    return Sheet(TABLE, rows)
+    return ResultTable(TABLE, rows)
 
 
-def fitted(result) -> list[list[str]]:
+def fit_rows(result) -> list[list[str]]:
     """Fitted orders of all variables, in L1, L2 and max norm."""
-    return [[f"{name}", *(slope(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
+    return [[f"{name}", *(fit_text(fits[norm]) for norm in NORMS)] for name, fits in result.fits.items()]
 
 
-def slope(fit) -> str:
+def fit_text(fit) -> str:
     """Text of a fitted order with its spread, or "none" or "no error"."""
     from fvsolve.studies.accuracy.fit import NO_ERROR
 
@@ -153,17 +155,17 @@ def slope(fit) -> str:
     return f"{fit.order:.2f} ± {fit.spread:.2f}"
 
 
-def reasons(result):
+def reason_lines(result):
     """Reasons for missing orders and notes on orders, for the variables on the terminal."""
     from fvsolve.studies.accuracy.fit import NO_ERROR
 
-    for name in result.variables[:SHOWN]:
+    for name in result.variables[:SHOWN_VARIABLES]:
         notes: dict[str, list[str]] = {}
         for norm, fit in result.fits[name].items():
             if (fit.reason or fit.note) and fit.reason != NO_ERROR:
                 notes.setdefault(fit.reason or fit.note, []).append(norm)
         for text, norms in notes.items():
             yield f"{name} ({', '.join(norms)}): {text}"
-    others = [fit.reason for name in result.variables[SHOWN:] for fit in result.fits[name].values()]
+    others = [fit.reason for name in result.variables[SHOWN_VARIABLES:] for fit in result.fits[name].values()]
     if any(reason and reason != NO_ERROR for reason in others):
         yield "other variables have no order either; --json gives the reasons"

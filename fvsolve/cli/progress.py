@@ -12,7 +12,7 @@ from fvsolve.errors import visible
 
 
 @contextmanager
-def watched(case) -> Iterator[Callable[[float, float, int], None]]:
+def run_progress(case) -> Iterator[Callable[[float, float, int], None]]:
     """Context manager that yields a `progress` function for a run: it draws a bar and ends the run at Ctrl-C.
 
     The first Ctrl-C ends the run after a complete step; the second interrupts it at once.
@@ -26,12 +26,12 @@ def watched(case) -> Iterator[Callable[[float, float, int], None]]:
         if stop.is_set():
             raise KeyboardInterrupt
 
-    with _caught(stop), bar.shown if bar else _nothing():
+    with _interrupt_sets(stop), bar.shown if bar else _no_bar():
         yield progress
 
 
 @contextmanager
-def stoppable() -> Iterator[Callable[[float, float, int], None]]:
+def interruptible() -> Iterator[Callable[[float, float, int], None]]:
     """Context manager that yields a silent `progress` function, which ends a run at Ctrl-C like `run_progress`."""
     stop = threading.Event()
 
@@ -39,12 +39,12 @@ def stoppable() -> Iterator[Callable[[float, float, int], None]]:
         if stop.is_set():
             raise KeyboardInterrupt
 
-    with _caught(stop):
+    with _interrupt_sets(stop):
         yield progress
 
 
 @contextmanager
-def _caught(stop: threading.Event) -> Iterator[None]:
+def _interrupt_sets(stop: threading.Event) -> Iterator[None]:
     def handle(number, frame) -> None:
         stop.set()
         signal.signal(signal.SIGINT, before)
@@ -57,17 +57,17 @@ def _caught(stop: threading.Event) -> Iterator[None]:
 
 
 @contextmanager
-def _nothing() -> Iterator[None]:
+def _no_bar() -> Iterator[None]:
     yield
 
 
 @contextmanager
-def counted(label: str) -> Iterator[Callable[[int, int, str], None]]:
+def progress_bar(label: str) -> Iterator[Callable[[int, int, str], None]]:
     """Context manager that yields `progress(done, total, next)`: a bar on a terminal, otherwise lines at intervals."""
     if not sys.stderr.isatty():
-        from fvsolve.cli.studying import told
+        from fvsolve.cli.study_options import progress_line
 
-        with told() as progress:
+        with progress_line() as progress:
             yield progress
         return
     from rich.console import Console
@@ -88,7 +88,7 @@ class Bar:
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-        self.start, self.end, self.told = case.numerics.start, case.numerics.end, case.amount
+        self.start, self.end, self.format_amount = case.numerics.start, case.numerics.end, case.amount
         self.first: tuple[float, float] | None = None
         self.shown = Progress(
             TextColumn("{task.description}", markup=False),
@@ -107,5 +107,5 @@ class Bar:
         self.shown.update(
             self.task,
             completed=t - self.start,
-            now=f"{self.told(t, 'time', 6)} of {self.told(self.end, 'time', 6)}{speed}",
+            now=f"{self.format_amount(t, 'time', 6)} of {self.format_amount(self.end, 'time', 6)}{speed}",
         )

@@ -8,23 +8,23 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.linearise import At, Before, time_of
-from fvsolve.cli.studying import Out, cleared, folder_of, replaced
+from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.linearise import AtTime, BeforeJump, time_of
+from fvsolve.cli.study_options import Out, clear_files, folder_of, warn_replaced
 from fvsolve.output.column import column
-from fvsolve.studies.sheet import write
+from fvsolve.studies.result_table import write_csv
 
 SYMBOLS = {"admittance": "Y", "impedance": "Z"}
 
 
 @app.command()
 def response(
-    case: One,
+    case: OneCase,
     port: Annotated[
         str, typer.Option(metavar="NODE", help="node of the port: a reservoir, junction, inflow, chamber or tank")
     ],
-    at: At = None,
-    before: Before = False,
+    at: AtTime = None,
+    before: BeforeJump = False,
     scheme: Annotated[
         str | None, typer.Option(metavar="NAME", help="linear scheme (default scheme of the case)")
     ] = None,
@@ -39,30 +39,32 @@ def response(
     result = ask(loaded, port, time_of(at), before, scheme)
     folder = folder_of(loaded, "response", out)
     name = f"{port}.response"
-    header = ["frequency [Hz]", "w [rad/s]", "real", "imaginary", f"magnitude [{unit_of(result)}]", "phase [deg]"]
+    header = ["frequency [Hz]", "w [rad/s]", "real", "imaginary", f"magnitude [{si_unit(result)}]", "phase [deg]"]
     h = result.h
     columns = [result.w / (2.0 * np.pi), result.w, h.real, h.imag, np.abs(h), np.degrees(np.angle(h))]
-    replaced(folder, f"{name}.npz")
-    write(cleared(folder, f"{name}.png", f"{name}.svg") / f"{name}.csv", header, np.column_stack(columns).tolist())
+    warn_replaced(folder, f"{name}.npz")
+    write_csv(
+        clear_files(folder, f"{name}.png", f"{name}.svg") / f"{name}.csv", header, np.column_stack(columns).tolist()
+    )
     np.savez(folder / f"{name}.npz", A=result.a, B=result.b, C=result.c, D=result.d, states=np.array(result.states))
-    unit = unit_in(loaded, result)
+    unit = output_unit(loaded, result)
     draw(result, folder / name, *unit)
     if as_json:
         print_json(result.plain() | {"directory": str(folder)})
     else:
-        say(result, folder, name, unit[1])
+        print_response(result, folder, name, unit[1])
 
 
-def unit_of(result) -> str:
+def si_unit(result) -> str:
     """SI unit of the transfer function H."""
     return "m3/s/Pa" if result.kind == "admittance" else "Pa s/m3"
 
 
-def unit_in(case, result) -> tuple[float, str]:
+def output_unit(case, result) -> tuple[float, str]:
     """(value of 1 SI unit, unit) of H in the units of `[output]` for pressure and flow."""
     flow, pressure = column("", "flow", case), column("", "pressure", case)
     if flow.plain and pressure.plain:
-        return 1.0, unit_of(result)
+        return 1.0, si_unit(result)
     size = flow.span_from_si(1.0) / pressure.span_from_si(1.0)
     if result.kind == "admittance":
         return size, f"{flow.unit}/{pressure.span_unit}"
@@ -84,7 +86,7 @@ def draw(result, path: Path, size: float, unit: str) -> None:
         figure.savefig(path.with_name(f"{path.name}.{ending}"))
 
 
-def say(result, folder: Path, name: str, unit: str) -> None:
+def print_response(result, folder: Path, name: str, unit: str) -> None:
     """Print the transfer function's definition, the verdict with its reasons, and the files."""
     from fvsolve.cli import terminal
 

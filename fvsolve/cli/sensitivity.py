@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import Dask, Jobs, Out, Seed, cleared, folder_of, told
+from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.study_options import Dask, Jobs, Out, Seed, clear_files, folder_of, progress_line
 from fvsolve.cli.sweep import ranges
 
 
 @app.command()
 def sensitivity(
-    case: One,
+    case: OneCase,
     vary: Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="range of a key to vary")],
     outcome: Annotated[
         str, typer.Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")
@@ -33,24 +33,24 @@ def sensitivity(
 
     loaded = load_case(case, set)
     folder = folder_of(loaded, "sensitivity", out)
-    with told() as progress:
+    with progress_line() as progress:
         result = studies.sensitivity(
             loaded, ranges(vary, "--vary"), outcome, samples, seed, None, jobs, dask, folder, progress
         )
     paths = [
-        result.sheet.write(cleared(folder, "sensitivity.csv", "sensitivity.png") / "sensitivity.csv"),
+        result.sheet.write(clear_files(folder, "sensitivity.csv", "sensitivity.png") / "sensitivity.csv"),
         folder / "sensitivity.png",
     ]
     result.plot(paths[1])
     if as_json:
         print_json(result.plain() | {"directory": str(folder)})
     else:
-        show(result, f"{paths[0]}: {result.outcome}, {result.runs} runs")
+        print_table(result, f"{paths[0]}: {result.outcome}, {result.runs} runs")
 
 
 @app.command()
 def calibrate(
-    case: One,
+    case: OneCase,
     parameter: Annotated[list[str], typer.Option(metavar="KEY=LOW,HIGH", help="key to calibrate and its range")],
     seed: Seed = 0,
     jobs: Jobs = 1,
@@ -62,24 +62,24 @@ def calibrate(
     from fvsolve import studies
 
     loaded = load_case(case, set)
-    with told(kept=False) as progress:
+    with progress_line(resumable=False) as progress:
         result = studies.calibrate(loaded, ranges(parameter, "--parameter"), None, seed, jobs, dask, progress)
     if as_json:
         print_json(result.plain())
         return
     from fvsolve.cli import terminal
-    from fvsolve.studies.plans import bare_unit
+    from fvsolve.studies.sampling import si_unit_of
 
     probes = {series.probe.text: series.probe for series in loaded.compare.values() if series.probe is not None}
-    texts = [f"rms of {name} {difference(loaded, probes[name], rms)}" for name, rms in result.rms.items()]
-    units = {key: f"{key} [{unit}]" if (unit := bare_unit(loaded.raw, key)) else key for key in result.values}
-    show(result, ", ".join([*texts, f"{result.runs} runs"]), units)
+    texts = [f"rms of {name} {difference_text(loaded, probes[name], rms)}" for name, rms in result.rms.items()]
+    units = {key: f"{key} [{unit}]" if (unit := si_unit_of(loaded.raw, key)) else key for key in result.values}
+    print_table(result, ", ".join([*texts, f"{result.runs} runs"]), units)
 
     for doubt in result.doubts:
         terminal.line(terminal.console(), doubt, "yellow")
 
 
-def difference(case, probe, value: float) -> str:
+def difference_text(case, probe, value: float) -> str:
     """Text of a difference of a probe [SI], in the unit of the probe's record."""
     from fvsolve.output.column import column
 
@@ -87,7 +87,7 @@ def difference(case, probe, value: float) -> str:
     return f"{unit_column.span_from_si(value):.6g} {unit_column.span_unit}"
 
 
-def show(result, text: str, units: dict[str, str] = {}) -> None:  # noqa: B006
+def print_table(result, text: str, units: dict[str, str] = {}) -> None:  # noqa: B006
     """Print a table of keys and a line below it; `units` maps a key to its heading with unit."""
     from fvsolve.cli import terminal
 

@@ -7,15 +7,15 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, One, Set, app, load_case, print_json
-from fvsolve.cli.studying import told
-from fvsolve.cli.sweep import RANGE, values_of
+from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.study_options import progress_line
+from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
 
 
 @app.command()
 def size(
-    case: One,
+    case: OneCase,
     vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range")],
     goal: Annotated[
         str,
@@ -40,20 +40,20 @@ def size(
 
     faults, key, values, ties, loaded = [], "", [], {}, None
     with collect_faults(faults):
-        key, values = values_of(vary, "--vary", RANGE)
+        key, values = key_and_values(vary, "--vary", RANGE_FORMAT)
         if len(values) != 2:
             values = []
-            raise FvsolveError(f"--vary {vary}: expected {RANGE}")
+            raise FvsolveError(f"--vary {vary}: expected {RANGE_FORMAT}")
     with collect_faults(faults):
-        ties = sizing.tied(dependent)
+        ties = sizing.parse_ties(dependent)
     with collect_faults(faults):
         loaded = load_case(case, set)
-    faults += sizing.asked(loaded, key, values, goal, ties, rtol)
+    faults += sizing.find_faults(loaded, key, values, goal, ties, rtol)
     if faults:
         raise CaseError(faults, case)
-    with told(kept=False) as progress:
+    with progress_line(resumable=False) as progress:
         result = sizing.size(loaded, key, *values, goal, ties, None, rtol,
-                            lambda done, label: progress(done, sizing.MOST_RUNS, label), error)  # fmt: skip
+                            lambda done, label: progress(done, sizing.MAX_RUNS, label), error)  # fmt: skip
     if as_json:
         print_json(result.plain())
     else:
@@ -76,7 +76,7 @@ def _show(result) -> None:
     for text in dict.fromkeys(run.open for run in result.runs if run.open):
         terminal.line(console, f"open: {text}", "yellow")
     if result.value is None:
-        terminal.line(console, _unmet(result), "bold red")
+        terminal.line(console, _not_found_text(result), "bold red")
         return
     bracket = "at the end of the range" if result.bracket is None else (
         f"bracket {min(result.bracket):.6g} to {max(result.bracket):.6g}{unit}")  # fmt: skip
@@ -84,7 +84,7 @@ def _show(result) -> None:
     terminal.line(console, line, "green")
 
 
-def _unmet(result) -> str:
+def _not_found_text(result) -> str:
     """Text for a failed search: the nearest value, its margin, and the direction in which to search."""
     nearest, values = result.nearest, sorted(run.value for run in result.runs)
     unit = f" {result.unit}" if result.unit else ""

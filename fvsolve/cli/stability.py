@@ -9,9 +9,9 @@ import numpy as np
 import typer
 
 from fvsolve.cli.app import Json, Set, app, load_case, print_json
-from fvsolve.cli.linearise import At, Before, time_of
-from fvsolve.cli.studying import Dask, Jobs, Out, cleared, folder_of, listed, methods_of, told
-from fvsolve.studies.sheet import Column, Sheet, columns
+from fvsolve.cli.linearise import AtTime, BeforeJump, time_of
+from fvsolve.cli.study_options import Dask, Jobs, Out, clear_files, comma_list, folder_of, method_names, progress_line
+from fvsolve.studies.result_table import Column, ResultTable, columns
 
 PICTURES = 12  # greatest number of pairs of scheme and method for which pictures are drawn
 FILE = columns(
@@ -43,8 +43,8 @@ def stability(
     courant: Annotated[
         float | None, typer.Option(help="Courant number at which growth is computed (only without a case)")
     ] = None,
-    at: At = None,
-    before: Before = False,
+    at: AtTime = None,
+    before: BeforeJump = False,
     jobs: Jobs = 1,
     dask: Dask = None,
     out: Out = None,
@@ -59,22 +59,22 @@ def stability(
         "--jobs": jobs if jobs != 1 else None,
         "--dask": dask,
     }
-    refuse(case, of_a_case, {"--cells": cells, "--courant": courant})
+    refuse_options(case, of_a_case, {"--cells": cells, "--courant": courant})
     if case is None:
-        from fvsolve.cli.grid import without_case
+        from fvsolve.cli.periodic_grid import without_case
 
         without_case(scheme, method, cells, steps, as_json, out, courant)
         return
-    from fvsolve.studies.stability.growth import STEPS
+    from fvsolve.studies.stability.power_growth import STEPS
     from fvsolve.studies.stability.stability import stability as ask
 
     loaded = load_case(case, set, scheme, method)
     folder = folder_of(loaded, "stability", out)
-    with told() as progress:
+    with progress_line() as progress:
         result = ask(
             loaded,
-            listed(scheme, "--scheme"),
-            methods_of(method),
+            comma_list(scheme, "--scheme"),
+            method_names(method),
             time_of(at),
             before,
             steps or STEPS,
@@ -83,17 +83,17 @@ def stability(
             jobs=jobs,
             dask=dask,
         )
-    table = Sheet(FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in result.rows])
-    files = [table.write(cleared(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
+    table = ResultTable(FILE, [row.plain() | {"notes": "; ".join(row.notes)} for row in result.rows])
+    files = [table.write(clear_files(folder, "stability.csv", "spectrum-*.png") / "stability.csv").name]
     if len(result.rows) <= PICTURES:
         files += pictures(result, folder)
     if as_json:
         print_json(result.plain() | {"directory": str(folder), "files": files})
     else:
-        say(result, folder, files)
+        print_stability(result, folder, files)
 
 
-def refuse(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
+def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
     """Raise FvsolveError for options without effect: those of a case without it, those of a grid with a case."""
     from fvsolve.errors import FvsolveError
 
@@ -112,7 +112,7 @@ def pictures(result, folder: Path) -> list[str]:
     for row in result.rows:
         if row.limited or row.lines:
             continue
-        side = result.side(row.scheme)
+        side = result.system(row.scheme)
         is_known = np.isfinite(row.predicted) and row.predicted > 0.0
         h = row.predicted if is_known else 1.0 / max(np.abs(side.spectrum.values).max(), 1e-300)
         field = None if "field_of_values" in row.left_out else h * side.field
@@ -125,7 +125,7 @@ def pictures(result, folder: Path) -> list[str]:
     return names
 
 
-def say(result, folder: Path, files: list[str]) -> None:
+def print_stability(result, folder: Path, files: list[str]) -> None:
     """Print the table, and notes on bounds that mislead."""
     from fvsolve.cli import terminal
 
@@ -139,18 +139,20 @@ def say(result, folder: Path, files: list[str]) -> None:
     )
     if cells:
         terminal.line(console, f"Courant number: step times {first_row.rate:.6g} 1/s; bounds as Courant numbers")
-    terminal.sheet(Sheet(shown(cells), [line for row in rows for line in lines(row)]), console)
+    terminal.print_sheet(
+        ResultTable(terminal_columns(cells), [line for row in rows for line in table_lines(row)]), console
+    )
     for row in rows:
         for note in row.notes:
-            terminal.line(console, f"  {label(row)}: {note}")
+            terminal.line(console, f"  {row_label(row)}: {note}")
         for bound, reason in row.left_out.items():
-            terminal.line(console, f"  {label(row)}: {bound.replace('_', ' ')}: {reason}")
-    for text in result.said:
+            terminal.line(console, f"  {row_label(row)}: {bound.replace('_', ' ')}: {reason}")
+    for text in result.notes:
         terminal.line(console, f"  {text}")
     terminal.line(console, f"{folder}: {', '.join(files)}")
 
 
-def shown(cells: bool) -> list[Column]:
+def terminal_columns(cells: bool) -> list[Column]:
     """Columns on the terminal. With cells, steps are given also as Courant numbers, and bounds only so."""
     heads = {"scheme": "scheme", "method": "method"}
     for quantity in ("predicted", "measured"):
@@ -163,17 +165,17 @@ def shown(cells: bool) -> list[Column]:
     return [Column(key, head, ".5g") for key, head in heads.items() if key not in omitted]
 
 
-def lines(row) -> list[dict]:
+def table_lines(row) -> list[dict]:
     """Lines of the table for a row; a limited scheme has an additional line for each frozen linear scheme."""
-    from fvsolve.studies.stability.row import said
+    from fvsolve.studies.stability.stability_row import json_number
 
-    frozen_lines = [{"scheme": f"{row.scheme}: {name}", "method": row.method, "predicted": said(h),
-              "predicted_courant": said(row.courant(h))} for name, h in row.frozen.items()]  # fmt: skip
+    frozen_lines = [{"scheme": f"{row.scheme}: {name}", "method": row.method, "predicted": json_number(h),
+              "predicted_courant": json_number(row.courant(h))} for name, h in row.frozen.items()]  # fmt: skip
     percent = f"{100 * row.difference:+.2f} %" if np.isfinite(row.difference) else None
     part = f"{row.where} ({100 * row.share:.0f} %)" if row.where else None
     return [*frozen_lines, row.plain() | {"percent": percent, "part": part}]
 
 
-def label(row) -> str:
+def row_label(row) -> str:
     """Label of a row in the notes: scheme and method, or the method alone without cells."""
     return f"{row.scheme}, {row.method}" if row.rate > 0.0 else row.method

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, One, app, load_case, print_json, value_of
-from fvsolve.cli.studying import Dask, Jobs, Out, Seed, cleared, folder_of, told, writable
+from fvsolve.cli.app import Json, OneCase, app, load_case, print_json, value_of
+from fvsolve.cli.study_options import Dask, Jobs, Out, Seed, clear_files, folder_of, progress_line, writable_folder
 from fvsolve.errors import FvsolveError
 
 Values = Annotated[
@@ -23,15 +23,15 @@ Ranges = Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", hel
 Outcomes = Annotated[
     list[str], typer.Option("--quantity", metavar="max(PROBE)", help="quantity to chart (default all extremes)")
 ]
-WANTED = "KEY=a,b,c, for example links.main.cells=100,200,400"
-RANGE = "KEY=LOW,HIGH, for example links.main.length=900,1000"
-SHOWN = 6  # greatest number of columns of the table on a terminal, without the keys
-MOST = 100  # greatest number of rows of that table
+VALUES_FORMAT = "KEY=a,b,c, for example links.main.cells=100,200,400"
+RANGE_FORMAT = "KEY=LOW,HIGH, for example links.main.length=900,1000"
+MAX_COLUMNS = 6  # greatest number of columns of the table on a terminal, without the keys
+MAX_ROWS = 100  # greatest number of rows of that table
 
 
 @app.command()
 def sweep(
-    case: One,
+    case: OneCase,
     set: Values = [],  # noqa: B006
     points: Annotated[
         Path | None,
@@ -50,18 +50,18 @@ def sweep(
 ) -> None:
     """Run a case for every combination of values. The table has a row for each run; a failed run has its reason."""
     from fvsolve import studies
-    from fvsolve.studies.plans import headed
+    from fvsolve.studies.sampling import key_with_unit
 
-    values_by_key = dict(values_of(text) for text in set)
+    values_by_key = dict(key_and_values(text) for text in set)
     fixed = {key: values[0] for key, values in values_by_key.items() if len(values) == 1}
     if vary and sample is None:
         raise FvsolveError(f"--vary {vary[0]}: expected --sample sobol:N too. For a grid of values use --set KEY=a,b,c")
     varied = {key: values for key, values in values_by_key.items() if key not in fixed} | ranges(vary, "--vary")
     loaded = load_case(case, [])
     folder = folder_of(loaded, "sweep", out)
-    with told() as progress:
+    with progress_line() as progress:
         result = studies.sweep(loaded, varied, fixed, jobs, folder, progress, points, sample, seed, dask)
-    heads = {key: headed(loaded.raw, key, [row[key] for row in result.rows]) for key in result.keys}
+    heads = {key: key_with_unit(loaded.raw, key, [row[key] for row in result.rows]) for key in result.keys}
     charts = write_charts(result, outcome, folder, heads)
     if as_json:
         print_json(result.plain() | {"directory": str(folder), "charts": [str(path) for path in charts]})
@@ -72,7 +72,7 @@ def sweep(
 
 def ranges(texts: list[str], option: str) -> dict[str, list]:
     """Parse `KEY=LOW,HIGH` texts: key -> [low, high]. Raises FvsolveError for a key that is given twice."""
-    pairs = [values_of(text, option, RANGE) for text in texts]
+    pairs = [key_and_values(text, option, RANGE_FORMAT) for text in texts]
     duplicates = [key for key, _ in pairs if [name for name, _ in pairs].count(key) > 1]
     if duplicates:
         raise FvsolveError(f"{option} {duplicates[0]} is given twice. Give it once")
@@ -90,25 +90,25 @@ def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str
     names = [result.outcome(name) for name in outcomes] or [
         column for column in available if column.startswith(("max(", "min("))
     ]
-    cleared(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
+    clear_files(folder / "charts", "*max-*.png", "*min-*.png", "final-*.png")
     paths = []
     for name in names:
         stem = re.sub(r"[^A-Za-z0-9.@_-]+", "-", name.partition(" [")[0]).strip("-")
-        path = writable(folder / "charts") / f"{stem}.png"
+        path = writable_folder(folder / "charts") / f"{stem}.png"
         outcome_figure(result, name, heads).savefig(path)
         paths.append(path)
     return paths
 
 
-def values_of(text: str, option: str = "--set", expected: str = WANTED) -> tuple[str, list]:
+def key_and_values(text: str, option: str = "--set", expected: str = VALUES_FORMAT) -> tuple[str, list]:
     """Parse `KEY=a,b,c` into the key and its values. Raises FvsolveError for any other text."""
     key, equals, listed = text.partition("=")
     if not (equals and key.strip() and listed.strip()):
         raise FvsolveError(f"{option} {text}: expected {expected}")
-    return key.strip(), [value_of(entry) for entry in split(listed)]
+    return key.strip(), [value_of(entry) for entry in split_list(listed)]
 
 
-def split(text: str) -> list[str]:
+def split_list(text: str) -> list[str]:
     """Split a text at commas outside of brackets, braces and quotes."""
     parts, depth, quote = [""], 0, ""
     for letter in text:
@@ -126,24 +126,25 @@ def split(text: str) -> list[str]:
 
 def _show(result, folder: Path, heads: dict[str, str]) -> None:
     from fvsolve.cli import terminal
-    from fvsolve.studies.sweep import pasted
+    from fvsolve.studies.sweep import as_option_text
 
     console = terminal.console()
     columns = [*result.keys, "ok", *(name for name in result.columns if name.startswith(("min(", "max(")))]
-    shown = columns[len(result.keys) : len(result.keys) + 1 + SHOWN]
-    first_rows = result.rows[:MOST]
+    shown = columns[len(result.keys) : len(result.keys) + 1 + MAX_COLUMNS]
+    first_rows = result.rows[:MAX_ROWS]
     rows = [
-        [*(pasted(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)] for row in first_rows
+        [*(as_option_text(row[key]) for key in result.keys), *(_text(row.get(name)) for name in shown)]
+        for row in first_rows
     ]
     terminal.table([*heads.values(), *shown], rows, console)
     for row in first_rows:
-        values = ", ".join(f"{key} = {pasted(row[key])}" for key in result.keys)
+        values = ", ".join(f"{key} = {as_option_text(row[key])}" for key in result.keys)
         if not row["ok"]:
             terminal.line(console, f"{values}: {row['reason']}", "bold red")
         if row.get("marks"):
             terminal.line(console, f"{values}: {row['marks']}", "yellow")
     reused = f", {result.reused} of them reused from an earlier sweep" if result.reused else ""
-    reused += f", the first {MOST} are printed here" if len(result.rows) > MOST else ""
+    reused += f", the first {MAX_ROWS} are printed here" if len(result.rows) > MAX_ROWS else ""
     terminal.line(console, f"{folder / 'sweep.csv'}: {len(result.rows)} rows{reused}")
 
 

@@ -35,7 +35,7 @@ def table(headers: list[str], rows: list[list[str]], output=None) -> None:
     (output or console()).print(grid)
 
 
-def sheet(table_data, output=None) -> None:
+def print_sheet(table_data, output=None) -> None:
     """Print a `ResultTable`, values formatted as its columns state."""
     table(*table_data.words(), output)
 

@@ -12,7 +12,7 @@ from fvsolve.errors import FvsolveError, RunError, listing
 from fvsolve.output.envelope import QUANTITIES
 from fvsolve.report.heads import in_units
 from fvsolve.run import open_run
-from fvsolve.studies.design import STUDY
+from fvsolve.studies.scenarios import STUDY
 
 PAGE = "report.html"
 ASKED = ("fluid", "cells", "methods", "steps", "rejections", "rhs", "seconds", "events", "cavities")
@@ -55,7 +55,7 @@ def _write_study(directory: Path, path: Path, xlsx: bool) -> list[Path]:
     from fvsolve.report.page import page
     from fvsolve.report.study import study_page
     from fvsolve.report.workbook import study_tables, write_tables
-    from fvsolve.studies.design import open_study
+    from fvsolve.studies.scenarios import open_study
 
     study, runs = open_study(directory), []
     for row in study["runs"]:

@@ -3,23 +3,23 @@
 from fvsolve.lazy_exports import lazy_names
 
 _HOMES = {  # public name -> module of this package
-    "LineImpedance": "ports.line",
+    "LineImpedance": "ports.line_impedance",
     "Linear": "linear.linearise",
     "Transfer": "ports.state_space",
     "advection_limit": ".step_limits.advection_limit",
     "advection_limits": ".step_limits.advection_limit",
     "calibrate": "calibrate",
     "chart": "accuracy.chart",
-    "optimise": "closing",
-    "energy": "energy.energy",
+    "optimise": "closure_optimisation",
+    "energy": "energy.energy_balance",
     "failure_map": "failure.failure_map",
     "fit": "accuracy.fit",
-    "ladder": "accuracy.models",
+    "ladder": "accuracy.model_hierarchy",
     "limit_of": ".step_limits.advection_limit",
-    "limited_limits": "stability.limited",
-    "line_positive_real": "ports.line",
+    "limited_limits": "stability.limited_schemes",
+    "line_positive_real": "ports.line_impedance",
     "linearise": "linear.linearise",
-    "measured_limits": "stability.periodic",
+    "measured_limits": "stability.periodic_limits",
     "order": "accuracy.order",
     "passivity": "energy.passivity",
     "positive_real": "ports.positive_real",
@@ -27,10 +27,10 @@ _HOMES = {  # public name -> module of this package
     "sensitivity": "sensitivity",
     "size": "sizing",
     "stability": "stability.stability",
-    "study": "design",
+    "study": "scenarios",
     "state_positive_real": "ports.state_space",
     "sweep": "sweep",
-    "sweep_positive_real": "ports.line",
+    "sweep_positive_real": "ports.line_impedance",
 }
 
 __all__ = lazy_names(__name__, _HOMES)  # noqa: PLE0605

@@ -11,27 +11,29 @@ import numpy as np
 from fvsolve.case import Case, load
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.run.comparison import interpolated
-from fvsolve.studies.many import many
-from fvsolve.studies.outcome import refusal
-from fvsolve.studies.plans import ranges, sampled
-from fvsolve.studies.row import RowMaker
-from fvsolve.studies.sheet import Column, Plain, Sheet
+from fvsolve.studies.outcome import refusal_text
+from fvsolve.studies.parallel import run_tasks
+from fvsolve.studies.result_table import Column, PlainData, ResultTable
+from fvsolve.studies.sampling import key_ranges, sample_points
 from fvsolve.studies.sweep import VARY
+from fvsolve.studies.sweep_row import RowMaker
 from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, TABLE, TEXT, validated
 
-FIRST = 16  # sample points per key; the minimisations start at the best of them
+SAMPLE_PER_KEY = 16  # sample points per key; the minimisations start at the best of them
 DESCENTS = 3  # number of minimisations
-STEP = 1e-4  # difference step of slopes, as a fraction of the range
-TIED = 0.999  # correlation of errors above which two keys cannot be distinguished
-EDGE = 1e-3  # distance from an end of the range, as a fraction of it, below which a value counts as at the end
-ROUNDS = 6  # greatest number of rounds of weights
-SETTLED = 0.01  # relative change of weights below which the rounds end
-LEAST = 1e-6  # least scatter as a fraction of the range of a series, from the digits of files and from time steps
-FAILED = 1e6  # residual of a run that failed
+SLOPE_STEP = 1e-4  # difference step of slopes, as a fraction of the range
+CORRELATED = 0.999  # correlation of errors above which two keys cannot be distinguished
+AT_BOUND = 1e-3  # distance from an end of the range, as a fraction of it, below which a value counts as at the end
+MAX_ROUNDS = 6  # greatest number of rounds of weights
+WEIGHT_TOLERANCE = 0.01  # relative change of weights below which the rounds end
+LEAST_SCATTER = (
+    1e-6  # least scatter as a fraction of the range of a series, from the digits of files and from time steps
+)
+FAILED_RESIDUAL = 1e6  # residual of a run that failed
 
 
 @dataclass(frozen=True)
-class Calibration(Plain):
+class Calibration(PlainData):
     """Result of a calibration.
 
     values, sigma : by key [SI], fitted value and its standard deviation from the scatter of each series; sigma is
@@ -49,13 +51,13 @@ class Calibration(Plain):
     runs: int = 0
 
     @property
-    def sheet(self) -> Sheet:
+    def sheet(self) -> ResultTable:
         """A row for each key."""
         rows = [{"key": key, "value": value, "sigma": self.sigma[key]} for key, value in self.values.items()]
-        return Sheet([Column("key"), Column("value", words=".8g"), Column("sigma", words=".3g")], rows)
+        return ResultTable([Column("key"), Column("value", words=".8g"), Column("sigma", words=".3g")], rows)
 
 
-class Differences(RowMaker):
+class Residuals(RowMaker):
     """Run a case with values of keys and return computed less measured values of each series, over its range."""
 
     def __call__(self, values: Mapping[str, Any]) -> list[np.ndarray] | str:
@@ -66,7 +68,7 @@ class Differences(RowMaker):
             case = self.read(values)
             result = run(case)
         except CaseError as error:
-            return refusal(error)
+            return refusal_text(error)
         if result.reason.startswith("interrupted"):
             raise KeyboardInterrupt
         if result.reason != "finished":
@@ -78,14 +80,14 @@ class Differences(RowMaker):
             computed = interpolated(result.seconds, result.si(series.probe.text), time[within])
             if not np.isfinite(computed).all():
                 return f"{series.probe.text} is not finite"
-            differences.append((computed - series.v[within]) / spread(series.v))
+            differences.append((computed - series.v[within]) / series_range(series.v))
         return differences
 
-    def lost(self, values: Mapping[str, Any]) -> str:
+    def lost_result(self, values: Mapping[str, Any]) -> str:
         return "lost"
 
 
-def spread(measured: np.ndarray) -> float:
+def series_range(measured: np.ndarray) -> float:
     """Range of a series, which scales its differences; 1 for a constant series."""
     return float(np.ptp(measured)) or 1.0
 
@@ -112,35 +114,35 @@ def calibrate(
         raise FvsolveError("no key to fit. Give at least one key and its range: links.main.wave_speed=900,1300")
     if not loaded.compare:
         raise FvsolveError("no measured series to fit to. Expected a [compare] with a series in the case")
-    bounds = ranges(loaded, free)
-    points = sampled(loaded, free, f"sobol:{FIRST * len(bounds)}", seed)
-    return Fitting(loaded, bounds, points, progress or (lambda done, total, text: None)).found(jobs, dask)
+    bounds = key_ranges(loaded, free)
+    points = sample_points(loaded, free, f"sobol:{SAMPLE_PER_KEY * len(bounds)}", seed)
+    return LeastSquaresFit(loaded, bounds, points, progress or (lambda done, total, text: None)).solve(jobs, dask)
 
 
-class Fitting:
+class LeastSquaresFit:
     """State of a fit. The unknowns x are fractions of the ranges of the keys."""
 
     def __init__(
         self, case: Case, bounds: dict[str, tuple[float, float]], points: list[dict], progress: Callable
     ) -> None:
-        self.case, self.bounds, self.points, self.told = case, bounds, points, progress
+        self.case, self.bounds, self.points, self.progress = case, bounds, points, progress
         self.low, high = (np.array(side) for side in zip(*bounds.values(), strict=True))
         self.width = high - self.low
-        self.work, self.runs = Differences(case, {"expect": {}}), 0
+        self.work, self.runs = Residuals(case, {"expect": {}}), 0
         self.weights = np.ones(len(case.compare))
 
-    def found(self, jobs: int, dask: str | None) -> Calibration:
+    def solve(self, jobs: int, dask: str | None) -> Calibration:
         """Best result of all minimisations, with standard deviations; weights of several series are iterated."""
         from scipy.optimize import least_squares
 
-        answers = [self.descend(least_squares, x) for x in self.beginnings(jobs, dask)]
+        answers = [self.minimise(least_squares, x) for x in self.start_points(jobs, dask)]
         best = min(answers, key=lambda answer: answer.cost)
-        for _ in range(ROUNDS if self.weights.size > 1 else 0):
+        for _ in range(MAX_ROUNDS if self.weights.size > 1 else 0):
             before, self.weights = self.weights, 1.0 / self.scatter(best)
-            if np.allclose(self.weights / self.weights[0], before / before[0], rtol=SETTLED):
+            if np.allclose(self.weights / self.weights[0], before / before[0], rtol=WEIGHT_TOLERANCE):
                 break
-            best = self.descend(least_squares, best.x)
-        return self.judged(best)
+            best = self.minimise(least_squares, best.x)
+        return self.result(best)
 
     def scatter(self, answer: Any) -> np.ndarray:
         """Standard deviation of each series about the fit, over its range : float64[series].
@@ -154,18 +156,20 @@ class Fitting:
         degrees = np.array([len(part) - np.einsum("ij,jk,ik->", part, inverse, part) for part in parts])
         squares = np.array([float(series @ series) for series in differences])
         pooled = squares.sum() / max(1.0, sum(series.size for series in differences) - answer.x.size)
-        return np.sqrt(np.maximum(np.where(degrees > 1.0, squares / np.maximum(degrees, 1.0), pooled), LEAST**2))
+        return np.sqrt(
+            np.maximum(np.where(degrees > 1.0, squares / np.maximum(degrees, 1.0), pooled), LEAST_SCATTER**2)
+        )
 
-    def weighed(self, differences: list[np.ndarray]) -> np.ndarray:
+    def weighted(self, differences: list[np.ndarray]) -> np.ndarray:
         """Differences of all series, each times its weight, in one array."""
         return np.concatenate([weight * series for weight, series in zip(self.weights, differences, strict=True)])
 
-    def beginnings(self, jobs: int, dask: str | None) -> list[np.ndarray]:
+    def start_points(self, jobs: int, dask: str | None) -> list[np.ndarray]:
         """Run the sample and return its best points as start values."""
         costs, reason = np.full(len(self.points), np.inf), ""
-        for k, answer in many(self.work, self.points, jobs, dask):
+        for k, answer in run_tasks(self.work, self.points, jobs, dask):
             self.runs += 1
-            self.told(self.runs, len(self.points), "sample; minimisations follow")
+            self.progress(self.runs, len(self.points), "sample; minimisations follow")
             if isinstance(answer, str):
                 reason = reason or answer
             else:
@@ -175,13 +179,13 @@ class Fitting:
         best = [k for k in np.argsort(costs, kind="stable")[:DESCENTS] if np.isfinite(costs[k])]
         return [(np.array([*self.points[k].values()]) - self.low) / self.width for k in best]
 
-    def descend(self, least_squares: Callable, x: np.ndarray) -> Any:
+    def minimise(self, least_squares: Callable, x: np.ndarray) -> Any:
         """Minimise from a point, with slopes by differences over `SLOPE_STEP`."""
         size = sum(series.size for series in self.differences(x))
 
         def residual(x: np.ndarray) -> np.ndarray:
             differences = self.differences(x)
-            return self.weighed(differences) if differences else np.full(size, FAILED)
+            return self.weighted(differences) if differences else np.full(size, FAILED_RESIDUAL)
 
         def slopes(x: np.ndarray) -> np.ndarray:
             return np.column_stack([self.slope(x, k, size) for k in range(x.size)])
@@ -191,10 +195,10 @@ class Fitting:
     def slope(self, x: np.ndarray, k: int, size: int) -> np.ndarray:
         """Column k of the Jacobian, from two runs near the point that finish, central if possible; 0 if fewer do."""
         results = []
-        for at in (x[k] - STEP, x[k] + STEP, x[k]):
+        for at in (x[k] - SLOPE_STEP, x[k] + SLOPE_STEP, x[k]):
             near = np.clip(np.where(np.arange(x.size) == k, at, x), 0.0, 1.0)
             if len(results) < 2 and (differences := self.differences(near)):
-                results.append((near[k], self.weighed(differences)))
+                results.append((near[k], self.weighted(differences)))
         return (
             (results[1][1] - results[0][1]) / (results[1][0] - results[0][0]) if len(results) == 2 else np.zeros(size)
         )
@@ -203,33 +207,33 @@ class Fitting:
         """Differences of each series at a point; an empty list if the run fails."""
         self.runs += 1
         answer = self.work(self.values(x))
-        self.told(len(self.points), len(self.points), f"{self.runs} runs")
+        self.progress(len(self.points), len(self.points), f"{self.runs} runs")
         return [] if isinstance(answer, str) else answer
 
     def values(self, x: np.ndarray) -> dict[str, float]:
         return dict(zip(self.bounds, (self.low + x * self.width).tolist(), strict=True))
 
-    def judged(self, answer: Any) -> Calibration:
+    def result(self, answer: Any) -> Calibration:
         """Fitted values with standard deviations, correlations and doubts from the Jacobian."""
         keys, differences = [*self.bounds], self.differences(answer.x)
         degrees = max(1, answer.fun.size - answer.x.size)
         scatter = 2.0 * answer.cost / degrees
-        covariance, doubts = told_apart(answer.jac, keys)
+        covariance, doubts = identifiability(answer.jac, keys)
         sigma = np.sqrt(scatter * np.diag(covariance)) * self.width
         sigma[[any(doubt.startswith(f"{key} changes nothing") for doubt in doubts) for key in keys]] = np.inf
         root = np.sqrt(np.diag(covariance))
         correlation = covariance / np.outer(root, root)
         np.fill_diagonal(correlation, 1.0)
         doubts += [f"{key} lies at an end of its range" for key, x in zip(keys, answer.x, strict=True)
-                   if min(x, 1.0 - x) <= EDGE]  # fmt: skip
+                   if min(x, 1.0 - x) <= AT_BOUND]  # fmt: skip
         series = self.case.compare.values()
-        rms = {entry.probe.text: spread(entry.v) * float(np.sqrt(np.mean(series_difference**2)))
+        rms = {entry.probe.text: series_range(entry.v) * float(np.sqrt(np.mean(series_difference**2)))
                for entry, series_difference in zip(series, differences, strict=True)}  # fmt: skip
         return Calibration(self.values(answer.x), dict(zip(keys, sigma.tolist(), strict=True)),
                            correlation.tolist(), rms, doubts, self.runs)  # fmt: skip
 
 
-def told_apart(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, list[str]]:
+def identifiability(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, list[str]]:
     """(inverse of J' J, texts on keys that the data do not determine) for the Jacobian J over fractions of ranges.
 
     Singular values of J are bounded from below, so that the inverse is finite also for keys without effect.
@@ -243,7 +247,7 @@ def told_apart(slopes: np.ndarray, keys: list[str]) -> tuple[np.ndarray, list[st
     for j, last in enumerate(keys):
         for k, other_key in enumerate(keys[:j]):
             correlation = float(inverse[j, k] / (root[j] * root[k]))
-            if abs(correlation) > TIED and last not in without_effect and other_key not in without_effect:
+            if abs(correlation) > CORRELATED and last not in without_effect and other_key not in without_effect:
                 doubts.append(
                     f"{other_key} and {last} cannot be distinguished: the correlation of errors is {correlation:.5f}"
                 )

@@ -12,30 +12,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.studies.accuracy.cells import pipes
-from fvsolve.studies.accuracy.plane import contents, variable_of
+from fvsolve.studies.accuracy.basin_projection import basin_fields, variable_name
+from fvsolve.studies.accuracy.case_resolution import pipes
 from fvsolve.studies.outcome import Outcome
 
 END = {"nodes": "nodes at the end: ", "links": "links at the end: "}  # prefixes of quantities
 NORMS = ("L1", "L2", "max")
-STILL = 1e-9  # a component whose range is below this fraction of its size counts as constant
+CONSTANT = 1e-9  # a component whose range is below this fraction of its size counts as constant
 
 
 @dataclass(frozen=True)
-class Gap:
+class Deviation:
     """Error of a component.
 
     off : float64[k]  run less reference [SI]; weights : float64[k]  lengths, areas or times of the values
     span : range in the reference [SI]; nan if constant
     """
 
-    off: np.ndarray
+    error: np.ndarray
     weights: np.ndarray
     span: float = math.nan
 
     def norms(self) -> dict[str, float]:
         """Weighted mean, root mean square and greatest of absolute differences [SI]."""
-        size, share = np.abs(self.off), self.weights / self.weights.sum()
+        size, share = np.abs(self.error), self.weights / self.weights.sum()
         return {"L1": float(share @ size), "L2": math.sqrt(float(share @ size**2)), "max": float(size.max(initial=0.0))}
 
     def ranges(self) -> dict[str, float]:
@@ -62,7 +62,7 @@ class Distance:
 # recorded probes ----------------------------------------------------------------------------------------------------
 
 
-def recorded(case, keys: Mapping | None = None) -> dict:
+def recording_keys(case, keys: Mapping | None = None) -> dict:
     """Overrides with which a run also records the probes of `end_probes`, and no frames."""
     own = [probe.text for probe in case.probes]
     return {**(keys or {}), "output.probes": list(dict.fromkeys([*own, *end_probes(case)])), "output.fields": 0}
@@ -84,27 +84,27 @@ def end_probes(case) -> list[str]:
 # measures -----------------------------------------------------------------------------------------------------------
 
 
-def differences(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict[str, dict[str, float]]:
+def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict[str, dict[str, float]]:
     """Variable -> errors of a run in L1, L2 and max [SI]: end fields, probes over time, end values of nodes and links.
 
     own : probes compared over time (default all); `recording_keys` adds probes that are needed only for end values.
     """
-    deviations, by_component = {}, field_gaps(run, truth)
+    deviations, by_component = {}, field_deviations(run, truth)
     for quantity in ("pressure", "flow") if run.model.pipes else ():
         gaps = [by_component[pipe.name, quantity] for pipe in run.model.pipes]
-        deviations[quantity] = Gap(
+        deviations[quantity] = Deviation(
             *(np.concatenate([getattr(deviation, key) for deviation in gaps]) for key in ("off", "weights"))
         )
     for basin in run.model.basins:
-        by_content = {content: by_component.get((basin, content)) for content in contents(basin, run.y)}
-        deviations |= {variable_of(basin, content): gap for content, gap in by_content.items() if gap is not None}
+        by_content = {content: by_component.get((basin, content)) for content in basin_fields(basin, run.y)}
+        deviations |= {variable_name(basin, content): gap for content, gap in by_content.items() if gap is not None}
     ends, at_end = set(end_probes(run.model.case)), {}
-    for name, gap in row_gaps(run, truth).items():
+    for name, gap in probe_deviations(run, truth).items():
         if name in ends:
-            at_end.setdefault(END[name.split(".")[0]] + name.rsplit(".", 1)[1], []).append(gap.off[-1])
+            at_end.setdefault(END[name.split(".")[0]] + name.rsplit(".", 1)[1], []).append(gap.error[-1])
         if own is None or name in own:
             deviations[name] = gap
-    deviations |= {name: Gap(np.array(off), np.ones(len(off))) for name, off in at_end.items()}
+    deviations |= {name: Deviation(np.array(off), np.ones(len(off))) for name, off in at_end.items()}
     return {name: gap.norms() for name, gap in deviations.items()}
 
 
@@ -113,27 +113,27 @@ def distance(run: Outcome, truth) -> Distance:
     if not run.ok:
         return Distance()
     with np.errstate(invalid="ignore", over="ignore"):
-        ends = [gap.ranges()["L1"] for gap in field_gaps(run, truth).values() if gap.span > 0.0]
-        gaps = moving(run, truth)
+        ends = [gap.ranges()["L1"] for gap in field_deviations(run, truth).values() if gap.span > 0.0]
+        gaps = moving_probes(run, truth)
         if not gaps:
             return Distance(end=max(ends, default=math.nan))
         means = {name: gap.ranges()["L1"] for name, gap in gaps.items()}
-        ends += [abs(float(gap.off[-1])) / gap.span for gap in gaps.values()]
+        ends += [abs(float(gap.error[-1])) / gap.span for gap in gaps.values()]
         greatest = max(gap.ranges()["max"] for gap in gaps.values())
-        beyond = max(max(high, -low) for low, high in extremes(run, truth))
+        beyond = max(max(high, -low) for low, high in extreme_differences(run, truth))
         worst = max(means, key=means.get)
         return Distance(means[worst], greatest, max(ends), max(0.0, beyond), worst)
 
 
-def extremes_apart(run: Outcome, truth) -> float:
+def extremes_distance(run: Outcome, truth) -> float:
     """Greatest difference of least and greatest values of probes, relative to ranges; nan if all are constant."""
-    return max((max(abs(low), abs(high)) for low, high in extremes(run, truth)), default=math.nan)
+    return max((max(abs(low), abs(high)) for low, high in extreme_differences(run, truth)), default=math.nan)
 
 
-def extremes(run: Outcome, truth) -> list[tuple[float, float]]:
+def extreme_differences(run: Outcome, truth) -> list[tuple[float, float]]:
     """Differences (run less reference) of least and greatest values of changing probes, relative to ranges."""
     values, reference_values = run.rows[:, 1:], truth.rows(run)
-    span = ranges(reference_values)
+    span = column_ranges(reference_values)
     low, high = ((pick(values, axis=0) - pick(reference_values, axis=0)) / span for pick in (np.min, np.max))
     return [(float(low[k]), float(high[k])) for k in np.flatnonzero(span > 0.0)]
 
@@ -141,20 +141,20 @@ def extremes(run: Outcome, truth) -> list[tuple[float, float]]:
 # components ---------------------------------------------------------------------------------------------------------
 
 
-def moving(run: Outcome, truth) -> dict[str, Gap]:
+def moving_probes(run: Outcome, truth) -> dict[str, Deviation]:
     """Deviations of the probes that change in the reference."""
-    return {name: gap for name, gap in row_gaps(run, truth).items() if gap.span > 0.0}
+    return {name: gap for name, gap in probe_deviations(run, truth).items() if gap.span > 0.0}
 
 
-def row_gaps(run: Outcome, truth) -> dict[str, Gap]:
+def probe_deviations(run: Outcome, truth) -> dict[str, Deviation]:
     """Probe -> deviation over time, for probes with values in the reference."""
-    weights, reference_values = times(run.rows[:, 0]), truth.rows(run)
-    off, span = run.rows[:, 1:] - reference_values, ranges(reference_values)
+    weights, reference_values = time_weights(run.rows[:, 0]), truth.rows(run)
+    off, span = run.rows[:, 1:] - reference_values, column_ranges(reference_values)
     columns = [k for k in range(len(run.probes)) if not np.isnan(reference_values[:, k]).all()]
-    return {run.probes[k]: Gap(off[:, k], weights, float(span[k])) for k in columns}
+    return {run.probes[k]: Deviation(off[:, k], weights, float(span[k])) for k in columns}
 
 
-def field_gaps(run: Outcome, truth) -> dict[tuple, Gap]:
+def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
     """(pipe or basin, quantity) -> deviation over the cells at the end.
 
     The range of a pipe is that of its pressure; for its flow it is multiplied by A / (rho a). The range of a quantity
@@ -162,7 +162,7 @@ def field_gaps(run: Outcome, truth) -> dict[tuple, Gap]:
     """
     model, deviations = run.model, {}
     reference_fields = truth.fields(model) if model.pipes or model.basins else {}
-    own_fields = fields(model, waves(run)) if model.pipes else {}
+    own_fields = fields(model, wave_sums(run)) if model.pipes else {}
     for k, pipe in enumerate(model.pipes):
         lengths, span = np.full(pipe.cells, pipe.length / pipe.cells), truth.spans.get(pipe.name, math.nan)
         flow_per_pressure = float(model.tables.pipes[k]["admittance"]) / model.case.properties.density
@@ -173,7 +173,7 @@ def field_gaps(run: Outcome, truth) -> dict[tuple, Gap]:
             (span, span * flow_per_pressure),
             strict=True,
         ):
-            deviations[pipe.name, quantity] = Gap(values - reference_values, lengths, width)
+            deviations[pipe.name, quantity] = Deviation(values - reference_values, lengths, width)
     for basin in model.basins:
         basin_fields = reference_fields.get(("basin", basin.name))
         if basin_fields is None:
@@ -182,31 +182,31 @@ def field_gaps(run: Outcome, truth) -> dict[tuple, Gap]:
         if len(spans) >= 3 and basin.quantities:
             spans[1:3] = spans[1:3].max()
         for (content, values), reference_values, span in zip(
-            contents(basin, run.y).items(), basin_fields, spans, strict=True
+            basin_fields(basin, run.y).items(), basin_fields, spans, strict=True
         ):
-            deviations[basin, content] = Gap(
-                values - reference_values, basin.mesh.area, float(span) if span > STILL else math.nan
+            deviations[basin, content] = Deviation(
+                values - reference_values, basin.mesh.area, float(span) if span > CONSTANT else math.nan
             )
     return deviations
 
 
-def times(t: np.ndarray) -> np.ndarray:
+def time_weights(t: np.ndarray) -> np.ndarray:
     """Weights of rows in a mean over time [s], trapezoidal; 1 each if all rows have the same time."""
     steps = 0.5 * np.diff(t)
     weights = np.append(steps, 0.0) + np.append(0.0, steps)
     return weights if weights.sum() > 0.0 else np.ones(t.size)
 
 
-def ranges(values: np.ndarray) -> np.ndarray:
+def column_ranges(values: np.ndarray) -> np.ndarray:
     """Range of every column : float64[columns], nan for constant columns."""
     span, size = np.ptp(values, axis=0), np.abs(values).max(axis=0)
-    return np.where(span > STILL * size, span, np.nan)
+    return np.where(span > CONSTANT * size, span, np.nan)
 
 
-def spans_of(envelope: Mapping[str, Mapping]) -> dict[str, float]:
+def pressure_ranges(envelope: Mapping[str, Mapping]) -> dict[str, float]:
     """Pipe -> range of its pressure over a run [Pa], from the envelope."""
     pressures = {name: np.append(entry["min_pressure"], entry["max_pressure"]) for name, entry in envelope.items()}
-    return {name: float(ranges(entry)) for name, entry in pressures.items()}
+    return {name: float(column_ranges(entry)) for name, entry in pressures.items()}
 
 
 # fields -------------------------------------------------------------------------------------------------------------
@@ -222,7 +222,7 @@ def fields(model, waves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict:
     return by_pipe
 
 
-def waves(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def wave_sums(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Sum and difference of both waves in the cells of every pipe at the end [kg/s]."""
     sums = dict(run.lines)
     for row, pipe in zip(run.model.tables.pipes, run.model.pipes, strict=True):
@@ -233,7 +233,7 @@ def waves(run: Outcome) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     return sums
 
 
-def averaged(fine: np.ndarray, cells: int) -> np.ndarray:
+def cell_averages(fine: np.ndarray, cells: int) -> np.ndarray:
     """Averages over fewer or more equal cells, conservative to rounding.
 
     If the number of old cells is not a multiple of `cells`, the integral is interpolated by a spline of degree 5.
@@ -248,14 +248,14 @@ def averaged(fine: np.ndarray, cells: int) -> np.ndarray:
     return np.diff(curve(np.linspace(0.0, 1.0, cells + 1))) * cells
 
 
-def size_of(run: Outcome, name: str) -> float:
+def variable_size(run: Outcome, name: str) -> float:
     """Greatest absolute value of a variable of a run [SI]."""
     if name in ("pressure", "flow"):
         k = ("pressure", "flow").index(name)
-        return max(float(np.max(np.abs(pair[k]))) for pair in fields(run.model, waves(run)).values())
+        return max(float(np.max(np.abs(pair[k]))) for pair in fields(run.model, wave_sums(run)).values())
     for basin in run.model.basins:
-        for quantity, values in contents(basin, run.y).items():
-            if name == variable_of(basin, quantity):
+        for quantity, values in basin_fields(basin, run.y).items():
+            if name == variable_name(basin, quantity):
                 return float(np.max(np.abs(values)))
     named = [(text, END.get(text.split(".")[0], "") + text.rsplit(".", 1)[-1]) for text in run.probes]
     columns = [k for k, texts in enumerate(named, 1) if name in texts]

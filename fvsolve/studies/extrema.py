@@ -21,11 +21,11 @@ import numpy as np
 SAFETY = 2.15  # factor on remainders
 QUICK, SLOW = 0.25, 0.6  # ratios of differences at order 2, and at the least order that is accepted
 GROWTH = 2.0  # greatest factor for differences that grow
-BESIDE = 0.6  # factor on remainders of places other than that of the greatest value
-SHARE = 0.2  # fraction of the mean difference of all maxima
-MOVED = 16.0  # limit of the two further terms, in differences of the greatest value
+OTHER_PLACES = 0.6  # factor on remainders of places other than that of the greatest value
+MEAN_FRACTION = 0.2  # fraction of the mean difference of all maxima
+MAX_MOVED = 16.0  # limit of the two further terms, in differences of the greatest value
 CONVERGED, TRUSTED = (0.35, 0.75), (0.5, 1.0)  # ratios of mean differences of signals -> factor on the bound
-FIRM = 1.6  # factor on the remainder by that ratio
+MINIMUM_SAFETY = 1.6  # factor on the remainder by that ratio
 RISE = 0.002  # drop between two separate maxima, as a fraction of the range of a signal
 
 Signal = tuple[np.ndarray, np.ndarray]  # times and values
@@ -37,27 +37,31 @@ def greatest_error(places: Sequence[Sequence[Signal]], triple: Sequence[float], 
     places : for each place the signals at two or three increasing resolutions; triple : greatest value of all steps at
     each resolution; believed : False if no order of convergence may be assumed
     """
-    own_maxima, maxima = three(np.array([triple], float)), [local_maxima(signals) for signals in places]
+    own_maxima, maxima = three_values(np.array([triple], float)), [local_maxima(signals) for signals in places]
     if not places:
-        return error_of_maxima(own_maxima, rests(own_maxima, believed))
+        return error_of_maxima(own_maxima, remainders(own_maxima, believed))
     k = int(np.argmax([np.max(signals[-2][1]) for signals in places]))
     rows = [own_maxima, *(values[np.isfinite(values).all(axis=1)] for _, values in maxima)]
-    bounds = [rests(values, believed) * (1.0 if j in (0, k + 1) else BESIDE) for j, values in enumerate(rows)]
+    bounds = [
+        remainders(values, believed) * (1.0 if j in (0, k + 1) else OTHER_PLACES) for j, values in enumerate(rows)
+    ]
     error = error_of_maxima(np.vstack(rows), np.concatenate(bounds))
     (cuts, _), (middle, fine), most = maxima[k], places[k][-2:], float(np.max(np.abs(np.diff(own_maxima))))
-    moved = apart(middle, fine) if segment(cuts, middle) == segment(cuts, fine) else 0.0
-    mean = SHARE * float(np.mean(np.max(np.abs(np.diff(rows[k + 1], axis=1)), axis=1, initial=0.0)))
-    ratio = ratio_of_signals(places[k])
+    moved = difference_at_peaks(middle, fine) if greatest_segment(cuts, middle) == greatest_segment(cuts, fine) else 0.0
+    mean = MEAN_FRACTION * float(np.mean(np.max(np.abs(np.diff(rows[k + 1], axis=1)), axis=1, initial=0.0)))
+    ratio = convergence_ratio(places[k])
     error *= float(np.interp(ratio, CONVERGED, TRUSTED))
-    return max(error, min(max(moved, mean), MOVED * most), FIRM * rest_by(ratio, own_maxima[0]))
+    return max(
+        error, min(max(moved, mean), MAX_MOVED * most), MINIMUM_SAFETY * remainder_by_ratio(ratio, own_maxima[0])
+    )
 
 
-def three(maxima: np.ndarray) -> np.ndarray:
+def three_values(maxima: np.ndarray) -> np.ndarray:
     """Values at three resolutions : float64[maxima, 3]; of two, the missing first is extrapolated."""
     return maxima if maxima.shape[1] == 3 else np.column_stack([2.0 * maxima[:, 0] - maxima[:, 1], maxima])
 
 
-def segment(cuts: np.ndarray, signal: Signal) -> int:
+def greatest_segment(cuts: np.ndarray, signal: Signal) -> int:
     """Index of the local maximum that is the greatest of a signal."""
     return int(np.searchsorted(cuts, signal[0][np.argmax(signal[1])]))
 
@@ -69,7 +73,7 @@ def local_maxima(signals: Sequence[Signal]) -> tuple[np.ndarray, np.ndarray]:
     greatest = np.full((len(cuts) + 1, len(signals)), -np.inf)
     for k, (times, values) in enumerate(signals):
         np.maximum.at(greatest[:, k], np.searchsorted(cuts, times), values)
-    return cuts, three(greatest)
+    return cuts, three_values(greatest)
 
 
 def troughs(values: np.ndarray, rise: float) -> list[int]:
@@ -98,7 +102,7 @@ def error_of_maxima(maxima: np.ndarray, off: np.ndarray) -> float:
     return max(above - most, most - below)
 
 
-def rests(triples: np.ndarray, believed: bool = True) -> np.ndarray:
+def remainders(triples: np.ndarray, believed: bool = True) -> np.ndarray:
     """Remainders: bounds of the changes of the middle values by all finer resolutions; triples : float64[values, 3]."""
     first, second = np.diff(triples, axis=1).T
     a, b, sways = np.abs(first), np.abs(second), first * second < 0.0
@@ -108,14 +112,14 @@ def rests(triples: np.ndarray, believed: bool = True) -> np.ndarray:
     return rest * np.where(sways, 1.0, np.clip(ratio, 1.0, GROWTH))
 
 
-def rest_by(ratio: float, values: np.ndarray) -> float:
+def remainder_by_ratio(ratio: float, values: np.ndarray) -> float:
     """Remainder of the second of three values, by the larger of its own ratio of differences and `ratio`."""
     a, b = np.abs(np.diff(values)).tolist()
     r = min(max(b / a if a > 0.0 else 0.0, ratio, QUICK), SLOW)
     return max(b, a * r) / (1.0 - r)
 
 
-def ratio_of_signals(signals: Sequence[Signal]) -> float:
+def convergence_ratio(signals: Sequence[Signal]) -> float:
     """Mean difference of the two finest signals over that of the two coarsest; `SLOW` for only two signals."""
     if len(signals) < 3:
         return SLOW
@@ -125,7 +129,7 @@ def ratio_of_signals(signals: Sequence[Signal]) -> float:
     return float(np.mean(np.abs(fine - middle))) / before if before > 0.0 else SLOW
 
 
-def apart(middle: Signal, fine: Signal) -> float:
+def difference_at_peaks(middle: Signal, fine: Signal) -> float:
     """Greatest difference of two signals at the times of their greatest values."""
     times = [signal[0][np.argmax(signal[1])] for signal in (middle, fine)]
     return float(np.max(np.abs(np.interp(times, *fine) - np.interp(times, *middle))))

@@ -9,15 +9,15 @@ import numpy as np
 
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.run import model_of
-from fvsolve.studies.lines import averages
+from fvsolve.studies.delay_line_keys import line_averages
 
 
-def names(given: str | Sequence[str] | None) -> list[str] | None:
+def name_list(given: str | Sequence[str] | None) -> list[str] | None:
     """Convert a name or names to a list without duplicates; None stays None."""
     return None if given is None else list(dict.fromkeys([given] if isinstance(given, str) else given))
 
 
-def grown(reason: str) -> bool:
+def has_diverged(reason: str) -> bool:
     """True if a run ended because its values grew without bound."""
     return "not finite" in reason or "has grown to" in reason
 
@@ -44,7 +44,7 @@ class Outcome:
     seconds: float = float("nan")
     processor: float = float("nan")
     model: object = None
-    slate: object = None
+    run_data: object = None
     lines: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     def __getstate__(self) -> dict:
@@ -80,7 +80,7 @@ class RowSink:
         """Ignore the end of the run."""
 
 
-def prepared(case, set: Mapping | None = None):
+def study_model(case, set: Mapping | None = None):
     """Build the model of a case with changed keys, without frames, for `outcome`. Raises CaseError."""
     from fvsolve.case import load
 
@@ -99,21 +99,21 @@ def outcome(
     run : function that makes a run from (model, state, sink, progress) (default `solve.Run`)
     """
     try:
-        model = prepared(case, set) if not hasattr(case, "tables") else case
+        model = study_model(case, set) if not hasattr(case, "tables") else case
     except CaseError as error:
-        return Outcome(refusal(error), refused=True)
-    outcomes = [_once(model, y, run)]
-    outcomes += [_once(model, y, run) for _ in range(best_of - 1) if outcomes[0].seconds <= budget]
+        return Outcome(refusal_text(error), refused=True)
+    outcomes = [_single_run(model, y, run)]
+    outcomes += [_single_run(model, y, run) for _ in range(best_of - 1) if outcomes[0].seconds <= budget]
     return min(outcomes, key=lambda entry: entry.seconds)
 
 
-def refusal(error: CaseError) -> str:
+def refusal_text(error: CaseError) -> str:
     """Reason of a refusal in one line: each different fault with the first place where it occurs."""
     first = {fault.message: fault.place for fault in reversed(error.faults)}
     return f"refused: {'; '.join(f'{place}: {message}' for message, place in reversed(first.items()))}"
 
 
-def _once(model, y, run) -> Outcome:
+def _single_run(model, y, run) -> Outcome:
     from fvsolve.solve import initial_state
     from fvsolve.solve.solve import Run
 
@@ -129,18 +129,20 @@ def _once(model, y, run) -> Outcome:
     return Outcome(
         summary.reason, summary.finished, False, summary.t, solver.loop.now.copy(), rows, names,
         summary.envelope, summary.counts, summary.seconds, solver.processor, model, solver.slate,
-        averages(solver.slate, summary.t, solver.loop.stepper.out),
+        line_averages(solver.slate, summary.t, solver.loop.stepper.out),
     )  # fmt: skip
 
 
 Progress = Callable[[int, int, str], None]  # (finished points, all points, text of the next point)
 
 
-def without_basins(case, study: str, riding: bool = False) -> None:
+def refuse_basins(case, study: str, allow_sloshing: bool = False) -> None:
     """Raise FvsolveError if a case has basins, whose cells a study cannot refine or replace yet.
 
     riding : accept sloshing basins that are fixed to bodies
     """
-    names = [name for name in case.meshes if not (riding and case.nodes[name].on and case.nodes[name].own.sloshes)]
+    names = [
+        name for name in case.meshes if not (allow_sloshing and case.nodes[name].on and case.nodes[name].own.sloshes)
+    ]
     if names:
         raise FvsolveError(f"{study} does not support basins yet; the case has {listing(names)}")

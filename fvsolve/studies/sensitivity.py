@@ -13,20 +13,20 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.plans import ranges
-from fvsolve.studies.sheet import Column, Plain, Sheet
+from fvsolve.studies.result_table import Column, PlainData, ResultTable
+from fvsolve.studies.sampling import key_ranges
 from fvsolve.studies.sweep import VARY, sweep
 from fvsolve.units import show
 from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, PATH, TABLE, TEXT, validated
 
 COLUMNS = ("S1", "S1_conf", "ST", "ST_conf", "mu_star", "mu_star_conf", "mu", "sigma")
 LEVELS = 4  # levels of the Morris grid
-PATHS = 4  # least number of Morris trajectories
-LEAST = 2  # least base sample size of Sobol
+MIN_PATHS = 4  # least number of Morris trajectories
+MIN_SAMPLES = 2  # least base sample size of Sobol
 
 
 @dataclass(frozen=True, repr=False)
-class Sensitivity(Displayable, Plain):
+class Sensitivity(Displayable, PlainData):
     """Sensitivity indices of every key.
 
     S1, ST : first-order and total index, the fraction of the variance of the outcome due to a key alone, and due to the
@@ -55,13 +55,13 @@ class Sensitivity(Displayable, Plain):
         return f"of {self.outcome} to {len(self.keys)} keys, {self.runs} runs: greatest for {self.keys[strongest]}"
 
     @property
-    def sheet(self) -> Sheet:
+    def sheet(self) -> ResultTable:
         """A row for each key."""
         rows = [{"key": key, **{name: getattr(self, name)[k] for name in COLUMNS}} for k, key in enumerate(self.keys)]
-        return Sheet([Column("key"), *(Column(name, words=".4g") for name in COLUMNS)], rows)
+        return ResultTable([Column("key"), *(Column(name, words=".4g") for name in COLUMNS)], rows)
 
     def table_columns(self) -> dict[str, list]:
-        return self.sheet.listed()
+        return self.sheet.table_columns()
 
 
 @validated(
@@ -93,15 +93,15 @@ def sensitivity(
     which needs N (keys + 2) runs; Morris needs N / 4 (keys + 1) more. Other arguments as for `sweep`, which makes the
     runs and reuses earlier ones. Raises FvsolveError if a run does not have the outcome.
     """
-    if samples < LEAST:
-        raise FvsolveError(f"samples = {samples} is too small. Expected {LEAST} or more, a power of two")
+    if samples < MIN_SAMPLES:
+        raise FvsolveError(f"samples = {samples} is too small. Expected {MIN_SAMPLES} or more, a power of two")
     if callable(case):
         bounds = {key: (float(low), float(high)) for key, (low, high) in vary.items()}
     else:
-        bounds = ranges(load(case, set), vary)
+        bounds = key_ranges(load(case, set), vary)
     if not bounds:
         raise FvsolveError("no key varies. Give at least one key and its range: links.main.length=900,1000")
-    sobol, morris = planned(bounds, samples, seed)
+    sobol, morris = sample_points(bounds, samples, seed)
     points = [dict(zip(bounds, row, strict=True)) for row in np.concatenate([sobol, morris]).tolist()]
     if callable(case):
         values = np.array([float(case(point)) for point in points])
@@ -112,7 +112,7 @@ def sensitivity(
             raise FvsolveError('no outcome. Expected an outcome such as "max(gate.pressure)"')
         sweep_result = sweep(case, set=set, jobs=jobs, out=out, progress=progress, points=points, dask=dask)
         outcome, values = sweep_result.outcome(outcome), values_of(sweep_result, outcome)
-    indices = analysed(bounds, sobol, values[: len(sobol)], morris, values[len(sobol) :], seed)
+    indices = analyse_values(bounds, sobol, values[: len(sobol)], morris, values[len(sobol) :], seed)
     return Sensitivity(tuple(bounds), outcome or "the function", len(points), *indices)
 
 
@@ -127,23 +127,23 @@ def values_of(result, outcome: str) -> np.ndarray:
     return np.array([float(row[name]) for row in result.rows])
 
 
-def planned(bounds: Mapping[str, tuple[float, float]], samples: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def sample_points(bounds: Mapping[str, tuple[float, float]], samples: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Sample points of the Sobol and the Morris method : float64[n, keys] each."""
-    _known()
+    _require_salib()
     from SALib.sample import morris, sobol
 
-    problem = problem_of(bounds)
+    problem = salib_problem(bounds)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # warnings on sample sizes that are not powers of two
         sobol_points = sobol.sample(problem, samples, calc_second_order=False, seed=seed)
-    return sobol_points, morris.sample(problem, max(PATHS, samples // 4), num_levels=LEVELS, seed=seed)
+    return sobol_points, morris.sample(problem, max(MIN_PATHS, samples // 4), num_levels=LEVELS, seed=seed)
 
 
-def analysed(bounds, sobol_points, sobol_values, morris_points, morris_values, seed: int) -> list[list[float]]:
+def analyse_values(bounds, sobol_points, sobol_values, morris_points, morris_values, seed: int) -> list[list[float]]:
     """Indices of all keys in the order of `COLUMNS`. Raises FvsolveError if the outcome is constant."""
     from SALib.analyze import morris, sobol
 
-    problem = problem_of(bounds)
+    problem = salib_problem(bounds)
     if np.ptp(sobol_values) == 0.0:
         raise FvsolveError(f"the outcome is {show(float(sobol_values[0]))} in all runs: no key changes it")
     scale = float(np.std(sobol_values))  # scaled values keep their digits in the sums of squares of SALib
@@ -153,12 +153,12 @@ def analysed(bounds, sobol_points, sobol_values, morris_points, morris_values, s
     return [np.asarray(indices[name], dtype=float).tolist() for name in COLUMNS]
 
 
-def problem_of(bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+def salib_problem(bounds: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     """Problem definition of SALib."""
     return {"num_vars": len(bounds), "names": [*bounds], "bounds": [list(limits) for limits in bounds.values()]}
 
 
-def _known() -> None:
+def _require_salib() -> None:
     try:
         import SALib  # noqa: F401
     except ImportError:

@@ -16,14 +16,14 @@ from fvsolve.parts.arithmetic import Arithmetic
 from fvsolve.run import run
 from fvsolve.run.result import FAILS
 from fvsolve.run.verdicts import SIZES
-from fvsolve.studies.peaks import peak_errors
-from fvsolve.studies.plans import bare_unit, is_known, quantity_of
+from fvsolve.studies.peak_error import peak_errors
+from fvsolve.studies.sampling import is_known, key_quantity, si_unit_of
 from fvsolve.units import UNITS, show
 
 GOALS = ("minimum", "maximum")
-LOOKS = 8  # greatest number of trials between two ends if limits fail at both
-MOST_RUNS = 60
-EDGE = 0.1  # least distance of the next value from the ends of the bracket, as a fraction of its width
+INTERIOR_TRIALS = 8  # greatest number of trials between two ends if limits fail at both
+MAX_RUNS = 60
+GUESS_MARGIN = 0.1  # least distance of the next value from the ends of the bracket, as a fraction of its width
 _VALUE = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*")
 
 
@@ -72,7 +72,7 @@ class Size:
         return data if self.value is not None else data | {"nearest": vars(self.nearest)}
 
 
-def amount(given: Any) -> tuple[float, str]:
+def number_and_unit(given: Any) -> tuple[float, str]:
     """(number, unit) of a value, unit "" for a bare number. Raises ValueError if it is not a number."""
     if isinstance(given, (int, float)) and not isinstance(given, bool):
         return float(given), ""
@@ -82,10 +82,10 @@ def amount(given: Any) -> tuple[float, str]:
     return float(match[1]), match[2]
 
 
-def ends(low: Any, high: Any) -> tuple[float, float, str]:
+def parse_range(low: Any, high: Any) -> tuple[float, float, str]:
     """(low, high, unit) of a range in a common unit. Raises FvsolveError for different dimensions or low >= high."""
     try:
-        (a, unit_a), (b, unit_b) = amount(low), amount(high)
+        (a, unit_a), (b, unit_b) = number_and_unit(low), number_and_unit(high)
     except ValueError as error:
         raise FvsolveError(str(error)) from None
     if unit_a != unit_b:
@@ -100,21 +100,21 @@ def ends(low: Any, high: Any) -> tuple[float, float, str]:
     return a, b, unit_b
 
 
-class Sizing:
+class SizeSearch:
     """State of a search."""
 
     def __init__(self, case: Case, key: str, unit: str, ties: Mapping[str, str], progress: Callable | None,
                  error: bool = False) -> None:  # fmt: skip
         self.case, self.key, self.unit, self.progress, self.error = case, key, unit, progress, error
         self.runs: list[SizeRun] = []
-        self.rules = {tied: Arithmetic(text) for tied, text in ties.items()}
+        self.formulas = {tied: Arithmetic(text) for tied, text in ties.items()}
 
     def keys(self, value: float) -> dict[str, Any]:
         """Overrides for a value of the key, with dependent keys from formulas of x, the value in SI."""
         unit = UNITS.get(self.unit)
         x = value if unit is None else float(unit.si(value)) + (self.case.ambient_pressure if unit.gauge else 0.0)
         overrides: dict[str, Any] = {self.key: f"{value!r} {self.unit}" if self.unit else value}
-        for tied, rule in self.rules.items():
+        for tied, rule in self.formulas.items():
             try:
                 overrides[tied] = float(np.asarray(rule(np.array([x]), np.array([0.0])))[0])
             except ValueError as error:
@@ -140,7 +140,7 @@ class Sizing:
             raise KeyboardInterrupt
         if self.error and result.ok:
             peak_errors(result, case)
-        self.runs.append(sized(value, result))
+        self.runs.append(size_run(value, result))
         return self.runs[-1]
 
     def search(self, low: float, high: float, goal: str, rtol: float) -> tuple[float | None, tuple | None]:
@@ -148,19 +148,19 @@ class Sizing:
         best, opposite = (low, high) if goal == "minimum" else (high, low)
         if self(best).ok:
             return best, None
-        good = opposite if self(opposite).ok else self.between()
+        good = opposite if self(opposite).ok else self.find_interior()
         if good is None:
             return None, None
         bad = max((entry.value for entry in self.runs if not entry.ok and (entry.value - good) * (best - good) > 0.0),
                   key=lambda x: -abs(x - good))  # fmt: skip
-        while abs(good - bad) > rtol * max(abs(good), abs(bad)) and len(self.runs) < MOST_RUNS:
-            x = self.guess(bad, good)
+        while abs(good - bad) > rtol * max(abs(good), abs(bad)) and len(self.runs) < MAX_RUNS:
+            x = self.next_value(bad, good)
             good, bad = (x, bad) if self(x).ok else (good, x)
         return good, (bad, good)
 
-    def between(self) -> float | None:
+    def find_interior(self) -> float | None:
         """Search a value that holds near the run with the greatest margin, in ever smaller intervals."""
-        for _ in range(LOOKS):
+        for _ in range(INTERIOR_TRIALS):
             runs = sorted(self.runs, key=lambda run: run.value)
             position = max(range(len(runs)), key=lambda k: -math.inf if runs[k].margin is None else runs[k].margin)
             gaps = [(runs[k + 1].value - runs[k].value, k) for k in (position - 1, position) if 0 <= k < len(runs) - 1]
@@ -170,18 +170,20 @@ class Sizing:
                 return x
         return None
 
-    def guess(self, bad: float, good: float) -> float:
+    def next_value(self, bad: float, good: float) -> float:
         """Next value: zero of the linear interpolation of margins, away from the ends, in turn with the midpoint."""
         margins = [self(x).margin for x in (bad, good)]
         share = 0.5
         if None not in margins and margins[1] > margins[0] and len(self.runs) % 2:
-            share = min(max(-margins[0] / (margins[1] - margins[0]), EDGE), 1.0 - EDGE)
+            share = min(max(-margins[0] / (margins[1] - margins[0]), GUESS_MARGIN), 1.0 - GUESS_MARGIN)
         return bad + share * (good - bad)
 
 
-def sized(value: float, result: Any) -> SizeRun:
+def size_run(value: float, result: Any) -> SizeRun:
     """Evaluate the limit verdicts of a run."""
-    margins = [(relative(row, verdict.quantity), verdict.name) for verdict in result.verdicts for row in verdict.worst]
+    margins = [
+        (relative_margin(row, verdict.quantity), verdict.name) for verdict in result.verdicts for row in verdict.worst
+    ]
     margin, name = min(margins)
     ok, failed = (
         all(verdict.ok for verdict in result.verdicts),
@@ -198,7 +200,7 @@ def sized(value: float, result: Any) -> SizeRun:
     return SizeRun(value, result.ok and ok, margin if is_known else None, name, result.reason, reason)
 
 
-def relative(row: Mapping[str, Any], quantity: str) -> float:
+def relative_margin(row: Mapping[str, Any], quantity: str) -> float:
     """Margin at a place, less its error, relative to the limit.
 
     The divisor is at least the usual size of the quantity, such as an atmosphere for pressures and heads.
@@ -225,17 +227,17 @@ def size(
     loaded = None
     with collect_faults(faults):
         loaded = load(case, dict(set or {}))
-    faults += asked(loaded, key, (low, high), goal, ties or {}, rtol)
+    faults += find_faults(loaded, key, (low, high), goal, ties or {}, rtol)
     if faults:
         raise CaseError(faults, "case" if loaded is None else loaded.name)
-    first, last, unit = ends(low, high)
-    search = Sizing(loaded, key, unit, ties or {}, progress, error)
+    first, last, unit = parse_range(low, high)
+    search = SizeSearch(loaded, key, unit, ties or {}, progress, error)
     value, bracket = search.search(first, last, goal, rtol)
     tie_texts = tuple(f"{tied} = {text}" for tied, text in (ties or {}).items())
-    return Size(key, unit or bare_unit(loaded.raw, key), goal, value, bracket, search.runs, tie_texts)
+    return Size(key, unit or si_unit_of(loaded.raw, key), goal, value, bracket, search.runs, tie_texts)
 
 
-def asked(
+def find_faults(
     case: Case | None, key: str, span: Sequence[Any], goal: str, ties: Mapping[str, str], rtol: float
 ) -> list[Fault]:
     """Faults of the arguments of a search, before any run.
@@ -250,8 +252,8 @@ def asked(
         faults.append(Fault("rtol", f"{rtol} is out of range. Expected a number between 0 and 1"))
     count = len(faults)
     with collect_faults(faults, f"--vary {key}"):
-        low, high, unit = ends(*span) if span else (0.0, 1.0, "")
-        if case is not None and is_known(case.raw, key) and quantity_of(case.raw, key) is None:
+        low, high, unit = parse_range(*span) if span else (0.0, 1.0, "")
+        if case is not None and is_known(case.raw, key) and key_quantity(case.raw, key) is None:
             raise ValueError("has words or whole numbers as values, so it has no range. Use a sweep")
     for name, text in ties.items():
         with collect_faults(faults, f"--dependent {name}"):
@@ -264,7 +266,7 @@ def asked(
     if case is not None and span and len(faults) == count + (not case.limits):
         run_faults: list[Fault] = []
         with collect_faults(run_faults):
-            load(case, Sizing(case, key, unit, ties, None).keys(high if goal == "maximum" else low))
+            load(case, SizeSearch(case, key, unit, ties, None).keys(high if goal == "maximum" else low))
         options = {key: "--vary", **dict.fromkeys(ties, "--dependent")}
         faults += [Fault(f"{options[run_fault.place]} {run_fault.place}", run_fault.message)
                    if run_fault.place in options else run_fault
@@ -272,7 +274,7 @@ def asked(
     return faults
 
 
-def tied(texts: Sequence[str]) -> dict[str, str]:
+def parse_ties(texts: Sequence[str]) -> dict[str, str]:
     """Parse `KEY = formula` texts: key -> formula. Raises CaseError with all faults."""
     ties: dict[str, str] = {}
     faults = []

@@ -19,18 +19,18 @@ from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
 from fvsolve.fluid.cache import coolprop
 from fvsolve.output.restart import programs
-from fvsolve.studies.many import many
-from fvsolve.studies.plans import grid, of_file, refuse_unknown, sampled
-from fvsolve.studies.points import Points, hashed, writing
-from fvsolve.studies.row import REFUSED, RowMaker
-from fvsolve.studies.sheet import Column, Sheet
+from fvsolve.studies.parallel import run_tasks
+from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
+from fvsolve.studies.result_table import Column, ResultTable
+from fvsolve.studies.sampling import grid, points_from_file, refuse_unknown, sample_points
+from fvsolve.studies.sweep_row import REFUSED, RowMaker
 from fvsolve.units import show
 from fvsolve.validation import COUNT, COUNT_FROM_ZERO, FUNCTION, PATH, ROW, SERIES, TABLE, TEXT, Kind, validated
 
-FIRST = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
-LAST = ("expectations", "verdicts", "steps", "seconds")
-KEPT = {"row": 5}  # version of the content of rows: rows of older versions on disk are not reused
-WORDS = ("title", "description", "source")  # keys of a case that do not change rows
+FIRST_COLUMNS = ("ok", "reason", "t [s]", "marks", "warnings", "fluid")
+LAST_COLUMNS = ("expectations", "verdicts", "steps", "seconds")
+ROW_VERSION = {"row": 5}  # version of the content of rows: rows of older versions on disk are not reused
+TEXT_KEYS = ("title", "description", "source")  # keys of a case that do not change rows
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,19 +56,19 @@ class Sweep(Displayable):
         return f"over {', '.join(self.keys)}: {len(self.rows)} runs, {failed} of them not ok"
 
     def table_columns(self) -> dict[str, list]:
-        return Sheet([Column(name) for name in self.columns], self.rows).listed()
+        return ResultTable([Column(name) for name in self.columns], self.rows).table_columns()
 
     @property
     def columns(self) -> list[str]:
         """Names of all columns; those of probes in the order of first appearance."""
         names = dict.fromkeys(name for row in self.rows for name in row)
-        fixed = {*self.keys, *FIRST, *LAST}
-        return [*self.keys, *FIRST, *(name for name in names if name not in fixed), *LAST]
+        fixed = {*self.keys, *FIRST_COLUMNS, *LAST_COLUMNS}
+        return [*self.keys, *FIRST_COLUMNS, *(name for name in names if name not in fixed), *LAST_COLUMNS]
 
     @property
     def outcomes(self) -> list[str]:
         """Names of the columns of probes."""
-        return self.columns[len(self.keys) + len(FIRST) : -len(LAST)]
+        return self.columns[len(self.keys) + len(FIRST_COLUMNS) : -len(LAST_COLUMNS)]
 
     def outcome(self, name: str) -> str:
         """Column of an outcome, given with or without its unit. Raises FvsolveError for an unknown outcome."""
@@ -85,8 +85,8 @@ class Sweep(Displayable):
     def write(self, path: Path) -> None:
         """Write the table as CSV, with values of keys in the format of `--set`. The file is replaced atomically."""
         rows = ({name: self._cell(name, x) for name, x in row.items()} for row in self.rows)
-        with writing(path):
-            temporary = Sheet([Column(name) for name in self.columns], [*rows]).write(path.with_suffix(".tmp"))
+        with write_errors(path):
+            temporary = ResultTable([Column(name) for name in self.columns], [*rows]).write(path.with_suffix(".tmp"))
             os.replace(temporary, path)
 
     def write_parquet(self, path: Path) -> bool:
@@ -102,7 +102,7 @@ class Sweep(Displayable):
                 columns[name] = [str(self._cell(name, x)) for x in values]
             elif any(isinstance(x, float) for x in values):
                 columns[name] = [None if x is None else float(x) for x in values]
-        with writing(path):
+        with write_errors(path):
             pyarrow.parquet.write_table(pyarrow.table(columns), path.with_suffix(".tmp"))
             os.replace(path.with_suffix(".tmp"), path)
         return True
@@ -112,7 +112,7 @@ class Sweep(Displayable):
             return "; ".join(notice["text"] for notice in value or ())
         if name == "fluid":
             return value["name"] if value else ""
-        return pasted(value) if name in self.keys else "" if value is None else value
+        return as_option_text(value) if name in self.keys else "" if value is None else value
 
 
 VARY = Kind(
@@ -163,26 +163,30 @@ def sweep(
     if jobs < 1:
         raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
     raw, base = raw_of(case), dict(set or {})
-    runs = planned(case, raw, base, vary or {}, points, sample, seed)
+    runs = planned_values(case, raw, base, vary or {}, points, sample, seed)
     refuse_unknown(case, {**base, **runs[0]}, raw)
     folder = None if out is None else Path(out)
-    with Points(folder) as cache:
-        return Sweeping(case, raw, base, runs, cache, progress).go(folder, jobs, dask)
+    with ResultCache(folder) as cache:
+        return SweepRun(case, raw, base, runs, cache, progress).run(folder, jobs, dask)
 
 
-def planned(source: Any, raw: dict, base: dict, vary: Mapping, points, sample: str | None, seed: int) -> list[dict]:
+def planned_values(
+    source: Any, raw: dict, base: dict, vary: Mapping, points, sample: str | None, seed: int
+) -> list[dict]:
     """Values of every run: from points, a sample or a grid."""
     if points is not None:
         if vary or sample:
             raise FvsolveError("points have all values of every run. Expected no vary and no sample in addition")
-        runs = of_file(Path(points), source, raw) if PATH.accepts(points) else [dict(point) for point in points]
+        runs = (
+            points_from_file(Path(points), source, raw) if PATH.accepts(points) else [dict(point) for point in points]
+        )
         if not runs or not runs[0] or any(point.keys() != runs[0].keys() for point in runs):
             raise FvsolveError("points have different keys. Expected at least one key, with a value in every run")
         return runs
     if sample is not None:
         if not vary:
             raise FvsolveError("no key varies. Give at least one key and its range: links.main.length=900,1000")
-        return sampled(load(source, base), vary, sample, seed)
+        return sample_points(load(source, base), vary, sample, seed)
     if not vary or all(len(values) < 2 for values in vary.values()):
         raise FvsolveError("no key varies. Give at least two values of a key, for example links.main.cells=100,200")
     empty = [key for key, values in vary.items() if not len(values)]
@@ -191,45 +195,51 @@ def planned(source: Any, raw: dict, base: dict, vary: Mapping, points, sample: s
     return grid(vary)
 
 
-class Sweeping:
+class SweepRun:
     """State of a sweep."""
 
-    def __init__(self, source, raw: dict, base: dict, runs: list[dict], cache: Points, progress) -> None:
-        self.runs, self.kept, self.told = runs, cache, progress or (lambda done, total, text: None)
+    def __init__(self, source, raw: dict, base: dict, runs: list[dict], cache: ResultCache, progress) -> None:
+        self.runs, self.cache, self.progress = runs, cache, progress or (lambda done, total, text: None)
         self.source, self.base = source, base
-        self.found: dict[int, dict] = {}
+        self.rows: dict[int, dict] = {}
         self.digests: dict[str, str] = {}  # name of a file -> hash of its content
-        relevant = {key: value for key, value in raw.items() if key not in WORDS}
+        relevant = {key: value for key, value in raw.items() if key not in TEXT_KEYS}
         versions_used = programs() | {"numba": "", "coolprop": coolprop()}
-        self.who = hashed({**versions_used, "case": relevant, "base": base, "files": [*self.files((relevant, base))]})
+        self.identity = digest_of(
+            {**versions_used, "case": relevant, "base": base, "files": [*self.files((relevant, base))]}
+        )
 
-    def go(self, folder: Path | None, jobs: int, dask: str | None) -> Sweep:
+    def run(self, folder: Path | None, jobs: int, dask: str | None) -> Sweep:
         """Compute all rows; files are written if there is a folder, also after an interruption."""
         self.began = time.perf_counter()
         try:
             self.fill(jobs, dask)
         except BaseException:
             with suppress(RunError):  # a failure to write must not hide the original exception
-                self.made(folder)
+                self.write(folder)
             raise
-        return self.made(folder)
+        return self.write(folder)
 
     def fill(self, jobs: int, dask: str | None) -> None:
         """Read the rows of earlier sweeps, then run the remaining ones."""
-        keys = [hashed({"who": self.who, "set": values, "files": [*self.files(values)]}) for values in self.runs]
+        keys = [
+            digest_of({"who": self.identity, "set": values, "files": [*self.files(values)]}) for values in self.runs
+        ]
         for index, key in enumerate(keys):
-            if (earlier := self.kept.known(key)) is not None:
-                self.found[index] = self.runs[index] | earlier
-        waiting = [index for index in range(len(keys)) if index not in self.found]
-        self.tell(waiting[:1])
-        for number, row in many(RowMaker(self.source, self.base), [self.runs[index] for index in waiting], jobs, dask):
+            if (earlier := self.cache.lookup(key)) is not None:
+                self.rows[index] = self.runs[index] | earlier
+        waiting = [index for index in range(len(keys)) if index not in self.rows]
+        self.report_progress(waiting[:1])
+        for number, row in run_tasks(
+            RowMaker(self.source, self.base), [self.runs[index] for index in waiting], jobs, dask
+        ):
             index = waiting[number]
-            self.found[index] = self.runs[index] | self.kept.keep(keys[index], KEPT, row)
-            self.tell([index + 1] if index + 1 < len(keys) else [])
+            self.rows[index] = self.runs[index] | self.cache.store(keys[index], ROW_VERSION, row)
+            self.report_progress([index + 1] if index + 1 < len(keys) else [])
 
-    def made(self, folder: Path | None) -> Sweep:
+    def write(self, folder: Path | None) -> Sweep:
         """Rows so far, written to the folder. Raises FvsolveError if all runs are refused for the same reason."""
-        result = Sweep(tuple(self.runs[0]), [self.found[index] for index in sorted(self.found)], self.kept.reused)
+        result = Sweep(tuple(self.runs[0]), [self.rows[index] for index in sorted(self.rows)], self.cache.reused)
         refused = {row["reason"] if row["reason"].startswith(REFUSED) else "" for row in result.rows}
         if len(result.rows) == len(self.runs) and len(refused) == 1 and "" not in refused:
             raise FvsolveError(f"all {len(self.runs)} runs are {refused.pop()}")
@@ -238,12 +248,14 @@ class Sweeping:
             result.write_parquet(folder / "sweep.parquet")
         return result
 
-    def tell(self, coming: list[int]) -> None:
+    def report_progress(self, coming: list[int]) -> None:
         """Report progress: finished rows, estimated remaining time and the next values."""
-        own, remaining = len(self.found) - self.kept.reused, len(self.runs) - len(self.found)
+        own, remaining = len(self.rows) - self.cache.reused, len(self.runs) - len(self.rows)
         spent = time.perf_counter() - self.began
-        text = f"{span(spent / own * remaining)} left, " if own and remaining else ""
-        self.told(len(self.found), len(self.runs), text + "".join(_said(self.runs[index]) for index in coming))
+        text = f"{duration_text(spent / own * remaining)} left, " if own and remaining else ""
+        self.progress(
+            len(self.rows), len(self.runs), text + "".join(_values_text(self.runs[index]) for index in coming)
+        )
 
     def files(self, values: Any) -> Iterator[str]:
         """Hashes of all files that are named in values, searched recursively."""
@@ -278,18 +290,18 @@ def folder_of(source) -> Path:
     return Path.cwd() if isinstance(source, Mapping) else Path(source).parent
 
 
-def span(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
     """Text of a duration [s] in s, min or h."""
     if seconds < 100.0:
         return f"{seconds:.0f} s"
     return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def _said(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{key} = {pasted(value)}" for key, value in values.items())
+def _values_text(values: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} = {as_option_text(value)}" for key, value in values.items())
 
 
-def pasted(value: Any) -> str:
+def as_option_text(value: Any) -> str:
     """Text of a value in the format of `--set`: TOML, with quotes around words only if necessary."""
     import tomllib
 

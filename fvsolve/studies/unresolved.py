@@ -12,30 +12,30 @@ import numpy as np
 from fvsolve.errors import listing
 from fvsolve.model.resolution import LEAST_CELLS, answering_parts
 from fvsolve.parts.schedule import Schedule
-from fvsolve.studies.accuracy.cells import counts, from_files, in_cells, scaled
-from fvsolve.studies.lines import lines
+from fvsolve.studies.accuracy.case_resolution import basins_from_files, cell_counts, pipes_with_cells, scaled
+from fvsolve.studies.delay_line_keys import delay_lines
 
 Part = tuple[str, str]  # group and name
 MANY_STEPS = 20.0  # accumulated error of steps between jumps of delay lines, in tolerances of a step
 SMOOTHED = (
     0.05  # effect of jumps below a quarter of numerics.delay_tolerance, smoothed over a step, relative to that key
 )
-FEW = 4  # least number of cells for which half the resolution differs
-NAMED = 3  # greatest number of names in a text
-WIDE = 0.05  # error relative to the span of a signal above which a reason is given
-SMALL = 0.1  # differences below this fraction of an error are not its cause
+MIN_CELLS = 4  # least number of cells for which half the resolution differs
+MAX_NAMES = 3  # greatest number of names in a text
+WIDE_ERROR = 0.05  # error relative to the span of a signal above which a reason is given
+SMALL_DIFFERENCE = 0.1  # differences below this fraction of an error are not its cause
 
 
-def uncut(case: Any) -> list[str]:
+def single_cell_pipes(case: Any) -> list[str]:
     """Pipes whose number of cells (1) does not change at half the resolution."""
-    cells = counts(case)
+    cells = cell_counts(case)
     half = scaled(cells, 0.5)
-    return [name for name in in_cells(case) if half[f"links.{name}.cells"] == cells[f"links.{name}.cells"]]
+    return [name for name in pipes_with_cells(case) if half[f"links.{name}.cells"] == cells[f"links.{name}.cells"]]
 
 
-def passed_at_once(case: Any) -> dict[str, tuple[str, int]]:
+def short_pipes(case: Any) -> dict[str, tuple[str, int]]:
     """Pipe -> (neighbour, cells that it needs), for pipes with a travel time below that of a cell of a neighbour."""
-    pipes, short = in_cells(case), {}
+    pipes, short = pipes_with_cells(case), {}
     travel = {name: pipe.length / case.wave_speed(name) for name, pipe in pipes.items()}
     by_node: dict[str, list[str]] = {}
     for name, pipe in pipes.items():
@@ -44,19 +44,19 @@ def passed_at_once(case: Any) -> dict[str, tuple[str, int]]:
     for name, pipe in pipes.items():
         for neighbour in (*by_node[pipe.from_], *by_node[pipe.to]):
             if travel[neighbour] / pipes[neighbour].cells > travel[name]:
-                short[name] = neighbour, math.ceil(FEW * travel[neighbour] / travel[name])
+                short[name] = neighbour, math.ceil(MIN_CELLS * travel[neighbour] / travel[name])
     return short
 
 
 def brief_pulses(case: Any) -> list[str]:
     """Scheduled keys with a pulse shorter than the greatest travel time of a cell."""
-    pipes = in_cells(case)
+    pipes = pipes_with_cells(case)
     cell = max((pipe.length / pipe.cells / case.wave_speed(name) for name, pipe in pipes.items()), default=0.0)
     return [f"{group}.{name}.{key}" for group in ("nodes", "links") for name, part in getattr(case, group).items()
-            for key, info in type(part).model_fields.items() if pulse(getattr(part, key)) < cell]  # fmt: skip
+            for key, info in type(part).model_fields.items() if pulse_width(getattr(part, key)) < cell]  # fmt: skip
 
 
-def pulse(value: Any) -> float:
+def pulse_width(value: Any) -> float:
     """Shortest time in which a schedule changes in both directions [s]; inf if it does not."""
     if not isinstance(value, Schedule) or value.wave or len(value.time) < 3:
         return np.inf
@@ -76,10 +76,10 @@ class Unresolved:
         self.case, self.runs = case, runs
         self.unknown = unknown_parts(case)
         self.tolerance = 0.0
-        if case.numerics.rtol is not None and lines(case):
+        if case.numerics.rtol is not None and delay_lines(case):
             self.tolerance = max(MANY_STEPS * case.numerics.rtol, SMOOTHED * case.numerics.delay_tolerance)
-        liquid = ["column separation, so no order is assumed; use more cells"] if parted(runs) else []
-        self.shared = [*liquid, *differing(runs), *few_beside_answers(case)]
+        liquid = ["column separation, so no order is assumed; use more cells"] if has_separation(runs) else []
+        self.shared = [*liquid, *differing_events(runs), *coarse_pipes_at_devices(case)]
 
     def reason(self, part: tuple[str, str], triple: Sequence[float | None], error: float | None, span: float,
                unit: str) -> str | None:  # fmt: skip
@@ -88,21 +88,25 @@ class Unresolved:
         triple : peak at half, one and twice the resolution, in its unit
         """
         if error is None:
-            return self.unknown.get(part) or stopped(self.case, self.runs)
-        if error <= WIDE * span:
+            return self.unknown.get(part) or stopped_runs_text(self.case, self.runs)
+        if error <= WIDE_ERROR * span:
             return None
-        return "; ".join(self.shared) or differences(triple, error, unit, self.case)
+        return "; ".join(self.shared) or difference_text(triple, error, unit, self.case)
 
 
 def unknown_parts(case: Any) -> dict[Part, str]:
     """Part -> reason for which its peaks are unknown: all parts under a short pulse, else short pipes with nodes."""
     reasons: dict[Part, str] = {}
     if pulses := brief_pulses(case):
-        text = f"{listing(pulses, NAMED)} changes in both directions within the travel time of a cell; use more cells"
+        text = (
+            f"{listing(pulses, MAX_NAMES)} changes in both directions within the travel time of a cell; use more cells"
+        )
         reasons = {(group, name): text for group in ("nodes", "links") for name in getattr(case, group)}
     texts = {name: f"{name} is shorter than a cell of {neighbour}; set links.{neighbour}.cells = {cells}"
-             for name, (neighbour, cells) in passed_at_once(case).items()}  # fmt: skip
-    texts |= {name: f"{name} has a single cell; set links.{name}.cells = {FEW}" for name in uncut(case)}
+             for name, (neighbour, cells) in short_pipes(case).items()}  # fmt: skip
+    texts |= {
+        name: f"{name} has a single cell; set links.{name}.cells = {MIN_CELLS}" for name in single_cell_pipes(case)
+    }
     for name, text in texts.items():
         link = case.links[name]
         for part in (("links", name), ("nodes", link.from_), ("nodes", link.to)):
@@ -110,20 +114,22 @@ def unknown_parts(case: Any) -> dict[Part, str]:
     return reasons
 
 
-def stopped(case: Any, runs: dict[float, Any]) -> str:
+def stopped_runs_text(case: Any, runs: dict[float, Any]) -> str:
     """Reason for which runs at other resolutions have no value of a peak."""
     ended = [f"{times:g} times the resolution: {run.reason}" for times, run in runs.items() if run.reason != "finished"]
     if len(runs) == 1:
-        ended = [f"cells of {listing(from_files(case), NAMED)} come from a file; use a file with finer cells"]
+        ended = [
+            f"cells of {listing(basins_from_files(case), MAX_NAMES)} come from a file; use a file with finer cells"
+        ]
     return "; ".join(ended) or "at another resolution it is not a number; use more cells or shorter steps"
 
 
-def differences(triple: Sequence[float | None], error: float, unit: str, case: Any) -> str:
+def difference_text(triple: Sequence[float | None], error: float, unit: str, case: Any) -> str:
     """Text on the differences of a peak between three resolutions, for a wide error."""
-    remedy = "more cells" if counts(case) else "shorter steps"
+    remedy = "more cells" if cell_counts(case) else "shorter steps"
     peaks = [peak for peak in triple if peak is not None]
     steps = np.diff(peaks)
-    if np.abs(steps).max() < SMALL * error:
+    if np.abs(steps).max() < SMALL_DIFFERENCE * error:
         return f"another peak of the signal, or a moving peak, may exceed it; use {remedy}"
     steps_text = " and ".join(f"{abs(peak):.2g}" for peak in steps)
     if len(steps) == 1:
@@ -133,25 +139,25 @@ def differences(triple: Sequence[float | None], error: float, unit: str, case: A
     return f"differences of {steps_text} {unit} between resolutions {order}; use {remedy}"
 
 
-def parted(runs: dict[float, Any]) -> bool:
+def has_separation(runs: dict[float, Any]) -> bool:
     """True if column separation occurred in a run."""
     return any(run.summary["cavities"] for run in runs.values())
 
 
-def few_beside_answers(case: Any) -> list[str]:
+def coarse_pipes_at_devices(case: Any) -> list[str]:
     """Texts on pipes with too few cells next to devices that respond to waves."""
-    pipes, devices = in_cells(case), answering_parts(case)
-    texts = [f"{name} has {pipe.cells} cell{'' if pipe.cells == 1 else 's'} beside {listing(devices[name], NAMED)}; "
+    pipes, devices = pipes_with_cells(case), answering_parts(case)
+    texts = [f"{name} has {pipe.cells} cell{'' if pipe.cells == 1 else 's'} beside {listing(devices[name], MAX_NAMES)}; "
              f"set links.{name}.cells = {LEAST_CELLS}"
              for name, pipe in pipes.items() if pipe.cells < LEAST_CELLS and devices[name]]  # fmt: skip
-    return texts[:NAMED]
+    return texts[:MAX_NAMES]
 
 
-def differing(runs: dict[float, Any]) -> list[str]:
+def differing_events(runs: dict[float, Any]) -> list[str]:
     """Text on devices whose numbers of events differ between resolutions, if there are any."""
     finished = [runs[times] for times in sorted(runs) if runs[times].reason == "finished"]
     counts = [Counter(event["name"] for event in run.summary["events"]) for run in finished]
     names = sorted(set().union(*counts)) if len(finished) > 1 else []
     by_device = {name: [event[name] for event in counts] for name in names}
     texts = [f"{name} ({', '.join(map(str, values))})" for name, values in by_device.items() if len(set(values)) > 1]
-    return [f"events differ between resolutions: {listing(texts, NAMED)}"] if texts else []
+    return [f"events differ between resolutions: {listing(texts, MAX_NAMES)}"] if texts else []

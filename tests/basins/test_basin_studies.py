@@ -18,12 +18,12 @@ from fvsolve.errors import FvsolveError
 from fvsolve.model import RunData
 from fvsolve.model.energy_accounts import Accounts
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.studies.accuracy.cells import counts, keys, scaled
+from fvsolve.studies.accuracy.basin_projection import project_to
+from fvsolve.studies.accuracy.case_resolution import cell_counts, cell_keys_of, scaled
 from fvsolve.studies.accuracy.chart import chart
 from fvsolve.studies.accuracy.order import order
-from fvsolve.studies.accuracy.plane import lowered
-from fvsolve.studies.accuracy.refine import plan, resolutions
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.accuracy.refine import refinement_plan, resolutions
+from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.stability.stability import stability
 
@@ -82,12 +82,12 @@ def test_cells_of_pipes_and_basins_double_together_in_both_directions():
     nodes = {"lake": reservoir(2e5), "pool": pool((4, 6), patches={"in": {"side": "west"}})}
     case = fvsolve.load(scene(nodes, {"main": pipe("lake", "pool.in", 50.0, 0.1, 1000.0, 10)}, 0.1, still))
     assert resolutions(case)["nodes.pool.cells"] == "both"
-    rows = plan(case, levels=3).levels
+    rows = refinement_plan(case, levels=3).levels
     assert [row.set["nodes.pool.cells"] for row in rows] == [[4, 6], [8, 12], [16, 24]]
     assert [row.set["links.main.cells"] for row in rows] == [10, 20, 40] and rows[2].cells == 16 * 24 + 40
-    one = plan(case, key="nodes.pool.cells", levels=2).levels[1]
+    one = refinement_plan(case, key="nodes.pool.cells", levels=2).levels[1]
     assert one.set["nodes.pool.cells"] == [8, 12] and one.set["links.main.cells"] == 10
-    assert keys(scaled(counts(case), 0.5)) == {"links.main.cells": 5, "nodes.pool.cells": [2, 3]}
+    assert cell_keys_of(scaled(cell_counts(case), 0.5)) == {"links.main.cells": 5, "nodes.pool.cells": [2, 3]}
 
 
 def test_what_a_basin_holds_is_the_same_on_coarser_cells():
@@ -96,7 +96,7 @@ def test_what_a_basin_holds_is_the_same_on_coarser_cells():
         cases = [fvsolve.load(alone(pool(cells, **more), 1.0)) for cells in ((48, 32), (24, 16))]
         fine, coarse = (FreeSurfaceRows(case, "pool") for case in cases)
         value = np.cos(0.3 * fine.x) * np.exp(0.2 * fine.y)
-        found = lowered(fine, value[None], coarse)[0]
+        found = project_to(fine, value[None], coarse)[0]
         assert found @ coarse.mesh.area == approx(value @ fine.mesh.area, rel=1e-14)
         wanted = np.cos(0.3 * coarse.x) * np.exp(0.2 * coarse.y)
         assert np.abs(found - wanted).max() < 5e-3
@@ -110,7 +110,7 @@ def test_a_mesh_from_a_file_has_no_finer_one(tmp_path):
     basin = {"type": "basin", "mesh": {"file": str(tmp_path / "square.vtu")}, "level": 1.0}
     case = fvsolve.load(scene({"pool": basin}, {}, 1.0, PLANE))
     with pytest.raises(FvsolveError, match="the mesh of pool is a file, which cannot be refined"):
-        plan(case, "both")
+        refinement_plan(case, "both")
 
 
 # Jacobians and implicit steps ---------------------------------------------------------------------------------------
@@ -268,7 +268,7 @@ def test_a_basin_that_drains_gives_the_valve_what_its_tank_gives():
     basin, twin = shown["basin"], shown["tank"]
     assert basin.dissipated["tap"][-1] == approx(twin.dissipated["tap"][-1], rel=2e-4)
     assert basin.stored["pool"][-1] == approx(twin.stored["pool"][-1], rel=2e-4)
-    assert 0.0 < basin.made[-1] < 1e-4 * basin.through
+    assert 0.0 < basin.numerical_remainder[-1] < 1e-4 * basin.throughput
 
 
 @pytest.mark.parametrize("head", [0.5, 3.0], ids=["out", "in"])
@@ -377,7 +377,7 @@ def test_friction_of_the_bed_is_booked_and_takes_what_it_takes():
     """Beside what the scheme takes, a slosh over Manning's bed loses what it has less: to a hundredth."""
     smooth, rough = (energy(alone(pool((32, 16), SLOSH, **more), 2.0)) for more in ({}, {"manning": 0.05}))
     (taken,) = rough.dissipated.values()
-    assert taken[-1] > 0.0 and rough.made[-1] == approx(smooth.made[-1], rel=0.01)
+    assert taken[-1] > 0.0 and rough.numerical_remainder[-1] == approx(smooth.numerical_remainder[-1], rel=0.01)
     left = rough.stored["pool"][-1] - smooth.stored["pool"][-1]
     assert left == approx(-taken[-1], rel=0.01)
 

@@ -18,7 +18,7 @@ from fvsolve.mesh import rectangle
 from fvsolve.mesh.edges import edges_of
 from fvsolve.mesh.shapes import assemble
 from fvsolve.model.model import State
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 SIDES = {"west": (0, 0.0), "east": (0, 1.0), "south": (1, 0.0), "north": (1, 1.0)}
 STEPPED = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2"}

@@ -23,7 +23,7 @@ from fvsolve.run.part_extremes import part_extremes
 from fvsolve.run.verdicts import nearest, verdict
 from fvsolve.solve import initial_state, solve
 from fvsolve.studies.calibrate import calibrate
-from fvsolve.studies.closing import optimise
+from fvsolve.studies.closure_optimisation import optimise
 from fvsolve.studies.sizing import size
 
 BOILS = 2300.0  # Pa, of the scenes' water

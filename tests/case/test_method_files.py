@@ -93,16 +93,16 @@ def test_two_files_of_one_name_are_not_one_method(tmp_path):
 
 @pytest.mark.parametrize("inside", [True, False])
 def test_a_chart_prints_a_line_that_the_case_accepts(tmp_path, inside):
-    from fvsolve.cli.studying import method_from
-    from fvsolve.studies.accuracy.chart import _aim, chart
+    from fvsolve.cli.study_options import method_name
+    from fvsolve.studies.accuracy.chart import _target_setting, chart
 
     case = placed(tmp_path / "case", method="dormand-prince")
     file = tmp_path / ("case" if inside else "") / "methods" / "ssp43.txt"
     file.parent.mkdir()
     file.write_text(SSP43)
-    made = chart(case, methods=[method_from(str(file))], rtol=[1e-3, 1e-5])
+    made = chart(case, methods=[method_name(str(file))], rtol=[1e-3, 1e-5])
     point = next(one for one in made.points if one.setting.method == "ssp43")  # which is cheapest hangs on the clock
-    (line,) = (one for one in _aim(1e-2, point, fvsolve.load(case)).lines() if one.startswith("method"))
+    (line,) = (one for one in _target_setting(1e-2, point, fvsolve.load(case)).toml_lines() if one.startswith("method"))
     assert line == f'method = "{"methods/ssp43.txt" if inside else file}"'
     METHODS.pop("ssp43")
     case.write_text(case.read_text().replace('method = "dormand-prince"', line))
@@ -110,13 +110,13 @@ def test_a_chart_prints_a_line_that_the_case_accepts(tmp_path, inside):
 
 
 def test_points_are_found_again_only_by_the_same_tableau(tmp_path):
-    from fvsolve.studies.points import key_of
+    from fvsolve.studies.result_cache import case_key
 
     case = fvsolve.load(placed(tmp_path, method="dormand-prince"))
     keys = []
     for tableau in (SSP43, HEUN_EULER, SSP43):
         fvsolve.tableau("mine", tableau)
-        keys.append(key_of(case, {"method": "mine"}))
+        keys.append(case_key(case, {"method": "mine"}))
     assert keys[0] == keys[2] != keys[1]
 
 

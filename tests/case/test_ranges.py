@@ -272,12 +272,12 @@ def ladder(pipes: int) -> dict:
 
 
 def test_check_shows_what_stands_out_of_many_in_the_units_of_the_output(capsys):
-    from fvsolve.cli import report
+    from fvsolve.cli import printing
 
     model = model_of(load(ladder(50)))
-    report.checks(model.case, model.checks)
+    printing.print_checks(model.case, model.checks)
     short = capsys.readouterr().out
-    report.checks(model.case, model.checks, every=True)
+    printing.print_checks(model.case, model.checks, every=True)
     whole = capsys.readouterr().out
     rows = lambda text: {line.split()[0] for line in text.splitlines() if re.match(r" *[pn]\d+ ", line)}  # noqa: E731
     assert {f"p{k}" for k in range(1, 51)} | {f"n{k}" for k in range(1, 51)} == rows(whole)

@@ -11,7 +11,7 @@ from reference import pulses, scenes
 from reference.order_json import call, studies
 
 from fvsolve.studies import order
-from fvsolve.studies.outcome import grown
+from fvsolve.studies.outcome import has_diverged
 
 SPACE = {"upwind": 1, "linear-upwind": 2, "fromm": 2, "central": 2, "upwind3": 3, "upwind5": 5, "muscl": 2, "weno5": 5}
 
@@ -148,7 +148,7 @@ def test_a_failed_row_is_a_row_with_its_reason(capsys, tmp_path):
     case = pulses.case(20, method="rk4", step=0.02)
     words = ("--refine", "time", "--levels", "5", "--set", "numerics.end=4")
     [found] = studies(capsys, tmp_path, case, *words)
-    assert grown(found["rows"][0]["reason"]) and found["fits"]["pressure"]["L1"]["marks"][0] == "failed"
+    assert has_diverged(found["rows"][0]["reason"]) and found["fits"]["pressure"]["L1"]["marks"][0] == "failed"
     assert found["fits"]["pressure"]["L2"]["order"] == approx(4, abs=0.3)
     assert any("failed" in note for note in found["notes"])
 

@@ -8,7 +8,7 @@ import pytest
 from reference.scenes import junction, lake, pipe, ramp, reservoir, scene, valve
 
 from fvsolve.case import load
-from fvsolve.cli.response import unit_in
+from fvsolve.cli.response import output_unit
 from fvsolve.studies import response
 
 UNITS = {
@@ -81,10 +81,10 @@ def test_a_number_is_told_in_the_unit_asked_for(command, pattern, si, own, size,
 
 def test_a_response_is_drawn_in_the_unit_that_stands_at_it(cases):
     found = [response(load(path), "top") for path in cases]
-    sizes = [unit_in(load(path), one) for path, one in zip(cases, found, strict=True)]
+    sizes = [output_unit(load(path), one) for path, one in zip(cases, found, strict=True)]
     assert sizes[0] == (1.0, "m3/s/Pa") and sizes[1] == (pytest.approx(1e8), "l/s/bar")
     inner = response(load(cases[1]), "gate")
-    assert unit_in(load(cases[1]), inner) == (pytest.approx(1e-8), "bar/(l/s)")
+    assert output_unit(load(cases[1]), inner) == (pytest.approx(1e-8), "bar/(l/s)")
 
 
 def test_a_number_without_a_unit_is_sized_without_one(fvs, cases):

@@ -18,13 +18,13 @@ from fvsolve.exact.solution import averages
 from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.run import model_of
 from fvsolve.studies.outcome import outcome
-from fvsolve.studies.truth import start_of
+from fvsolve.studies.reference import initial_values
 
 
 def solved(case):
     """(case, exact solution)."""
     case = load(case)
-    return case, exact.solution(case, start_of(model_of(case)))
+    return case, exact.solution(case, initial_values(model_of(case)))
 
 
 def probe(case, name: str):
@@ -372,7 +372,7 @@ def test_any_solution_on_any_scene_either_holds_or_is_refused_part_by_part(file,
     except CaseError as error:
         assert f'"{name}"' in str(error) or "without" in str(error)
         return
-    found = exact.solution(case, start_of(model_of(case)))
+    found = exact.solution(case, initial_values(model_of(case)))
     assert np.isfinite(found.probe(case.probes[0], np.array([case.numerics.start]))).all()
 
 

@@ -17,7 +17,7 @@ from fvsolve.fluid import properties
 from fvsolve.fluid.laws import MixtureLaw
 from fvsolve.kernels import density as law
 from fvsolve.kernels import dtypes as rec
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 OIL = {"name": "user", "density": 870.0, "bulk_modulus": 1.6e9, "viscosity": 0.04}
 MIXTURES = {
@@ -172,9 +172,9 @@ def test_ledgers_of_mass_and_energy_close_with_air_in_pipes_and_chambers(keys):
     coarse, fine = (energy(main(fluid, cells)) for cells in (24, 48))
     assert not coarse.law and fine.relative < min(0.5 * coarse.relative, 3e-4)
     assert np.sum([*fine.scheme.values(), fine.step, fine.newton], axis=0) == approx(
-        fine.remainder, abs=1e-12 * fine.through
+        fine.remainder, abs=1e-12 * fine.throughput
     )
-    assert np.abs(fine.step).max() < 1e-6 * fine.through
+    assert np.abs(fine.step).max() < 1e-6 * fine.throughput
 
 
 @pytest.mark.parametrize("keys", [{"air_fraction": 0.02}, {"air_fraction": 0.02, "gas_exponent": 1.4}])

@@ -16,7 +16,7 @@ import fvsolve
 from fvsolve.errors import CaseError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 CASE = CASES / "adelaide.toml"
 WATER = {**scenes.WATER, "law": "mixture", "air_fraction": 1e-7, "cavitation": True}
@@ -265,7 +265,7 @@ def test_without_an_event_nothing_moves_by_one_bit():
 def test_the_numbers_dissipate_while_a_cavity_opens_and_closes():
     found = energy(CASE, {"links.main.cells": 40})
     assert found.verdict == "the numbers dissipate"
-    assert np.diff(found.made).min() > -2e-3 * found.through
+    assert np.diff(found.numerical_remainder).min() > -2e-3 * found.throughput
     assert found.marks == []
 
 

@@ -413,10 +413,10 @@ def test_an_unknown_word_and_a_bad_share():
 
 
 def test_a_line_of_the_case_is_a_rung():
-    from fvsolve.studies.accuracy.rungs import restated, structures
+    from fvsolve.studies.accuracy.model_levels import level_keys, level_names
 
     case = fvsolve.load(main(1.0) | {"numerics": {"end": 1.0}})
-    assert "delay lines" in structures(case) and restated(case, "delay lines") == {
+    assert "delay lines" in level_names(case) and level_keys(case, "delay lines") == {
         "links.main.pipe_model": "delay-line"
     }
 

@@ -10,12 +10,12 @@ from reference.scenes import scene
 
 from fvsolve.model.energy_norm import energy_form, form_of
 from fvsolve.steppers import method_named, stability_function
-from fvsolve.studies.linear.frozen import frozen
-from fvsolve.studies.linear.linearise import linearised
-from fvsolve.studies.stability.bounds import numerical_abscissa
-from fvsolve.studies.stability.growth import DenseGrowth
+from fvsolve.studies.linear.linearise import linearise_at
+from fvsolve.studies.linear.operating_point import operating_point
+from fvsolve.studies.stability.growth_method import predicted_limit
+from fvsolve.studies.stability.power_growth import DenseGrowth
+from fvsolve.studies.stability.region_bounds import numerical_abscissa
 from fvsolve.studies.stability.stability import stability
-from fvsolve.studies.stability.system import predicted
 
 MASS, DAMPING = 10.0, 1000.0
 
@@ -51,14 +51,14 @@ def by_hand(stiffness, method, steps=1000):
 
 def system_of(case, method, at=None, steps=1000):
     """The linear system of a case in its energy norm."""
-    state = frozen(case, at=at)
-    return DenseGrowth(method_named(method), energy_form(state.model, state.y).seen(linearised(state).a), steps)
+    state = operating_point(case, at=at)
+    return DenseGrowth(method_named(method), energy_form(state.model, state.y).seen(linearise_at(state).a), steps)
 
 
 @pytest.mark.parametrize("stiffness, hold", [(1e6, 0.0), (1e7, 0.1)])
 @pytest.mark.parametrize("method", ["rk4", "ssp-rk3"])
 def test_two_masses_on_a_spring_fail_where_their_relative_motion_does(stiffness, hold, method):
-    found = predicted(system_of(pair(stiffness, hold), method)).step
+    found = predicted_limit(system_of(pair(stiffness, hold), method)).step
     assert found == pytest.approx(by_hand(stiffness, method), rel=2e-4)
 
 
@@ -67,8 +67,8 @@ def test_two_free_masses_are_measured_as_predicted_and_no_implicit_step_of_their
     assert abs(row.difference) < 0.005 and row.field_of_values <= row.predicted * (1 + 1e-4)
     assert row.field_of_values > 0.0 and row.predicted == pytest.approx(by_hand(1e6, "rk4", 300), rel=2e-4)
     for name in ("implicit-euler", "gauss-4"):
-        assert math.isinf(predicted(system_of(pair(1e6), name)).step)
-        assert math.isinf(predicted(system_of(pair(1e7, 0.1), name)).step)
+        assert math.isinf(predicted_limit(system_of(pair(1e6), name)).step)
+        assert math.isinf(predicted_limit(system_of(pair(1e7, 0.1), name)).step)
 
 
 @pytest.mark.parametrize("push", [0.0, 30.0])
@@ -76,7 +76,7 @@ def test_energy_changes_by_its_slope_along_the_flow_1(push):
     """dV/dt = dV/dx f(x, u) of two masses on springs: what a force gives less what the damper takes, at any state."""
     case = pair(1e4, 2e3)
     case["links"]["push"] = {"type": "force", "to": "b", "force": push}
-    model = frozen(case).model
+    model = operating_point(case).model
     form, names = energy_form(model), list(model.state_names)
     for seed in range(5):
         y = np.random.default_rng(seed).normal(size=len(names))
@@ -87,7 +87,7 @@ def test_energy_changes_by_its_slope_along_the_flow_1(push):
 
 
 def test_masses_that_nothing_holds_are_idle_together_and_a_held_one_is_not():
-    free, held = (frozen(pair(1e6, hold)).model for hold in (0.0, 0.1))
+    free, held = (operating_point(pair(1e6, hold)).model for hold in (0.0, 0.1))
     form = energy_form(free)
     together = np.array([1.0, 0.0, 1.0, 0.0])
     assert form.size == 3 and form.forward @ together == pytest.approx(np.zeros(3), abs=1e-9)
@@ -120,7 +120,7 @@ def test_an_idle_state_that_moves_what_has_energy_gets_the_least_weight():
 def test_the_greatest_growth_is_found_at_every_power_of_a_small_system():
     """An oscillator in a norm that is not its own: growth of Euler's steps swings as it rises."""
     e, steps = np.array([[0.0, 1.0], [-40.0, 0.0]]), 300
-    found = predicted(DenseGrowth(method_named("euler"), e, steps)).step
+    found = predicted_limit(DenseGrowth(method_named("euler"), e, steps)).step
 
     def most(h):
         power, size = np.eye(2), 0.0

@@ -43,7 +43,7 @@ def bits(model: Model) -> str:
 
 def written(run) -> list[np.ndarray]:
     """What a run has to show: its rows, its last state, and all that it wrote but its room to work in."""
-    slate = run.slate
+    slate = run.run_data
     return [run.rows, run.y, slate.armed, slate.marks, slate.envelope, slate.extremes]
 
 

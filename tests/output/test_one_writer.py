@@ -12,7 +12,7 @@ from reference.scenes import still
 import fvsolve
 from fvsolve.errors import RunError
 from fvsolve.studies import sweep
-from fvsolve.studies.points import Points
+from fvsolve.studies.result_cache import ResultCache
 
 WAITING = """
 import sys
@@ -73,7 +73,7 @@ def test_a_run_that_fails_lets_go(tmp_path):
 
 def test_studies_share_no_folder(tmp_path):
     vary = {"nodes.pond.level": [1.0, 2.0]}
-    with Points(tmp_path), pytest.raises(RunError, match="is in use: a study still writes there"):
+    with ResultCache(tmp_path), pytest.raises(RunError, match="is in use: a study still writes there"):
         sweep(still(), vary, out=tmp_path)
     assert len(sweep(still(), vary, out=tmp_path).rows) == 2
     written = {path.name for path in tmp_path.iterdir()}

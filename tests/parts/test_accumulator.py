@@ -14,7 +14,7 @@ import fvsolve
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.output.memory import MemorySink
 from fvsolve.solve.solve import Run
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
 LENGTH, DIAMETER, BORE = 20.0, 0.1, area(0.1)
@@ -147,7 +147,7 @@ def test_its_energy_closes_and_it_gives_no_more_than_it_had(law):
     for more in ({"exponent": 1.0}, {"connection": connection}):
         one = energy(swing(0.04, 3.0, {"method": "gauss-6", "step": 1e-3}, law, **more), port="lake")
         column = sum(loss[-1] for loss in one.law.values())  # what is no energy of this law in a rigid column
-        assert abs(one.made[-1] - column) < 1e-9 * one.through and one.port.passive
+        assert abs(one.numerical_remainder[-1] - column) < 1e-9 * one.throughput and one.port.passive
         at_start = one.at_start.get("a", one.at_start.get("a.inside"))
         assert at_start > 0.0
         assert all((np.diff(loss) >= -1e-9).all() for loss in one.dissipated.values())

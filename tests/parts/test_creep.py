@@ -12,9 +12,9 @@ from reference.scenes import WATER, area, junction, reservoir, scene
 import fvsolve
 from fvsolve import exact
 from fvsolve.errors import CaseError
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.ports.response import response
-from fvsolve.studies.truth import start_of
+from fvsolve.studies.reference import initial_values
 
 LENGTH, BORE, WALL, FLOW, START = 400.0, 0.05, 0.0063, 1e-3, 0.1
 ELEMENTS = {"compliance": [1e-10, 2e-10, 3e-10], "time": [0.05, 0.5, 3.0]}
@@ -42,7 +42,7 @@ def line(cells: int = 50, kind: str = "smooth", end: float = 4.0, creep=ELEMENTS
 def solved(case: dict):
     """(run, values of the exact solution by probe and time, Joukowsky jump [Pa], travel time [s])."""
     model = fvsolve.build(fvsolve.load({**case, "exact": {"name": "creeping-line"}}))
-    truth = exact.solution(model.case, start_of(model))
+    truth = exact.solution(model.case, initial_values(model))
     speed = model.case.wave_speed("main")
     jump = WATER["density"] * speed * FLOW / area(BORE)
     return fvsolve.run(model), lambda k, t: truth.probe(model.probes[k], t), jump, LENGTH / speed
@@ -147,7 +147,7 @@ def test_under_other_laws_too_and_what_a_law_leaves_has_a_line_of_its_own():
     taken = np.array(other[1].dissipated["main creep"])
     assert taken[-1] == approx(linear.dissipated["main creep"][-1], rel=0.02) and np.all(np.diff(taken) >= 0.0)
     left = [one.scheme["main"][-1] for one in other]
-    assert abs(left[1]) < abs(left[0]) / 8.0 and abs(left[1]) < 2e-6 * other[1].through
+    assert abs(left[1]) < abs(left[0]) / 8.0 and abs(left[1]) < 2e-6 * other[1].throughput
     law = other[1].law["main"][-1]
     assert abs(law) < 5e-3 * taken[-1] and law == approx(other[0].law["main"][-1], rel=1e-3)
     assert other[1].remainder[-1] == approx(law + left[1] + other[1].step[-1] + other[1].newton[-1], abs=1e-9)

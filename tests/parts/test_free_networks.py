@@ -13,7 +13,7 @@ from fvsolve.errors import CaseError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.build import build
 from fvsolve.solve import initial_state
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 MASS, LOW, TURN = 60e3, 0.8, 4e5  # of the hull: its mass [kg], how low that lies [m], inertia about it [kg m2]
 START = 0.15  # angle [rad]
@@ -195,8 +195,8 @@ def test_the_energy_of_a_free_hull_with_its_water_stays_but_for_steps(swap):
         case["numerics"] = {"end": 20.0, "method": "rk4", "step": step}
         found = energy(fv.load(case))
         losses.append(abs(found.remainder[-1]))
-    assert losses[1] < 0.1 * losses[0] < 1e-5 * found.through
-    assert not found.supplied and not found.dissipated and found.through > 1e4
+    assert losses[1] < 0.1 * losses[0] < 1e-5 * found.throughput
+    assert not found.supplied and not found.dissipated and found.throughput > 1e4
 
 
 # pipes ----------
@@ -369,7 +369,7 @@ def test_a_rig_in_free_flight_keeps_all_momenta_to_the_order_of_steps_and_cells(
 def test_the_energy_of_a_rig_in_free_flight_closes_but_for_steps_cells_and_valves(law, tanks):
     found = [energy(fv.load(rig(FLIES, law, tanks, cells, GRAVITY, step=step, end=0.15)))
              for cells, step in ((8, 2e-4), (8, 1e-4), (16, 1e-4))]  # fmt: skip
-    through = found[0].through
+    through = found[0].throughput
     assert abs(found[1].step[-1]) < 0.15 * abs(found[0].step[-1]) < 1e-4 * through
     lost = [sum(abs(one[-1]) for one in ledger.scheme.values()) for ledger in found]
     assert lost[2] < 0.4 * lost[1] < 2e-3 * through

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.parts.pump.suter_tables import SUTER_TABLES
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.linear.linearise import linearise
 
 ONE = {"flow": [0.1], "head": [50.0]}

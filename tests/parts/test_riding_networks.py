@@ -9,7 +9,7 @@ from scipy.integrate import simpson, solve_ivp
 import fvsolve as fv
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.output.fields import read_series
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 HALF, DEPTH, LEVEL = 4.0, 1.5, 0.8  # of a U-tube: between its arms, of its duct below the axis, of water above that [m]
 TANK, BORE, LOSS = 1.2, 0.6, 3.0  # [m2], [m]
@@ -364,8 +364,8 @@ def test_the_energy_of_a_u_tube_that_rolls_is_the_work_of_its_drive_less_frictio
         case["numerics"]["step"] = step
         found = energy(fv.load(case))
         losses.append(abs(found.step[-1]))
-        assert abs(found.law.get("duct", [0.0])[-1]) < (1e-9 if law == "linear" else 1e-5) * found.through
-    assert losses[1] < 0.1 * losses[0] < 2e-6 * found.through  # of fourth order
+        assert abs(found.law.get("duct", [0.0])[-1]) < (1e-9 if law == "linear" else 1e-5) * found.throughput
+    assert losses[1] < 0.1 * losses[0] < 2e-6 * found.throughput  # of fourth order
     truth = solve_ivp(lambda t, y: [y[1] / TANK, rate(*roll(t), *y)], (0, 20), [0.0, 0.0], t_eval=found.t, rtol=1e-11,
                       atol=1e-12, method="DOP853")  # fmt: skip
     held = water_energy(*roll(found.t)[:2], *truth.y)
@@ -387,9 +387,9 @@ def test_the_energy_of_a_pipe_between_tanks_that_roll_closes_but_for_its_cells(l
         case["links"]["duct"]["cells"] = cells
         case["numerics"] = {"end": 2.0, "scheme": "upwind5", "method": "rk4", "courant": 0.8}
         found.append(energy(fv.load(case)))
-        assert abs(found[-1].step[-1]) < 1e-9 * found[-1].through
+        assert abs(found[-1].step[-1]) < 1e-9 * found[-1].throughput
     lost = [abs(one.scheme["duct"][-1]) for one in found]
-    assert lost[1] < 0.6 * lost[0] < 1e-6 * found[0].through
+    assert lost[1] < 0.6 * lost[0] < 1e-6 * found[0].throughput
     case["output"] |= {"probes": ["hull.joint_tx", "hull.rate"], "every": 0.005}
     run = fv.run(case)
     work = simpson(run["hull.joint_tx"] * run["hull.rate"], x=run.t)
@@ -407,7 +407,7 @@ def test_water_that_flows_from_a_place_which_moves_brings_what_moving_it_takes()
         case = line([1, 0, 0], [1 + LONG, 0, 3], joint, cells=10, length=LONG + 1.0, courant=courant)
         found = energy(fv.load(case))
         steps.append(abs(found.step[-1]))
-        assert abs(found.scheme["pipe"][-1]) < 1e-5 * found.through
+        assert abs(found.scheme["pipe"][-1]) < 1e-5 * found.throughput
         assert found.supplied["open"][-1] != 0.0 and found.supplied["rig"][-1] != 0.0
     assert steps[1] < 0.1 * steps[0] or steps[0] < 1e-9 * found.through
 

@@ -9,7 +9,7 @@ import pytest
 from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, area, junction, pipe, reservoir, scene, tank, valve
 
 import fvsolve
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 CDA, BURST, SECTION, FILL = 2e-3, 3.5e4, 0.5, 0.05
 
@@ -100,7 +100,7 @@ def test_nothing_comes_back_from_ambient_and_its_energy_closes():
     assert (gauge < -1e3).any() and not flow[gauge < 0.0].any() and flow[-1] > 0.0
     found = energy(case)
     scheme = sum(taken[-1] for taken in found.scheme.values())
-    assert abs(found.made[-1] - scheme) < 1e-8 * found.through
+    assert abs(found.numerical_remainder[-1] - scheme) < 1e-8 * found.throughput
     assert (np.diff(found.dissipated["disc rupture disc"]) >= 0.0).all()
 
 

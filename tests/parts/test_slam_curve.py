@@ -7,7 +7,7 @@ import pytest
 from reference.scenes import RHO, WATER, area, junction, pipe, reservoir, scene
 
 import fvsolve
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 BORE, LENGTH = 0.2, 50.0
 RATES, VELOCITIES = [0.5, 2.0, 6.0], [0.02, 0.1, 0.5]
@@ -117,5 +117,5 @@ def test_its_energy_closes_through_a_slam_and_it_only_dissipates():
     assert "shuts" in times(fvsolve.run(case))
     found = energy(case)
     scheme = sum(taken[-1] for taken in found.scheme.values())
-    assert abs(found.made[-1] - scheme) < 1e-6 * found.through
+    assert abs(found.numerical_remainder[-1] - scheme) < 1e-6 * found.throughput
     assert (np.diff(found.dissipated["check check valve"]) >= 0.0).all()

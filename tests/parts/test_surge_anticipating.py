@@ -10,7 +10,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, WATER, junction, pipe, reser
 from scipy.integrate import solve_ivp
 
 import fvsolve
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 OPENS, HOLD, SHUTS = 0.4, 1.5, 2.5
 TIGHT = {"method": "dormand-prince", "rtol": 1e-10}
@@ -139,7 +139,7 @@ def test_resumed_in_the_midst_of_a_stroke_it_is_the_unbroken_run(tmp_path, end):
 
 def test_its_energy_closes_and_it_only_dissipates():
     found = energy(vessel({"method": "dormand-prince", "rtol": 1e-8}, trip=0.7))
-    assert abs(found.made[-1]) < 1e-7 * found.through
+    assert abs(found.numerical_remainder[-1]) < 1e-7 * found.throughput
     assert (np.diff(found.dissipated["sav surge anticipating"]) >= 0.0).all()
 
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 LENGTH, DIAMETER, FACTOR, SHAFT, THROAT = 2000.0, 3.0, 0.015, 80.0, 2.0
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
@@ -72,7 +72,7 @@ def test_the_head_beside_the_tank_is_its_level_and_the_loss():
 def test_the_throttle_dissipates_and_the_ledger_closes(law):
     one = energy(swing((1.0, 1.5), {"method": "gauss-6", "step": 0.25}, law), port="lake")
     column = sum(loss[-1] for loss in one.law.values())
-    assert abs(one.made[-1] - column) < 1e-7 * one.through and one.port.passive
+    assert abs(one.numerical_remainder[-1] - column) < 1e-7 * one.throughput and one.port.passive
     assert one.dissipated["t.connection"][-1] > 0.0 and "t.inside" in one.stored
 
 

@@ -17,10 +17,10 @@ import fvsolve
 from fvsolve import exact
 from fvsolve.errors import CaseError
 from fvsolve.model import unsteady_terms
-from fvsolve.studies.accuracy.rungs import column
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.accuracy.model_levels import rigid_column
+from fvsolve.studies.energy.energy_balance import energy
 from fvsolve.studies.ports.response import response
-from fvsolve.studies.truth import start_of
+from fvsolve.studies.reference import initial_values
 
 FOOT = 0.3048
 NUMBERS = (0.005, 0.05)  # nu L / (a R^2)
@@ -55,7 +55,7 @@ def joukowsky(number: float, reynolds: float = 500.0) -> float:
 def solved(case: dict):
     """(run, values of the exact solution by probe and time, exact solution) of a case."""
     model = fvsolve.build(fvsolve.load({**case, "exact": {"name": "laminar-line"}}))
-    truth = exact.solution(model.case, start_of(model))
+    truth = exact.solution(model.case, initial_values(model))
     return fvsolve.run(model), lambda k, t: truth.probe(model.probes[k], t), truth
 
 
@@ -220,7 +220,7 @@ def test_its_port_is_the_impedance_of_the_exact_line_and_passive():
 
 
 def test_a_rigid_column_in_its_place_has_no_memory():
-    found = column(fvsolve.load(line(0.02, 9)), "main")
+    found = rigid_column(fvsolve.load(line(0.02, 9)), "main")
     assert found["friction"] == {"model": "quasi-steady", "roughness": 0.0}
 
 

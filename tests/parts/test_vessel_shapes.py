@@ -12,7 +12,7 @@ from scipy.integrate import quad, solve_ivp
 import fvsolve
 from fvsolve.model.jacobian_pattern import jacobian_pattern
 from fvsolve.parts.accumulator import law_shape, law_vessel
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
 LENGTH, BORE = 20.0, area(0.1)
@@ -160,7 +160,7 @@ def test_its_energy_closes_and_its_compressor_supplies(law, more):
     case = swing(0.02, 1.0, {"method": "gauss-6", "step": 2e-3}, law, compressor=compressor, **more)
     one = energy(case, port="lake")
     column = sum(loss[-1] for loss in one.law.values())  # what is no energy of this law in a rigid column
-    assert abs(one.made[-1] - column) < 1e-10 * one.through
+    assert abs(one.numerical_remainder[-1] - column) < 1e-10 * one.throughput
     assert sum(one.supplied["a"]) > 0.0 and one.at_start["a"] > 0.0
 
 

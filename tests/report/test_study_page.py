@@ -14,13 +14,13 @@ from studies.test_design import STUDY, throttled
 import fvsolve
 from fvsolve.case.text import write
 from fvsolve.report.report import write_report
-from fvsolve.studies import design
+from fvsolve.studies import scenarios
 
 
 def test_a_study_is_reported_with_all_its_runs(tmp_path, fvs) -> None:
     (tmp_path / "main.toml").write_text(write(throttled()))
     (tmp_path / "taps.toml").write_text(STUDY.replace('"Two taps"', json.dumps(WICKED)))
-    found = design.study(tmp_path / "taps.toml", tmp_path / "out")
+    found = scenarios.study(tmp_path / "taps.toml", tmp_path / "out")
     status, text, _ = fvs("report", str(tmp_path / "out"), "--xlsx")
     assert status == 0 and "report.xlsx" in text
     said = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -45,7 +45,7 @@ def taps(tmp_path_factory):
     case["limits"]["deep"] = {"on": "main", "quantity": "head", "minimum": -1e3}
     (folder / "main.toml").write_text(write(case))
     (folder / "taps.toml").write_text(STUDY.replace('duration = "3 s"', 'duration = "30 s"'))
-    design.study(folder / "taps.toml", folder / "out")
+    scenarios.study(folder / "taps.toml", folder / "out")
     write_report(folder / "out", xlsx=True)
     return folder / "out"
 
@@ -99,6 +99,6 @@ def test_the_workbook_of_a_study_has_the_envelope_of_each_run(taps) -> None:
 def test_a_study_without_limits_says_so(tmp_path) -> None:
     (tmp_path / "main.toml").write_text(write(throttled() | {"limits": {}}))
     (tmp_path / "taps.toml").write_text(STUDY)
-    design.study(tmp_path / "taps.toml", tmp_path / "out")
+    scenarios.study(tmp_path / "taps.toml", tmp_path / "out")
     write_report(tmp_path / "out")
     assert "No limits were stated" in Read((tmp_path / "out" / "report.html").read_text(encoding="utf-8")).text

@@ -127,7 +127,7 @@ def test_the_first_run_on_a_machine_says_that_it_compiles(fvs, tmp_path, monkeyp
     from fvsolve import jit
     from fvsolve.cli import app
 
-    app._tell_of_compiling.cache_clear()
+    app._announce_compilation.cache_clear()
     monkeypatch.setattr(jit, "is_cold", lambda: True)
     assert "compiles" in fvs("check", CASE)[2]
     assert "compiles" not in fvs("check", CASE)[2]

@@ -9,7 +9,7 @@ from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene,
 
 import fvsolve
 from fvsolve.case.text import write
-from fvsolve.studies import design
+from fvsolve.studies import scenarios
 
 LARGEST = 1e4  # m, which no true head of the scene comes near: it is shut from 2 m/s, 200 m by Joukowsky
 
@@ -63,7 +63,7 @@ def test_all_that_is_printed_says_from_when(fvs, tmp_path, monkeypatch) -> None:
     assert fvs("report", "run", "--xlsx")[0] == 0
     assert f"not valid from t = {said['invalid_from']:.6g} s on" in (tmp_path / "run" / "report.html").read_text()
     (tmp_path / "two.toml").write_text('case = "scene.toml"\n[events.close]\n')
-    found = design.study(tmp_path / "two.toml", tmp_path / "out")
+    found = scenarios.study(tmp_path / "two.toml", tmp_path / "out")
     assert not found.ok and found.holds == [] and "not valid from t = " in fvs("study", "two.toml", "--out", "out")[1]
     assert fvs("report", "out")[0] == 0
     assert "not valid from t = " in (tmp_path / "out" / "report.html").read_text()

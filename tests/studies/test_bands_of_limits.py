@@ -11,8 +11,8 @@ from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene,
 import fvsolve
 from fvsolve.case.text import write
 from fvsolve.report.report import write_report
-from fvsolve.studies import design
-from fvsolve.studies.peaks import peak_errors
+from fvsolve.studies import scenarios
+from fvsolve.studies.peak_error import peak_errors
 from fvsolve.studies.sizing import size
 
 SURE = 49.5  # m, below the head that the whole scene starts from: its margin is the least, and does not depend on cells
@@ -87,7 +87,7 @@ def test_run_report_and_study_say_the_same_state(fvs, tmp_path, monkeypatch) -> 
     page = write_report(tmp_path / "run", tmp_path / "run.html", False)[0].read_text()
     assert "The verdict of a limit is open" in page
     (tmp_path / "two.toml").write_text('case = "short.toml"\nestimate_error = true\n[events.close]\n')
-    found = design.study(tmp_path / "two.toml", tmp_path / "out")
+    found = scenarios.study(tmp_path / "two.toml", tmp_path / "out")
     row = json.loads((tmp_path / "out" / "study.json").read_text())["runs"][0]["verdicts"][0]
     assert row["state"] == "open" and not found.ok and found.holds == []
     (line,) = csv.DictReader((tmp_path / "out" / "study.csv").open())
@@ -125,9 +125,9 @@ def test_a_size_holds_its_limits_by_more_than_their_errors() -> None:
 
 def test_a_place_without_a_known_error_is_open(monkeypatch) -> None:
     """The run of twice the resolution stops early: nothing bounds the error."""
-    from fvsolve.studies import peaks
+    from fvsolve.studies import peak_error
 
-    case, real = short_pipe(minimum=SURE), peaks.run
+    case, real = short_pipe(minimum=SURE), peak_error.run
 
     def stopped(case, set=None, **more):
         made = real(case, set=set, **more)
@@ -135,7 +135,7 @@ def test_a_place_without_a_known_error_is_open(monkeypatch) -> None:
             made.summary["reason"] = "interrupted"
         return made
 
-    monkeypatch.setattr(peaks, "run", stopped)
+    monkeypatch.setattr(peak_error, "run", stopped)
     found = judged(case)
     assert found["error"] is None and found["state"] == "open" and not found["ok"]
 

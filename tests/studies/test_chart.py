@@ -33,11 +33,11 @@ from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.accuracy import timing
 from fvsolve.studies.accuracy.chart import chart
-from fvsolve.studies.accuracy.files import figure, write_csv
-from fvsolve.studies.accuracy.front import curves
-from fvsolve.studies.distance import Distance, averaged, distance
-from fvsolve.studies.outcome import Outcome, outcome, prepared
-from fvsolve.studies.truth import judge, of_halvings, of_run
+from fvsolve.studies.accuracy.chart_files import chart_picture, write_chart_csv
+from fvsolve.studies.accuracy.work_precision import curves_by_name
+from fvsolve.studies.distance import Distance, cell_averages, distance
+from fvsolve.studies.outcome import Outcome, outcome, study_model
+from fvsolve.studies.reference import best_reference, reference_of_refinements, reference_of_run
 
 SUPPLY, HOLE, VOLUME, P0 = 5e6, 1e-6, 0.5, 1e6
 LENGTH, DIAMETER, SPEED, OPEN, PRESSURE = 300.0, 0.2, 1000.0, 4e-4, AMBIENT + 4e5
@@ -153,7 +153,7 @@ def test_the_error_at_the_end_is_that_of_the_fields_too(closing):
 
 def told(rows, *probes) -> Outcome:
     """A run that ended with these rows."""
-    return Outcome("finished", ok=True, rows=rows, probes=probes, model=prepared(pot()))
+    return Outcome("finished", ok=True, rows=rows, probes=probes, model=study_model(pot()))
 
 
 def test_rows_before_and_after_a_jump_are_both_compared_and_weigh_nothing_twice():
@@ -161,7 +161,7 @@ def test_rows_before_and_after_a_jump_are_both_compared_and_weigh_nothing_twice(
     exact = np.column_stack([t, [0.0, 0.0, 10.0, 10.0]])
     off = exact.copy()
     off[1, 1] += 1.0  # only before the jump
-    found = distance(told(off, "p"), of_run(told(exact, "p")))
+    found = distance(told(off, "p"), reference_of_run(told(exact, "p")))
     assert found.trajectory == pytest.approx(0.5 * 0.1 / 2.0)
     assert found.greatest == pytest.approx(0.1)
     assert found.end == 0.0
@@ -171,7 +171,7 @@ def test_every_probe_is_measured_by_its_own_range_and_one_that_stands_still_by_n
     t = np.linspace(0.0, 1.0, 5)
     exact = np.column_stack([t, 1e6 + 10.0 * t, 1e-3 * t, np.full(5, 7.0)])
     off = exact + np.array([0.0, 0.1, 2e-5, 3.0])
-    found = distance(told(off, "a", "b", "c"), of_run(told(exact, "a", "b", "c")))
+    found = distance(told(off, "a", "b", "c"), reference_of_run(told(exact, "a", "b", "c")))
     assert found.worst == "b"
     assert found.trajectory == pytest.approx(0.02)
     assert found.overshoot == pytest.approx(0.02)
@@ -181,7 +181,7 @@ def test_a_run_that_stopped_early_has_no_error():
     t = np.linspace(0.0, 1.0, 5)
     exact = np.column_stack([t, t])
     early = Outcome("stopped", rows=exact[:3], probes=("a",))
-    assert math.isnan(distance(early, of_run(told(exact, "a"))).trajectory)
+    assert math.isnan(distance(early, reference_of_run(told(exact, "a"))).trajectory)
 
 
 @pytest.mark.parametrize("fine, coarse", [(40, 10), (47, 10), (64, 48)])
@@ -192,7 +192,7 @@ def test_averages_over_fewer_cells_are_those_of_the_field(fine, coarse):
         edges = np.linspace(0.0, 1.0, n + 1)
         return np.diff(np.sin(2 * edges) / 2) * n
 
-    assert averaged(cells(fine), coarse) == pytest.approx(cells(coarse), abs=1e-12 if fine == 40 else 1e-5)
+    assert cell_averages(cells(fine), coarse) == pytest.approx(cells(coarse), abs=1e-12 if fine == 40 else 1e-5)
 
 
 # floor ------------------------------------------------------------------------------------------------------------
@@ -200,27 +200,27 @@ def test_averages_over_fewer_cells_are_those_of_the_field(fine, coarse):
 
 def opinion(name: str, shift: float, own: float):
     t = np.linspace(0.0, 1.0, 11)
-    found = of_run(told(np.column_stack([t, t + shift]), "a"), name)
-    return replace(found, doubt=Distance(own, own, own))
+    found = reference_of_run(told(np.column_stack([t, t + shift]), "a"), name)
+    return replace(found, uncertainty=Distance(own, own, own))
 
 
 def test_two_references_that_disagree_give_a_floor():
-    found = judge([opinion("rough", 0.01, 1e-4), opinion("fine", 0.0, 1e-6)])
+    found = best_reference([opinion("rough", 0.01, 1e-4), opinion("fine", 0.0, 1e-6)])
     assert (found.words, found.second) == ("fine", "rough")
-    assert found.doubt.trajectory == pytest.approx(0.01)
+    assert found.uncertainty.trajectory == pytest.approx(0.01)
 
 
 def test_references_that_agree_by_chance_have_the_floor_of_their_own_error():
-    found = judge([opinion("one", 1e-9, 3e-3), opinion("other", 0.0, 2e-3)])
-    assert found.doubt.trajectory == pytest.approx(2e-3)
+    found = best_reference([opinion("one", 1e-9, 3e-3), opinion("other", 0.0, 2e-3)])
+    assert found.uncertainty.trajectory == pytest.approx(2e-3)
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 5.0])
 def test_halvings_tell_the_error_of_a_reference(order):
     t = np.linspace(0.0, 1.0, 11)
     runs = [told(np.column_stack([t, t * (1 + 0.1 * 2.0 ** (-order * k))]), "a") for k in range(3)]
-    exact = of_run(told(np.column_stack([t, t]), "a"))
-    own = of_halvings("", runs).doubt.trajectory
+    exact = reference_of_run(told(np.column_stack([t, t]), "a"))
+    own = reference_of_refinements("", runs).uncertainty.trajectory
     assert own == pytest.approx(1.5 * distance(runs[2], exact).trajectory, rel=0.05)  # half as much again, to be sure
 
 
@@ -305,18 +305,18 @@ def test_failed_runs_are_in_list_table_and_picture(tmp_path):
     assert not by_step[1e-30].ok and by_step[1e-30].reason.startswith("refused: ")
     assert by_step[1e-6].ok
     assert [point.setting.size for point in found.failed] == [2e-3, 1e-30]
-    write_csv(found, tmp_path / "chart.csv")
+    write_chart_csv(found, tmp_path / "chart.csv")
     lines = list(csv.DictReader((tmp_path / "chart.csv").open()))
     assert len(lines) == len(found.points)
     assert [line["reason"].split(":")[0] for line in lines if line["ok"] == "0"][1:] == ["refused"]
-    drawn = [one for one in figure(found).axes[0].lines if one.get_markerfacecolor() == "none"]
+    drawn = [one for one in chart_picture(found).axes[0].lines if one.get_markerfacecolor() == "none"]
     assert sum(len(one.get_xdata()) for one in drawn) == 1  # the refused one spent nothing
     assert not any(row.name == "rk4" and row.target < 1e-2 for row in found.front if row.by_updates is None)
 
 
 def test_a_run_that_costs_too_much_is_given_up_and_so_are_the_finer_ones_of_its_curve(monkeypatch, capsys):
     """A thimble of a microlitre for ten seconds: millions of explicit steps, whatever the tolerance."""
-    monkeypatch.setattr(timing, "LIMIT", 0.3)
+    monkeypatch.setattr(timing, "CPU_LIMIT", 0.3)
     case = stiff()
     case["nodes"]["pot"] = chamber(1e-9, P0)
     case["numerics"]["end"], case["output"]["every"] = 10.0, 0.1
@@ -341,7 +341,9 @@ def test_the_front_names_the_cheapest_curve_by_updates_and_the_default_beside_it
     assert closing.default == "weno5 rk4"
     assert "weno5 rk4" in closing.curves()
     row = next(row for row in closing.front if row.target == pytest.approx(1e-3))
-    fine = {name: [p for p in points if p.trajectory <= 1e-3] for name, points in curves(closing.points).items()}
+    fine = {
+        name: [p for p in points if p.trajectory <= 1e-3] for name, points in curves_by_name(closing.points).items()
+    }
     assert row.by_updates == "upwind5 rk4"
     assert row.updates <= min(point.updates for points in fine.values() for point in points)
     if fine["weno5 rk4"]:
@@ -362,7 +364,7 @@ def test_pasted_lines_reach_the_target(tmp_path):
     target = 3e-3
     case = line(cells=37)
     found = chart(case, schemes=["upwind", "upwind5"], methods=["rk4"], cells=[10, 20, 40], target=target)
-    numerics, _, others = "\n".join(found.aim.lines()).partition("\n\n")
+    numerics, _, others = "\n".join(found.aim.toml_lines()).partition("\n\n")
     case["numerics"] = {"end": END}
     ((name, table),) = tomllib.loads(others)["links"].items()
     case["links"][name] |= table
@@ -380,7 +382,7 @@ def test_pipes_that_state_no_cells_are_given_a_cell_time(tmp_path):
     case = line()
     del case["links"]["main"]["cells"]
     found = chart(case, schemes=["upwind5"], methods=["rk4"], cells=[10, 40], target=1e-2)
-    case["numerics"] = {"end": END, **tomllib.loads("\n".join(found.aim.lines()))}
+    case["numerics"] = {"end": END, **tomllib.loads("\n".join(found.aim.toml_lines()))}
     run = fvsolve.run(case)
     assert run.case.links["main"].cells == found.aim.point.setting.cells
     values = np.column_stack([run[name] for name in ("gate.pressure", "tap.flow", "main.pressure@0.5")])

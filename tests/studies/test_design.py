@@ -15,8 +15,8 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, 
 import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
-from fvsolve.studies import design
-from fvsolve.studies.sizing import ends, size, tied
+from fvsolve.studies import scenarios
+from fvsolve.studies.sizing import parse_range, parse_ties, size
 
 
 def throttled() -> dict:
@@ -59,7 +59,7 @@ def study(tmp_path):
 
 
 def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_path) -> None:
-    found = design.study(study, tmp_path / "out")
+    found = scenarios.study(study, tmp_path / "out")
     assert [(row["event"], row["protection"]) for row in found.rows] == [
         ("fast", "none"), ("fast", "vessel"), ("slow", "none"), ("slow", "vessel")]  # fmt: skip
     alone = fvsolve.run(
@@ -73,19 +73,19 @@ def test_every_event_meets_every_protection_as_runs_of_their_own_do(study, tmp_p
     assert fvsolve.open_run(tmp_path / "out" / "fast.vessel").verdicts[0].ok
     assert len((tmp_path / "out" / "study.csv").read_text().splitlines()) == 5
     stamps = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*/summary.json")}
-    again = design.study(study, tmp_path / "out")
+    again = scenarios.study(study, tmp_path / "out")
     assert again.rows == found.rows
     assert {path: path.stat().st_mtime_ns for path in stamps} == stamps  # nothing was run again
-    assert design.open_study(tmp_path / "out")["title"] == "Two taps"
+    assert scenarios.open_study(tmp_path / "out")["title"] == "Two taps"
     (tmp_path / "out" / "report.html").touch()  # of the runs before
-    design.study(study, tmp_path / "out")
+    scenarios.study(study, tmp_path / "out")
     assert not (tmp_path / "out" / "report.html").exists()
 
 
 def test_processes_and_errors_change_no_verdict(study, tmp_path) -> None:
-    one = design.study(study, tmp_path / "one")
+    one = scenarios.study(study, tmp_path / "one")
     study.write_text(STUDY.replace("case =", "estimate_error = true\ncase ="))
-    banded = design.study(study, tmp_path / "two", jobs=2)
+    banded = scenarios.study(study, tmp_path / "two", jobs=2)
     for row, beside in zip(one.rows, banded.rows, strict=True):
         assert row["extremes"] == beside["extremes"]
         for verdict, other in zip(row["verdicts"], beside["verdicts"], strict=True):  # an open place stands first
@@ -124,7 +124,7 @@ def test_the_command_prints_a_table_and_leaves_with_1_where_no_protection_holds(
 def test_what_is_wrong_is_named(study, change, told: str) -> None:
     study.write_text(STUDY.replace(*change))
     with pytest.raises(CaseError) as error:
-        design.study(study, study.parent / "out")
+        scenarios.study(study, study.parent / "out")
     assert told in str(error.value)
     assert not (study.parent / "out").exists()
 
@@ -134,7 +134,7 @@ def test_all_that_is_wrong_of_a_study_comes_at_once_by_line(study) -> None:
     text = text.replace("[protections.none]", "[protections.none]\nlinks.tap.aera = 2").replace('"main"', '"mian"')
     study.write_text(text + "[events.cut]\nlinks.main.cells = 20\n[protections.fine]\nlinks.main.cells = 10\n")
     with pytest.raises(CaseError) as error:
-        design.study(study, study.parent / "out")
+        scenarios.study(study, study.parent / "out")
     assert [str(one).partition(": ")[0] for one in error.value.faults] == [f"line {n}" for n in (2, 9, 12, 18, 21)]
     assert [one.place for one in error.value.faults] == [
         "title", "events.slow.links.tap.opening.duration", "protections.none.links.tap.aera",
@@ -159,7 +159,7 @@ def test_a_protection_holds_by_limits_alone(tmp_path) -> None:
     rows = [{"event": event, "protection": protection, "ok": True,
              "verdicts": [{"ok": True}] if protection == "vessel" and event == "fast" else []}
             for event in ("fast", "slow") for protection in ("none", "vessel")]  # fmt: skip
-    found = design.Studied(None, tmp_path, rows)
+    found = scenarios.ScenarioResults(None, tmp_path, rows)
     assert found.limited and found.holds == ["vessel"] and found.ok
 
 
@@ -212,7 +212,7 @@ def test_ends_that_hold_or_fail_are_said() -> None:
 
 
 def test_ties_follow_in_si() -> None:
-    found = size(still(minimum=3e5), "nodes.lake.head", "80 ft", "250 ft", ties=tied(["links.main.length = 10 * x"]),
+    found = size(still(minimum=3e5), "nodes.lake.head", "80 ft", "250 ft", ties=parse_ties(["links.main.length = 10 * x"]),
                  rtol=0.01)  # fmt: skip
     assert found.ties == ("links.main.length = 10 * x",)
     assert found.value * 0.3048 == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=0.02)
@@ -236,16 +236,16 @@ def test_what_cannot_be_sized_is_said() -> None:
     with pytest.raises(FvsolveError, match="words or whole numbers"):
         size(still(minimum=3e5), "links.main.cells", 10, 20)
     with pytest.raises(FvsolveError, match="is not below"):
-        ends("80 m", "20 m")
+        parse_range("80 m", "20 m")
     with pytest.raises(FvsolveError, match="have different kinds of units"):
-        ends("80 m", "90 bar")
+        parse_range("80 m", "90 bar")
     with pytest.raises(FvsolveError, match="is not a number"):
-        ends("wide", 3)
+        parse_range("wide", 3)
     with pytest.raises(FvsolveError, match="expected"):
-        tied(["links.main.length"])
+        parse_ties(["links.main.length"])
     with pytest.raises(CaseError, match='did you mean "lake"'):
         size(still(minimum=3e5), "nodes.lkae.head", 20.0, 80.0)
-    assert np.isclose(ends("1 km", "2000 m")[0], 1000.0) and AMBIENT > 0.0
+    assert np.isclose(parse_range("1 km", "2000 m")[0], 1000.0) and AMBIENT > 0.0
 
 
 def test_all_that_is_wrong_of_a_search_comes_at_once(fvs, tmp_path) -> None:

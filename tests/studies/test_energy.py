@@ -27,7 +27,7 @@ from reference.scenes import (
 from scipy.stats import binom
 
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.energy.energy import energy
+from fvsolve.studies.energy.energy_balance import energy
 
 BETA = WATER["bulk_modulus"]
 TIGHT = {"method": "dormand-prince", "rtol": 1e-11}
@@ -67,7 +67,7 @@ def test_with_no_event_only_the_steady_throughput_is_booked(law):
     found = energy(case)
     assert not found.stored and not found.step.any()
     assert last(found.supplied) == pytest.approx(last(found.dissipated), rel=1e-13)
-    assert np.abs(found.remainder).max() <= 1e-13 * found.through
+    assert np.abs(found.remainder).max() <= 1e-13 * found.throughput
     if law == "linear":
         head = (5e5 + RHO * GRAVITY * 30.0) / (RHO * GRAVITY)
         k = 0.02 * 1000.0 / 0.3 / area(0.3) ** 2 + 1.0 / 0.002**2
@@ -90,8 +90,8 @@ def test_heights_count_from_the_lowest_node_and_lifting_a_scene_changes_nothing(
     assert (low.datum, high.datum) == (0.0, 250.0)
     for what in ("supplied", "stored", "dissipated"):
         for name, one in getattr(low, what).items():
-            assert getattr(high, what)[name] == pytest.approx(one, rel=1e-9, abs=1e-9 * low.through)
-    assert high.remainder == pytest.approx(low.remainder, abs=1e-9 * low.through)
+            assert getattr(high, what)[name] == pytest.approx(one, rel=1e-9, abs=1e-9 * low.throughput)
+    assert high.remainder == pytest.approx(low.remainder, abs=1e-9 * low.throughput)
 
 
 def closing(courant: float, cells: int, end: float) -> dict:
@@ -104,8 +104,8 @@ def closing(courant: float, cells: int, end: float) -> dict:
 
 def test_a_sudden_closure_at_courant_one_loses_nothing():
     found = energy(closing(1.0, 20, 4.0))
-    assert np.abs(found.remainder).max() < 1e-12 * found.through
-    assert found.scheme["main"][-1] > 0.01 * found.through  # what cells dissipate, the steps create
+    assert np.abs(found.remainder).max() < 1e-12 * found.throughput
+    assert found.scheme["main"][-1] > 0.01 * found.throughput  # what cells dissipate, the steps create
     assert found.verdict == "rounding"
 
 
@@ -240,7 +240,7 @@ def test_the_ledgers_of_shipped_cases_close(name, near):
     assert found.ok
     assert found.relative < near
     parts = [*found.scheme.values(), *found.law.values(), found.step, found.newton]
-    assert np.sum(parts, axis=0) == pytest.approx(found.remainder, abs=1e-12 * found.through)
+    assert np.sum(parts, axis=0) == pytest.approx(found.remainder, abs=1e-12 * found.throughput)
 
 
 def test_a_column_that_stops_dead_loses_its_kinetic_energy():
@@ -277,7 +277,7 @@ def test_no_part_ever_holds_less_than_nothing(name, law):
 
     found = energy(shipped.find(name), {"fluid.law": law})
     for part, change in found.stored.items():
-        assert np.min(found.at_start[part] + change) >= -1e-6 * found.through, part
+        assert np.min(found.at_start[part] + change) >= -1e-6 * found.throughput, part
 
 
 def test_a_port_that_is_none_is_named():

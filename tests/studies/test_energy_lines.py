@@ -45,16 +45,16 @@ def test_the_ledger_of_an_instant_closure_is_exact(method, share):
     risen, p = RHO * SPEED * FLOW / AREA, RHO * GRAVITY * HEAD
     elastic = (abs(filled) * risen**2 + 2.0 * filled * risen * p) * AREA / (2.0 * RHO * SPEED**2)
     stored = LENGTH * (elastic - still * RHO * FLOW**2 / (2.0 * AREA))
-    assert found.stored["main"][-1] == pytest.approx(stored, abs=1e-12 * found.through)
-    assert np.max(np.abs(found.made)) < 1e-12 * found.through
+    assert found.stored["main"][-1] == pytest.approx(stored, abs=1e-12 * found.throughput)
+    assert np.max(np.abs(found.numerical_remainder)) < 1e-12 * found.throughput
 
 
 @pytest.mark.parametrize("h", [0.01, 0.013])
 def test_stages_outside_a_step_see_jumps_of_its_neighbours(h):
     """crouzeix-4 looks ahead and back: once the gate is shut nothing is made, also where jumps arrive as steps end."""
     found = energy(main(LOSSLESS, junction(step(0.1, FLOW, 0.0)), "crouzeix-4", h, 2.0))
-    shut = found.made[found.t > 0.12]
-    assert np.max(np.abs(shut - shut[0])) < 1e-12 * found.through
+    shut = found.numerical_remainder[found.t > 0.12]
+    assert np.max(np.abs(shut - shut[0])) < 1e-12 * found.throughput
 
 
 def test_what_is_stored_and_taken_as_by_fine_cells():
@@ -84,7 +84,7 @@ def test_a_short_line_takes_and_never_gives():
     taken = found.scheme["short"]
     assert set(found.scheme) == {"short"}
     assert taken[-1] > 0.0
-    assert np.min(np.diff(taken)) > -1e-12 * found.through
+    assert np.min(np.diff(taken)) > -1e-12 * found.throughput
 
 
 @pytest.mark.parametrize("method", ["rk4", "trapezoid"])
@@ -95,7 +95,7 @@ def test_from_the_other_end(method):
     other = energy(case)
     for what in ("supplied", "stored", "dissipated", "scheme"):
         for name, values in getattr(one, what).items():
-            assert np.max(np.abs(getattr(other, what)[name] - values)) < 1e-9 * one.through, (what, name)
+            assert np.max(np.abs(getattr(other, what)[name] - values)) < 1e-9 * one.throughput, (what, name)
 
 
 def test_a_jump_into_a_store_is_booked_as_the_store_has_it():
@@ -107,4 +107,4 @@ def test_a_jump_into_a_store_is_booked_as_the_store_has_it():
     }
     for h in (0.014, 0.007, 0.0035, 0.0017):
         found = energy(scene(nodes, links, 3.0, {"pipe_model": "delay-line", "method": "rk4", "step": h}))
-        assert np.max(np.abs(found.made)) < 30.0 * h**2 * found.through
+        assert np.max(np.abs(found.numerical_remainder)) < 30.0 * h**2 * found.throughput

@@ -7,8 +7,8 @@ import pytest
 from reference.scenes import AMBIENT, WATER, chamber, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.studies.energy.energy import energy
-from fvsolve.studies.energy.pairs import measured
+from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy.energy_of_pairs import measure_pairs
 
 VOLUME, P0, P1 = 0.02, 5e5, 50e5  # over ambient
 PER = VOLUME / WATER["bulk_modulus"]
@@ -26,10 +26,10 @@ def test_a_chamber_that_has_filled_is_supplied_what_it_took_and_creates_nothing(
     assert found.supplied["src"][-1] == pytest.approx(PER * P1 * (P1 - P0), rel=1e-6)
     assert found.stored["pot"][-1] == pytest.approx(0.5 * PER * (P1**2 - P0**2), rel=1e-6)
     assert found.dissipated["hole"][-1] == pytest.approx(0.5 * PER * (P1 - P0) ** 2, rel=3e-5)
-    assert found.remainder == pytest.approx(found.step + found.newton, abs=1e-12 * found.through)
-    assert np.abs(found.newton).max() < 1e-12 * found.through
+    assert found.remainder == pytest.approx(found.step + found.newton, abs=1e-12 * found.throughput)
+    assert np.abs(found.newton).max() < 1e-12 * found.throughput
     if method.startswith("gauss"):  # they conserve squares: steps leave rounding, and the verdict says so
-        assert np.abs(found.step).max() < 1e-12 * found.through
+        assert np.abs(found.step).max() < 1e-12 * found.throughput
         assert found.verdict == "rounding"
     elif method == "radau-iia-5":
         assert found.verdict != "the numbers create energy"
@@ -42,7 +42,7 @@ def test_what_newton_leaves_is_a_part_of_its_own_and_condemns_no_method():
     assert found.newton_counts
     assert list(found.numerical()) == ["step", "newton", "remainder"]
     assert found.plain()["newton_loss"] == found.newton[-1]
-    (row,) = measured(case, None, ["radau-iia-5"])
+    (row,) = measure_pairs(case, None, ["radau-iia-5"])
     assert not row["creates"]
     assert row["newton_loss"] == found.newton[-1]
 

@@ -29,9 +29,17 @@ from fvsolve import jit
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.failure.failure_map import failure_map
-from fvsolve.studies.failure.verdict import FAR, Measures, excess, pace, ranges_of, ringing, verdict
-from fvsolve.studies.failure.watched import WINDOW, watched
-from fvsolve.studies.points import Points, package_hash
+from fvsolve.studies.failure.run_verdict import (
+    BLOWN_RANGES,
+    Measures,
+    excess_variation,
+    probe_ranges,
+    ringing_amplitude,
+    turn_interval,
+    verdict,
+)
+from fvsolve.studies.failure.step_recording import WINDOW_STEPS, run_recorded
+from fvsolve.studies.result_cache import ResultCache, package_hash
 
 TOLERANCE = 0.02
 
@@ -67,7 +75,7 @@ def test_an_error_that_a_shorter_step_reduces_is_coarse_and_one_that_stays_is_wr
 def test_what_is_not_finite_or_far_away_has_blown_up():
     stopped = Measures("stopped: a value is not finite at main.r[3] at t = 1 s; ...", False)
     assert verdict(stopped, never, TOLERANCE) == "blown up"
-    assert verdict(found(farthest=1.01 * FAR), never, TOLERANCE) == "blown up"
+    assert verdict(found(farthest=1.01 * BLOWN_RANGES), never, TOLERANCE) == "blown up"
     assert verdict(found(farthest=math.nan), never, TOLERANCE) == "blown up"
 
 
@@ -86,32 +94,34 @@ def test_swings_are_ringing_whatever_the_error():
 def test_the_amplitude_of_ringing_is_what_is_left_after_eight_changes(factor):
     n = np.arange(40)
     swings = 0.3 * factor**n
-    amplitude = ringing([swings[:, None]], np.ones(1))
+    amplitude = ringing_amplitude([swings[:, None]], np.ones(1))
     assert amplitude == pytest.approx(0.5 * 0.3 * (1 - factor) * abs(factor) ** 7)
 
 
 def test_a_growing_swing_and_one_on_a_slope_ring_and_waves_noise_free_steps_and_short_swings_do_not():
     n = np.arange(60.0)
-    assert ringing([(-1.05) ** n[:, None]], np.ones(1)) > 1.0
-    assert ringing([(0.02 * n + 0.1 * (-1) ** n)[:, None]], np.ones(1)) == pytest.approx(0.09)
+    assert ringing_amplitude([(-1.05) ** n[:, None]], np.ones(1)) > 1.0
+    assert ringing_amplitude([(0.02 * n + 0.1 * (-1) ** n)[:, None]], np.ones(1)) == pytest.approx(0.09)
     for smooth in (np.sin(0.8 * n), np.minimum(n, 30.0), (n > 30).astype(float), np.sin(2.0 * n)):
-        assert ringing([smooth[:, None]], np.ones(1)) == 0.0
-    assert ringing([np.where(n < 7, (-1.0) ** n, 0.0)[:, None]], np.ones(1)) == 0.0
-    assert ringing([np.ones((WINDOW - 2, 1))], np.ones(1)) == 0.0
+        assert ringing_amplitude([smooth[:, None]], np.ones(1)) == 0.0
+    assert ringing_amplitude([np.where(n < 7, (-1.0) ** n, 0.0)[:, None]], np.ones(1)) == 0.0
+    assert ringing_amplitude([np.ones((WINDOW_STEPS - 2, 1))], np.ones(1)) == 0.0
 
 
 def test_excess_counts_what_swings_beyond_the_reference_and_nothing_else():
     t = np.linspace(0, 1, 101)[:, None]
     square = np.floor(4 * t) % 2
-    assert excess(square, square, np.ones(1)) == 0.0
-    assert excess(0.5 * square, square, np.ones(1)) == 0.0  # less is no swing
-    assert excess(square + 5.0 * (np.arange(101) == 40)[:, None], square, np.ones(1)) == 0.0  # nor is a single row
-    assert excess(square + 0.1 * (-1.0) ** np.arange(101)[:, None], square, np.ones(1)) > 4.0
+    assert excess_variation(square, square, np.ones(1)) == 0.0
+    assert excess_variation(0.5 * square, square, np.ones(1)) == 0.0  # less is no swing
+    assert (
+        excess_variation(square + 5.0 * (np.arange(101) == 40)[:, None], square, np.ones(1)) == 0.0
+    )  # nor is a single row
+    assert excess_variation(square + 0.1 * (-1.0) ** np.arange(101)[:, None], square, np.ones(1)) > 4.0
 
 
 def test_a_probe_that_stands_still_is_not_judged():
     rows = np.array([[1.0, 5.0], [3.0, 5.0], [2.0, 5.0]])
-    assert list(ranges_of(rows)) == [2.0, math.inf]
+    assert list(probe_ranges(rows)) == [2.0, math.inf]
 
 
 # real runs ---------------------------------------------------------------------------------------------------------
@@ -204,7 +214,7 @@ def test_a_method_that_cannot_go_by_the_case_is_refused_with_its_reason():
 def test_finished_squares_are_kept_and_reused(tmp_path):
     asked = {"schemes": ["upwind"], "methods": ["euler"], "courants": [0.5, 1.0]}
     first = failure_map(load(closing()), out=tmp_path, **asked)
-    again = Points(tmp_path)
+    again = ResultCache(tmp_path)
     assert failure_map(load(closing()), out=again, **asked) == first
     assert again.reused == len((tmp_path / "points.jsonl").read_text().splitlines()) > 2
 
@@ -218,7 +228,7 @@ def test_points_of_other_sources_are_not_taken_up(tmp_path, monkeypatch):
         study.write_text(study.read_text(encoding="utf-8") + words, encoding="utf-8")
         monkeypatch.setattr(jit, "PACKAGE", package)
         package_hash.cache_clear()
-        with Points(tmp_path) as points:
+        with ResultCache(tmp_path) as points:
             points.get(load(closing()), {}, lambda said=words: made.append(said) or {"value": 1.0})
     package_hash.cache_clear()
     assert made == ["", "# another"]
@@ -228,7 +238,7 @@ def test_what_is_watched_steps_as_any_run_does():
     from fvsolve.studies.outcome import outcome
 
     case = closing()
-    seen, bursts = watched(case)
+    seen, bursts = run_recorded(case)
     plain = outcome(case)
     assert np.array_equal(seen.rows, plain.rows) and np.array_equal(seen.y, plain.y)
     assert sum(map(len, bursts)) > 100
@@ -309,7 +319,7 @@ def test_a_swing_of_the_scene_that_euler_amplifies_is_no_ringing():
 
 def test_the_pace_of_swings_is_the_rows_of_half_a_period():
     n = np.arange(400.0)
-    assert pace(np.sin(2 * np.pi * n / 40), 0.02) == 20.0
-    assert pace(np.exp(-n / 60) * np.sin(2 * np.pi * n / 40), 1e-3) == pytest.approx(20.0, abs=1.0)
-    assert pace(n / 400, 1e-3) == pace(np.minimum(n, 100.0), 1e-3) == math.inf
-    assert pace(n / 400 + 1e-4 * (-1.0) ** n, 1e-3) == math.inf
+    assert turn_interval(np.sin(2 * np.pi * n / 40), 0.02) == 20.0
+    assert turn_interval(np.exp(-n / 60) * np.sin(2 * np.pi * n / 40), 1e-3) == pytest.approx(20.0, abs=1.0)
+    assert turn_interval(n / 400, 1e-3) == turn_interval(np.minimum(n, 100.0), 1e-3) == math.inf
+    assert turn_interval(n / 400 + 1e-4 * (-1.0) ** n, 1e-3) == math.inf

@@ -11,11 +11,11 @@ from reference.scenes import chamber, junction, lake, pipe, scene, valve
 from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
-from fvsolve.studies.linear import matrices
+from fvsolve.studies.linear import state_matrices
+from fvsolve.studies.linear.eigenvalues import eigenvalues_near, poles_of
 from fvsolve.studies.linear.linearise import linearise
-from fvsolve.studies.linear.spectrum import near, poles_of
 from fvsolve.studies.ports.response import response
-from fvsolve.studies.stability import carried, measured
+from fvsolve.studies.stability import real_runs, vector_growth
 from fvsolve.studies.stability.stability import stability
 
 
@@ -49,30 +49,30 @@ def test_of_20000_states_the_slowest_poles_and_the_outputs_are_found_soon():
     values = poles_of(found.a, energy_form(found.at.model))
     exact = (2 * np.arange(1, 10) - 1) * 0.5
     assert [p["frequency"] for p in values.poles()[:9]] == pytest.approx(exact, rel=1e-6)
-    assert not values.complete and "of 20000: those nearest 0" in values.said
+    assert not values.complete and "of 20000: those nearest 0" in values.description
 
 
 def test_outputs_found_by_halves_are_those_of_every_state_tried_alone(monkeypatch):
     case = line(40, ["end.pressure", "main.flow@0.37", "main.pressure@0.1"])
     found = linearise(case).c
-    monkeypatch.setattr(matrices, "seen", lambda at, *more: range(at.model.y_size))
+    monkeypatch.setattr(state_matrices, "visible_states", lambda at, *more: range(at.model.y_size))
     assert np.array_equal(found, linearise(case).c) and np.count_nonzero(found) > 3
 
 
 def test_an_eigenvalue_that_is_too_late_is_left_out_and_said():
     found = linearise(line(900))
     e = energy_form(found.at.model).seen(found.a)
-    assert near(e, 1e-3, latest=0.0).size == 0
+    assert eigenvalues_near(e, 1e-3, latest=0.0).size == 0
 
 
 def test_what_takes_too_long_to_predict_is_refused_with_the_way_out(monkeypatch):
-    monkeypatch.setattr(carried, "LONGEST", -1.0)
+    monkeypatch.setattr(vector_growth, "TIME_LIMIT", -1.0)
     with pytest.raises(FvsolveError, match="600 states and 100 steps take longer.*--set links.NAME.cells=100.*--steps"):
         stability(line(300), steps=100)
 
 
 def test_what_takes_too_long_to_measure_is_left_out_and_said(monkeypatch):
-    monkeypatch.setattr(measured, "LONGEST", -1.0)
+    monkeypatch.setattr(real_runs, "TIME_LIMIT", -1.0)
     (row,) = stability(line(8), steps=100).rows
     assert np.isfinite(row.predicted) and np.isnan(row.measured) and "take longer" in row.left_out["measured"]
 
@@ -87,8 +87,8 @@ def test_runs_that_leave_the_state_where_no_linear_step_fails_are_explained():
 
 def test_auto_is_the_method_it_begins_with_once_and_says_so():
     found = stability(masses(), methods=["auto", "dormand-prince"], steps=50)
-    assert [row.method for row in found.rows] == ["dormand-prince"] and "rodas-5p" in found.said[0]
-    assert stability(masses(), methods=["rk4"], steps=50).said == ()
+    assert [row.method for row in found.rows] == ["dormand-prince"] and "rodas-5p" in found.notes[0]
+    assert stability(masses(), methods=["rk4"], steps=50).notes == ()
 
 
 @pytest.mark.parametrize("arguments, said", [

@@ -32,8 +32,8 @@ from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.solve import initial_state
 from fvsolve.solve.advance import advance, hold
-from fvsolve.studies.linear.linearise import linearise, linearised
-from fvsolve.studies.linear.spectrum import poles_of, spectrum
+from fvsolve.studies.linear.eigenvalues import find_eigenvalues, poles_of
+from fvsolve.studies.linear.linearise import linearise, linearise_at
 
 K = 2.2e9
 TIGHT = {"method": "dormand-prince", "rtol": 1e-9}
@@ -67,7 +67,7 @@ def test_a_chamber_behind_an_orifice_is_as_by_hand():
 def test_poles_are_eigenvalues_of_a_with_their_vectors(case):
     """det(lambda I - A) = 0 and (A - lambda I) v = 0, by singular values of A in units that balance it."""
     a = matrix_balance(linearise(case).a)[0]
-    values = spectrum(a).values
+    values = find_eigenvalues(a).values
     assert len(values) == len(a)
     for pole in values:
         m = pole * np.eye(len(a)) - a
@@ -99,7 +99,7 @@ def test_a_rigid_column_swings_between_two_tanks_at_its_frequency():
               "friction": {"model": "none"}}  # fmt: skip
     found = linearise(scene(nodes, {"c": column}, 1.0, TIGHT))
     omega = math.sqrt(GRAVITY * area(0.5) / 40.0 * (1 / 2.0 + 1 / 1.0))
-    poles = spectrum(found.a).poles()
+    poles = find_eigenvalues(found.a).poles()
     assert [p["frequency"] for p in poles] == pytest.approx([0.0, omega / (2 * math.pi)], abs=1e-9)
     assert abs(poles[1]["damping"]) < 1e-8
 
@@ -120,7 +120,7 @@ def servo(**more):
 def test_a_shut_servo_has_the_natural_frequency_of_its_oil():
     found = linearise(servo())
     stiffness = K * (2e-3**2 / (1e-5 + 2e-3 * 0.1) + 1e-3**2 / (1e-5 + 1e-3 * 0.2))
-    fastest = spectrum(found.a).poles()[-1]
+    fastest = find_eigenvalues(found.a).poles()[-1]
     assert 2 * math.pi * fastest["frequency"] == pytest.approx(math.sqrt(stiffness / 300.0), rel=2e-3)
 
 
@@ -264,7 +264,7 @@ def test_a_matches_the_models_own_jacobian_and_large_ones_are_sparse():
 def test_a_spectrum_too_large_to_be_whole_says_which_poles_it_holds():
     found = linearise(line(900))
     values = poles_of(found.a, energy_form(found.at.model))
-    assert not values.complete and "of 1800" in values.said and "ARPACK" in values.said
+    assert not values.complete and "of 1800" in values.description and "ARPACK" in values.description
     exact = (2 * np.arange(1, 4) - 1) * 0.5
     assert [p["frequency"] for p in values.poles()[:3]] == pytest.approx(exact, rel=1e-6)
 
@@ -312,7 +312,7 @@ def test_a_valve_at_a_drop_of_zero_has_its_laminar_slope_and_none_where_it_is_ba
     assert found.a[0, 0] == pytest.approx(-laminar * K / (RHO * 1e-3), rel=1e-4)
     bare["transition"] = 0.0
     with pytest.raises(FvsolveError, match="b.mass: its slope does not converge.*drop of zero"):
-        linearised(replace(found.at, model=replace(model, tables=model.tables._replace(valves=bare))))
+        linearise_at(replace(found.at, model=replace(model, tables=model.tables._replace(valves=bare))))
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from multiprocessing import active_children
 import pytest
 
 from fvsolve.errors import FvsolveError, RunError
-from fvsolve.studies import many as engine
-from fvsolve.studies.many import many, sized
+from fvsolve.studies import parallel as engine
+from fvsolve.studies.parallel import next_chunk_size, run_tasks
 
 
 class Work:
@@ -41,20 +41,20 @@ def squares(found) -> dict:
 
 def test_all_tasks_are_done_the_first_one_here():
     tasks = [3, 1, 4, 1, 5, 9, 2, 6]
-    found = dict(many(Work(), tasks, jobs=2))
+    found = dict(run_tasks(Work(), tasks, jobs=2))
     assert squares(found) == {k: task * task for k, task in enumerate(tasks)}
     assert found[0][1] == os.getpid() and os.getpid() not in {found[k][1] for k in range(1, 8)}
-    assert dict(many(Work(), tasks)) == {k: (task * task, os.getpid()) for k, task in enumerate(tasks)}
-    assert [*many(Work(), [], jobs=2)] == [] and squares(dict(many(Work(), [7], jobs=2))) == {0: 49}
+    assert dict(run_tasks(Work(), tasks)) == {k: (task * task, os.getpid()) for k, task in enumerate(tasks)}
+    assert [*run_tasks(Work(), [], jobs=2)] == [] and squares(dict(run_tasks(Work(), [7], jobs=2))) == {0: 49}
 
 
 def test_a_process_that_is_killed_costs_its_chunk_which_another_does(tmp_path):
-    found = dict(many(Work({5}, str(tmp_path / "killed")), range(200), jobs=2))
+    found = dict(run_tasks(Work({5}, str(tmp_path / "killed")), range(200), jobs=2))
     assert (tmp_path / "killed").exists() and squares(found) == {k: k * k for k in range(200)}
 
 
 def test_what_kills_every_process_is_lost_and_nothing_else():
-    found = dict(many(Work({7, 30}), range(40), jobs=2))
+    found = dict(run_tasks(Work({7, 30}), range(40), jobs=2))
     assert {k for k, answer in found.items() if answer == ("lost", k)} == {7, 30}
     rest = {*range(40)} - {7, 30}
     assert squares({k: found[k] for k in rest}) == {k: k * k for k in rest}
@@ -64,7 +64,7 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
     """Killed, it can tell nobody; what they do would go on for hours."""
     script = """if True:
         import os, signal, sys, time
-        from fvsolve.studies.many import many
+        from fvsolve.studies.parallel import many
         def said(task):
             if task: open(f"{sys.argv[1]}/{os.getpid()}", "w").close(); time.sleep(60.0)
         if __name__ == "__main__": [*many(said, [0, 1, 2], jobs=2)]"""
@@ -88,83 +88,85 @@ def until(holds) -> None:
 def test_what_a_task_raises_is_raised_here_and_no_process_stays():
     before = {*active_children()}  # of Dask's
     with pytest.raises(ValueError, match="what a task raises"):
-        dict(many(Work(), [1, 2, "fault", 4], jobs=2))
+        dict(run_tasks(Work(), [1, 2, "fault", 4], jobs=2))
     assert not {*active_children()} - before
 
 
 def test_chunks_take_about_a_second_and_grow_no_faster_than_that_can_be_known():
-    assert sized(1, 0.01, 1) == engine.LEAPS
-    assert sized(8, 0.08, 8) == 64 and sized(64, 0.64, 64) == 100
-    assert sized(100, 10.0, 100) == 10 and sized(1, 60.0, 1) == 1
+    assert next_chunk_size(1, 0.01, 1) == engine.MAX_GROWTH
+    assert next_chunk_size(8, 0.08, 8) == 64 and next_chunk_size(64, 0.64, 64) == 100
+    assert next_chunk_size(100, 10.0, 100) == 10 and next_chunk_size(1, 60.0, 1) == 1
 
 
 def test_workers_of_dask_give_what_processes_give(cluster):
     tasks = [*range(50)]
-    found = dict(many(Work(), tasks, dask=cluster.scheduler_address))
+    found = dict(run_tasks(Work(), tasks, dask=cluster.scheduler_address))
     assert squares(found) == {k: k * k for k in tasks}
     assert os.getpid() not in {found[k][1] for k in range(1, 50)}
     with pytest.raises(ValueError, match="what a task raises"):
-        dict(many(Work(), [1, 2, "fault", 4], dask=cluster.scheduler_address))
+        dict(run_tasks(Work(), [1, 2, "fault", 4], dask=cluster.scheduler_address))
 
 
 def test_a_worker_of_dask_that_is_killed_costs_its_chunk(cluster, tmp_path):
-    found = dict(many(Work({5}, str(tmp_path / "killed")), range(60), dask=cluster.scheduler_address))
+    found = dict(run_tasks(Work({5}, str(tmp_path / "killed")), range(60), dask=cluster.scheduler_address))
     assert (tmp_path / "killed").exists() and squares(found) == {k: k * k for k in range(60)}
 
 
 def test_a_scheduler_that_is_not_there_is_named(monkeypatch):
-    cluster_room = pytest.importorskip("fvsolve.studies.cluster")
+    cluster_room = pytest.importorskip("fvsolve.studies.dask_cluster")
     pytest.importorskip("distributed", reason="Dask is an extra")
-    monkeypatch.setattr(cluster_room, "PATIENCE", 0.5)
+    monkeypatch.setattr(cluster_room, "TIMEOUT", 0.5)
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
         for wrong in (address, "nowhere:at:all", "tcp://"):
             said = f'no Dask scheduler answers at "{wrong}": .*. Expected an address such as tcp'
             with pytest.raises(FvsolveError, match=said):
-                dict(many(Work(), [1, 2, 3], dask=wrong))
+                dict(run_tasks(Work(), [1, 2, 3], dask=wrong))
 
 
 def test_a_scheduler_without_workers_is_named(monkeypatch):
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
-    from fvsolve.studies import cluster as room
+    from fvsolve.studies import dask_cluster as room
 
-    monkeypatch.setattr(room, "PATIENCE", 0.5)
+    monkeypatch.setattr(room, "TIMEOUT", 0.5)
     with distributed.LocalCluster(n_workers=0, dashboard_address=":0") as empty:
         with pytest.raises(FvsolveError, match="has no workers. Start workers: dask worker tcp"):
-            dict(many(Work(), [1, 2, 3], dask=empty.scheduler_address))
+            dict(run_tasks(Work(), [1, 2, 3], dask=empty.scheduler_address))
 
 
 def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
-    from fvsolve.studies import cluster as room
+    from fvsolve.studies import dask_cluster as room
 
     own = room.programs()
-    assert room.strange(own) == [] and room.strange({**own, "sources": "other"}) == [
+    assert room.program_differences(own) == [] and room.program_differences({**own, "sources": "other"}) == [
         f"sources other (here {own['sources']})"
     ]
-    assert room.strange(ModuleNotFoundError("No module named 'fvsolve'")) == ["no fvsolve (No module named 'fvsolve')"]
+    assert room.program_differences(ModuleNotFoundError("No module named 'fvsolve'")) == [
+        "no fvsolve (No module named 'fvsolve')"
+    ]
     asked = []
 
-    def versions(said, own=room.versions):
+    def versions(said, own=room.version_numbers):
         asked.append(said)
         return own(said) | ({} if len(asked) == 1 else {"distributed": "2019.1"})  # the first is that of here
 
-    monkeypatch.setattr(room, "versions", versions)
+    monkeypatch.setattr(room, "version_numbers", versions)
     said = (
         r"has other versions, .*: the scheduler has distributed 2019.1 \(here .*worker .*"
         r"\. Install the same versions there"
     )
     with pytest.raises(FvsolveError, match=said):
-        dict(many(Work(), [1, 2, 3], dask=cluster.scheduler_address))
+        dict(run_tasks(Work(), [1, 2, 3], dask=cluster.scheduler_address))
 
 
 def test_a_scheduler_that_goes_away_is_told_and_nobody_waits_for_ever(monkeypatch):
     distributed = pytest.importorskip("distributed", reason="Dask is an extra")
-    from fvsolve.studies import cluster as room
+    from fvsolve.studies import dask_cluster as room
 
-    monkeypatch.setattr(room, "PATIENCE", 3.0)
+    monkeypatch.setattr(room, "TIMEOUT", 3.0)
     made = distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0", processes=False)
-    found = many(Slow(), range(20), dask=made.scheduler_address)
+    found = run_tasks(Slow(), range(20), dask=made.scheduler_address)
     next(found), next(found)
     made.close()
     with pytest.raises(RunError, match=r"lost the Dask scheduler at .*\. Finished runs are kept"):

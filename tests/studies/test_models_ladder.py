@@ -15,8 +15,8 @@ import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import ladder
-from fvsolve.studies.accuracy.models import change_time
-from fvsolve.studies.accuracy.rungs import restated, structures
+from fvsolve.studies.accuracy.model_hierarchy import change_time
+from fvsolve.studies.accuracy.model_levels import level_keys, level_names
 
 LENGTH, DIAMETER, SPEED, FACTOR = 300.0, 0.2, 1000.0, 0.02
 AREA = math.pi / 4 * DIAMETER**2
@@ -46,7 +46,7 @@ def test_slow_changes_need_a_column_alone_and_quick_ones_the_line():
     assert quick.cheapest.name in ("full line", "delay lines") and named(quick, "rigid column").error > 0.1
     assert slow.change_time == pytest.approx(20.0) and quick.change_time == 0.0
     assert slow.travel_time == pytest.approx(LENGTH / SPEED)
-    assert "waves hardly matter" in slow.thumb[1] and "waves matter" in quick.thumb[1]
+    assert "waves hardly matter" in slow.rules[1] and "waves matter" in quick.rules[1]
     coarse = ladder(shutting(0.0, every=0.0437), target=0.01)  # 40 cells err by more behind a jump, lines at no time
     # but its own: no row is there
     assert named(coarse, "full line").error > 0.01 > named(coarse, "delay lines").error  # exact at any step
@@ -74,7 +74,7 @@ def test_errors_are_differences_of_runs_over_the_range_of_the_richest():
 
 
 def test_a_lumped_volume_has_half_the_line_and_its_friction():
-    said = restated(fvsolve.load(shutting(2.0)), "lumped volume")
+    said = level_keys(fvsolve.load(shutting(2.0)), "lumped volume")
     assert said["nodes.gate"]["type"] == "chamber" and said["links.main"]["type"] == "orifice"
     held = 0.5 * AREA * LENGTH * WATER["bulk_modulus"] / (RHO * SPEED**2)  # its compressibility is the line's
     assert said["nodes.gate"]["volume"] == pytest.approx(held)
@@ -84,14 +84,14 @@ def test_a_lumped_volume_has_half_the_line_and_its_friction():
 def test_every_rung_starts_from_the_steady_flow_of_the_line():
     case = fvsolve.load(shutting(2.0))
     start = fvsolve.run(case)["main.flow"][0]
-    for rung in structures(case):
-        assert fvsolve.run(case, restated(case, rung))["main.flow"][0] == pytest.approx(start, rel=1e-6)
+    for rung in level_names(case):
+        assert fvsolve.run(case, level_keys(case, rung))["main.flow"][0] == pytest.approx(start, rel=1e-6)
 
 
 def test_a_chamber_keeps_its_own_volume_beside_the_lines():
     case = shutting(2.0)
     case["nodes"]["gate"] = chamber(0.5)
-    lumped = restated(fvsolve.load(case), "column and volume")["nodes.gate"]["volume"]
+    lumped = level_keys(fvsolve.load(case), "column and volume")["nodes.gate"]["volume"]
     assert lumped == pytest.approx(0.5 + 0.5 * AREA * LENGTH * WATER["bulk_modulus"] / (RHO * SPEED**2))
 
 
@@ -145,10 +145,10 @@ def test_laws_that_differ_beyond_what_changes_are_said_to():
         "log": 1.2e9 / 850.0 * -np.expm1(-(np.array([1e7, 1.01e7]) - AMBIENT) / 1.2e9),  # int dp / rho
     }
     shift = head["linear"][0] - AMBIENT / 850.0 - head["log"][0]
-    assert found.apart.probe == "pump.head" and found.apart.start == pytest.approx(
+    assert found.law_difference.probe == "pump.head" and found.law_difference.start == pytest.approx(
         shift / np.ptp(head["log"]), rel=0.02
     )
-    assert f": {found.apart.start:.3g} is there from the start" in found.thumb[0]
+    assert f": {found.law_difference.start:.3g} is there from the start" in found.rules[0]
 
 
 def test_strain_is_the_change_from_the_start_over_the_stiffness_of_the_pipe():
@@ -156,7 +156,7 @@ def test_strain_is_the_change_from_the_start_over_the_stiffness_of_the_pipe():
     p = fvsolve.run(case, {"fluid.law": "log"}).si("gate.pressure")
     found = ladder(case)
     assert found.strain == pytest.approx(np.max(np.abs(p - p[0])) / (RHO * SPEED**2))
-    assert found.apart.error == pytest.approx(named(found, "full line").error)
+    assert found.law_difference.error == pytest.approx(named(found, "full line").error)
 
 
 def test_bodies_alone_are_one_rung_under_their_own_law():
@@ -165,7 +165,7 @@ def test_bodies_alone_are_one_rung_under_their_own_law():
     for law in ("linear", "log"):
         found = ladder(scene(nodes, links, 1.0, {}, fluid=WATER | {"law": law}))
         assert [(one.name, one.law, one.error) for one in found.rungs] == [("as it is", law, 0.0)]
-        assert found.thumb == [] and found.apart is None
+        assert found.rules == [] and found.law_difference is None
 
 
 def test_ctrl_c_during_a_rung_ends_the_ladder(tmp_path):
@@ -235,11 +235,11 @@ def test_a_rung_is_within_the_target_of_what_many_cells_say_and_not_of_the_case(
     times = int(found.richest.name.split()[0])
     step = {"numerics.step": control["step"] / times} if control else {}
     top = {"links.a.cells": 3 * times, "links.b.cells": 2 * times, "fluid.law": "log", **step}
-    assert off(top) <= 0.01 and off(top) == pytest.approx(found.own, rel=0.5)
-    assert found.own <= 0.01 and found.cheapest.error <= 0.01
+    assert off(top) <= 0.01 and off(top) == pytest.approx(found.own_error, rel=0.5)
+    assert found.own_error <= 0.01 and found.cheapest.error <= 0.01
 
 
 def test_where_no_refinement_reaches_the_target_the_answer_says_what_it_is_worth():
     found = ladder(coarse(), target=1e-5)
-    assert found.own > 1e-5 and f"itself has an error of about {found.own:.2g}" in found.thumb[-1]
-    assert "more than the target" in found.thumb[-1] and found.plain()["own_error"] == found.own
+    assert found.own_error > 1e-5 and f"itself has an error of about {found.own_error:.2g}" in found.rules[-1]
+    assert "more than the target" in found.rules[-1] and found.plain()["own_error"] == found.own_error

@@ -36,7 +36,7 @@ def test_small_waves_need_modes_and_great_ones_cells():
 
 def test_it_says_how_far_from_shallow_a_tank_is():
     found = ladder(rolling(1e-4, level=1.0), target=0.05)
-    (said,) = found.deep
+    (said,) = found.shallow_water
     assert (
         said == "tank: its slowest wave, with k h = 1, is 16 % too fast in shallow water, more than the target: modes "
         "are more accurate for small waves"

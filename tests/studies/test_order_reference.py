@@ -13,9 +13,9 @@ from reference.order_json import call
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError
 from fvsolve.studies import order
-from fvsolve.studies.distance import averaged, differences, end_probes, recorded
+from fvsolve.studies.distance import cell_averages, end_probes, error_norms, recording_keys
 from fvsolve.studies.outcome import outcome
-from fvsolve.studies.truth import truth
+from fvsolve.studies.reference import find_reference
 
 
 @pytest.mark.parametrize("cells", [1, 3, 10, 20, 30, 60, 7, 13, 47])
@@ -24,7 +24,7 @@ def test_averages_over_other_cells_are_those_of_the_same_function(cells):
         return -np.diff(np.cos(3.0 * edges)) / (3.0 * np.diff(edges))
 
     fine, coarse = mean(np.linspace(0.0, 1.0, 61)), mean(np.linspace(0.0, 1.0, cells + 1))
-    found = averaged(fine, cells)
+    found = cell_averages(fine, cells)
     assert found == approx(coarse, abs=1e-13 if 60 % cells == 0 else 1e-8)
     assert found.mean() == approx(fine.mean(), rel=1e-14)
 
@@ -43,15 +43,15 @@ def test_the_finer_run_and_the_exact_solution_find_the_same_errors():
 def test_the_error_that_a_reference_states_of_itself_is_about_its_true_one(case, scheme):
     case = load(case, {"numerics.scheme": scheme})
     keys = {"links.main.cells": 4 * case.links["main"].cells}
-    made = truth(case, recorded(case, keys), opinions=1, judged=True, exact=False)
-    exact = truth(case, recorded(case, keys), opinions=1)
+    made = find_reference(case, recording_keys(case, keys), opinions=1, exclude_own=True, exact=False)
+    exact = find_reference(case, recording_keys(case, keys), opinions=1)
     [cells] = [int(word) for word in made.words.split() if word.isdigit()]
     keys = {"numerics.scheme": "upwind5", "numerics.method": "dormand-prince", "links.main.cells": cells}
-    run = outcome(case, recorded(case, {**keys, "numerics.step": 0.5 * 100.0 / 1000.0 / cells}))
-    true = differences(run, exact)
+    run = outcome(case, recording_keys(case, {**keys, "numerics.step": 0.5 * 100.0 / 1000.0 / cells}))
+    true = error_norms(run, exact)
     for variable in ("pressure", "flow"):
         for norm in ("L1", "L2"):
-            assert 0.3 < made.own[variable][norm] / true[variable][norm] < 6.0, (variable, norm)
+            assert 0.3 < made.own_error[variable][norm] / true[variable][norm] < 6.0, (variable, norm)
 
 
 def test_rows_that_the_reference_cannot_judge_are_marked_and_said():

@@ -26,10 +26,10 @@ from reference.scenes import step as stepped
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.energy.energy import energy
-from fvsolve.studies.energy.pairs import measured
+from fvsolve.studies.energy.energy_balance import energy
+from fvsolve.studies.energy.energy_of_pairs import measure_pairs
 from fvsolve.studies.energy.passivity import closed_pipe, courant_limit, method_claim, passivity, scheme_claim
-from fvsolve.studies.outcome import outcome, prepared
+from fvsolve.studies.outcome import outcome, study_model
 
 study = importlib.import_module("fvsolve.studies.energy.passivity")
 VOLUME, FLOW = 0.2, 1e-3
@@ -59,7 +59,7 @@ def test_other_methods_create_energy_in_a_chamber_by_some_flow(name):
 
     claim, method = method_claim(name), method_named(name)
     assert not claim.any_network
-    together = study.same_time(method.c)
+    together = study.stages_by_time(method.c)
     times = sorted(set(np.round(method.c, 12)))
     matrix = together.T @ study.stage_matrix(method.a, method.b) @ together
     q = together @ np.linalg.eigh(matrix)[1][:, 0]
@@ -87,10 +87,10 @@ def test_others_keep_condition_2_on_it(method):
     """Methods of order two and more see a flow that does not change within a step, and make nothing of it."""
     found = energy(pumped(method, 0.01, 30), port="pump")
     assert found.port.passive
-    assert found.port.margin >= -1e-12 * found.through
+    assert found.port.margin >= -1e-12 * found.throughput
     if method in ("implicit-euler", "implicit-midpoint", "gauss-4"):
         lost = 60 * 0.5 * (0.01 * FLOW) ** 2 * BETA / VOLUME if method == "implicit-euler" else 0.0
-        assert found.remainder[-1] == pytest.approx(lost, abs=1e-9 * found.through)
+        assert found.remainder[-1] == pytest.approx(lost, abs=1e-9 * found.throughput)
 
 
 def swinging(method: str, h_omega: float, steps: int = 60) -> dict:
@@ -127,7 +127,9 @@ def pipe_model(scheme: str, method: str, courant: float, steps: int = 1):
     h = courant * 50.0 / 1000.0
     nodes = {"a": junction(), "b": junction(), "tap": reservoir(1e6)}
     links = {"pipe": pipe("a", "b", 1000.0, 0.3, 1000.0, study.CELLS), "shut": valve("b", "tap", 1e-4, 0.0)}
-    return prepared(scene(nodes, links, steps * h, {"scheme": scheme, "method": method, "step": h, "initial": "rest"}))
+    return study_model(
+        scene(nodes, links, steps * h, {"scheme": scheme, "method": method, "step": h, "initial": "rest"})
+    )
 
 
 def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
@@ -137,7 +139,7 @@ def worst_state(scheme: str, method: str, courant: float) -> np.ndarray:
     a, s = closed_pipe(scheme)
     b = courant * study.pipe_operator(scheme)
     r = stability_function(study.method_of(method))
-    up, down = (study.of_matrix([float(x) for x in p.coefficients], b) for p in (r.numerator, r.denominator))
+    up, down = (study.matrix_polynomial([float(x) for x in p.coefficients], b) for p in (r.numerator, r.denominator))
     assert a.shape == s.shape
     return np.linalg.solve(s, np.linalg.svd(np.linalg.solve(down, up))[2][0])
 
@@ -198,7 +200,9 @@ def test_the_tool_names_the_pairs_that_break_passivity():
 
 def test_a_case_is_tried_by_pairs_and_those_that_create_energy_are_named():
     case = fvsolve.load(swinging("rk4", 0.5))
-    rows = {row["method"]: row for row in measured(case, None, ["euler", "implicit-midpoint", "implicit-euler"], "sea")}
+    rows = {
+        row["method"]: row for row in measure_pairs(case, None, ["euler", "implicit-midpoint", "implicit-euler"], "sea")
+    }
     assert rows["euler"]["creates"]
     assert not rows["implicit-euler"]["creates"]
     assert not rows["implicit-midpoint"]["creates"]

@@ -9,9 +9,9 @@ from model.test_resolution import station
 from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.studies.levels import finer
-from fvsolve.studies.peaks import peak_errors
-from fvsolve.studies.unresolved import differing
+from fvsolve.studies.peak_error import peak_errors
+from fvsolve.studies.refinement import refined_keys
+from fvsolve.studies.unresolved import differing_events
 
 
 @pytest.mark.parametrize(
@@ -21,7 +21,7 @@ def test_bands_of_shipped_cases_hold_what_four_times_the_resolution_gives(name: 
     case = fvsolve.load(name)
     said = peak_errors(fvsolve.run(case), case)
     peaks = said["peaks"]
-    fine = fvsolve.run(case, set=finer(case, 4.0) | {"output.every": case.output.every / 4.0})
+    fine = fvsolve.run(case, set=refined_keys(case, 4.0) | {"output.every": case.output.every / 4.0})
     for probe, one in peaks.items():
         for side, value in (("minimum", fine.extremes[probe].minimum), ("maximum", fine.extremes[probe].maximum)):
             assert abs(value - one[side]["value"]) <= one[side]["error"], (probe, side)
@@ -59,7 +59,7 @@ def test_the_command_says_how_far_peaks_and_verdicts_are_off(fvs, tmp_path, monk
     peak, verdict = said["peaks"]["gate.pressure"]["maximum"], said["verdicts"][0]
     assert peak["value"] == said["extremes"]["gate.pressure"]["maximum"]
     assert peak["error"] <= verdict["error"] <= 0.01 * verdict["value"]  # of the whole pipe, whose places differ more
-    fine = fvsolve.run(case, set=finer(fvsolve.load(case), 8.0))
+    fine = fvsolve.run(case, set=refined_keys(fvsolve.load(case), 8.0))
     assert abs(fine.extremes["gate.pressure"].maximum - peak["value"]) <= peak["error"]
     assert abs(fine.verdicts[0].value - verdict["value"]) <= verdict["error"]
     assert fvsolve.open_run(tmp_path / "runs" / "scene").verdicts[0].error == verdict["error"]
@@ -73,13 +73,16 @@ def test_the_command_says_how_far_peaks_and_verdicts_are_off(fvs, tmp_path, monk
 
 def test_a_finer_case_is_finer_in_all_that_has_a_resolution() -> None:
     case = fvsolve.load(throttled())
-    assert finer(case, 2.0) == {"links.main.cells": 60}
+    assert refined_keys(case, 2.0) == {"links.main.cells": 60}
     stepped = fvsolve.load(case, {"numerics.step": "2 ms"})
-    assert finer(stepped, 2.0) == {"links.main.cells": 60, "numerics.step": 0.001}
+    assert refined_keys(stepped, 2.0) == {"links.main.cells": 60, "numerics.step": 0.001}
     line = fvsolve.load(case, {"numerics.pipe_model": "delay-line", "numerics.rtol": 1e-5})
-    assert finer(line, 0.5) == {"numerics.rtol": 4e-5, "numerics.delay_tolerance": 0.02, "links.main.cells": 15}
+    assert refined_keys(line, 0.5) == {"numerics.rtol": 4e-5, "numerics.delay_tolerance": 0.02, "links.main.cells": 15}
     line = fvsolve.load(case, {"numerics.pipe_model": "delay-line", "numerics.courant": 0.9})
-    assert finer(line, 2.0) == {"numerics.courant": 0.45, "numerics.delay_tolerance": 0.005}  # by which its steps go
+    assert refined_keys(line, 2.0) == {
+        "numerics.courant": 0.45,
+        "numerics.delay_tolerance": 0.005,
+    }  # by which its steps go
 
 
 def two_pipes(limits: dict) -> dict:
@@ -100,7 +103,7 @@ def test_a_trough_that_finer_cells_deepen_leaves_a_limit_open() -> None:
     case = two_pipes({"low": {"on": "end", "quantity": "pressure", "minimum": "6.3 bar"}})
     said = peak_errors(fvsolve.run(case), fvsolve.load(case))
     peak, (verdict,) = said["peaks"]["end.pressure"]["minimum"], said["verdicts"]
-    fine = fvsolve.run(case, set=finer(fvsolve.load(case), 8.0)).extremes["end.pressure"].minimum
+    fine = fvsolve.run(case, set=refined_keys(fvsolve.load(case), 8.0)).extremes["end.pressure"].minimum
     assert said["extremes"]["end.pressure"]["t_min"] == 0.0 and fine < 6.2e5 < verdict["limit"] < peak["value"]
     assert peak["value"] - fine < peak["error"] and verdict["state"] == "open"
 
@@ -183,7 +186,7 @@ def test_a_pulse_that_no_cell_shows_is_not_known() -> None:
 def test_events_that_differ_between_resolutions_are_named() -> None:
     runs = {times: Finished([{"name": "nrv"}] * many + [{"name": "pump"}])
             for times, many in ((0.5, 2), (1.0, 2), (2.0, 150))}  # fmt: skip
-    assert differing(runs) == ["events differ between resolutions: nrv (2, 2, 150)"]
+    assert differing_events(runs) == ["events differ between resolutions: nrv (2, 2, 150)"]
 
 
 class Finished:

@@ -13,8 +13,8 @@ from fvsolve.schemes import LIMITERS, branches
 from fvsolve.step_limits.advection_limit import advection_limit
 from fvsolve.step_limits.symbol import WEIGHTS, weights_of
 from fvsolve.steppers import METHODS
-from fvsolve.studies.stability.limited import limited_limit, measured, monotone_limit, starts
-from fvsolve.studies.stability.periodic import Circle, measured_limit, measured_limits
+from fvsolve.studies.stability.limited_schemes import limited_limit, measured_courant, monotone_limit, start_fields
+from fvsolve.studies.stability.periodic_limits import PeriodicPipe, measured_limit, measured_limits
 
 EXPLICIT = [name for name, one in METHODS.items() if name == one.name and one.explicit]
 
@@ -45,7 +45,7 @@ def test_a_run_is_what_numpy_makes_of_the_same_steps(scheme):
         one = wanted + courant * rate(wanted)
         two = 0.75 * wanted + 0.25 * (one + courant * rate(one))
         wanted = wanted / 3 + 2 / 3 * (two + courant * rate(two))
-    assert Circle(scheme, "ssp-rk3", cells).run(u, courant, steps) == pytest.approx(wanted, rel=1e-11, abs=1e-11)
+    assert PeriodicPipe(scheme, "ssp-rk3", cells).run(u, courant, steps) == pytest.approx(wanted, rel=1e-11, abs=1e-11)
 
 
 @pytest.mark.parametrize("scheme", WEIGHTS)
@@ -114,8 +114,8 @@ def test_weno_stencils_with_their_ideal_weights_are_upwind5():
 @pytest.mark.parametrize("method", ["euler", "ssp-rk3"])
 def test_total_variation_does_not_grow_up_to_the_bound(limiter, bound, method):
     assert monotone_limit(limiter, method) == pytest.approx(bound)
-    circle = Circle("muscl", method, 50, limiter)
-    for u in starts(50).values():
+    circle = PeriodicPipe("muscl", method, 50, limiter)
+    for u in start_fields(50).values():
         for _ in range(200):
             before, u = np.abs(np.diff(u, append=u[:1])).sum(), circle.run(u, bound, 1)
             assert np.abs(np.diff(u, append=u[:1])).sum() <= before * (1 + 1e-12)
@@ -123,8 +123,8 @@ def test_total_variation_does_not_grow_up_to_the_bound(limiter, bound, method):
 
 def test_van_leers_limiter_with_euler_has_no_sharp_limit():
     """0.67, 0.56, 0.52 of the issue: 50 cells, one wave, 500, 5 000 and 50 000 steps; above the bound 1/2."""
-    u = starts(50)["wave"]
-    found = [measured("muscl", "van-leer", "euler", u, n) for n in (500, 5000, 50000)]
+    u = start_fields(50)["wave"]
+    found = [measured_courant("muscl", "van-leer", "euler", u, n) for n in (500, 5000, 50000)]
     assert found == pytest.approx([0.67, 0.57, 0.52], abs=0.01) and found[-1] > 0.5
 
 

@@ -9,7 +9,7 @@ from scipy.stats import qmc
 import fvsolve
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.studies import sweep
-from fvsolve.studies.plans import of_file, ranges, sampled
+from fvsolve.studies.sampling import key_ranges, points_from_file, sample_points
 
 RANGES = {"links.valve.area": ["10 cm2", 0.002], "links.valve.opening.start": [0.5, "1 s"], "nodes.outfall.pressure":
           ["0 barg", "1 barg"]}  # fmt: skip
@@ -21,7 +21,7 @@ def case():
 
 
 def test_ends_of_ranges_are_read_in_their_units_pressures_absolute(case):
-    assert ranges(case, RANGES) == {
+    assert key_ranges(case, RANGES) == {
         "links.valve.area": (0.001, 0.002), "links.valve.opening.start": (0.5, 1.0),
         "nodes.outfall.pressure": (101325.0, 201325.0),
     }  # fmt: skip
@@ -29,14 +29,16 @@ def test_ends_of_ranges_are_read_in_their_units_pressures_absolute(case):
 
 @pytest.mark.parametrize("kind", ["sobol", "lhs"])
 def test_a_sample_fills_its_ranges_more_evenly_than_chance_and_its_seed_says_which(case, kind):
-    found = sampled(case, RANGES, f"{kind}:64", seed=3)
+    found = sample_points(case, RANGES, f"{kind}:64", seed=3)
     values = np.array([[*one.values()] for one in found])
-    low, high = np.array([*ranges(case, RANGES).values()]).T
+    low, high = np.array([*key_ranges(case, RANGES).values()]).T
     unit = (values - low) / (high - low)
     assert values.shape == (64, 3) and unit.min() >= 0.0 and unit.max() <= 1.0
     assert qmc.discrepancy(unit) < 0.5 * qmc.discrepancy(np.random.default_rng(0).random((64, 3)))
     assert all(np.array_equal(np.sort(np.floor(64 * column)), np.arange(64)) for column in unit.T)  # one in each 64th
-    assert sampled(case, RANGES, f"{kind}:64", seed=3) == found != sampled(case, RANGES, f"{kind}:64", seed=4)
+    assert (
+        sample_points(case, RANGES, f"{kind}:64", seed=3) == found != sample_points(case, RANGES, f"{kind}:64", seed=4)
+    )
 
 
 def test_all_that_is_wrong_of_ranges_is_said_at_once(case):
@@ -44,7 +46,7 @@ def test_all_that_is_wrong_of_ranges_is_said_at_once(case):
              "numerics.scheme": ["muscl", "weno5"], "links.main.diameter": [0.1, "1 kg"], "links.main.lengt": [1, 2],
              "nodes.lake.head": [1, 2, 3], "links.main.wave_speed": [-1.0, 1000.0]}  # fmt: skip
     with pytest.raises(CaseError) as raised:
-        ranges(case, wrong)
+        key_ranges(case, wrong)
     said = str(raised.value)
     assert "8 faults" in said and "the range from 0.002 to 0.001 is reversed" in said
     assert 'the range from "900 m" to 900 is empty' in said and '"1 kg" is a mass; expected a length' in said
@@ -62,13 +64,13 @@ def test_all_that_is_wrong_of_ranges_is_said_at_once(case):
 @pytest.mark.parametrize("sample", ["sobol", "sobol:0", "sobol:-3", "halton:8", "lhs:1e3", "sobol:99999999999"])
 def test_a_sample_that_is_none_is_named(case, sample):
     with pytest.raises(FvsolveError, match="Expected sobol:N or lhs:N with N runs"):
-        sampled(case, RANGES, sample, 0)
+        sample_points(case, RANGES, sample, 0)
 
 
 def read(case, tmp_path, text: str | bytes) -> list[dict]:
     path = tmp_path / "points.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return of_file(path, case, case.raw)
+    return points_from_file(path, case, case.raw)
 
 
 PLAIN = [

@@ -16,7 +16,7 @@ from pytest import approx
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.numbers.polynomial import Polynomial
 from fvsolve.studies import positive_real
-from fvsolve.studies.ports.rational import places
+from fvsolve.studies.ports.rational import locate_roots
 
 S = [1, 0]  # s itself
 
@@ -284,7 +284,7 @@ ROUTH = {  # rows of Routh's array that begin with, or hold nothing but, zeros
 @pytest.mark.parametrize("name", ROUTH)
 def test_half_planes_are_counted_where_rows_of_routh_degenerate(name):
     p, wanted = ROUTH[name]
-    found = places(Polynomial(p[::-1]))
+    found = locate_roots(Polynomial(p[::-1]))
     assert (found.right, found.axis, found.left) == wanted
 
 
@@ -296,7 +296,7 @@ def test_half_planes_are_counted_where_rows_of_routh_degenerate(name):
 def test_half_planes_of_products_of_known_roots(real, pairs):
     p = times([1], *([1, -r] for r in real), *([1, -2 * a, a * a + b * b] for a, b in pairs))
     where = [*real, *(a for a, _ in pairs for _ in range(2))]
-    found = places(Polynomial(p[::-1]))
+    found = locate_roots(Polynomial(p[::-1]))
     assert (found.right, found.axis, found.left) == (
         sum(x > 0 for x in where), sum(x == 0 for x in where), sum(x < 0 for x in where))  # fmt: skip
 

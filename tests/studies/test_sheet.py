@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.output.summary import plain
-from fvsolve.studies.sheet import Column, Plain, Sheet, columns, text
+from fvsolve.studies.result_table import Column, PlainData, ResultTable, cell_text, columns
 
 COLUMNS = (Column("name"), Column("step", "step [s]", ".3g"), Column("whole", words=lambda row: f"<{row['name']}>"))
 ROWS = [{"name": "a, b", "step": np.float64(1.0 / 3.0), "whole": 1}, {"name": "c", "step": math.nan, "whole": None}]
 
 
 def test_a_file_reads_back_to_the_last_bit_and_has_nothing_for_what_is_not_known(tmp_path):
-    with open(Sheet(COLUMNS, ROWS).write(tmp_path / "sheet.csv"), encoding="utf-8", newline="") as file:
+    with open(ResultTable(COLUMNS, ROWS).write(tmp_path / "sheet.csv"), encoding="utf-8", newline="") as file:
         header, first, second = csv.reader(file)
     assert header == ["name", "step [s]", "whole"]
     assert first[0] == "a, b" and float(first[1]) == 1.0 / 3.0
@@ -25,15 +25,15 @@ def test_a_file_reads_back_to_the_last_bit_and_has_nothing_for_what_is_not_known
 
 
 def test_json_and_frame_have_the_keys_and_the_terminal_the_words():
-    made = Sheet(COLUMNS, [ROWS[0], {"name": "c"}])
+    made = ResultTable(COLUMNS, [ROWS[0], {"name": "c"}])
     assert json.loads(json.dumps(made.plain(), allow_nan=False))[1] == {"name": "c", "step": None, "whole": None}
-    assert made.listed() == {"name": ["a, b", "c"], "step": [1.0 / 3.0, None], "whole": [1, None]}
+    assert made.table_columns() == {"name": ["a, b", "c"], "step": [1.0 / 3.0, None], "whole": [1, None]}
     assert made.words() == (["name", "step [s]", "whole"], [["a, b", "0.333", "<a, b>"], ["c", "-", "<c>"]])
     assert [one.title for one in columns(step="step [s]", mark="mark")] == ["step [s]", "mark"]
 
 
 def test_values_in_words():
-    assert [text(one, ".2g") for one in (None, True, False, "none", 0.123, 7)] == [
+    assert [cell_text(one, ".2g") for one in (None, True, False, "none", 0.123, 7)] == [
         "-",
         "yes",
         "no",
@@ -44,7 +44,7 @@ def test_values_in_words():
 
 
 @dataclass(frozen=True)
-class Pole(Plain):
+class Pole(PlainData):
     at: complex
     limit: float
 

@@ -16,14 +16,14 @@ from fvsolve.cli import main
 from fvsolve.errors import FvsolveError
 from fvsolve.model.energy_norm import energy_form
 from fvsolve.steppers import METHODS, method_named, stability_function
-from fvsolve.studies.linear.frozen import frozen
-from fvsolve.studies.linear.linearise import linearise, linearised
-from fvsolve.studies.stability.bounds import field_of_values, region_limit
-from fvsolve.studies.stability.carried import Sparse, stepping
-from fvsolve.studies.stability.growth import DenseGrowth, growth, powers, step_matrix
-from fvsolve.studies.stability.measured import Runs
+from fvsolve.studies.linear.linearise import linearise, linearise_at
+from fvsolve.studies.linear.operating_point import operating_point
+from fvsolve.studies.stability.growth_method import predicted_limit
+from fvsolve.studies.stability.power_growth import DenseGrowth, matrix_powers, power_growth, step_matrix
+from fvsolve.studies.stability.real_runs import RealRuns
+from fvsolve.studies.stability.region_bounds import field_of_values, region_limit
 from fvsolve.studies.stability.stability import stability
-from fvsolve.studies.stability.system import predicted
+from fvsolve.studies.stability.vector_growth import VectorGrowth, step_function
 
 NUMERICS = {"method": "rk4", "step": 1e-3}
 IMPLICIT = ["implicit-euler", "trapezoid", "gauss-4", "radau-iia-5", "lobatto-iiic-4", "tr-bdf2", "rodas-5p"]
@@ -68,17 +68,17 @@ def chambers(count, scheme="upwind"):
 
 def matrix(case):
     """J of a case in its energy norm."""
-    at = frozen(case)
-    return energy_form(at.model).seen(linearised(at).a)
+    at = operating_point(case)
+    return energy_form(at.model).seen(linearise_at(at).a)
 
 
 def test_powers_are_powers_and_hold_the_last():
     m = np.array([[0.9, 0.3], [-0.2, 1.0]])
     for steps in (1, 2, 33, 999, 1000, 1024):
-        found = dict(powers(m, steps))
+        found = dict(matrix_powers(m, steps))
         assert max(found) == steps and set(range(1, min(steps, 64) + 1)) <= set(found)
         assert all(np.allclose(p, np.linalg.matrix_power(m, n), rtol=1e-10) for n, p in found.items())
-        assert set(dict(powers(m, steps, few=True))) <= set(found)
+        assert set(dict(matrix_powers(m, steps, few=True))) <= set(found)
 
 
 @pytest.mark.parametrize("name", [name for name, m in METHODS.items() if name == m.name])
@@ -105,9 +105,9 @@ def test_one_implicit_step_of_the_program_is_the_step_matrix(name):
 
 def one_step_error(case, name, h):
     """The program's step of unit vectors against R(h J), relative, in the energy norm."""
-    at = frozen(case)
-    a = linearised(at).a
-    runs = Runs(at, name, energy_form(at.model), a=a)
+    at = operating_point(case)
+    a = linearise_at(at).a
+    runs = RealRuns(at, name, energy_form(at.model), a=a)
     size = 1e-6
     columns = []
     for unit in np.eye(len(a)):
@@ -120,11 +120,11 @@ def one_step_error(case, name, h):
 
 @pytest.mark.parametrize("steps", [100, 1000])
 def test_limits_of_one_mode_are_those_of_its_powers(steps):
-    decay = predicted(DenseGrowth(method_named("euler"), np.array([[-5.0]]), steps))
+    decay = predicted_limit(DenseGrowth(method_named("euler"), np.array([[-5.0]]), steps))
     assert decay.step == pytest.approx((1 + 1000 ** (1 / steps)) / 5.0, rel=2e-4)
-    swing = predicted(DenseGrowth(method_named("euler"), np.array([[0.0, 3.0], [-3.0, 0.0]]), steps))
+    swing = predicted_limit(DenseGrowth(method_named("euler"), np.array([[0.0, 3.0], [-3.0, 0.0]]), steps))
     assert swing.step == pytest.approx(math.sqrt(1000 ** (2 / steps) - 1) / 3.0, rel=2e-4)
-    assert predicted(DenseGrowth(method_named("radau-iia-5"), np.array([[-5.0]]), steps)).step == math.inf
+    assert predicted_limit(DenseGrowth(method_named("radau-iia-5"), np.array([[-5.0]]), steps)).step == math.inf
 
 
 def test_the_greatest_growth_is_not_missed_between_the_powers_looked_at():
@@ -134,7 +134,7 @@ def test_the_greatest_growth_is_not_missed_between_the_powers_looked_at():
         for _ in range(400):
             power = power @ m
             most = max(most, np.linalg.norm(power, 2))
-        found = growth(m, 400)
+        found = power_growth(m, 400)
         assert 0.99 * most <= found.size <= most * (1 + 1e-9)
         assert np.linalg.norm(np.linalg.matrix_power(m, found.steps) @ found.start) == pytest.approx(
             found.size, rel=1e-6
@@ -145,7 +145,7 @@ def test_an_inflow_pipe_grows_at_courant_numbers_far_below_what_its_eigenvalues_
     for cells in (30, 100):
         e = 10.0 * cells * (np.eye(cells, k=-1) - np.eye(cells))
         euler = method_named("euler")
-        found = predicted(DenseGrowth(euler, e, 400)).step * 10.0 * cells
+        found = predicted_limit(DenseGrowth(euler, e, 400)).step * 10.0 * cells
         assert found == pytest.approx(by_hand(cells, 400), rel=1e-3)
         assert found < 1.15
         assert region_limit(euler, np.diag(e)) * 10.0 * cells == pytest.approx(2.0, rel=1e-6)
@@ -174,7 +174,8 @@ def test_vectors_carried_along_find_the_limit_of_squaring():
     for case, name in ((through(20, "upwind"), "euler"), (shut(20, "upwind5"), "rk4")):
         e, method = matrix(case), method_named(name)
         exact, found = (
-            predicted(kind(method, part, 300)).step for kind, part in ((DenseGrowth, e), (Sparse, csr_array(e)))
+            predicted_limit(kind(method, part, 300)).step
+            for kind, part in ((DenseGrowth, e), (VectorGrowth, csr_array(e)))
         )
         assert found == pytest.approx(exact, rel=5e-3)
 
@@ -185,7 +186,7 @@ def test_a_vector_carried_along_takes_the_same_step_as_the_matrix(name):
 
     e, rng = matrix(shut(6, "upwind5")), np.random.default_rng(2)
     v = rng.standard_normal((e.shape[0], 2))
-    found = stepping(method_named(name), 0.01, csr_array(e))(v)
+    found = step_function(method_named(name), 0.01, csr_array(e))(v)
     assert found == pytest.approx(step_matrix(method_named(name), 0.01 * e) @ v, abs=1e-11)
 
 

@@ -11,17 +11,17 @@ import fvsolve
 from fvsolve import studies
 from fvsolve.errors import FvsolveError
 from fvsolve.steppers.tableau import method_named
-from fvsolve.studies.linear.frozen import stopped
-from fvsolve.studies.stability.delayed import Delayed
-from fvsolve.studies.stability.delayed_row import DelayedLimits
-from fvsolve.studies.stability.delayed_runs import DelayedRuns, entries
+from fvsolve.studies.linear.operating_point import with_held_schedules
+from fvsolve.studies.stability.delay_line_row import DelayLineLimits
+from fvsolve.studies.stability.delay_line_runs import DelayLineRuns, read_history
+from fvsolve.studies.stability.delay_line_system import DelayLineSystem
 
 
-def system(case: dict, method: str, h: float) -> Delayed:
+def system(case: dict, method: str, h: float) -> DelayLineSystem:
     """Steps of h [s] of a case as a linear system."""
     case["numerics"] |= {"method": method, "step": h}
     model = fvsolve.build(fvsolve.load(case))
-    return Delayed(stopped(model, 0.0), method_named(method), h)
+    return DelayLineSystem(with_held_schedules(model, 0.0), method_named(method), h)
 
 
 @pytest.mark.parametrize("method", ["euler", "rk4", "ssp-rk3", "trapezoid", "gauss-4"])
@@ -32,15 +32,17 @@ def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
     case = {"vessel": vessel(method, 0.01, volume=0.15), "short": short("delay-line"), "rough": rough}[scene]
     one = system(case, method, 0.01)
     x, before = (part[..., :1] * 1e-6 for part in one.starts())  # of which all moves
-    runs = DelayedRuns.__new__(DelayedRuns)
+    runs = DelayLineRuns.__new__(DelayLineRuns)
     runs.steps = 40
-    moved, still = (runs.begun(one, width * x[:, 0], width * before[..., 0]) for width in (1.0, 0.0))
+    moved, still = (runs.start_run(one, width * x[:, 0], width * before[..., 0]) for width in (1.0, 0.0))
     for run in (moved, still):
         run.run(40.0)
-    _, _, x, before = one.carried(x, before, 40, np.inf)
-    found = entries(moved.slate.past, one) - entries(still.slate.past, one)
+    _, _, x, before = one.propagate(x, before, 40, np.inf)
+    found = read_history(moved.slate.past, one) - read_history(still.slate.past, one)
     assert found == pytest.approx(before[..., 0], abs=1e-6 * np.abs(before).max())
-    assert moved.now[one.kept] - still.now[one.kept] == pytest.approx(x[:, 0], abs=1e-6 * np.abs(x).max(initial=0.0))
+    assert moved.now[one.states] - still.now[one.states] == pytest.approx(
+        x[:, 0], abs=1e-6 * np.abs(x).max(initial=0.0)
+    )
 
 
 @pytest.mark.parametrize("method", ["euler", "implicit-midpoint"])
@@ -55,7 +57,7 @@ def test_runs_fail_at_the_step_that_is_predicted(method):
 def test_what_check_tells_to_grow_has_a_limit_below_the_step():
     """Of the runs that tests/limits/test_lines.py holds to what `check` tells, with steps of 10 ms for 30 s."""
     for method, volume, grows in (("euler", 0.6, True), ("ssp-rk3", 0.15, True), ("rk4", 0.15, False)):
-        made = DelayedLimits(
+        made = DelayLineLimits(
             fvsolve.load(vessel(method, 0.01, 30.0, volume)), "upwind", method_named(method), 3000, 30.0
         )
         assert made.fails(0.01) == grows

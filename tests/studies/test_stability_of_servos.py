@@ -9,9 +9,9 @@ import pytest
 from reference.scenes import area, chamber, reservoir, scene, valve
 
 import fvsolve
-from fvsolve.studies.linear.frozen import frozen
-from fvsolve.studies.stability.measured import Runs
-from fvsolve.studies.stability.stability import Side, stability
+from fvsolve.studies.linear.operating_point import operating_point
+from fvsolve.studies.stability.real_runs import RealRuns
+from fvsolve.studies.stability.stability import LinearSystem, stability
 
 ARM = Path(__file__).parents[1] / "reference" / "servo-arm.toml"
 IMPLICIT = {"numerics.method": "radau-iia-5"}
@@ -22,12 +22,12 @@ THETA = "0 | 0 0\n 1 | 3/5 2/5\n ---\n | 3/5 2/5"  # |R| = 1.5 at infinity: fail
 @pytest.fixture(scope="module")
 def arm():
     """The arm in motion: hoses at hardly any drop, whose laws stay linear for 1e-11 of what pressures are."""
-    return Side(frozen(ARM, IMPLICIT, 0.7))
+    return LinearSystem(operating_point(ARM, IMPLICIT, 0.7))
 
 
 def runs(side, method):
     """Runs of a method, without an end in time."""
-    found = Runs(side.at, method, side.form, a=side.linear.a)
+    found = RealRuns(side.at, method, side.form, a=side.linear.a)
     found.latest = np.inf
     return found
 

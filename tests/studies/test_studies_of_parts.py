@@ -8,26 +8,32 @@ from reference import pump_trip
 from reference.folders import CASES
 
 import fvsolve
-from fvsolve.cli.order import unit
+from fvsolve.cli.order import variable_unit
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.accuracy import afford, models
-from fvsolve.studies.accuracy.afford import affordable
+from fvsolve.studies.accuracy import model_hierarchy, time_budget
+from fvsolve.studies.accuracy.chart_settings import (
+    CoarseRun,
+    chart_settings,
+    default_curve,
+    run_work,
+    unsupported_schemes,
+)
 from fvsolve.studies.accuracy.fit import fit
-from fvsolve.studies.accuracy.judge import plausible
-from fvsolve.studies.accuracy.models import change_time
-from fvsolve.studies.accuracy.plan import Coarse, default_curve, left_out, settings, work
-from fvsolve.studies.accuracy.rungs import Unsayable, restated
+from fvsolve.studies.accuracy.model_hierarchy import change_time
+from fvsolve.studies.accuracy.model_levels import NotApplicable, level_keys
+from fvsolve.studies.accuracy.order_study import check_order
+from fvsolve.studies.accuracy.time_budget import affordable_plan
 from fvsolve.studies.accuracy.timing import GIVEN_UP
-from fvsolve.studies.failure import watched as watched_runs
-from fvsolve.studies.failure.eigen_limit import spectrum
-from fvsolve.studies.failure.verdict import SKIPPED, Measures, verdict
+from fvsolve.studies.failure import step_recording as watched_runs
+from fvsolve.studies.failure.eigenvalue_limit import eigenvalues_of
+from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, verdict
 from fvsolve.studies.linear.linearise import linearise
 from fvsolve.studies.outcome import outcome
-from fvsolve.studies.points import Points
+from fvsolve.studies.reference import candidates, find_reference
+from fvsolve.studies.result_cache import ResultCache
 from fvsolve.studies.stability import stability as room
-from fvsolve.studies.stability.carried import TooLarge
 from fvsolve.studies.stability.stability import stability
-from fvsolve.studies.truth import candidates, truth
+from fvsolve.studies.stability.vector_growth import TooLarge
 
 
 def case(name, **numerics):
@@ -66,7 +72,7 @@ def test_a_limited_scheme_is_measured_where_its_frozen_weights_take_too_long(mon
 
     few = case("surge-tank", links__tunnel__type="pipe", links__tunnel__wave_speed=1000.0, links__tunnel__cells=20)
     known = stability(few, ["muscl"], ["ssp-rk3"], steps=100).rows[0].measured
-    monkeypatch.setattr(room, "predicted", never)
+    monkeypatch.setattr(room, "predicted_limit", never)
     (row,) = stability(few, ["muscl"], ["ssp-rk3"], steps=100).rows
     assert not row.frozen and row.left_out["frozen weights"] == "too large"
     assert row.measured == pytest.approx(known, rel=0.2)
@@ -80,7 +86,7 @@ def test_a_limited_scheme_is_measured_where_its_frozen_weights_take_too_long(mon
     ("main.gauge_pressure@0.5", "Pa"), ("pump.speed", "-"),
 ])  # fmt: skip
 def test_every_probe_has_the_unit_of_its_part(variable, said):
-    assert unit(variable) == said
+    assert variable_unit(variable) == said
 
 
 @pytest.mark.parametrize(("name", "states"), [
@@ -108,20 +114,20 @@ def test_check_names_the_pipe_that_sets_the_step_and_knows_what_cavities_cost():
 
 def test_an_order_that_would_take_long_begins_on_fewer_cells_and_says_so(monkeypatch, tmp_path):
     few = case("relief-on-closed-main", links__main__cells=64)
-    whole = affordable(few, None, None, 3, None, "auto", None)
+    whole = affordable_plan(few, None, None, 3, None, "auto", None)
     assert [level.cells for level in whole.levels] == [64, 128, 256] and "begun" not in whole.words
-    monkeypatch.setattr(afford, "LONGEST", 1e-6)
-    made = affordable(few, None, None, 3, None, "auto", Points(tmp_path))
+    monkeypatch.setattr(time_budget, "CPU_BUDGET", 1e-6)
+    made = affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path))
     assert [level.cells for level in made.levels] == [8, 16, 32] and "starts with 8 of 64 cells" in made.words
-    assert affordable(few, None, None, 3, 50, "auto", None).levels[0].cells == 50
+    assert affordable_plan(few, None, None, 3, 50, "auto", None).levels[0].cells == 50
     monkeypatch.undo()
-    assert affordable(few, None, None, 3, None, "auto", Points(tmp_path)) == made  # a study that goes on
+    assert affordable_plan(few, None, None, 3, None, "auto", ResultCache(tmp_path)) == made  # a study that goes on
 
 
 def test_errors_that_fall_quicker_than_scheme_and_method_can_make_them_are_said_to_show_no_order():
     sizes = [2.0**-k for k in range(5)]
-    assert "not the order of the method" in plausible(fit(sizes, [h**8 for h in sizes]), 4.0).note
-    assert not plausible(fit(sizes, [h**4 for h in sizes]), 4.0).note
+    assert "not the order of the method" in check_order(fit(sizes, [h**8 for h in sizes]), 4.0).note
+    assert not check_order(fit(sizes, [h**4 for h in sizes]), 4.0).note
 
 
 def test_with_cavities_a_reference_is_finer_by_the_scheme_that_follows_them():
@@ -133,11 +139,11 @@ def test_with_cavities_a_reference_is_finer_by_the_scheme_that_follows_them():
 
 
 def test_a_chart_leaves_out_what_does_not_follow_cavities():
-    found, coarse = case("adelaide"), Coarse(25, 800.0, 800, [1e6], 0.0)
-    made = settings(found, coarse, None, None, [50], None, None)
+    found, coarse = case("adelaide"), CoarseRun(25, 800.0, 800, [1e6], 0.0)
+    made = chart_settings(found, coarse, None, None, [50], None, None)
     assert {one.scheme for one in made} == {"upwind", "muscl"} and default_curve(found) == "muscl rk4"
-    assert left_out(found, None) == ["upwind5", "weno5"] and not left_out(found, ["weno5"])
-    assert not left_out(case("pump-trip"), None)
+    assert unsupported_schemes(found, None) == ["upwind5", "weno5"] and not unsupported_schemes(found, ["weno5"])
+    assert not unsupported_schemes(case("pump-trip"), None)
 
 
 def test_with_cavities_both_references_of_a_chart_can_be_run():
@@ -148,12 +154,12 @@ def test_with_cavities_both_references_of_a_chart_can_be_run():
 
 def test_the_work_of_a_chart_counts_pipes_of_one_cell_once():
     found = case("pump-trip")
-    assert work(found, 400) == pytest.approx(4 * work(found, 200))
-    assert work(case("net3-pump-trip"), 400) < 3 * work(case("net3-pump-trip"), 200)
+    assert run_work(found, 400) == pytest.approx(4 * run_work(found, 200))
+    assert run_work(case("net3-pump-trip"), 400) < 3 * run_work(case("net3-pump-trip"), 200)
 
 
 def test_a_chart_of_dear_rates_has_fewer_cells():
-    cheap, dear = (Coarse(25, 800.0, 800, [8e6, 2e6, 5e5, 1e5], 0.0, dearness).levels for dearness in (1.0, 30.0))
+    cheap, dear = (CoarseRun(25, 800.0, 800, [8e6, 2e6, 5e5, 1e5], 0.0, dearness).levels for dearness in (1.0, 30.0))
     assert max(dear) < max(cheap) and len(dear) == len(cheap)
 
 
@@ -168,16 +174,16 @@ def test_what_acts_on_a_pump_that_trips_is_its_run_down():
 
 
 def test_a_vessel_is_not_said_by_a_volume():
-    with pytest.raises(Unsayable, match="a volume at top would replace the air-valve"):
-        restated(case("air-valve"), "lumped volume")
-    with pytest.raises(Unsayable, match="all ends have a given pressure"):
-        restated(case("pump-trip-air-vessel"), "column and volume")
+    with pytest.raises(NotApplicable, match="a volume at top would replace the air-valve"):
+        level_keys(case("air-valve"), "lumped volume")
+    with pytest.raises(NotApplicable, match="all ends have a given pressure"):
+        level_keys(case("pump-trip-air-vessel"), "column and volume")
 
 
 def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
-    monkeypatch.setattr(models, "PATIENCE", 0.0)
+    monkeypatch.setattr(model_hierarchy, "LEVEL_CPU_LIMIT", 0.0)
     with pytest.raises(FvsolveError, match="the case itself does not run: not run: 1 cell was given up already"):
-        models.ladder(case("relief-on-closed-main", links__main__cells=4, numerics__courant=0.001))
+        model_hierarchy.ladder(case("relief-on-closed-main", links__main__cells=4, numerics__courant=0.001))
 
 
 # pictures -------------------------------------------------------------------------------------------------------
@@ -188,14 +194,14 @@ def test_a_law_that_takes_long_is_not_tried_on_more_cells(monkeypatch):
 
 def test_a_map_of_cavities_has_a_reference_and_a_limit():
     few = case("adelaide", links__main__cells=8)
-    found = truth(few)
-    assert found.words.startswith("muscl van-leer on 32 cells") and 0.0 < found.doubt.trajectory < 1.0
-    assert np.array_equal(spectrum(few, {}), spectrum(few, {"numerics.scheme": "upwind"}))
+    found = find_reference(few)
+    assert found.words.startswith("muscl van-leer on 32 cells") and 0.0 < found.uncertainty.trajectory < 1.0
+    assert np.array_equal(eigenvalues_of(few, {}), eigenvalues_of(few, {"numerics.scheme": "upwind"}))
 
 
 def test_a_square_that_takes_too_long_is_given_up_and_called_neither_wrong_nor_blown_up(monkeypatch):
     late, off = Measures(f"{GIVEN_UP} 10 s", False), Measures("finished", True, error=0.5, farthest=0.0)
-    assert verdict(late, lambda: off, 0.02) == verdict(off, lambda: late, 0.02) == SKIPPED
-    monkeypatch.setattr(watched_runs, "LONGEST", 0.0)
-    found, _ = watched_runs.watched(case("relief-on-closed-main", links__main__cells=4))
+    assert verdict(late, lambda: off, 0.02) == verdict(off, lambda: late, 0.02) == NOT_RUN
+    monkeypatch.setattr(watched_runs, "CPU_LIMIT", 0.0)
+    found, _ = watched_runs.run_recorded(case("relief-on-closed-main", links__main__cells=4))
     assert found.reason.startswith(GIVEN_UP) and not found.ok

@@ -16,11 +16,11 @@ from reference.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valv
 import fvsolve
 from fvsolve.case.text import write
 from fvsolve.cli.app import value_of
-from fvsolve.cli.sweep import split
+from fvsolve.cli.sweep import split_list
 from fvsolve.draw.sweep import outcome_figure
 from fvsolve.errors import CaseError, FvsolveError, RunError
 from fvsolve.studies import sweep
-from fvsolve.studies.sweep import Sweep, pasted
+from fvsolve.studies.sweep import Sweep, as_option_text
 
 
 @pytest.fixture
@@ -131,7 +131,7 @@ def test_a_row_shows_what_the_model_could_not_follow(line, fvs, tmp_path):
     quiet, marked = sweep(line, {"links.valve.opening": [1.0, shut]}).rows
     assert quiet["marks"] == "" and marked["ok"] and "below vapour pressure" in marked["marks"]
     (tmp_path / "line.toml").write_text(write(line))
-    values = f"links.valve.opening=1.0,{pasted(shut)}"
+    values = f"links.valve.opening=1.0,{as_option_text(shut)}"
     code, out, _ = fvs("sweep", tmp_path / "line.toml", "--set", values, "--out", tmp_path)
     assert code == 0 and marked["marks"] in " ".join(out.split())
     with open(tmp_path / "sweep.csv", newline="") as file:
@@ -145,7 +145,7 @@ def test_a_row_shows_what_the_model_could_not_follow(line, fvs, tmp_path):
      {"model": "steady", "factor": 0.02, "on": False}],
 )  # fmt: skip
 def test_a_value_is_written_as_set_reads_it(value):
-    (text,) = split(pasted(value))
+    (text,) = split_list(as_option_text(value))
     assert value_of(text) == value and type(value_of(text)) is type(value)
 
 
@@ -191,7 +191,7 @@ def test_a_case_that_was_read_with_other_values_keeps_them(line):
     ],
 )  # fmt: skip
 def test_values_are_parted_at_commas_outside_of_brackets_and_quotes(text, parts):
-    assert split(text) == parts
+    assert split_list(text) == parts
 
 
 @pytest.mark.parametrize("vary, jobs", [({}, 1), ({"numerics.courant": [0.5]}, 1), (VARY, 0)])

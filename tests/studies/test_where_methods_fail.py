@@ -17,8 +17,8 @@ from reference.scenes import AMBIENT, RHO, WATER, chamber, ramp, reservoir, scen
 import fvsolve
 from fvsolve.case import load
 from fvsolve.steppers import analyse, method_named, seen_frequency, stability_function
-from fvsolve.studies.failure.watched import watched
-from fvsolve.studies.outcome import outcome, prepared
+from fvsolve.studies.failure.step_recording import run_recorded
+from fvsolve.studies.outcome import outcome, study_model
 
 
 def r_of(method: str, z: complex) -> complex:
@@ -50,13 +50,13 @@ def chamber_eigenvalue() -> float:
 def test_an_explicit_method_fails_at_the_step_that_the_chambers_eigenvalue_predicts(method):
     case, steps = CASES / "pipe-tiny-chamber.toml", 3000
     rate = chamber_eigenvalue()
-    model = prepared(case, tiny(method, 1e-6, 1e-3))
+    model = study_model(case, tiny(method, 1e-6, 1e-3))
     spectrum = np.linalg.eigvals(model.jacobian(0.0, np.zeros(model.y_size)))
     assert np.abs(spectrum).max() == pytest.approx(abs(rate), rel=2e-3)
     limit = analyse(method).real_interval / np.abs(spectrum).max()
     sizes = []
     for h in (0.99 * limit, 1.01 * limit):
-        model = prepared(case, tiny(method, h, steps * h))
+        model = study_model(case, tiny(method, h, steps * h))
         y = np.zeros(model.y_size)
         at = model.state_names.index(next(name for name in model.state_names if name.startswith("body")))
         y[at] = 1e-12 * model.scale[at]
@@ -90,10 +90,10 @@ def swings(method: str, h: float) -> tuple[np.ndarray, float]:
     case = bottle()
     rest = outcome(case, {"numerics.end": 20.0}).rows[-1, 1]
     settings = {"numerics.method": method, "numerics.step": h, "numerics.end": 0.5 + 12 * h, "output.every": h}
-    found, bursts = watched(case, settings)
+    found, bursts = run_recorded(case, settings)
     assert found.ok
     after = np.concatenate(bursts)[round(0.5 / h) - 1 :, 0]  # from the last step before the jump
-    model = prepared(case)
+    model = study_model(case)
     at = np.zeros(model.y_size)
     rate = model.jacobian(0.9, at)[0, 0]
     return after - rest, h * rate
@@ -176,7 +176,7 @@ def shown_frequency(method: str, h: float) -> float:
 def test_a_mode_beyond_pi_over_h_shows_at_the_wrong_frequency_that_is_predicted(method):
     omega = column_frequency()
     h = 3.0 * math.pi / omega
-    model = prepared(surge(method, h, 1))
+    model = study_model(surge(method, h, 1))
     assert np.abs(np.linalg.eigvals(model.jacobian(0.0, np.zeros(2))).imag).max() == pytest.approx(omega, rel=1e-9)
     shown = shown_frequency(method, h)
     assert shown == pytest.approx(seen_frequency(method, omega, h), rel=1e-3)
@@ -219,7 +219,7 @@ def test_a_bare_square_root_chatters_about_zero_drop_by_the_amplitude_that_its_s
 
 def slope_at_rest(h: float, reynolds: float) -> float:
     """|lambda| of the softened law at equal levels [1/s]."""
-    model = prepared(levelling("euler", h, 1.0, laminar_reynolds=reynolds))
+    model = study_model(levelling("euler", h, 1.0, laminar_reynolds=reynolds))
     equal = np.array([-1.0, 1.0]) * LEVEL / 2 * RHO  # of masses, from the start
     return float(np.abs(np.linalg.eigvals(model.jacobian(0.0, equal))).max())
 

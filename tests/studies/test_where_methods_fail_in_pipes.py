@@ -31,7 +31,7 @@ from fvsolve.model.energy_norm import energy_weights
 from fvsolve.model.scheme_codes import CODES
 from fvsolve.step_limits.step_notices import step_limits
 from fvsolve.steppers import analyse, method_named, stability_function
-from fvsolve.studies.outcome import outcome, prepared
+from fvsolve.studies.outcome import outcome, study_model
 
 LENGTH, DIAMETER, SPEED = 100.0, 0.3, 1000.0
 THRESHOLD = 1e3  # growth that counts as failure
@@ -44,7 +44,7 @@ def lossless(cells: int, scheme: str, method: str, h: float, steps: int = 1):
     nodes = {"lake": lake(50.0), "end": junction()}
     links = {"main": pipe("lake", "end", LENGTH, DIAMETER, SPEED, cells)}
     numerics = {"scheme": scheme, "method": method, "step": h}
-    return prepared(scene(nodes, links, steps * h, numerics, ["end.pressure"], steps * h))
+    return study_model(scene(nodes, links, steps * h, numerics, ["end.pressure"], steps * h))
 
 
 def one_step(method: str, matrix: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def matched(cells: int, scheme: str, method: str, h: float, steps: int):
     nodes = {"lake": reservoir(AMBIENT + 4 * drop), "end": junction(), "out": reservoir(AMBIENT + 3 * drop)}
     links = {"main": pipe("lake", "end", LENGTH, DIAMETER, SPEED, cells), "valve": valve("end", "out", flow_area)}
     numerics = {"scheme": scheme, "method": method, "step": h}
-    return prepared(scene(nodes, links, steps * h, numerics, ["end.pressure"], steps * h))
+    return study_model(scene(nodes, links, steps * h, numerics, ["end.pressure"], steps * h))
 
 
 @pytest.mark.parametrize("courant", [1.3, 1.4, 1.5])
@@ -256,7 +256,7 @@ def crossed(heights, steps: int, method: str, courant: float, scheme: str, limit
     nodes = {"one": lake(50.0), "two": lake(50.0)}
     links = {"main": pipe("one", "two", LENGTH, DIAMETER, SPEED, cells)}
     numerics = {"scheme": scheme, "limiter": limiter, "method": method, "step": h}
-    model = prepared(scene(nodes, links, steps * h, numerics, ["main.flow"], steps * h))
+    model = study_model(scene(nodes, links, steps * h, numerics, ["main.flow"], steps * h))
     y = np.zeros(model.y_size)
     y[18 : 18 + len(heights)] = heights
     before, after = (np.abs(np.diff(np.pad(v[:cells], 1))).sum() for v in (y, outcome(model, y=y).y))
@@ -411,7 +411,7 @@ def test_upwind_with_euler_at_courant_one_grows_wherever_there_is_friction_and_s
         links = {"main": pipe("lake", "gate", 300.0, 0.3, 1000.0, 20, friction={"model": "steady", "factor": 0.05})}
         numerics = {"scheme": "upwind", "method": "euler", "courant": courant}
         case = scene(nodes, links, 60.0, numerics, ["main.flow@0.5"], 0.5)
-        before, result = step_limits(prepared(case)), fvsolve.run(case)
+        before, result = step_limits(study_model(case)), fvsolve.run(case)
         assert [one.ok for one in before] == ([False] if grows else []) and result.ok is not grows
         assert bool([one for one in result.warnings if one.kind == "growth"]) is grows
         if grows:

@@ -15,30 +15,46 @@ from fvsolve.display import Displayable
 from fvsolve.errors import CaseError, FvsolveError, listing
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 from fvsolve.steppers.tableau import BUILT_IN
-from fvsolve.studies.accuracy.cells import from_files
-from fvsolve.studies.accuracy.front import FrontRow, Point, cheapest, coarser, curves, errors_of, row, setting_between
-from fvsolve.studies.accuracy.pareto import targets
-from fvsolve.studies.accuracy.plan import Coarse, coarse, default_curve, known, left_out, settings
-from fvsolve.studies.accuracy.setting import MethodSetting, adaptive, cell_keys, longest
-from fvsolve.studies.accuracy.timing import GIVEN_UP, compile_seconds, quickest
-from fvsolve.studies.distance import Distance, distance, moving
-from fvsolve.studies.errands import Errand, Errands
-from fvsolve.studies.lines import cells_for_lines, in_cells, lines, settled
-from fvsolve.studies.outcome import Progress, names, prepared
-from fvsolve.studies.points import Points
-from fvsolve.studies.sheet import Column, Sheet
-from fvsolve.studies.truth import Truth, truth
+from fvsolve.studies.accuracy.case_resolution import basins_from_files
+from fvsolve.studies.accuracy.chart_settings import (
+    CoarseRun,
+    chart_settings,
+    check_names,
+    default_curve,
+    run_coarse,
+    unsupported_schemes,
+)
+from fvsolve.studies.accuracy.method_setting import MethodSetting, cell_keys, is_adaptive, main_part_name
+from fvsolve.studies.accuracy.pareto import target_powers
+from fvsolve.studies.accuracy.timing import GIVEN_UP, best_run_of, compile_seconds
+from fvsolve.studies.accuracy.work_precision import (
+    FrontRow,
+    Point,
+    cheapest_curve,
+    coarser_setting,
+    curves_by_name,
+    front_row,
+    good_errors,
+    interpolated_setting,
+)
+from fvsolve.studies.delay_line_keys import as_cells, cells_for_lines, delay_lines, fixed_choices
+from fvsolve.studies.distance import Distance, distance, moving_probes
+from fvsolve.studies.outcome import Progress, name_list, study_model
+from fvsolve.studies.reference import Reference, find_reference
+from fvsolve.studies.result_cache import ResultCache
+from fvsolve.studies.result_table import Column, ResultTable
+from fvsolve.studies.run_queue import RunQueue, RunRequest
 from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, PATH, TABLE, TEXT, validated
 
-FRAME = (
+TABLE_COLUMNS = (
     "scheme", "method", "cells", "size", "trajectory", "greatest", "end", "overshoot", "worst", "seconds", "updates",
     "steps", "ok", "reason",
 )  # fmt: skip
-WRONG = 1.0  # errors above the range of the component are wrong results
+WRONG_ERROR = 1.0  # errors above the range of the component are wrong results
 
 
 @dataclass(frozen=True)
-class Aim:
+class TargetSetting:
     """Setting whose run reaches a target error, with its point and its keys.
 
     numerics : keys of [numerics] without that prefix; others : all other keys, dotted
@@ -49,12 +65,12 @@ class Aim:
     numerics: dict
     others: dict
 
-    def lines(self) -> list[str]:
+    def toml_lines(self) -> list[str]:
         """Lines of TOML: keys of `[numerics]`, then the tables of parts whose cells change."""
-        toml_lines = [f"{key} = {toml(value)}" for key, value in self.numerics.items()]
+        toml_lines = [f"{key} = {toml_value(value)}" for key, value in self.numerics.items()]
         for key, value in self.others.items():
             table, _, name = key.rpartition(".")
-            toml_lines += ["", f"[{table}]", f"{name} = {toml(value)}"]
+            toml_lines += ["", f"[{table}]", f"{name} = {toml_value(value)}"]
         return toml_lines
 
 
@@ -76,18 +92,18 @@ class Chart(Displayable):
     compile_seconds: float
     front: list[FrontRow]
     reused: int = 0
-    aim: Aim | None = None
+    aim: TargetSetting | None = None
     told: tuple[str, ...] = field(default=())
     left_out: tuple[str, ...] = field(default=())
 
-    picture = "fvsolve.studies.accuracy.files:figure"
+    picture = "fvsolve.studies.accuracy.chart_files:figure"
 
     def summary_line(self) -> str:
         return f"of {self.case!r}: {len(self.points)} points, {len(self.failed)} failed; default {self.default}"
 
     def table_columns(self) -> dict[str, list]:
         """Columns TABLE_COLUMNS of all points."""
-        return Sheet([Column(key) for key in FRAME], self.rows).listed()
+        return ResultTable([Column(key) for key in TABLE_COLUMNS], self.rows).table_columns()
 
     @property
     def rows(self) -> list[dict]:
@@ -96,7 +112,7 @@ class Chart(Displayable):
 
     def curves(self) -> dict[str, list[Point]]:
         """Points by name of scheme and method, from coarse to fine."""
-        return curves(self.points)
+        return curves_by_name(self.points)
 
     @property
     def stands(self) -> Point | None:
@@ -115,7 +131,11 @@ class Chart(Displayable):
     def plain(self) -> dict:
         """Return the chart as plain data, SI, with the lines of `aim` as text."""
         stands = None if self.stands is None else asdict(self.stands)
-        return asdict(self) | {"stands": stands} | ({} if self.aim is None else {"paste": "\n".join(self.aim.lines())})
+        return (
+            asdict(self)
+            | {"stands": stands}
+            | ({} if self.aim is None else {"paste": "\n".join(self.aim.toml_lines())})
+        )
 
 
 @validated(
@@ -155,111 +175,114 @@ def chart(
     Raises CaseError, FvsolveError.
     """
     base_case, report = load(case, set), progress or (lambda *_: None)
-    base_case = load(base_case, settled(base_case)) if settled(base_case) else base_case
-    with Points(out) as points, Errands(base_case, jobs, dask) as queue:
-        return _Study(base_case, points, report, queue).go(schemes, methods, cells, rtol, step, target)
+    base_case = load(base_case, fixed_choices(base_case)) if fixed_choices(base_case) else base_case
+    with ResultCache(out) as points, RunQueue(base_case, jobs, dask) as queue:
+        return _ChartStudy(base_case, points, report, queue).run(schemes, methods, cells, rtol, step, target)
 
 
-def toml(value) -> str:
+def toml_value(value) -> str:
     """Text or number in TOML."""
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
-class _Study:
+class _ChartStudy:
     """Runs, reference and results of one chart."""
 
-    def __init__(self, case: Case, points: Points, progress: Progress, queue: Errands) -> None:
-        self.case, self.errands = case, queue
-        if from_files(self.case):
-            reason = f"chart refines cells, but the mesh of {listing(from_files(self.case))} is a file"
+    def __init__(self, case: Case, points: ResultCache, progress: Progress, queue: RunQueue) -> None:
+        self.case, self.queue = case, queue
+        if basins_from_files(self.case):
+            reason = f"chart refines cells, but the mesh of {listing(basins_from_files(self.case))} is a file"
             raise FvsolveError(f"{reason}. Try order --refine time, which keeps the cells")
         self.points, self.progress = points, progress
-        self.celled = load(case, in_cells(lines(case))) if lines(case) else case
+        self.case_in_cells = load(case, as_cells(delay_lines(case))) if delay_lines(case) else case
         self.default, self.compiling = default_curve(self.case), 0.0
-        self.coarse: Coarse | None = None  # of a case with cells or delay lines
+        self.coarse: CoarseRun | None = None  # of a case with cells or delay lines
         self.done, self.total, self.least_overshoot = 0, 0, 0.0
         self.given_up: dict[tuple, str] = {}  # curve -> resolution of the run that was given up
 
-    def go(self, schemes, methods, cells, rtol, step, target) -> Chart:
+    def run(self, schemes, methods, cells, rtol, step, target) -> Chart:
         """Run all settings, and settings for the target if there is one."""
-        schemes, methods = names(schemes), names(methods)
-        known(schemes, methods)
-        if longest(self.celled):
-            self.coarse = Coarse(**self.points.get(self.case, {"study": "chart", "coarse": True}, self.coarsely))
+        schemes, methods = name_list(schemes), name_list(methods)
+        check_names(schemes, methods)
+        if main_part_name(self.case_in_cells):
+            self.coarse = CoarseRun(**self.points.get(self.case, {"study": "chart", "coarse": True}, self.coarse_data))
             self.compiling += self.coarse.compile_seconds
-        self.all = settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
+        self.all = chart_settings(self.case, self.coarse, schemes, methods, cells, rtol, step)
         self.finest = max((entry.cells for entry in self.all if entry.cells), default=None)
         self.total = len(self.all) + 1
         floor = self.floor()
         self.least_overshoot = floor["overshoot"] or 0.0
-        self.ahead()
+        self.run_ahead()
         points, least = [self.point(setting) for setting in self.all], floor["trajectory"]
         if target is not None:
-            points = self.downwards(points, target)
+            points = self.add_coarser(points, target)
         if all(point.trajectory < least for point in points if point.ok):
-            raise FvsolveError(_useless(self.case, points, floor))
-        rows = [row(points, entry, least, self.default) for entry in targets(errors_of(points), least)]
-        target_setting = None if target is None else self.aim(points, target, floor)
+            raise FvsolveError(_useless_text(self.case, points, floor))
+        rows = [front_row(points, entry, least, self.default) for entry in target_powers(good_errors(points), least)]
+        target_setting = None if target is None else self.reach_target(points, target, floor)
         return Chart(
             self.case.name, points, floor["reference"], floor["second"], floor, self.default, self.compiling, rows,
-            self.points.reused, target_setting, tuple(floor["told"]), tuple(left_out(self.case, schemes)),
+            self.points.reused, target_setting, tuple(floor["told"]), tuple(unsupported_schemes(self.case, schemes)),
         )  # fmt: skip
 
     @cached_property
-    def truth(self) -> Truth:
+    def reference(self) -> Reference:
         """Reference of all points, computed if some point is new, after the code of all curves is compiled."""
         for setting in {entry.curve: entry for entry in reversed(self.all)}.values():
             self.progress(self.done, self.total, f"compiling {setting.name}")
             self.compiling += self.compile(setting)
         stiff = self.coarse is not None and self.coarse.stiff
-        reference = truth(
-            self.case, self.judged(), stiff=stiff,
-            tell=lambda name: self.progress(self.done, self.total, f"reference {name}"), errands=self.errands,
+        reference = find_reference(
+            self.case, self.finest_keys(), stiff=stiff,
+            progress=lambda name: self.progress(self.done, self.total, f"reference {name}"), queue=self.queue,
         )  # fmt: skip
-        if not moving(reference.run, reference):
+        if not moving_probes(reference.run, reference):
             reason = "all probes are constant, so errors have no range. Try a probe that changes, or a longer run"
             raise FvsolveError(f"{self.case.name}: {reason}")
         return reference
 
-    def judged(self) -> dict | None:
+    def finest_keys(self) -> dict | None:
         """Keys of the finest cells under study, for the references; delay lines get cells of that travel time."""
-        if not lines(self.case):
+        if not delay_lines(self.case):
             return None if self.finest is None else cell_keys(self.case, self.finest)
-        main, cells = longest(self.case) or longest(self.celled), self.finest or max(self.coarse.levels)
+        main, cells = (
+            main_part_name(self.case) or main_part_name(self.case_in_cells),
+            self.finest or max(self.coarse.levels),
+        )
         keys = cell_keys(self.case, cells) if self.finest else {}
         return keys | cells_for_lines(self.case, self.case.links[main].length / self.case.wave_speed(main) / cells)
 
-    def coarsely(self) -> dict:
+    def coarse_data(self) -> dict:
         """Coarse run as plain data, so that a repeated study finds the same cells in the cache."""
-        return asdict(coarse(self.case if longest(self.case) else self.celled))
+        return asdict(run_coarse(self.case if main_part_name(self.case) else self.case_in_cells))
 
     def floor(self) -> dict:
         """References in words, and how far they disagree."""
 
         def make() -> dict:
-            reference = self.truth
-            texts = {"reference": reference.words, "second": reference.second, "told": reference.told}
-            return texts | asdict(reference.doubt)
+            reference = self.reference
+            texts = {"reference": reference.words, "second": reference.second, "told": reference.failures}
+            return texts | asdict(reference.uncertainty)
 
         floor = self.points.get(self.case, {"study": "chart", "floor": self.finest}, make)
         self.done += 1
         return floor
 
-    def ahead(self) -> None:
+    def run_ahead(self) -> None:
         """Run all new settings in other processes, and store their results."""
-        if self.errands.alone:
+        if self.queue.in_process:
             return
         by_cost = sorted(self.all, key=lambda setting: (setting.cells or 0, -setting.size))
-        new = [setting for setting in by_cost if self.points.find(self.case, self.extra(setting)) is None]
+        new = [setting for setting in by_cost if self.points.find(self.case, self.cache_key(setting)) is None]
         if not new:
             return
-        self.truth  # noqa: B018  computes the reference first, with runs of its own
-        requests = [Errand(quickest, setting.keys) for setting in new]
-        for count, at in enumerate(self.errands.ahead(requests), 1):
+        self.reference  # noqa: B018  computes the reference first, with runs of its own
+        requests = [RunRequest(best_run_of, setting.keys) for setting in new]
+        for count, at in enumerate(self.queue.run_ahead(requests), 1):
             self.progress(self.done + count, self.total, f"{new[at].name}, {new[at].fineness}")
-            self.points.get(self.case, self.extra(new[at]), lambda setting=new[at]: self.measure(setting))
+            self.points.get(self.case, self.cache_key(new[at]), lambda setting=new[at]: self.measure(setting))
 
-    def extra(self, setting: MethodSetting) -> dict:
+    def cache_key(self, setting: MethodSetting) -> dict:
         """Settings that identify a cached point of the case."""
         return {"study": "chart", "keys": setting.keys, "judged by": self.finest}
 
@@ -268,24 +291,24 @@ class _Study:
         self.progress(self.done, self.total, f"{setting.name}, {setting.fineness}")
         given_up = self.given_up
         if setting.curve in given_up:
-            data = nothing(f"not run: {given_up[setting.curve]} was given up already")
+            data = empty_point(f"not run: {given_up[setting.curve]} was given up already")
         else:
-            data = self.points.get(self.case, self.extra(setting), lambda: self.measure(setting))
+            data = self.points.get(self.case, self.cache_key(setting), lambda: self.measure(setting))
         self.done += 1
-        if data["reason"].startswith(GIVEN_UP) and grows(setting):
+        if data["reason"].startswith(GIVEN_UP) and cost_grows(setting):
             given_up[setting.curve] = setting.fineness
         values = {key: math.nan if value is None else value for key, value in data.items()}
         if values["overshoot"] < self.least_overshoot:
             values["overshoot"] = 0.0
         return Point(setting, **values)
 
-    def downwards(self, points: list[Point], target: float) -> list[Point]:
+    def add_coarser(self, points: list[Point], target: float) -> list[Point]:
         """All points, with coarser points before each curve until its coarsest point exceeds the target."""
         all_points = []
-        for curve in curves(points).values():
+        for curve in curves_by_name(points).values():
             extended = list(curve)
             while extended[0].ok and extended[0].trajectory <= target:
-                setting = coarser(self.case, extended[0].setting)
+                setting = coarser_setting(self.case, extended[0].setting)
                 if setting is None:
                     break
                 self.total += 1
@@ -296,69 +319,71 @@ class _Study:
     def compile(self, setting: MethodSetting) -> float:
         """Wall time of the first run of a curve less that of the second [s]; 0 for a refused setting."""
         try:
-            return compile_seconds(prepared(self.case, setting.keys))
+            return compile_seconds(study_model(self.case, setting.keys))
         except CaseError:
             return 0.0
 
     def measure(self, setting: MethodSetting) -> dict:
         """Data of a point: errors and cost of a run, or the reason why there are none."""
-        reference, run = self.truth, self.errands(self.case, Errand(quickest, setting.keys))
+        reference, run = self.reference, self.queue(self.case, RunRequest(best_run_of, setting.keys))
         if run.refused:
-            return nothing(run.reason)
+            return empty_point(run.reason)
         errors = asdict(distance(run, reference))
         ok, reason = run.ok, run.reason
-        if ok and not errors["trajectory"] <= WRONG:
+        if ok and not errors["trajectory"] <= WRONG_ERROR:
             ok, reason = False, f"wrong: the error is {errors['trajectory']:.3g} times the range of {errors['worst']}"
         cost = {"seconds": run.processor, "rhs": run.counts["rhs"], "updates": run.cell_updates}
         return {"ok": ok, "reason": reason, **errors, **cost, "steps": run.counts["steps"]}
 
-    def aim(self, points: list[Point], target: float, floor: dict) -> Aim:
+    def reach_target(self, points: list[Point], target: float, floor: dict) -> TargetSetting:
         """Cheapest setting for a target error, run and refined until its error is within the target."""
         if not target >= floor["trajectory"]:
             raise FvsolveError(
                 f"a target of {target:g} is below the floor: the two references ({floor['reference']}; "
                 f"{floor['second']}) disagree by {floor['trajectory']:.2g}. Try a larger target, or more cells"
             )
-        best = cheapest(points, target, floor["trajectory"], "seconds")
+        best = cheapest_curve(points, target, floor["trajectory"], "seconds")
         if best is None:
             finer = "more cells" if self.finest else "shorter steps" if self.coarse else "a smaller rtol"
             raise FvsolveError(
-                f"no setting reaches an error of {target:g}, the least is {min(errors_of(points)):.2g}. Try {finer}"
+                f"no setting reaches an error of {target:g}, the least is {min(good_errors(points)):.2g}. Try {finer}"
             )
         name, crossing = best
-        curve = curves(points)[name]
+        curve = curves_by_name(points)[name]
         for share in (crossing.share, 0.5 * (1.0 + crossing.share)) if crossing.within else ():
             point = self.point(
-                setting_between(self.case, curve[crossing.coarser].setting, curve[crossing.finer].setting, share)
+                interpolated_setting(self.case, curve[crossing.coarser].setting, curve[crossing.finer].setting, share)
             )
             if point.ok and point.trajectory <= target:
-                return _aim(target, point, self.case)
-        return _aim(target, curve[crossing.finer], self.case)
+                return _target_setting(target, point, self.case)
+        return _target_setting(target, curve[crossing.finer], self.case)
 
 
-def nothing(reason: str) -> dict:
+def empty_point(reason: str) -> dict:
     """Data of a point without a run."""
     cost = {"seconds": math.nan, "rhs": 0, "updates": 0, "steps": 0}
     return {"ok": False, "reason": reason, **asdict(Distance()), **cost}
 
 
-def grows(setting: MethodSetting) -> bool:
+def cost_grows(setting: MethodSetting) -> bool:
     """True if finer settings of a curve cost more; an implicit method may be faster with a smaller tolerance."""
-    if setting.cells is not None or setting.control == "step" or not adaptive(setting.method):
+    if setting.cells is not None or setting.control == "step" or not is_adaptive(setting.method):
         return True
     return setting.method != AUTO and METHODS[setting.method].explicit
 
 
-def _aim(target: float, point: Point, case: Case) -> Aim:
+def _target_setting(target: float, point: Point, case: Case) -> TargetSetting:
     """Setting of a point, with a method from a file as the path of that file."""
     keys = point.setting.keys
     if "numerics.method" in keys:
-        keys = keys | {"numerics.method": _written(keys["numerics.method"], case)}
+        keys = keys | {"numerics.method": _method_in_file(keys["numerics.method"], case)}
     numerics = {key.removeprefix("numerics."): value for key, value in keys.items() if key.startswith("numerics.")}
-    return Aim(target, point, numerics, {key: value for key, value in keys.items() if not key.startswith("numerics.")})
+    return TargetSetting(
+        target, point, numerics, {key: value for key, value in keys.items() if not key.startswith("numerics.")}
+    )
 
 
-def _written(method: str, case: Case) -> str:
+def _method_in_file(method: str, case: Case) -> str:
     """Method as in a case file: for a tableau in a file its path, relative to the case if it is below its folder."""
     path = Path(METHODS[method].source) if method in METHODS and method not in BUILT_IN else None
     if path is None or not path.is_file():
@@ -367,11 +392,13 @@ def _written(method: str, case: Case) -> str:
     return path.relative_to(folder).as_posix() if folder and path.is_relative_to(folder) else str(path)
 
 
-def _useless(case: Case, points: list[Point], floor: dict) -> str:
+def _useless_text(case: Case, points: list[Point], floor: dict) -> str:
     """Message for references that are not accurate enough for any point."""
-    least = min(errors_of(points), default=math.nan)
+    least = min(good_errors(points), default=math.nan)
     errors = f"all errors (least {least:.2g})" if math.isfinite(least) else "any useful error, and no run succeeded"
-    remedy = "a larger --step (if delay lines are exact, any step will do)" if lines(case) else "a larger --rtol"
-    remedy = "fewer --cells (references have four times the cells of the finest run)" if longest(case) else remedy
+    remedy = "a larger --step (if delay lines are exact, any step will do)" if delay_lines(case) else "a larger --rtol"
+    remedy = (
+        "fewer --cells (references have four times the cells of the finest run)" if main_part_name(case) else remedy
+    )
     return (f"{case.name}: the two references ({floor['reference']}; {floor['second']}) disagree by "
             f"{floor['trajectory']:.2g}, more than {errors}. Try {remedy}, or an earlier end of the run")  # fmt: skip

@@ -16,16 +16,16 @@ from fvsolve.errors import FvsolveError
 from fvsolve.validation import NUMBER, SERIES, Kind, is_array, validated
 
 LEAST_ROWS = 3
-ABOVE_FLOOR = 10.0  # an error below this multiple of the floor is not used
-FLAT = 10.0  # errors at the floor lie within this factor of each other
-RISE = 1.5  # greatest factor by which errors before the window may rise from row to row
-STEEPER = 3.0  # greatest ratio of the orders before a short window to its slope
-CLEAR = 0.03  # greatest spread of a clear line, times 1 + order
-LEAST_FALL = 1.8  # factor by which errors must fall over the window
+FLOOR_MARGIN = 10.0  # an error below this multiple of the floor is not used
+FLOOR_SPREAD = 10.0  # errors at the floor lie within this factor of each other
+ALLOWED_RISE = 1.5  # greatest factor by which errors before the window may rise from row to row
+STEEP_RATIO = 3.0  # greatest ratio of the orders before a short window to its slope
+CLEAR_SPREAD = 0.03  # greatest spread of a clear line, times 1 + order
+LEAST_REDUCTION = 1.8  # factor by which errors must fall over the window
 LEAST_ORDER = 0.2
-DRIFT = 1.5, 3.0  # further drift of orders, least and greatest, as a multiple of their last change
+DRIFT_STEPS = 1.5, 3.0  # further drift of orders, least and greatest, as a multiple of their last change
 NO_ERROR = "no order: no row has an error above zero"
-PRE, FLOOR, ASIDE, FAILED = "pre-asymptotic", "floor", "off the line", "failed"
+PRE_ASYMPTOTIC, FLOOR, OFF_LINE, FAILED = "pre-asymptotic", "floor", "off the line", "failed"
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,11 @@ def fit(sizes, errors, floor: float = 0.0) -> Fit:
         raise FvsolveError("errors must not be negative. Try their absolute values")
     rows = FitRows(h, e, floor)
     if rows.good.size < LEAST_ROWS:
-        return rows.none(rows.too_few())
-    result = rows.whole() or rows.without_one() or rows.whole(strict=False) or rows.none(rows.why())
-    return rows.none(rows.drifting()) if result.spread >= result.order else result
+        return rows.no_fit(rows.too_few_reason())
+    result = (
+        rows.fit_all() or rows.fit_without_outlier() or rows.fit_all(strict=False) or rows.no_fit(rows.failure_reason())
+    )
+    return rows.no_fit(rows.drift_reason()) if result.spread >= result.order else result
 
 
 class FitRows:
@@ -88,23 +90,23 @@ class FitRows:
         self.h, self.e, self.floor = h, e, floor
         self.marks = [FAILED if not math.isfinite(x) else "" for x in e]
         self.pairwise = tuple(float(p) for p in pair_orders(h, e))
-        at_floor = [i for i, x in enumerate(e) if math.isfinite(x) and (x == 0.0 or x < ABOVE_FLOOR * floor)]
+        at_floor = [i for i, x in enumerate(e) if math.isfinite(x) and (x == 0.0 or x < FLOOR_MARGIN * floor)]
         last = next((i for i in at_floor if all(k in at_floor or self.marks[k] for k in range(i, len(e)))), len(e))
         for i in at_floor:
-            self.marks[i] = FLOOR if i >= last else ASIDE
+            self.marks[i] = FLOOR if i >= last else OFF_LINE
         self.good = np.array([i for i, mark in enumerate(self.marks) if not mark], dtype=int)
 
     # fits ---------------------------------------------------------------------------------------------------
 
-    def whole(self, strict: bool = True) -> Fit | None:
+    def fit_all(self, strict: bool = True) -> Fit | None:
         """Fit a window of all good rows; None if there is no window.
 
         If not strict, the last order of the window may deviate from the others; the spread then includes it.
         """
-        limits = window(self.h[self.good], self.e[self.good], strict)
-        return None if limits is None else self.made(self.good, *limits)
+        limits = find_window(self.h[self.good], self.e[self.good], strict)
+        return None if limits is None else self.fit_window(self.good, *limits)
 
-    def without_one(self) -> Fit | None:
+    def fit_without_outlier(self) -> Fit | None:
         """Fit a window without one row that lies far below the line of the other rows; None if there is none.
 
         Such a row occurs where an error changes sign.
@@ -112,51 +114,53 @@ class FitRows:
         best = None
         for i in range(1, len(self.good) - 1):
             rest = np.delete(self.good, i)
-            limits = window(self.h[rest], self.e[rest])
+            limits = find_window(self.h[rest], self.e[rest])
             if limits is None or limits[1] - limits[0] < LEAST_ROWS + 1 or not limits[0] < i < limits[1]:
                 continue
-            candidate = self.made(rest, *limits, outlier=int(self.good[i]))
+            candidate = self.fit_window(rest, *limits, outlier=int(self.good[i]))
             line = candidate.constant * self.h[self.good[i]] ** candidate.order
             if self.e[self.good[i]] < 0.5 * line and (best is None or candidate.spread < best.spread):
                 best = candidate
         return best
 
-    def made(self, rows: np.ndarray, first: int, stop: int, note: str = "", outlier: int | None = None) -> Fit:
+    def fit_window(self, rows: np.ndarray, first: int, stop: int, note: str = "", outlier: int | None = None) -> Fit:
         """Fit the rows first to stop - 1 of `rows`; outlier : row that lies off the line."""
         marks = list(self.marks)
         for k, i in enumerate(rows):
-            marks[i] = PRE if k < first else FLOOR if k >= stop and not note else ASIDE if k >= stop else ""
+            marks[i] = (
+                PRE_ASYMPTOTIC if k < first else FLOOR if k >= stop and not note else OFF_LINE if k >= stop else ""
+            )
         if outlier is not None:
-            marks[outlier] = ASIDE
+            marks[outlier] = OFF_LINE
             note = note or "one error lies far below the line of the other errors, as if the error changed sign there"
         h, e = self.h[rows[first:stop]], self.e[rows[first:stop]]
         slope, intercept = line_of(h, e)
         p, recent = pair_orders(h, e), rows[max(first - 1, 0) : stop]
-        drift = DRIFT[0] if FLOOR in marks else still_to_go(pair_orders(self.h[recent], self.e[recent]))
+        drift = DRIFT_STEPS[0] if FLOOR in marks else remaining_drift(pair_orders(self.h[recent], self.e[recent]))
         limit = p[-1] + drift * (p[-1] - p[-2])
         spread = float(np.max(np.abs([*p, limit] - np.float64(slope))))
         return Fit(self.pairwise, slope, spread, tuple(marks), math.exp(intercept), "", note)
 
-    def none(self, reason: str) -> Fit:
+    def no_fit(self, reason: str) -> Fit:
         """Result without an order."""
         return Fit(self.pairwise, math.nan, math.nan, tuple(self.marks), math.nan, reason)
 
     # reasons ---------------------------------------------------------------------------------------------------
 
-    def too_few(self) -> str:
+    def too_few_reason(self) -> str:
         """Reason for fewer than three good rows."""
         if not np.any(self.e > 0.0):
             return NO_ERROR
-        if FLOOR in self.marks or ASIDE in self.marks:
+        if FLOOR in self.marks or OFF_LINE in self.marks:
             return (
                 f"no order: {len(self.good)} of {len(self.h)} rows are above the floor. Expected at least {LEAST_ROWS}"
             )
         return f"no order: {len(self.good)} rows. Expected at least {LEAST_ROWS}"
 
-    def why(self) -> str:
+    def failure_reason(self) -> str:
         """Reason why no window shows an order."""
         e, p = self.e[self.good], pair_orders(self.h[self.good], self.e[self.good])
-        if np.any(e[1:] > RISE * e[:-1]) and not e[-1] < e[0] / LEAST_FALL:
+        if np.any(e[1:] > ALLOWED_RISE * e[:-1]) and not e[-1] < e[0] / LEAST_REDUCTION:
             return "no order: the errors do not fall"
         if np.all(p < LEAST_ORDER):
             return f"no order: the errors hardly fall; orders between rows are below {LEAST_ORDER:g}"
@@ -165,7 +169,7 @@ class FitRows:
         last_orders = ", ".join(f"{x:.2f}" for x in p[-3:])
         return f"no order: the last orders between rows differ ({last_orders}). Try more levels, or fewer"
 
-    def drifting(self) -> str:
+    def drift_reason(self) -> str:
         """Reason if the spread reaches the order, so that the orders may drift on to zero or to twice their value."""
         last_orders = ", ".join(f"{x:.2f}" for x in pair_orders(self.h[self.good], self.e[self.good])[-3:])
         rows = self.good.size
@@ -182,12 +186,12 @@ def pair_orders(h: np.ndarray, e: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(orders), orders, math.nan)
 
 
-def still_to_go(p: np.ndarray) -> float:
+def remaining_drift(p: np.ndarray) -> float:
     """Expected further drift of orders, as a multiple of their last change.
 
     With ratio r < 1 of the last two changes it is the geometric series r / (1 - r), within the limits of DRIFT_STEPS.
     """
-    least, greatest = DRIFT
+    least, greatest = DRIFT_STEPS
     if len(p) < LEAST_ROWS:
         return greatest
     before, last = p[-2] - p[-3], p[-1] - p[-2]
@@ -203,12 +207,12 @@ def line_of(h: np.ndarray, e: np.ndarray) -> tuple[float, float]:
     return float(slope), float(intercept)
 
 
-def near(order: float) -> float:
+def order_tolerance(order: float) -> float:
     """Greatest distance of the orders between rows from the slope of their line."""
     return 0.12 + 0.04 * order
 
 
-def window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int, int, str] | None:
+def find_window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int, int, str] | None:
     """(first, stop, note) of the last window of rows that shows one order; None if there is none.
 
     Errors after the window must be flat, or a single row after at least four rows may leave their line. Errors before
@@ -217,25 +221,25 @@ def window(h: np.ndarray, e: np.ndarray, strict: bool = True) -> tuple[int, int,
     p = pair_orders(h, e)
     for stop in range(len(h), LEAST_ROWS - 1, -1):
         first = stop - LEAST_ROWS
-        if not agrees(h, e, first, stop) or (strict and leaves(p[: stop - 1])):
+        if not is_line(h, e, first, stop) or (strict and last_deviates(p[: stop - 1])):
             continue
-        first, stop = widened(h, e, p, first, stop)
-        note = behind(h, e, first, stop)
-        if e[first] < LEAST_FALL * e[stop - 1] or hides(h, e, first, stop):
+        first, stop = extend_window(h, e, p, first, stop)
+        note = classify_tail(h, e, first, stop)
+        if e[first] < LEAST_REDUCTION * e[stop - 1] or may_be_floor(h, e, first, stop):
             continue
-        if note is not None and np.all(e[1 : first + 1] < RISE * e[:first]):
+        if note is not None and np.all(e[1 : first + 1] < ALLOWED_RISE * e[:first]):
             return first, stop, note
     return None
 
 
-def agrees(h, e, first: int, stop: int) -> bool:
+def is_line(h, e, first: int, stop: int) -> bool:
     """True if rows lie on a falling line."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     spread = np.max(np.abs(pair_orders(h[first:stop], e[first:stop]) - slope))
-    return slope >= LEAST_ORDER and spread <= near(slope)
+    return slope >= LEAST_ORDER and spread <= order_tolerance(slope)
 
 
-def leaves(p: np.ndarray) -> bool:
+def last_deviates(p: np.ndarray) -> bool:
     """True if the last order deviates from the orders before it: the changes of converging orders decrease."""
     if len(p) < LEAST_ROWS:
         return False
@@ -243,24 +247,26 @@ def leaves(p: np.ndarray) -> bool:
     return bool(last > 2.0 * before + 0.03 * (1.0 + max(p[-2], 0.0)))
 
 
-def hides(h, e, first: int, stop: int) -> bool:
+def may_be_floor(h, e, first: int, stop: int) -> bool:
     """True if a short or rough window follows rows that fall much faster: it may be their floor."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     before = np.max(pair_orders(h[: first + 1], e[: first + 1]), initial=0.0)
-    return bool(before > STEEPER * slope + 0.3) and not (stop - first > LEAST_ROWS and clear(h, e, first, stop))
+    return bool(before > STEEP_RATIO * slope + 0.3) and not (
+        stop - first > LEAST_ROWS and is_clear_line(h, e, first, stop)
+    )
 
 
-def clear(h, e, first: int, stop: int) -> bool:
+def is_clear_line(h, e, first: int, stop: int) -> bool:
     """True if rows lie so close to a line that an excess of later rows above the line is visible."""
     slope, _ = line_of(h[first:stop], e[first:stop])
     spread = np.max(np.abs(pair_orders(h[first:stop], e[first:stop]) - slope))
-    return bool(spread < CLEAR * (1.0 + slope))
+    return bool(spread < CLEAR_SPREAD * (1.0 + slope))
 
 
-def widened(h, e, p, first: int, stop: int) -> tuple[int, int]:
+def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
     """Window extended by earlier rows on its line, and without a last row that begins to leave the line."""
-    while first > 0 and agrees(h, e, first - 1, stop) and abs(p[first - 1] - line_of(h[first:stop], e[first:stop])[0]) \
-            <= near(0.5 * (p[first - 1] + p[first])):  # fmt: skip
+    while first > 0 and is_line(h, e, first - 1, stop) and abs(p[first - 1] - line_of(h[first:stop], e[first:stop])[0]) \
+            <= order_tolerance(0.5 * (p[first - 1] + p[first])):  # fmt: skip
         first -= 1
     all_changes = np.max(np.abs(np.diff(p[first : stop - 1])), initial=0.0)
     inner_changes = np.max(np.abs(np.diff(p[first : stop - 2])), initial=0.0)
@@ -270,7 +276,7 @@ def widened(h, e, p, first: int, stop: int) -> tuple[int, int]:
     return first, stop
 
 
-def behind(h, e, first: int, stop: int) -> str | None:
+def classify_tail(h, e, first: int, stop: int) -> str | None:
     """Kind of the rows after a window: "" for none or a floor, a note if a row leaves the line, else None."""
     rest = e[stop:]
     if rest.size == 0:
@@ -278,13 +284,18 @@ def behind(h, e, first: int, stop: int) -> str | None:
     slope, intercept = line_of(h[first:stop], e[first:stop])
     excess = rest - np.exp(intercept) * h[stop:] ** slope  # above the line
     last = e[stop - 1]
-    if rest.size >= 2 and np.all(excess > 0.0) and excess.max() < FLAT * excess.min() and rest.max() < FLAT * last:
+    if (
+        rest.size >= 2
+        and np.all(excess > 0.0)
+        and excess.max() < FLOOR_SPREAD * excess.min()
+        and rest.max() < FLOOR_SPREAD * last
+    ):
         falls = math.log(excess[0] / excess[-1]) / math.log(h[stop] / h[-1])
         settled = pair_orders(h[-2:], e[-2:])[0] < 0.5 * slope
-        if falls < min(0.3 * slope, 0.4) and (settled or clear(h, e, first, stop)):
+        if falls < min(0.3 * slope, 0.4) and (settled or is_clear_line(h, e, first, stop)):
             return ""
     if rest.size == 1 and stop - first > LEAST_ROWS:
-        if 0.0 < excess[0] and rest[0] < RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
+        if 0.0 < excess[0] and rest[0] < ALLOWED_RISE * last and abs(rest[0] / last - 1.0) < 0.1 * slope:
             return ""  # the error no longer falls
         return "the last row leaves the line: a floor or another order begins there"
     return None

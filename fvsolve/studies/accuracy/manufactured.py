@@ -11,16 +11,16 @@ import numpy as np
 from fvsolve.errors import FvsolveError
 from fvsolve.exact.solution import Solution, averages
 from fvsolve.model import RunData
-from fvsolve.studies.accuracy.cells import pipes
-from fvsolve.studies.accuracy.judge import Judge
-from fvsolve.studies.accuracy.rows import Order
-from fvsolve.studies.distance import recorded
-from fvsolve.studies.errands import Errands
-from fvsolve.studies.outcome import Outcome, outcome, prepared
-from fvsolve.studies.truth import Truth, of_solution
+from fvsolve.studies.accuracy.case_resolution import pipes
+from fvsolve.studies.accuracy.order_result import Order
+from fvsolve.studies.accuracy.order_study import OrderStudy
+from fvsolve.studies.distance import recording_keys
+from fvsolve.studies.outcome import Outcome, outcome, study_model
+from fvsolve.studies.reference import Reference, reference_of_solution
+from fvsolve.studies.run_queue import RunQueue
 
 
-class Manufactured(Judge):
+class ManufacturedStudy(OrderStudy):
     """Rows of a study with a start, a source or an exact solution as functions along the pipes.
 
     Without a source the runs differ from usual runs by their initial state only; with a source they are integrated by
@@ -30,7 +30,7 @@ class Manufactured(Judge):
     def __init__(
         self, case, plan, against: str, initial: Callable | None, source: Callable | None, exact: Callable | None
     ) -> None:
-        super().__init__(case, plan, "auto", Errands(case), {})
+        super().__init__(case, plan, "auto", RunQueue(case), {})
         self.against = against
         if against == "exact" and exact is None:
             raise FvsolveError(
@@ -41,8 +41,8 @@ class Manufactured(Judge):
         if not case.law.linear:
             raise FvsolveError(f'initial, source and exact need the law "linear", but this case has "{case.fluid.law}"')
         t0 = case.numerics.start
-        self.source, self.exact = source and Given("source", source), exact and Given("exact", exact)
-        self.initial = initial and Given("initial", initial)
+        self.source, self.exact = source and UserFunction("source", source), exact and UserFunction("exact", exact)
+        self.initial = initial and UserFunction("initial", initial)
         if initial is None and exact is not None:
             self.initial = lambda pipe, x: self.exact(pipe, x, t0)
 
@@ -51,32 +51,34 @@ class Manufactured(Judge):
         return super().study(None, progress)
 
     @cached_property
-    def truth(self) -> Truth:
+    def reference(self) -> Reference:
         """Reference: the exact function, or a finer run from the same start and with the same source."""
         time_only = self.plan.way == "time" and self.against == "auto"  # the space error would hide the time error
         use_exact = self.exact is not None and self.against != "finer" and not time_only
-        return self.of_function() if use_exact else self.finer(self.plan.way, False, run=self.outcome)
+        return (
+            self.reference_of_function() if use_exact else self.find_reference(self.plan.way, False, run=self.outcome)
+        )
 
-    def of_function(self) -> Truth:
+    def reference_of_function(self) -> Reference:
         """Reference by the exact function; nodes have its pressures at the ends of their pipes."""
         laws = {}
         for name, pipe in pipes(self.case).items():
             for node, x in ((pipe.from_, 0.0), (pipe.to, pipe.length)):
                 laws[node] = lambda t, name=name, x=x: self.exact(name, np.full(np.shape(t), x), t)[0]
         solution = Solution(self.case, pressure=laws, pipe=self.exact)
-        return of_solution(solution, "function", "exact solution given as a function")
+        return reference_of_solution(solution, "function", "exact solution given as a function")
 
     def run(self, level) -> Outcome:
         """Run of a row."""
-        return self.outcome(self.case, recorded(self.case, level.set))
+        return self.outcome(self.case, recording_keys(self.case, level.set))
 
     def outcome(self, case, keys) -> Outcome:
         """Run of the case with changed keys, from the given start and with the given source."""
-        model = prepared(case, keys)
-        y = self.first(model)
-        return outcome(model, y=y) if self.source is None else Sourced(model, self.source).run(y)
+        model = study_model(case, keys)
+        y = self.initial_state(model)
+        return outcome(model, y=y) if self.source is None else RunWithSource(model, self.source).run(y)
 
-    def first(self, model) -> np.ndarray:
+    def initial_state(self, model) -> np.ndarray:
         """Initial state: deviations of both waves of the given start, averaged over cells [kg/s]; else zero."""
         y = np.zeros(model.y_size)
         for k, pipe in enumerate(model.pipes if self.initial else []):
@@ -89,7 +91,7 @@ class Manufactured(Judge):
         return y
 
 
-class Given:
+class UserFunction:
     """Function of the user along pipes; raises a FvsolveError if it fails or returns unusable values."""
 
     def __init__(self, name: str, function: Callable) -> None:
@@ -101,19 +103,19 @@ class Given:
         try:
             values = self.function(pipe, x, *t)
         except Exception as error:
-            raise self.wrong(pipe, f"raised {type(error).__name__}: {error}") from error
+            raise self.fault_for(pipe, f"raised {type(error).__name__}: {error}") from error
         try:
             first, second = (np.broadcast_to(np.asarray(field, dtype=float), shape) for field in values)
         except (TypeError, ValueError) as error:
             size = "x ".join(map(str, shape))
-            raise self.wrong(pipe, f"must return two numbers or arrays of {size} values, one for each x") from error
+            raise self.fault_for(pipe, f"must return two numbers or arrays of {size} values, one for each x") from error
         for field in (first, second):
             if not np.all(np.isfinite(field)):
                 place = float(np.broadcast_to(x, shape)[~np.isfinite(field)].flat[0])
-                raise self.wrong(pipe, f"returns values that are not finite, first at x = {place:g} m")
+                raise self.fault_for(pipe, f"returns values that are not finite, first at x = {place:g} m")
         return first, second
 
-    def wrong(self, pipe: str, problem: str) -> FvsolveError:
+    def fault_for(self, pipe: str, problem: str) -> FvsolveError:
         """Return the error, and store it: compiled steps that call the function cannot pass it on."""
         self.fault = FvsolveError(
             f'{self.name}(pipe, x{", t" if self.name != "initial" else ""}) on "{pipe}" {problem}'
@@ -121,10 +123,10 @@ class Given:
         return self.fault
 
 
-class Sourced:
+class RunWithSource:
     """One run with a source, in segments between the kinks and jumps of the case."""
 
-    def __init__(self, model, source: Given) -> None:
+    def __init__(self, model, source: UserFunction) -> None:
         self.model, self.slate, self.source, self.limit = model, RunData(model), source, np.inf
 
     def rates(self, t: float, y: np.ndarray, dydt: np.ndarray) -> None:

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.studies.accuracy.afford import affordable
-from fvsolve.studies.accuracy.rows import Order
-from fvsolve.studies.errands import Errands
-from fvsolve.studies.lines import lines, settled
-from fvsolve.studies.outcome import Progress, names, without_basins
-from fvsolve.studies.points import OUT, Points, kept_in
+from fvsolve.studies.accuracy.order_result import Order
+from fvsolve.studies.accuracy.time_budget import affordable_plan
+from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices
+from fvsolve.studies.outcome import Progress, name_list, refuse_basins
+from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
+from fvsolve.studies.run_queue import RunQueue
 from fvsolve.validation import COUNT, FUNCTION, NAMES, TABLE, TEXT, validated
 
-REFERENCES = ("auto", "exact", "finer", "richardson")
+REFERENCE_KINDS = ("auto", "exact", "finer", "richardson")
 
 
 @validated(
@@ -38,7 +38,7 @@ def order(
     case, set: Mapping | None = None, *, refine: str | None = None, key: str | None = None, levels: int | None = None,
     cells: int | None = None, schemes: str | Sequence[str] | None = None, methods: str | Sequence[str] | None = None,
     against: str = "auto", initial: Callable | None = None, source: Callable | None = None,
-    exact: Callable | None = None, out: str | Path | Points | None = None, progress: Progress | None = None,
+    exact: Callable | None = None, out: str | Path | ResultCache | None = None, progress: Progress | None = None,
     jobs: int = 1, dask: str | None = None,
 ) -> Order | list[Order]:  # fmt: skip
     """Errors of a case over a refinement, and the order at which they fall; a list for several schemes or methods.
@@ -54,26 +54,26 @@ def order(
     jobs, dask : processes that make the runs, as in `sweep`; functions of x and t need this process alone
     Raises CaseError, FvsolveError.
     """
-    if against not in REFERENCES:
+    if against not in REFERENCE_KINDS:
         raise FvsolveError(
-            f'against = "{against}" is unknown{did_you_mean(against, REFERENCES)}. Expected {", ".join(REFERENCES)}'
+            f'against = "{against}" is unknown{did_you_mean(against, REFERENCE_KINDS)}. Expected {", ".join(REFERENCE_KINDS)}'
         )
     given = initial, source, exact
     if any(given) and (jobs != 1 or dask is not None):
         raise FvsolveError("initial, source and exact are functions of this process. Expected jobs = 1 and no dask")
     report, studies = progress or (lambda *_: None), []
-    pairs = [(scheme, method) for scheme in names(schemes) or [None] for method in names(methods) or [None]]
-    with kept_in(out) as points, Errands(case, jobs, dask) as errands:
+    pairs = [(scheme, method) for scheme in name_list(schemes) or [None] for method in name_list(methods) or [None]]
+    with cache_in(out) as points, RunQueue(case, jobs, dask) as errands:
         for scheme, method in pairs:
             pair_settings = {"numerics.scheme": scheme, "numerics.method": method}
             settings = {**(set or {}), **{name: value for name, value in pair_settings.items() if value is not None}}
             studies.append(
-                _order(case, settings, (refine, key, levels, cells), against, given, points, report, errands)
+                _order_of_pair(case, settings, (refine, key, levels, cells), against, given, points, report, errands)
             )
     return studies[0] if len(studies) == 1 else studies
 
 
-def _order(case, settings: Mapping, rows: tuple, against, given, points, progress, errands: Errands) -> Order:
+def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points, progress, errands: RunQueue) -> Order:
     """Order study of one scheme and method.
 
     rows : refine, key, levels and cells; given : initial, source and exact solution, None if absent
@@ -81,18 +81,18 @@ def _order(case, settings: Mapping, rows: tuple, against, given, points, progres
     from fvsolve.case import load
 
     case = load(case, settings)
-    if fixed := settled(case):
+    if fixed := fixed_choices(case):
         settings = settings | fixed
         case = load(case, fixed)
-    refinement = affordable(case, *rows, against, points)
+    refinement = affordable_plan(case, *rows, against, points)
     if given == (None, None, None):
-        from fvsolve.studies.accuracy.judge import Judge
+        from fvsolve.studies.accuracy.order_study import OrderStudy
 
-        return Judge(case, refinement, against, errands, settings).study(points, progress)
-    from fvsolve.studies.accuracy.manufactured import Manufactured
+        return OrderStudy(case, refinement, against, errands, settings).study(points, progress)
+    from fvsolve.studies.accuracy.manufactured import ManufacturedStudy
 
-    without_basins(case, "order by functions of pipes")
-    if delayed := lines(case):
+    refuse_basins(case, "order by functions of pipes")
+    if delayed := delay_lines(case):
         raise FvsolveError(f"functions along pipes need cells, but {listing(delayed)} would be delay lines. Set "
                            'numerics.pipe_model = "finite-volume", and no `pipe_model` of a pipe')  # fmt: skip
-    return Manufactured(case, refinement, against, *given).study(points, progress)
+    return ManufacturedStudy(case, refinement, against, *given).study(points, progress)

@@ -29,7 +29,7 @@ class Crossing:
         return self.coarser != self.finer
 
 
-def crossing(errors: Sequence[float], costs: Sequence[float], target: float) -> Crossing | None:
+def find_crossing(errors: Sequence[float], costs: Sequence[float], target: float) -> Crossing | None:
     """Coarsest place of a curve from which on all errors are at most `target`; None if its finest point exceeds it."""
     good = len(errors)
     while good > 0 and errors[good - 1] <= target:
@@ -42,15 +42,15 @@ def crossing(errors: Sequence[float], costs: Sequence[float], target: float) -> 
     if not math.isfinite(before) or after <= 0.0:
         return Crossing(costs[good], good, good, 1.0)
     share = math.log(before / target) / math.log(before / after)
-    return Crossing(between(costs[good - 1], costs[good], share), good - 1, good, share)
+    return Crossing(interpolate_log(costs[good - 1], costs[good], share), good - 1, good, share)
 
 
-def between(low: float, high: float, share: float) -> float:
+def interpolate_log(low: float, high: float, share: float) -> float:
     """Number at the fraction `share` of the way from low to high, in logarithms."""
     return math.exp((1.0 - share) * math.log(low) + share * math.log(high))
 
 
-def front(errors: Sequence[float], costs: Sequence[float]) -> list[int]:
+def pareto_front(errors: Sequence[float], costs: Sequence[float]) -> list[int]:
     """Indices of the Pareto-optimal points (error, cost), from cheap to accurate."""
     indices, least = [], math.inf
     for k in sorted(range(len(errors)), key=lambda k: (costs[k], errors[k])):
@@ -60,7 +60,7 @@ def front(errors: Sequence[float], costs: Sequence[float]) -> list[int]:
     return indices
 
 
-def targets(errors: Sequence[float], floor: float) -> list[float]:
+def target_powers(errors: Sequence[float], floor: float) -> list[float]:
     """Powers of ten 1e-1, 1e-2, ... down to the last that some error reaches and that is not below the floor."""
     least = max(min((e for e in errors if math.isfinite(e)), default=math.inf), floor)
     powers, exponent = [], -1

@@ -10,31 +10,31 @@ import numpy as np
 from fvsolve.case.defaults import raw_link
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
-from fvsolve.studies.accuracy.cells import (
+from fvsolve.studies.accuracy.case_resolution import (
     Counts,
     basins,
-    counts,
-    from_files,
-    greatest_rate,
-    in_cells,
-    keys,
-    most,
+    basins_from_files,
+    cell_counts,
+    cell_keys_of,
+    cell_size,
+    greatest_wave_rate,
+    most_cells,
     pipes,
-    refinable,
+    pipes_with_cells,
+    refinable_counts,
     scaled,
-    size,
-    space_order,
-    total,
+    scheme_order,
+    total_cells,
 )
-from fvsolve.studies.lines import lines
-from fvsolve.studies.outcome import prepared
+from fvsolve.studies.delay_line_keys import delay_lines
+from fvsolve.studies.outcome import study_model
 
 WAYS = ("both", "space", "time")
 TIME_KEYS = ("numerics.step", "numerics.courant", "numerics.rtol")
-LEVELS = {"both": 4, "space": 4, "time": 6}
-LOOSE = 1e-4  # first tolerance of a refinement of rtol, unless that of the case is greater
-MOST_CELLS = 10**6  # greatest number of cells of a row
-STEP_SHARE = 0.01  # approximate ratio of time error to space error on the finest row, if space alone is refined
+DEFAULT_LEVELS = {"both": 4, "space": 4, "time": 6}
+FIRST_RTOL = 1e-4  # first tolerance of a refinement of rtol, unless that of the case is greater
+MAX_CELLS = 10**6  # greatest number of cells of a row
+STEP_ERROR_SHARE = 0.01  # approximate ratio of time error to space error on the finest row, if space alone is refined
 LEAST_COURANT = 0.02  # smaller Courant numbers would take too long
 
 
@@ -67,22 +67,22 @@ class Plan:
 
 def resolutions(case) -> dict[str, str]:
     """Keys of a case that set its resolution, with their kind of refinement: "both", "space" or "time"."""
-    ways = dict.fromkeys(counts(case), "both")
-    if lines(case):
+    ways = dict.fromkeys(cell_counts(case), "both")
+    if delay_lines(case):
         ways["numerics.delay_tolerance"] = "space"
     if pipes(case) or basins(case):
         ways["numerics.courant"] = "time"
-    if by_cell_time(case):
+    if pipes_by_cell_time(case):
         ways["numerics.cell_time"] = "both"
     return ways | {"numerics.step": "time", "numerics.rtol": "time"}
 
 
-def by_cell_time(case) -> list[str]:
+def pipes_by_cell_time(case) -> list[str]:
     """Names of pipes that do not state their cells."""
-    return [name for name in in_cells(case) if "cells" not in raw_link(case.raw, name)]
+    return [name for name in pipes_with_cells(case) if "cells" not in raw_link(case.raw, name)]
 
 
-def plan(
+def refinement_plan(
     case, refine: str | None = None, key: str | None = None, levels: int | None = None, cells: int | None = None
 ) -> Plan:
     """Rows of a refinement of a case, coarsest first.
@@ -98,16 +98,16 @@ def plan(
     if key is not None and key not in known:
         nearest = did_you_mean(key, known)
         raise FvsolveError(f"{key} is not a resolution of this case{nearest}. Expected one of {', '.join(known)}")
-    refine = refine or (known[key] if key else "both" if counts(case) or lines(case) else "time")
+    refine = refine or (known[key] if key else "both" if cell_counts(case) or delay_lines(case) else "time")
     if refine not in WAYS:
         raise FvsolveError(f'refine = "{refine}" is unknown{did_you_mean(refine, WAYS)}. Expected {", ".join(WAYS)}')
-    if refine != "time" and not lines(case):
-        refinable(case)
+    if refine != "time" and not delay_lines(case):
+        refinable_counts(case)
     if key is not None and (known[key] == "time") != (refine == "time"):
         raise FvsolveError(
             f'{key} refines {"time" if known[key] == "time" else "space"}, so refine = "{refine}" is impossible'
         )
-    levels = LEVELS[refine] if levels is None else levels
+    levels = DEFAULT_LEVELS[refine] if levels is None else levels
     if levels < 2:
         raise FvsolveError(f"levels = {levels} is too few. Expected at least 2, and at least 3 for a fitted order")
     if refine == "time" and cells is not None:
@@ -116,49 +116,54 @@ def plan(
         )
     if refine == "time":
         return time_plan(case, key, levels)
-    if lines(case) and (key == "numerics.delay_tolerance" or not counts(case)):
+    if delay_lines(case) and (key == "numerics.delay_tolerance" or not cell_counts(case)):
         if cells is not None:
             raise FvsolveError(f"cells = {cells}: cells of delay lines are only places of output. Leave it out")
-        return lines_plan(case, refine, levels)
+        return delay_line_plan(case, refine, levels)
     return space_plan(case, refine, key, levels, cells)
 
 
 # delay lines ------------------------------------------------------------------------------------------------------
 
 
-def lines_plan(case, way: str, levels: int) -> Plan:
+def delay_line_plan(case, way: str, levels: int) -> Plan:
     """Rows with half the tolerance of delay lines from row to row, so with twice the stretches.
 
     For "both" steps are halved too, and are the sizes [s]. Else sizes are the travel times of a stretch [s], of the
     line with most stretches in the last row.
     """
-    count, step = total(case, counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
-    rows = [lines_keys(case, way, k) for k in range(levels)]
+    count, step = total_cells(case, cell_counts(case)), first_step(case) if case.numerics.rtol is None else math.nan
+    rows = [stretch_keys(case, way, k) for k in range(levels)]
     if way == "both":
         by_error = math.isnan(step)
-        first = 1.0 / greatest_rate(case, counts(case)) if by_error else step
+        first = 1.0 / greatest_wave_rate(case, cell_counts(case)) if by_error else step
         refined = [Level(row if by_error else row | {"numerics.step": step / 2**k}, first / 2**k, count, step / 2**k)
                    for k, row in enumerate(rows)]  # fmt: skip
-        return Plan(way, "longest step [s]" if by_error else "step [s]", tuple(refined), STRETCHED[by_error])
-    tables = [prepared(case, row).tables.delays for row in rows]
+        return Plan(
+            way, "longest step [s]" if by_error else "step [s]", tuple(refined), STRETCH_AND_STEP_WORDS[by_error]
+        )
+    tables = [study_model(case, row).tables.delays for row in rows]
     line = int(np.argmax(tables[-1]["stretches"]))
     if tables[0]["stretches"][line] == tables[-1]["stretches"][line]:
         raise FvsolveError("a smaller numerics.delay_tolerance cuts no delay line of this case into more stretches: "
                            'there is no friction, or stretches are as short as a step. '
                            'Expected "both" or "time"')  # fmt: skip
     refined = [Level(row, float(table["tau"][line]), count, step) for row, table in zip(rows, tables, strict=True)]
-    return Plan(way, "stretch [s]", tuple(refined), f"{STRETCHES}, one step for all rows")
+    return Plan(way, "stretch [s]", tuple(refined), f"{STRETCH_WORDS}, one step for all rows")
 
 
-STRETCHES = "tolerance of delay lines halved, so that they have twice the stretches"
-STRETCHED = {False: f"{STRETCHES}, and steps halved", True: f"{STRETCHES}, and their longest step halved"}
+STRETCH_WORDS = "tolerance of delay lines halved, so that they have twice the stretches"
+STRETCH_AND_STEP_WORDS = {
+    False: f"{STRETCH_WORDS}, and steps halved",
+    True: f"{STRETCH_WORDS}, and their longest step halved",
+}
 
 
-def lines_keys(case, way: str, k: int) -> dict:
+def stretch_keys(case, way: str, k: int) -> dict:
     """Keys of row k: tolerance of delay lines divided by 2^k, and their cells times 2^k if these set the step."""
-    keys = {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k} if lines(case) else {}
-    if way == "both" and (case.numerics.rtol is not None or (counts(case) and case.numerics.courant is not None)):
-        keys |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in lines(case)}
+    keys = {"numerics.delay_tolerance": case.numerics.delay_tolerance / 2**k} if delay_lines(case) else {}
+    if way == "both" and (case.numerics.rtol is not None or (cell_counts(case) and case.numerics.courant is not None)):
+        keys |= {f"links.{name}.cells": pipes(case)[name].cells * 2**k for name in delay_lines(case)}
     return keys
 
 
@@ -167,41 +172,43 @@ def lines_keys(case, way: str, k: int) -> dict:
 
 def space_plan(case, way: str, key: str | None, levels: int, cells: int | None) -> Plan:
     """Rows with twice the cells from row to row, of all pipes and basins or of the part that the key names."""
-    first = coarsest(case, key, cells)
+    first = coarsest_counts(case, key, cells)
     refined = [name for name in first if key in (None, name)]
     if key == "numerics.cell_time":
-        refined = [f"links.{name}.cells" for name in by_cell_time(case)]
+        refined = [f"links.{name}.cells" for name in pipes_by_cell_time(case)]
     all_counts = [{name: tuple(n * 2**k for n in numbers) if name in refined else numbers
                    for name, numbers in first.items()} for k in range(levels)]  # fmt: skip
-    finest = total(case, all_counts[-1])
-    if finest > MOST_CELLS:
+    finest = total_cells(case, all_counts[-1])
+    if finest > MAX_CELLS:
         raise FvsolveError(f"the finest of {levels} levels would have {finest:.3g} cells. Expected at most "
-                           f"{MOST_CELLS:.0e}; try fewer levels, or fewer cells in the first row")  # fmt: skip
+                           f"{MAX_CELLS:.0e}; try fewer levels, or fewer cells in the first row")  # fmt: skip
     rows, courant = [], space_courant(case, levels) if way == "space" else case.numerics.courant
     for k, row_counts in enumerate(all_counts):
-        step, stepping = stepping_of(case, row_counts, row_counts if way == "both" else {**all_counts[-1]}, k, courant)
-        length = max(size(case, name, row_counts[name]) for name in refined)
-        stretched = lines_keys(case, way, k) if key is None else {}
+        step, stepping = step_keys(case, row_counts, row_counts if way == "both" else {**all_counts[-1]}, k, courant)
+        length = max(cell_size(case, name, row_counts[name]) for name in refined)
+        stretched = stretch_keys(case, way, k) if key is None else {}
         if stretched and way == "both" and courant is not None:
-            step = courant / greatest_rate(case, first) / 2**k
-        rows.append(Level(keys(row_counts) | stepping | stretched, length, total(case, row_counts), step))
+            step = courant / greatest_wave_rate(case, first) / 2**k
+        rows.append(Level(cell_keys_of(row_counts) | stepping | stretched, length, total_cells(case, row_counts), step))
     names = ", ".join(name.split(".")[1] for name in refined)
-    kinds = " and ".join(kind for kind, parts in (("pipes", in_cells(case)), ("basins", basins(case))) if parts)
-    text = f"cells of all {kinds}" if len(refined) == len(first) and not from_files(case) else f"cells of {names}"
-    text += " and stretches of delay lines" if lines(case) and key is None else ""
-    return Plan(way, "cell size [m]", tuple(rows), f"{text} doubled, {time_words(case, way, courant)}")
+    kinds = " and ".join(kind for kind, parts in (("pipes", pipes_with_cells(case)), ("basins", basins(case))) if parts)
+    text = (
+        f"cells of all {kinds}" if len(refined) == len(first) and not basins_from_files(case) else f"cells of {names}"
+    )
+    text += " and stretches of delay lines" if delay_lines(case) and key is None else ""
+    return Plan(way, "cell size [m]", tuple(rows), f"{text} doubled, {stepping_words(case, way, courant)}")
 
 
-def coarsest(case, key: str | None, cells: int | None) -> Counts:
+def coarsest_counts(case, key: str | None, cells: int | None) -> Counts:
     """Numbers of cells of the first row."""
-    own_counts = counts(case)
+    own_counts = cell_counts(case)
     if cells is None:
         return own_counts
     if cells < 1:
         raise FvsolveError(f"cells = {cells} is too few. Expected at least 1")
     if key in own_counts:
         return own_counts | scaled({key: own_counts[key]}, cells / max(own_counts[key]))
-    return scaled(own_counts, cells / most(own_counts))
+    return scaled(own_counts, cells / most_cells(own_counts))
 
 
 def space_courant(case, levels: int) -> float | None:
@@ -213,12 +220,12 @@ def space_courant(case, levels: int) -> float | None:
     numerics = case.numerics
     if numerics.courant is None:
         return None
-    p, q = space_order(case), METHODS[numerics.method].order
-    share = STEP_SHARE * 2.0 ** (-(levels - 1) * max(p - q, 0))
+    p, q = scheme_order(case), METHODS[numerics.method].order
+    share = STEP_ERROR_SHARE * 2.0 ** (-(levels - 1) * max(p - q, 0))
     return min(numerics.courant, max(LEAST_COURANT, float(f"{share ** (1.0 / q):.2g}")))
 
 
-def stepping_of(case, cells: Counts, step_cells: Counts, k: int, courant: float | None) -> tuple[float, dict]:
+def step_keys(case, cells: Counts, step_cells: Counts, k: int, courant: float | None) -> tuple[float, dict]:
     """(step [s], keys) of row k: by the Courant number on the cells `step_cells`, or from the case's step.
 
     step_cells : `cells` itself if the step is refined with the cells, so that the case's step is halved k times
@@ -228,14 +235,14 @@ def stepping_of(case, cells: Counts, step_cells: Counts, k: int, courant: float 
         return math.nan, {}
     if numerics.step is not None:
         halved = step_cells is cells
-        finest = numerics.step if halved else min(numerics.step, 1.0 / greatest_rate(case, step_cells))
+        finest = numerics.step if halved else min(numerics.step, 1.0 / greatest_wave_rate(case, step_cells))
         step = finest / 2**k if halved else finest
         return step, {"numerics.step": step}
-    step = courant / greatest_rate(case, step_cells)
+    step = courant / greatest_wave_rate(case, step_cells)
     return step, {} if step_cells is cells else {"numerics.step": step}
 
 
-def time_words(case, way: str, courant: float | None) -> str:
+def stepping_words(case, way: str, courant: float | None) -> str:
     """Description of the steps of a refinement."""
     numerics = case.numerics
     if numerics.rtol is not None:
@@ -243,7 +250,7 @@ def time_words(case, way: str, courant: float | None) -> str:
     if way == "space":
         finest = "" if courant is None else f": Courant number {courant:g}"
         return f"one step for all rows, the step of the finest row{finest}"
-    if numerics.step is not None or lines(case):
+    if numerics.step is not None or delay_lines(case):
         return "steps halved too"
     return f"Courant number {numerics.courant:g} in all rows"
 
@@ -253,13 +260,13 @@ def time_words(case, way: str, courant: float | None) -> str:
 
 def time_plan(case, key: str | None, levels: int) -> Plan:
     """Rows with half the step from row to row on one grid, or with a tenth of the tolerance."""
-    numerics, count = case.numerics, total(case, counts(case))
+    numerics, count = case.numerics, total_cells(case, cell_counts(case))
     by_error = key == "numerics.rtol" or (key is None and numerics.rtol is not None)
     if by_error:
         if numerics.method != AUTO and not METHODS[numerics.method].adaptive:
             raise FvsolveError(f"{numerics.method} estimates no error, so rtol cannot be refined. Expected "
                                "numerics.step, or another method")  # fmt: skip
-        first = max(LOOSE, numerics.rtol or 0.0)
+        first = max(FIRST_RTOL, numerics.rtol or 0.0)
         tolerances = [first / 10.0**k for k in range(levels)]
         rows = tuple(Level({"numerics.rtol": rtol}, rtol, count, math.nan) for rtol in tolerances)
         return Plan("time", "rtol", rows, "rtol divided by ten, on one grid" if count else "rtol divided by ten")
@@ -281,5 +288,5 @@ def first_step(case) -> float:
         return numerics.step
     if not (pipes(case) or basins(case)):
         return every
-    step = (numerics.courant or 0.9) / greatest_rate(case, counts(case))
+    step = (numerics.courant or 0.9) / greatest_wave_rate(case, cell_counts(case))
     return every / math.ceil(every / step) if every > step else step

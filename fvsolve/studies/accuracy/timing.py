@@ -9,20 +9,20 @@ import numpy as np
 from fvsolve.errors import CaseError
 from fvsolve.solve.solve import Run
 from fvsolve.steppers import loop_indices
-from fvsolve.studies.outcome import Outcome, outcome, prepared, refusal
+from fvsolve.studies.outcome import Outcome, outcome, refusal_text, study_model
 
-MOST = 5  # greatest number of runs, of which the fastest counts
-BUDGET = 0.4  # time of all repeated runs together, without the first [s]
-LIMIT = 30.0  # CPU time after which a run is stopped [s]
-LASTING = 120.0  # CPU time after which a reference run, or a row of an order study, is stopped [s]
-TASTE = 20_000  # steps after which a run that only compiles is stopped
+MAX_RUNS = 5  # greatest number of runs, of which the fastest counts
+REPEAT_TIME = 0.4  # time of all repeated runs together, without the first [s]
+CPU_LIMIT = 30.0  # CPU time after which a run is stopped [s]
+REFERENCE_CPU_LIMIT = 120.0  # CPU time after which a reference run, or a row of an order study, is stopped [s]
+PROBE_STEPS = 20_000  # steps after which a run that only compiles is stopped
 GIVEN_UP = "given up after"
 
 
-class Capped(Run):
+class CappedRun(Run):
     """Run that stops between two chunks of steps as soon as its cost exceeds a limit."""
 
-    most_seconds, most_steps = np.inf, np.inf
+    max_seconds, max_steps = np.inf, np.inf
 
     def pause(self) -> None:
         """Pause as any run does, then check the cost."""
@@ -31,7 +31,7 @@ class Capped(Run):
 
     def check(self) -> None:
         """Raise GivenUp if the cost exceeds its limits."""
-        if self.processor > self.most_seconds or self.loop.loop_state[loop_indices.STEPS] > self.most_steps:
+        if self.processor > self.max_seconds or self.loop.loop_state[loop_indices.STEPS] > self.max_steps:
             raise GivenUp
 
     def segments(self) -> str:
@@ -46,28 +46,28 @@ class GivenUp(Exception):
     """Raised to end a run that costs too much."""
 
 
-def capped(model, state, sink, progress) -> Run:
+def capped_run(model, state, sink, progress) -> Run:
     """Run with at most LIMIT seconds of CPU time."""
-    run = Capped(model, state, sink, progress)
-    run.most_seconds = LIMIT
+    run = CappedRun(model, state, sink, progress)
+    run.max_seconds = CPU_LIMIT
     return run
 
 
-def lasting(model, state, sink, progress) -> Run:
+def long_capped_run(model, state, sink, progress) -> Run:
     """Run with at most LASTING seconds of CPU time."""
-    run = Capped(model, state, sink, progress)
-    run.most_seconds = LASTING
+    run = CappedRun(model, state, sink, progress)
+    run.max_seconds = REFERENCE_CPU_LIMIT
     return run
 
 
-def tasted(model, state, sink, progress) -> Run:
+def probe_run(model, state, sink, progress) -> Run:
     """Run with about TASTE steps at most."""
-    run = Capped(model, state, sink, progress)
-    run.most_steps = TASTE
+    run = CappedRun(model, state, sink, progress)
+    run.max_steps = PROBE_STEPS
     return run
 
 
-def finished(model, run=None) -> Outcome:
+def finished_run(model, run=None) -> Outcome:
     """Outcome of one run of a model, made by `run`. Raises KeyboardInterrupt if the user interrupted the run."""
     result = outcome(model, run=run)
     if result.reason.startswith("interrupted"):
@@ -75,25 +75,25 @@ def finished(model, run=None) -> Outcome:
     return result
 
 
-def best(model, most: int = MOST, budget: float = BUDGET) -> Outcome:
+def best_run(model, most: int = MAX_RUNS, budget: float = REPEAT_TIME) -> Outcome:
     """Outcome with the least CPU time among up to `most` runs.
 
     A run that stops early, or exceeds its limit, is not repeated.
     """
-    began, fastest = perf_counter(), finished(model, capped)
+    began, fastest = perf_counter(), finished_run(model, capped_run)
     for _ in range(most - 1 if fastest.ok else 0):
         if perf_counter() - began + fastest.seconds > budget:
             break
-        fastest = min(fastest, finished(model, capped), key=lambda run: run.processor)
+        fastest = min(fastest, finished_run(model, capped_run), key=lambda run: run.processor)
     return fastest
 
 
-def quickest(case, keys) -> Outcome:
+def best_run_of(case, keys) -> Outcome:
     """Best run of a case with changed keys; a refused case also gives an outcome."""
     try:
-        return best(prepared(case, keys))
+        return best_run(study_model(case, keys))
     except CaseError as error:
-        return Outcome(refusal(error), refused=True)
+        return Outcome(refusal_text(error), refused=True)
 
 
 def compile_seconds(model) -> float:
@@ -104,6 +104,6 @@ def compile_seconds(model) -> float:
     times = []
     for _ in range(2):
         began = perf_counter()
-        finished(model, tasted)
+        finished_run(model, probe_run)
         times.append(perf_counter() - began)
     return max(0.0, times[0] - times[1])

@@ -19,11 +19,11 @@ from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.output.summary import plain
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
-from fvsolve.studies.outcome import names
+from fvsolve.studies.outcome import name_list
 from fvsolve.validation import FUNCTION, NAMES, validated
 
 CELLS = 20  # cells of the closed pipe
-SLACK = 1e-10  # excess of a norm over 1 that counts as rounding
+NORM_TOLERANCE = 1e-10  # excess of a norm over 1 that counts as rounding
 LEAST, MOST = 0.01, 8.0  # range of Courant numbers
 
 
@@ -97,8 +97,8 @@ def passivity(schemes=None, methods=None, progress=None) -> Passivity:
 
     progress : called as progress(done, total, next) for each name
     """
-    schemes = checked(schemes, list(SCHEMES), "scheme")
-    methods = checked(methods, method_names(), "method")
+    schemes = check_names(schemes, list(SCHEMES), "scheme")
+    methods = check_names(methods, method_names(), "method")
     report, total = progress or (lambda *_: None), len(schemes) + len(methods)
     of_schemes, of_methods, limits = [], [], {}
     for done, name in enumerate(schemes):
@@ -112,9 +112,9 @@ def passivity(schemes=None, methods=None, progress=None) -> Passivity:
     return Passivity(of_methods, of_schemes, pairs)
 
 
-def checked(given, known: list[str], kind: str) -> list[str]:
+def check_names(given, known: list[str], kind: str) -> list[str]:
     """List of names from a name or names, all known names for None. Raises FvsolveError for an unknown name."""
-    given = names(given)
+    given = name_list(given)
     for name in given or ():
         if name not in known:
             if name == AUTO:
@@ -133,7 +133,7 @@ def method_claim(name: str) -> MethodClaim:
     facts, method = analyse(name), method_named(name)
     if method.kind == "linear":
         return MethodClaim(name, None, None, facts.real_interval, facts.imaginary_interval)
-    m, together = stage_matrix(method.a, method.b), same_time(method.c)
+    m, together = stage_matrix(method.a, method.b), stages_by_time(method.c)
     lowest, size = np.linalg.eigvalsh(m)[0], np.abs(method.b).max()
     chamber = float(np.linalg.eigvalsh(together.T @ m @ together)[0])
     any_network = bool(lowest >= -1e-12 * size and method.b.min() >= 0.0)
@@ -147,7 +147,7 @@ def stage_matrix(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return weighted + weighted.T - np.outer(b, b)
 
 
-def same_time(c: np.ndarray) -> np.ndarray:
+def stages_by_time(c: np.ndarray) -> np.ndarray:
     """float64[s, times]: 1 if a stage is at a time; stages at equal times have equal flows."""
     times = sorted(set(np.round(c, 12)))
     return np.array([[float(abs(x - time) < 1e-9) for time in times] for x in c])
@@ -156,9 +156,9 @@ def same_time(c: np.ndarray) -> np.ndarray:
 @functools.cache
 def closed_pipe(scheme: str) -> tuple[np.ndarray, np.ndarray]:
     """(A, S) of a lossless pipe closed at both ends: dy/dt = A y per travel time of a cell, energy |S y|^2."""
-    from fvsolve.studies.outcome import prepared
+    from fvsolve.studies.outcome import study_model
 
-    model = prepared({
+    model = study_model({
         "schema": 1, "fluid": {"name": "user", "density": 1000.0, "bulk_modulus": 2e9, "viscosity": 1e-3,
                                "vapor_pressure": 2000.0, "law": "linear"},
         "nodes": {"a": {"type": "junction"}, "b": {"type": "junction"}, "tap": {"type": "reservoir", "pressure": 1e6}},
@@ -169,10 +169,10 @@ def closed_pipe(scheme: str) -> tuple[np.ndarray, np.ndarray]:
     })  # fmt: skip
     unit = 100.0 * np.eye(model.y_size)
     a = np.column_stack([model.rhs(0.0, state) / 100.0 for state in unit]) / model.wave_rates[0]
-    return a, np.kron(np.eye(2), point_matrix(model.tables.settings[0], CELLS))
+    return a, np.kron(np.eye(2), energy_matrix(model.tables.settings[0], CELLS))
 
 
-def point_matrix(settings, n: int) -> np.ndarray:
+def energy_matrix(settings, n: int) -> np.ndarray:
     """S with |S c|^2 equal to the sum over cells of the mean squares in the energy ledger, for n dx = 1."""
     from fvsolve.kernels.linear_energy import GAUSS_WEIGHTS, POINTS, polynomial_width
 
@@ -200,7 +200,7 @@ def scheme_claim(scheme: str) -> SchemeClaim:
         return SchemeClaim(scheme, None, None, None)
     b = pipe_operator(scheme)
     rate = float(np.linalg.eigvalsh(b + b.T)[-1])
-    passive = rate <= SLACK
+    passive = rate <= NORM_TOLERANCE
     return SchemeClaim(scheme, 0.0 if passive else rate, 1.0 if passive else greatest_gain(b), passive)
 
 
@@ -231,7 +231,7 @@ def courant_limit(scheme: str, method: str) -> float | None:
     if facts.a_stable:  # von Neumann: R(hA) is a contraction wherever A is dissipative
         return math.inf
     samples = np.geomspace(LEAST, MOST, 120)
-    failed = next((k for k, x in enumerate(samples) if not stretch(scheme, method, x) <= 1.0 + SLACK), None)
+    failed = next((k for k, x in enumerate(samples) if not step_gain(scheme, method, x) <= 1.0 + NORM_TOLERANCE), None)
     if failed is None:
         return math.inf
     if failed == 0:
@@ -239,14 +239,14 @@ def courant_limit(scheme: str, method: str) -> float | None:
     low, high = samples[failed - 1], samples[failed]
     while high - low > 1e-9 * high:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if stretch(scheme, method, middle) <= 1.0 + SLACK else (low, middle)
+        low, high = (middle, high) if step_gain(scheme, method, middle) <= 1.0 + NORM_TOLERANCE else (low, middle)
     return float(low)
 
 
-def stretch(scheme: str, method: str, courant: float) -> float:
+def step_gain(scheme: str, method: str, courant: float) -> float:
     """Norm of R(courant A): greatest growth factor of the square root of the energy in a step."""
     b = courant * pipe_operator(scheme)
-    numerator, denominator = (of_matrix(coefficients, b) for coefficients in polynomials(method))
+    numerator, denominator = (matrix_polynomial(coefficients, b) for coefficients in polynomials(method))
     return float(np.linalg.norm(np.linalg.solve(denominator, numerator), 2))
 
 
@@ -266,7 +266,7 @@ def method_of(name: str):
     return method_named(name)
 
 
-def of_matrix(coefficients: list[float], b: np.ndarray) -> np.ndarray:
+def matrix_polynomial(coefficients: list[float], b: np.ndarray) -> np.ndarray:
     """Polynomial of a matrix; coefficients lowest power first."""
     total = np.zeros_like(b)
     for x in reversed(coefficients):

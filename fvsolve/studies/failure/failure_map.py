@@ -12,22 +12,22 @@ import numpy as np
 from fvsolve.case import load
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.schemes import LIMITED
-from fvsolve.studies.errands import Errand, Errands
-from fvsolve.studies.failure.columns import Columns, as_cells, columns, default_schemes
-from fvsolve.studies.failure.eigen_limit import greatest_step, spectrum
-from fvsolve.studies.failure.lines_limit import LinesLimit
-from fvsolve.studies.failure.verdict import SKIPPED, Measures, measured, verdict
-from fvsolve.studies.failure.watched import watched
-from fvsolve.studies.lines import lines, settled
-from fvsolve.studies.outcome import Progress, names, without_basins
-from fvsolve.studies.points import OUT, Points, kept_in
-from fvsolve.studies.truth import Truth, truth
+from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices
+from fvsolve.studies.failure.delay_line_limit import WaveGrowthLimit
+from fvsolve.studies.failure.eigenvalue_limit import eigenvalues_of, greatest_step
+from fvsolve.studies.failure.map_columns import Columns, cells_for_delay_lines, default_schemes, map_columns
+from fvsolve.studies.failure.run_verdict import NOT_RUN, Measures, measure_run, verdict
+from fvsolve.studies.failure.step_recording import run_recorded
+from fvsolve.studies.outcome import Progress, name_list, refuse_basins
+from fvsolve.studies.reference import Reference, find_reference
+from fvsolve.studies.result_cache import OUT, ResultCache, cache_in
+from fvsolve.studies.run_queue import RunQueue, RunRequest
 from fvsolve.validation import COUNT, FUNCTION, NAMES, NUMBER, NUMBERS, ROW, TABLE, TEXT, Kind, is_row, validated
 
 METHODS = ("euler", "ssp-rk3", "rk4", "implicit-euler", "trapezoid", "gauss-4", "radau-iia-5")
 TOLERANCE = 0.02  # greatest mean error, over the range of a probe
-MOST_IMPLICIT = 50_000  # greatest number of steps of an implicit method
-ROWS = 1000  # rows of the history of each run
+MAX_IMPLICIT_STEPS = 50_000  # greatest number of steps of an implicit method
+OUTPUT_ROWS = 1000  # rows of the history of each run
 
 
 @dataclass(frozen=True)
@@ -80,10 +80,10 @@ class FailureMap:
     def plain(self) -> dict:
         """Return the map as plain data, SI; None for unknown or infinite limits."""
         data = {entry.name: getattr(self, entry.name) for entry in fields(self) if entry.name != "squares"}
-        return data | {"squares": [_plain(entry) for entry in self.squares]}
+        return data | {"squares": [_square_data(entry) for entry in self.squares]}
 
 
-KEY = Kind(
+KEY_VALUES = Kind(
     lambda value: (
         is_row(value, lambda item: True) and len(value) == 2 and TEXT.accepts(value[0]) and ROW.accepts(value[1])
     ),
@@ -96,7 +96,7 @@ KEY = Kind(
     methods=NAMES,
     courants=NUMBERS,
     steps=NUMBERS,
-    key=KEY,
+    key=KEY_VALUES,
     tolerance=NUMBER,
     out=OUT,
     progress=FUNCTION,
@@ -107,7 +107,7 @@ KEY = Kind(
 def failure_map(
     case, schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None,
     courants: Sequence[float] | None = None, steps: Sequence[float] | None = None,
-    key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, out: str | Path | Points | None = None,
+    key: tuple[str, Sequence] | None = None, tolerance: float = TOLERANCE, out: str | Path | ResultCache | None = None,
     progress: Progress | None = None, set: Mapping | None = None, jobs: int = 1, dask: str | None = None,
 ) -> FailureMap:  # fmt: skip
     """Run a case with every scheme and method at every step (or value of a key), and give a verdict on each run.
@@ -121,19 +121,21 @@ def failure_map(
     Raises FvsolveError for unknown names, for numbers out of range, and if the reference is not accurate enough.
     """
     case = load(case, dict(set or {}))
-    without_basins(case, "map")
-    case = load(case, settled(case))
+    refuse_basins(case, "map")
+    case = load(case, fixed_choices(case))
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise FvsolveError(f"--tolerance {tolerance} is out of range. Expected a positive number, for example 0.02")
-    base = {"output.every": (case.numerics.end - case.numerics.start) / ROWS}
-    column_set = columns(case, base, courants, steps, key)
-    schemes, methods = _known(names(schemes) or default_schemes(case, column_set), names(methods) or METHODS)
+    base = {"output.every": (case.numerics.end - case.numerics.start) / OUTPUT_ROWS}
+    column_set = map_columns(case, base, courants, steps, key)
+    schemes, methods = _check_names(
+        name_list(schemes) or default_schemes(case, column_set), name_list(methods) or METHODS
+    )
     places = [(scheme, method, k) for scheme in schemes for method in methods for k in range(len(column_set.sets))]
     squares, report = [], progress or (lambda *_: None)
-    with kept_in(out) as points, Errands(case, jobs, dask) as queue:
-        trials = Trials(case, base, column_set, tolerance, points, queue)
-        if not queue.alone:
-            trials.ahead(places, report)
+    with cache_in(out) as points, RunQueue(case, jobs, dask) as queue:
+        trials = MapRuns(case, base, column_set, tolerance, points, queue)
+        if not queue.in_process:
+            trials.run_ahead(places, report)
         for scheme, method, k in places:
             report(len(squares), len(places), f"{scheme}, {method}, {column_set.label(k)}")
             squares.append(trials.square(scheme, method, k))
@@ -142,42 +144,44 @@ def failure_map(
     limited = tuple(name for name in schemes if name in LIMITED and column_set.wave_rate)
     return FailureMap(
         case.name, column_set.name, tuple(column_set.values), schemes, methods, tuple(squares), tolerance,
-        words, trials.doubt, column_set.wave_rate, limited, bool(lines(case)),
+        words, trials.uncertainty, column_set.wave_rate, limited, bool(delay_lines(case)),
     )  # fmt: skip
 
 
-class Trials:
+class MapRuns:
     """Runs of one map, with their references, predicted limits and verdicts.
 
     base : keys of all runs; looking : True while missing runs are collected, so that none is made
     """
 
-    def __init__(self, case, base: dict, column_set: Columns, tolerance: float, points: Points, queue: Errands) -> None:
-        self.case, self.base, self.across, self.tolerance, self.points = case, base, column_set, tolerance, points
-        self.errands, self.looking = queue, False
+    def __init__(
+        self, case, base: dict, column_set: Columns, tolerance: float, points: ResultCache, queue: RunQueue
+    ) -> None:
+        self.case, self.base, self.columns, self.tolerance, self.cache = case, base, column_set, tolerance, points
+        self.queue, self.collecting = queue, False
         self.span = column_set.span
-        self._references: dict[int, Truth] = {}
+        self._references: dict[int, Reference] = {}
         self._spectra: dict[tuple, np.ndarray | None] = {}
         self._limits: dict[tuple, float | None] = {}
-        self._of_lines: dict[int, LinesLimit] = {}
+        self._delay_line_limits: dict[int, WaveGrowthLimit] = {}
 
     @property
-    def doubt(self) -> float:
+    def uncertainty(self) -> float:
         """Greatest uncertainty of all references, over ranges."""
-        return max(reference.doubt.trajectory for reference in self._references.values())
+        return max(reference.uncertainty.trajectory for reference in self._references.values())
 
-    def reference(self, k: int) -> Truth:
+    def reference(self, k: int) -> Reference:
         """Reference of column k, or of all columns of steps. Raises FvsolveError if it is not accurate enough."""
-        at = k if self.across.keys(k) else 0
+        at = k if self.columns.keys(k) else 0
         if at not in self._references:
-            finest, stiff = {**self.base, **self.across.keys(k)}, self.across.stiff(k)
-            finest |= as_cells(self.case, finest)
-            reference = truth(self.case, finest, stiff=stiff, errands=self.errands)
-            uncertainty = reference.doubt.trajectory
+            finest, stiff = {**self.base, **self.columns.keys(k)}, self.columns.stiff(k)
+            finest |= cells_for_delay_lines(self.case, finest)
+            reference = find_reference(self.case, finest, stiff=stiff, queue=self.queue)
+            uncertainty = reference.uncertainty.trajectory
             if uncertainty > self.tolerance / 2:
                 raise FvsolveError(
                     "the reference is not accurate enough: its error may be "
-                    f"{uncertainty:.2g} of the range of {reference.doubt.worst or 'a probe'}, but the tolerance is "
+                    f"{uncertainty:.2g} of the range of {reference.uncertainty.worst or 'a probe'}, but the tolerance is "
                     f"{self.tolerance:g}. Try --tolerance {4 * uncertainty:.1g}, or more cells; if this probe shows "
                     "only rounding, remove it from output.probes"
                 )
@@ -189,9 +193,11 @@ class Trials:
 
         None if either is not known.
         """
-        at = scheme, k if self.across.keys(k) else 0
+        at = scheme, k if self.columns.keys(k) else 0
         if at not in self._spectra:
-            self._spectra[at] = spectrum(self.case, {**self.base, **self.across.keys(k), "numerics.scheme": scheme})
+            self._spectra[at] = eigenvalues_of(
+                self.case, {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
+            )
         eigenvalues = self._spectra[at]
         if (method, *at) not in self._limits:
             both = (
@@ -206,54 +212,54 @@ class Trials:
 
         inf without delay lines, or without fixed steps.
         """
-        set = {**self.base, **self.across.keys(k), "numerics.scheme": scheme}
-        steps = [keys["numerics.step"] for keys in self.across.sets if "numerics.step" in keys]
-        if not steps or not lines(load(self.case, set)):
+        set = {**self.base, **self.columns.keys(k), "numerics.scheme": scheme}
+        steps = [keys["numerics.step"] for keys in self.columns.sets if "numerics.step" in keys]
+        if not steps or not delay_lines(load(self.case, set)):
             return math.inf
-        if k not in self._of_lines:
-            self._of_lines[k] = LinesLimit(self.case, set, steps)
-        return self._of_lines[k](method)
+        if k not in self._delay_line_limits:
+            self._delay_line_limits[k] = WaveGrowthLimit(self.case, set, steps)
+        return self._delay_line_limits[k](method)
 
     def square(self, scheme: str, method: str, k: int) -> Square:
         """Square of a run, with runs at shorter steps if its error is too great."""
-        trial = {**self.base, **self.across.sets[k], "numerics.scheme": scheme, "numerics.method": method}
-        step, waves = trial.get("numerics.step"), self.across.wave_rate
+        trial = {**self.base, **self.columns.sets[k], "numerics.scheme": scheme, "numerics.method": method}
+        step, waves = trial.get("numerics.step"), self.columns.wave_rate
         limit, errors = self.limit(scheme, method, k), []
 
         def shorter() -> Measures:
-            measures = self.measure({**trial, **_shorter(self.case, trial, 2 ** (len(errors) + 1))}, k)
+            measures = self.measure({**trial, **_shorter_steps(self.case, trial, 2 ** (len(errors) + 1))}, k)
             errors.append(measures.error)
             return measures
 
-        if step and self.span / step > MOST_IMPLICIT and not _explicit(method):
-            run, word = Measures(f"{self.span / step:.0f} implicit steps", False), SKIPPED
+        if step and self.span / step > MAX_IMPLICIT_STEPS and not _is_explicit(method):
+            run, word = Measures(f"{self.span / step:.0f} implicit steps", False), NOT_RUN
         else:
             run = self.measure(trial, k)
             word = verdict(run, shorter, self.tolerance)
         courant = step * waves if step and waves else None
         return Square(scheme, method, k, step, courant, word, run, errors[0] if errors else None, limit)
 
-    def ahead(self, places: Sequence[tuple[str, str, int]], report: Progress) -> None:
+    def run_ahead(self, places: Sequence[tuple[str, str, int]], report: Progress) -> None:
         """Make all runs in other processes: first the runs of all squares, then those with shorter steps.
 
         places : scheme, method and column of each square
         """
-        while missing := self.wanted(places):
+        while missing := self.missing_runs(places):
             missing.sort(key=lambda run: -run.trial.get("numerics.step", 0.0))  # the most expensive last
-            requests = [Errand(watched, run.keys) for run in missing]
-            for count, at in enumerate(self.errands.ahead(requests), 1):
+            requests = [RunRequest(run_recorded, run.keys) for run in missing]
+            for count, at in enumerate(self.queue.run_ahead(requests), 1):
                 self.measure(missing[at].trial, missing[at].column)
                 report(count, len(missing), f"{len(places)} squares")
 
-    def wanted(self, places: Sequence[tuple[str, str, int]]) -> list[Wanted]:
+    def missing_runs(self, places: Sequence[tuple[str, str, int]]) -> list[MissingRun]:
         """New runs that squares need next, each once."""
-        missing, self.looking = {}, True
+        missing, self.collecting = {}, True
         for place in places:
             try:
                 self.square(*place)
-            except Wanted as run:
+            except MissingRun as run:
                 missing[repr(run.trial)] = run
-        self.looking = False
+        self.collecting = False
         return [*missing.values()]
 
     def measure(self, trial: dict, k: int) -> Measures:
@@ -261,17 +267,17 @@ class Trials:
         every = max(trial["output.every"], trial.get("numerics.step", 0.0))  # no rows between two steps
         reference, run = self.reference(k), {**trial, "output.every": every}
         extra = {"study": "map", "set": trial, "reference": reference.words}
-        if self.looking and self.points.find(self.case, extra) is None:
-            raise Wanted(trial, run, k)
+        if self.collecting and self.cache.find(self.case, extra) is None:
+            raise MissingRun(trial, run, k)
 
         def make() -> dict:
-            return asdict(measured(*self.errands(self.case, Errand(watched, run)), reference))
+            return asdict(measure_run(*self.queue(self.case, RunRequest(run_recorded, run)), reference))
 
-        data = self.points.get(self.case, extra, make)
+        data = self.cache.get(self.case, extra, make)
         return Measures(**{name: math.nan if value is None else value for name, value in data.items()})
 
 
-class Wanted(Exception):
+class MissingRun(Exception):
     """Raised for a trial without a run in the cache.
 
     keys : keys of the run; column : column of its reference
@@ -282,7 +288,7 @@ class Wanted(Exception):
         self.trial, self.keys, self.column = trial, keys, column
 
 
-def _shorter(case, trial: dict, ratio: int) -> dict:
+def _shorter_steps(case, trial: dict, ratio: int) -> dict:
     """Keys for steps shorter by a factor; a tolerance is divided by its square."""
     numerics = case.numerics
     for name, factor in (("step", ratio), ("courant", ratio), ("rtol", ratio**2)):
@@ -294,13 +300,13 @@ def _shorter(case, trial: dict, ratio: int) -> dict:
     return {}
 
 
-def _explicit(method: str) -> bool:
+def _is_explicit(method: str) -> bool:
     from fvsolve.steppers import METHODS as KNOWN
 
     return method not in KNOWN or KNOWN[method].explicit
 
 
-def _known(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _check_names(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Schemes and methods without repetition. Raises FvsolveError for an unknown name."""
     from fvsolve.case.sections import MethodNames
     from fvsolve.schemes import SCHEMES
@@ -312,7 +318,7 @@ def _known(*given: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return tuple(dict.fromkeys(given[0])), tuple(dict.fromkeys(given[1]))
 
 
-def _plain(square: Square) -> dict:
+def _square_data(square: Square) -> dict:
     """Square as plain data, with its measures; None for an infinite limit."""
     data = asdict(square)
     data |= data.pop("measures")

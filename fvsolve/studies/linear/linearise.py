@@ -12,17 +12,23 @@ from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.model.inputs import PRESSURE, Input, inputs_of
 from fvsolve.schemes import SCHEMES
 from fvsolve.solve.advance import hold
-from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter
-from fvsolve.studies.linear.matrices import output_matrix, responses, state_matrix
-from fvsolve.studies.linear.slopes import COARSE, SMOOTH, longest, one_sided, two_sided
+from fvsolve.studies.linear.finite_differences import (
+    COARSE_STEPS,
+    SLOPE_TOLERANCE,
+    longest_step_slopes,
+    one_sided_differences,
+    two_sided_differences,
+)
+from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point
+from fvsolve.studies.linear.state_matrices import output_matrix, responses, state_matrix
 from fvsolve.units import DIMENSIONS
 from fvsolve.validation import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 
-EPS = ("eps_x", "eps_y", "eps_z")
+EULER_PARAMETERS = ("eps_x", "eps_y", "eps_z")
 STATE_UNITS = {
     "mass": "kg", "excess": "kg", "air": "kg", "forward": "kg/s", "backward": "kg/s", "memory": "kg/s", "flow": "kg/s",
     "creep": "kg/s", "position": "m", "velocity": "m/s", "speed": "-", "opening": "-",
-    "angle": "rad", "rate": "rad/s", "travel": "m", "travel_rate": "m/s", **dict.fromkeys(("eta", *EPS), "-"),
+    "angle": "rad", "rate": "rad/s", "travel": "m", "travel_rate": "m/s", **dict.fromkeys(("eta", *EULER_PARAMETERS), "-"),
     **{f"spin_{axis}": "rad/s" for axis in "xyz"}, **{f"centre_{axis}": "m" for axis in "xyz"},
     **{f"centre_v{axis}": "m/s" for axis in "xyz"},
 }  # fmt: skip
@@ -38,7 +44,7 @@ class Linear:
     to the sum of |entry| times small deviation of its column over the row
     """
 
-    at: Frozen
+    at: OperatingPoint
     a: Any
     b: np.ndarray
     c: np.ndarray
@@ -107,11 +113,11 @@ def linearise(
     name, a state without a derivative (a limited scheme, a valve at a drop of zero, a kink), a case without states.
     """
     set = dict(set or {}) | ({} if scheme is None else {"numerics.scheme": scheme})
-    point = frozen(case, set, at, before, outputs or ())
-    return linearised(point, inputs, len(outputs) if outputs is not None else len(point.model.probes))
+    point = operating_point(case, set, at, before, outputs or ())
+    return linearise_at(point, inputs, len(outputs) if outputs is not None else len(point.model.probes))
 
 
-def linearised(at: Frozen, inputs=(), outputs: int = 0) -> Linear:
+def linearise_at(at: OperatingPoint, inputs=(), outputs: int = 0) -> Linear:
     """Linearise about an operating point, with the first `outputs` of its probes as outputs."""
     model, inputs = at.model, tuple(dict.fromkeys(inputs))
     available = inputs_of(model)
@@ -151,7 +157,7 @@ def refuse_limiter(model) -> None:
         )
 
 
-def input_value(at: Frozen, name: str, input_: Input) -> float:
+def input_value(at: OperatingPoint, name: str, input_: Input) -> float:
     """Value of an input at the state [SI]."""
     model = at.model
     if input_.node >= 0:
@@ -165,7 +171,7 @@ def input_value(at: Frozen, name: str, input_: Input) -> float:
     return float((value - input_.offset) / input_.scale)
 
 
-def input_width(at: Frozen, input_: Input, value: float) -> float:
+def input_width(at: OperatingPoint, input_: Input, value: float) -> float:
     """Small change of an input for differences [SI]."""
     usual = input_.sort.small / (input_.scale or 1e4) if input_.node >= 0 else input_.sort.small
     return usual if input_.sort.bounded or input_.sort is PRESSURE else max(usual, abs(value))
@@ -176,11 +182,11 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
     model = at.model
     width = np.array([input_width(at, input_, value)])
     low, high = input_.sort.least, input_.sort.greatest
-    differences = two_sided
+    differences = two_sided_differences
     if input_.sort.bounded:
-        steps = np.concatenate([COARSE, steps])
+        steps = np.concatenate([COARSE_STEPS, steps])
     if value <= low or value >= high:
-        differences, width = one_sided, width if value <= low else -width
+        differences, width = one_sided_differences, width if value <= low else -width
     elif input_.sort.bounded:
         width = np.minimum(width, min(value - low, high - value))
 
@@ -190,9 +196,9 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
 
     x = np.array([value])
     sides = differences(at_input, x, width, at_input(x), steps)
-    slope, error, kink = longest(*sides, np.concatenate([size, np.zeros(outputs)]), steps)
-    if max(np.max(error), np.max(kink)) > SMOOTH:
-        reason = "from side to side" if np.max(kink) > SMOOTH else "with the step of the differences"
+    slope, error, kink = longest_step_slopes(*sides, np.concatenate([size, np.zeros(outputs)]), steps)
+    if max(np.max(error), np.max(kink)) > SLOPE_TOLERANCE:
+        reason = "from side to side" if np.max(kink) > SLOPE_TOLERANCE else "with the step of the differences"
         raise FvsolveError(f"{name} = {value:g} cannot be linearised: its effect differs {reason} there; give it "
                            "another value with --set, or choose another time with --at")  # fmt: skip
     return slope / width[0], float(np.max(error))

@@ -10,19 +10,19 @@ from fvsolve.errors import FvsolveError
 from fvsolve.steppers.numbers.polynomial import Polynomial, sign
 from fvsolve.steppers.numbers.sturm import odd_part
 from fvsolve.studies.ports.rational import (
-    Places,
     Root,
+    RootLocations,
+    axis_factor,
     coefficients,
     estimates,
+    even_odd_parts,
     float_root,
-    places,
+    locate_roots,
     positive_roots,
-    shared,
-    sides,
 )
-from fvsolve.studies.sheet import Plain
+from fvsolve.studies.result_table import PlainData
 
-FATES = {  # location of a cancelled pole -> text
+HIDDEN_POLES = {  # location of a cancelled pole -> text
     "right": "in the right half plane: a system with this pole is unstable, which H does not show",
     "axis": "on the imaginary axis: a system with this pole is not asymptotically stable, which H does not show",
     "left": "in the left half plane",
@@ -30,7 +30,7 @@ FATES = {  # location of a cancelled pole -> text
 
 
 @dataclass(frozen=True)
-class RootSaid:
+class RootPlace:
     """Root for a text; near : estimate in floats [1/s]; side : right, axis or left, exact."""
 
     near: complex
@@ -59,7 +59,7 @@ class Band:
 
 
 @dataclass(frozen=True)
-class Verdict(Plain):
+class Verdict(PlainData):
     """Result of `positive_real` with reasons.
 
     positive_real : definition (4.1) of the course, with the pole at infinity
@@ -77,11 +77,11 @@ class Verdict(Plain):
     strictly: bool
     lossless: bool
     reasons: tuple[str, ...]
-    poles: tuple[RootSaid, ...]
+    poles: tuple[RootPlace, ...]
     axis_poles: tuple[AxisPole, ...]
     bands: tuple[Band, ...]
     zeros: tuple[float, ...]
-    hidden: tuple[RootSaid, ...]
+    hidden: tuple[RootPlace, ...]
     numerator: tuple[Fraction, ...]
     denominator: tuple[Fraction, ...]
 
@@ -114,18 +114,22 @@ def positive_real(numerator, denominator) -> Verdict:
         raise FvsolveError("the denominator is zero. Expected at least one coefficient other than 0")
     common = n.gcd(d)
     n, d = n // common, d // common
-    where = places(d)
+    where = locate_roots(d)
     axis = [*_infinity(n, d), *_origin(n, d, where), *(_pair(n, d, x, order) for x, order in where.pairs)]
     even, below = _real_part(n, d)
     bands, zeros = _bands(even, below), _zeros(even, below)
-    hidden = _modes(common, places(common))
-    poles = _modes(d, where)
-    faults = [*_right(poles), *(pole.fault for pole in axis if pole.fault), *(_says(band) for band in bands)]
+    hidden = _root_places(common, locate_roots(common))
+    poles = _root_places(d, where)
+    faults = [
+        *_unstable_text(poles),
+        *(pole.fault for pole in axis if pole.fault),
+        *(_band_text(band) for band in bands),
+    ]
     holds = not faults
     lossless = holds and even.degree < 0 and n.degree >= 0
-    reasons = faults or _praise(axis, zeros, lossless, n)
+    reasons = faults or _proof_text(axis, zeros, lossless, n)
     return Verdict(
-        holds, holds and _strictly(n, d, where, even, zeros), lossless, (*reasons, *_cancelled(hidden)), poles,
+        holds, holds and _strictly(n, d, where, even, zeros), lossless, (*reasons, *_hidden_text(hidden)), poles,
         tuple(axis), tuple(bands), tuple(zeros), hidden, n.coefficients[::-1] or (Fraction(0),), d.coefficients[::-1],
     )  # fmt: skip
 
@@ -133,10 +137,10 @@ def positive_real(numerator, denominator) -> Verdict:
 # poles ----------------------------------------------------------------------------------------------------------
 
 
-def _modes(p: Polynomial, locations: Places) -> tuple[RootSaid, ...]:
+def _root_places(p: Polynomial, locations: RootLocations) -> tuple[RootPlace, ...]:
     names = ["right"] * locations.right + ["axis"] * locations.axis + ["left"] * locations.left
     pairs = zip(estimates(p), names, strict=True)
-    return tuple(RootSaid(complex(0.0, s.imag) if side == "axis" else s, side) for s, side in pairs)
+    return tuple(RootPlace(complex(0.0, s.imag) if side == "axis" else s, side) for s, side in pairs)
 
 
 def _infinity(n: Polynomial, d: Polynomial) -> list[AxisPole]:
@@ -152,7 +156,7 @@ def _infinity(n: Polynomial, d: Polynomial) -> list[AxisPole]:
     return [AxisPole(math.inf, order, complex(_float(residue)) if order == 1 else None, fault)]
 
 
-def _origin(n: Polynomial, d: Polynomial, locations: Places) -> list[AxisPole]:
+def _origin(n: Polynomial, d: Polynomial, locations: RootLocations) -> list[AxisPole]:
     if not locations.zero:
         return []
     if locations.zero > 1:
@@ -169,8 +173,8 @@ def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
     name = f"the pole at w = {x.frequency:.12g} rad/s"
     if order > 1:
         return AxisPole(x.frequency, order, None, f"{name} has order {order}; expected a simple pole")
-    c = shared(d)
-    (ne, no), (de, do) = sides(n), sides(d)
+    c = axis_factor(d)
+    (ne, no), (de, do) = even_odd_parts(n), even_odd_parts(d)
     re, ro = de // c, do // c
     turned, straight = ne * re + Polynomial([0, 1]) * no * ro, no * re - ne * ro
     slope, x_value = c.derivative(), x.refine()
@@ -192,7 +196,7 @@ def _pair(n: Polynomial, d: Polynomial, x: Root, order: int) -> AxisPole:
 
 def _real_part(n: Polynomial, d: Polynomial) -> tuple[Polynomial, Polynomial]:
     """(E, P) with Re H(jw) = E / P, polynomials in x = w^2; P = |D|^2."""
-    (ne, no), (de, do), x = sides(n), sides(d), Polynomial([0, 1])
+    (ne, no), (de, do), x = even_odd_parts(n), even_odd_parts(d), Polynomial([0, 1])
     return ne * de + x * no * do, de * de + x * do * do
 
 
@@ -212,8 +216,8 @@ def _bands(even: Polynomial, below: Polynomial) -> list[Band]:
 
 def _band(even: Polynomial, below: Polynomial, low: Root | None, high: Root | None) -> Band:
     while low and high and high.low - low.high <= (high.high - high.low) + (low.high - low.low):
-        low.halve()
-        high.halve()
+        low.bisect()
+        high.bisect()
     left, right = low.refine() if low else Fraction(0), high.refine() if high else None
     a, b = float_root(left), float_root(right) if high else math.inf
     width = _float((right - left) / (Fraction(a) + Fraction(b))) if high else math.inf
@@ -252,7 +256,7 @@ def _zeros(even: Polynomial, below: Polynomial) -> list[float]:
     return [*([0.0] if top.coefficients[0] == 0 else []), *(x.frequency for x in positive_roots(top))]
 
 
-def _strictly(n: Polynomial, d: Polynomial, locations: Places, even: Polynomial, zeros: list[float]) -> bool:
+def _strictly(n: Polynomial, d: Polynomial, locations: RootLocations, even: Polynomial, zeros: list[float]) -> bool:
     """True if all poles are left of the axis, Re H(jw) > 0 at every finite w, and w^2 Re H does not tend to zero."""
     bounded_decay = even.degree == (d.degree - 1 if n.degree < d.degree else d.degree)
     return locations.axis == 0 and not zeros and even.degree >= 0 and bounded_decay
@@ -261,15 +265,15 @@ def _strictly(n: Polynomial, d: Polynomial, locations: Places, even: Polynomial,
 # words ----------------------------------------------------------------------------------------------------------
 
 
-def _right(poles: tuple[RootSaid, ...]) -> list[str]:
+def _unstable_text(poles: tuple[RootPlace, ...]) -> list[str]:
     unstable = [mode.near for mode in poles if mode.side == "right"]
     if not unstable:
         return []
     count_text = "a pole" if len(unstable) == 1 else f"{len(unstable)} poles"
-    return [f"{count_text} in the right half plane, near s = {_listed(unstable)}"]
+    return [f"{count_text} in the right half plane, near s = {_roots_text(unstable)}"]
 
 
-def _says(band: Band) -> str:
+def _band_text(band: Band) -> str:
     if math.isinf(band.high):
         where = "at every w > 0" if band.low == 0.0 else f"for w > {band.low:.12g} rad/s"
     else:
@@ -278,7 +282,7 @@ def _says(band: Band) -> str:
     return f"Re H(jw) < 0 {where}, least {band.least:.6g} at {worst}"
 
 
-def _praise(axis: list[AxisPole], zeros: list[float], lossless: bool, n: Polynomial) -> list[str]:
+def _proof_text(axis: list[AxisPole], zeros: list[float], lossless: bool, n: Polynomial) -> list[str]:
     if n.degree < 0:
         return ["H = 0: positive real, neither supplies nor absorbs energy"]
     texts = ["no pole in the right half plane"]
@@ -293,17 +297,17 @@ def _praise(axis: list[AxisPole], zeros: list[float], lossless: bool, n: Polynom
     return texts
 
 
-def _cancelled(hidden: tuple[RootSaid, ...]) -> list[str]:
+def _hidden_text(hidden: tuple[RootPlace, ...]) -> list[str]:
     texts = []
-    for side, where in FATES.items():
+    for side, where in HIDDEN_POLES.items():
         roots = [mode.near for mode in hidden if mode.side == side]
         if roots:
             poles = "pole" if len(roots) == 1 else "poles"
-            texts.append(f"hidden: {len(roots)} cancelled {poles} near s = {_listed(roots)}, {where}")
+            texts.append(f"hidden: {len(roots)} cancelled {poles} near s = {_roots_text(roots)}, {where}")
     return texts
 
 
-def _listed(roots: list[complex]) -> str:
+def _roots_text(roots: list[complex]) -> str:
     return ", ".join(f"{s.real:.6g}" if s.imag == 0 else f"{s:.6g}" for s in roots)
 
 

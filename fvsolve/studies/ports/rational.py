@@ -48,14 +48,14 @@ def _exact(x, name: str) -> Fraction:
     )
 
 
-def sides(p: Polynomial) -> tuple[Polynomial, Polynomial]:
+def even_odd_parts(p: Polynomial) -> tuple[Polynomial, Polynomial]:
     """(e, o) with p(jw) = e(w^2) + j w o(w^2)."""
     signed = [x if k % 4 < 2 else -x for k, x in enumerate(p.coefficients)]
     return Polynomial(signed[0::2]), Polynomial(signed[1::2])
 
 
 @dataclass(frozen=True)
-class Places:
+class RootLocations:
     """Location of the roots of a real polynomial, counted with multiplicity.
 
     right, axis, left : numbers of roots with Re s > 0, = 0, < 0; zero : number of roots s = 0 (also counted in `axis`)
@@ -69,7 +69,7 @@ class Places:
     pairs: tuple[tuple[Root, int], ...]
 
 
-def places(p: Polynomial) -> Places:
+def locate_roots(p: Polynomial) -> RootLocations:
     """Locate the roots of p exactly: Cauchy index for the half planes, Sturm chain for the axis.
 
     left - right = change of arg p(jw) / pi (Hermite 1856, Routh 1877), by a chain of remainders without degenerate
@@ -78,14 +78,14 @@ def places(p: Polynomial) -> Places:
     zero = next((k for k, x in enumerate(p.coefficients) if x != 0), 0)
     pairs = tuple(_pairs(p))
     axis = zero + 2 * sum(order for _, order in pairs)
-    more_left = _turns(p)
+    more_left = _left_minus_right(p)
     right = (p.degree - axis - more_left) // 2
-    return Places(right, axis, right + more_left, zero, pairs)
+    return RootLocations(right, axis, right + more_left, zero, pairs)
 
 
 def _pairs(p: Polynomial):
     """Yield (x, order) of every pair of roots +-j sqrt(x), x > 0."""
-    common = shared(p)
+    common = axis_factor(p)
     for x in positive_roots(common):
         order, q = 1, common.derivative()
         while q.degree >= 0 and x.sign_of(q) == 0:
@@ -93,26 +93,28 @@ def _pairs(p: Polynomial):
         yield x, order
 
 
-def shared(p: Polynomial) -> Polynomial:
+def axis_factor(p: Polynomial) -> Polynomial:
     """Greatest common divisor c(x) of the even and odd part of p(jw), x = w^2."""
-    even, odd = sides(p)
+    even, odd = even_odd_parts(p)
     return even.gcd(odd)
 
 
-def _turns(p: Polynomial) -> int:
+def _left_minus_right(p: Polynomial) -> int:
     """Number of roots with Re s < 0 less number of roots with Re s > 0."""
     signed = [x if k % 4 < 2 else -x for k, x in enumerate(p.coefficients)]
     u = Polynomial(x if k % 2 == 0 else 0 for k, x in enumerate(signed))
     v = Polynomial(x if k % 2 else 0 for k, x in enumerate(signed))
-    return -index(v, u) if p.degree % 2 == 0 else index(u, v)
+    return -cauchy_index(v, u) if p.degree % 2 == 0 else cauchy_index(u, v)
 
 
-def index(top: Polynomial, below: Polynomial) -> int:
+def cauchy_index(top: Polynomial, below: Polynomial) -> int:
     """Cauchy index of top / below on the real line: number of jumps from -infinity to infinity less those back."""
     remainders = [below, top] if top.degree >= 0 else [below]
     while len(remainders) > 1 and (remainder := -(remainders[-2] % remainders[-1])).degree >= 0:
         remainders.append(remainder / abs(remainder.coefficients[-1]))
-    return _changes(_far(q, -1) for q in remainders) - _changes(_far(q, 1) for q in remainders)
+    return _sign_changes(_sign_at_infinity(q, -1) for q in remainders) - _sign_changes(
+        _sign_at_infinity(q, 1) for q in remainders
+    )
 
 
 class Root:
@@ -123,7 +125,7 @@ class Root:
         self.exact = p(high) == 0
         self.rising = sign(p(high)) > 0
 
-    def halve(self) -> None:
+    def bisect(self) -> None:
         """Halve the bracket."""
         middle = (self.low + self.high) / 2
         if self.exact:
@@ -140,7 +142,7 @@ class Root:
     def refine(self, bits: int = BITS) -> Fraction:
         """Upper end of a bracket of relative width 2^-bits, or the root itself if the bisection met it."""
         while not self.exact and (self.high - self.low) * (1 << bits) > self.high:
-            self.halve()
+            self.bisect()
         return self.high
 
     def sign_of(self, q: Polynomial) -> int:
@@ -148,11 +150,11 @@ class Root:
         if self.exact or q.degree < 1:
             return sign(q(self.high))
         common = chain(self.p.gcd(q))
-        if count(common, self.low, self.high):
+        if count_roots(common, self.low, self.high):
             return 0
         sequence = chain(q)
-        while q(self.low) == 0 or count(sequence, self.low, self.high):
-            self.halve()
+        while q(self.low) == 0 or count_roots(sequence, self.low, self.high):
+            self.bisect()
             if self.exact:
                 return sign(q(self.high))
         return sign(q(self.high))
@@ -178,24 +180,24 @@ def positive_roots(p: Polynomial) -> list[Root]:
     p = p // p.gcd(p.derivative())
     sequence, top = chain(p), abs(p.coefficients[-1])
     bound = Fraction(2) ** math.ceil(max(abs(x) for x in p.coefficients) / top + 1).bit_length()
-    intervals, roots = [(Fraction(0), bound, count(sequence, Fraction(0), bound))], []
+    intervals, roots = [(Fraction(0), bound, count_roots(sequence, Fraction(0), bound))], []
     while intervals:
         low, high, n_roots = intervals.pop()
         if n_roots == 1:
             roots.append(Root(p, low, high))
         elif n_roots > 1:
             middle = (low + high) / 2
-            n_left = count(sequence, low, middle)
+            n_left = count_roots(sequence, low, middle)
             intervals += [(middle, high, n_roots - n_left), (low, middle, n_left)]
     for root in roots:
         while not root.exact and root.low == 0:  # relative widths need a positive lower end
-            root.halve()
+            root.bisect()
     return roots
 
 
-def count(sequence: list[Polynomial], low: Fraction, high: Fraction) -> int:
+def count_roots(sequence: list[Polynomial], low: Fraction, high: Fraction) -> int:
     """Number of distinct roots in (low, high] of the polynomial with this Sturm chain."""
-    return _changes(sign(q(low)) for q in sequence) - _changes(sign(q(high)) for q in sequence)
+    return _sign_changes(sign(q(low)) for q in sequence) - _sign_changes(sign(q(high)) for q in sequence)
 
 
 def estimates(p: Polynomial) -> list[complex]:
@@ -207,12 +209,12 @@ def estimates(p: Polynomial) -> list[complex]:
     return sorted((complex(s) for s in roots), key=lambda s: (-s.real, abs(s.imag), -s.imag))
 
 
-def _changes(signs) -> int:
+def _sign_changes(signs) -> int:
     nonzero = [s for s in signs if s != 0]
     return sum(first != second for first, second in zip(nonzero, nonzero[1:], strict=False))
 
 
-def _far(p: Polynomial, side: int) -> int:
+def _sign_at_infinity(p: Polynomial, side: int) -> int:
     """Sign of p at side * infinity."""
     top = sign(p.coefficients[-1]) if p.degree >= 0 else 0
     return top if side > 0 or p.degree % 2 == 0 else -top

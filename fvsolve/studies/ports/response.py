@@ -12,8 +12,8 @@ from fvsolve.errors import FvsolveError, did_you_mean, listing
 from fvsolve.studies.ports.state_space import TOLERANCE, StateVerdict, Transfer, state_positive_real
 from fvsolve.validation import FLAG, NUMBER, TABLE, TEXT, validated
 
-LARGEST = 800  # greatest number of states; the Hamiltonian matrix is twice as large
-DECADE = 200  # frequencies per decade in the table
+MAX_STATES = 800  # greatest number of states; the Hamiltonian matrix is twice as large
+POINTS_PER_DECADE = 200  # frequencies per decade in the table
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,13 +88,13 @@ def response(
                            "inflow, chamber or tank")  # fmt: skip
     if port not in case.places:
         raise FvsolveError(f'no port named "{port}"{did_you_mean(port, case.places)}. Ports are {listing(case.places)}')
-    system, flows = _linear(case, port, at, before, scheme)
+    system, flows = _linear_system(case, port, at, before, scheme)
     a, b, c, d = system
     model = flows.at.model
     error = max(flows.error.values())
     transfer = _transfer(flows.at, a, b, c, d, error)
     verdict = state_positive_real(transfer, max(TOLERANCE, 10.0 * error))
-    w = _table(verdict, transfer) if frequencies is None else np.asarray(frequencies, float)
+    w = _frequency_table(verdict, transfer) if frequencies is None else np.asarray(frequencies, float)
     driven = case.places[port].driven
     kind = "admittance" if driven is not None and driven[1] == 0.0 else "impedance"
     return Response(
@@ -104,7 +104,7 @@ def response(
     )  # fmt: skip
 
 
-def _linear(case, port: str, at, before, scheme):
+def _linear_system(case, port: str, at, before, scheme):
     """((A, b, c, d), `Linear` system with the inputs and outputs of the port)."""
     from fvsolve.studies.linear.linearise import linearise
 
@@ -150,9 +150,9 @@ def _density(system, row) -> float:
 
 def _dense(a) -> np.ndarray:
     """Convert A to a full array. Raises FvsolveError if it has too many states."""
-    if a.shape[0] > LARGEST:
-        percent = math.floor(100 * LARGEST / a.shape[0])
-        raise FvsolveError(f"the case has {a.shape[0]} states. Expected {LARGEST} or fewer. Reduce the cells of its "
+    if a.shape[0] > MAX_STATES:
+        percent = math.floor(100 * MAX_STATES / a.shape[0])
+        raise FvsolveError(f"the case has {a.shape[0]} states. Expected {MAX_STATES} or fewer. Reduce the cells of its "
                            f"pipes to {percent} %: --set links.NAME.cells=...")  # fmt: skip
     return a if isinstance(a, np.ndarray) else a.toarray()
 
@@ -165,10 +165,10 @@ def _transfer(at, a, b, c, d, error: float) -> Transfer:
     return Transfer(form.seen(a), form.forward @ b, c @ form.back, d, error)
 
 
-def _table(verdict: StateVerdict, h: Transfer) -> np.ndarray:
+def _frequency_table(verdict: StateVerdict, h: Transfer) -> np.ndarray:
     """Frequencies of the table: logarithmic grid, poles that are not on the axis, and worst frequencies of dips."""
     low, high = verdict.low, verdict.high
-    grid = np.geomspace(low, high, int(DECADE * np.log10(high / low)) + 1)
+    grid = np.geomspace(low, high, int(POINTS_PER_DECADE * np.log10(high / low)) + 1)
     poles = np.abs(h.poles.imag[~np.isin(h.poles, verdict.axis)])
     poles = poles[(low < poles) & (poles < high)]
     return np.unique(np.concatenate([grid, poles, [dip.worst for dip in verdict.dips]]))

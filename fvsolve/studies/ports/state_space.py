@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.errors import FvsolveError
-from fvsolve.studies.sheet import Plain
+from fvsolve.studies.result_table import PlainData
 from fvsolve.validation import COMPLEX, MATRIX, NUMBER, POSITIVE, SERIES, instance_of, validated
 
 TOLERANCE = 1e-9  # values of Re H / |H| closer to zero are undecided, because of differences and rounding
 DECADES = 1.0  # searched below the slowest and above the fastest pole; more if Re H changes sign beyond
 FARTHEST = 1e4  # ratio to the slowest and fastest pole beyond which a change of sign is rounding
 GRID = 40  # frequencies per decade, in addition to those at which Re H can change sign
-NEXT = 100.0  # distance to a pole on the axis, in shifts, within which Re H is not linear in Re s
+POLE_DISTANCE = 100.0  # distance to a pole on the axis, in shifts, within which Re H is not linear in Re s
 # distances of frequencies from a pole on the axis, in shifts
-BESIDE = np.concatenate([-np.geomspace(100.0, 0.01, 13), [0.0], np.geomspace(0.01, 100.0, 13)])
+POLE_NEIGHBOURS = np.concatenate([-np.geomspace(100.0, 0.01, 13), [0.0], np.geomspace(0.01, 100.0, 13)])
 ROUNDING = 1e-13  # rounding error of H relative to the sum of absolute terms
-SHOWN = 1e-10  # a mode is hidden if its residue is below this fraction of the bound from norms of B and C
+HIDDEN_RESIDUE = 1e-10  # a mode is hidden if its residue is below this fraction of the bound from norms of B and C
 DEFECT = 1e-7  # greatest error of a pole relative to the norm of A, also for defective poles
 
 
@@ -45,7 +45,7 @@ class Transfer:
             self.b, self.c = self.b / scale, self.c * scale
         self.t, q = schur(self.a, output="complex") if self.a.size else (self.a, self.a)
         self.left, self.right = self.c @ q, q.conj().T @ self.b
-        self.poles, self.residues, self.doubt, self.seen = self._modes()
+        self.poles, self.residues, self.pole_error, self.visible = self._modes()
 
     def _modes(self) -> tuple[np.ndarray, ...]:
         from scipy.linalg import eig
@@ -59,14 +59,14 @@ class Transfer:
         moved = (10 * len(poles) * np.finfo(float).eps + self.error) * norm / np.abs(overlap)
         residues = (self.c @ right) * (left.conj().T @ self.b) / overlap
         most = np.linalg.norm(self.b) * np.linalg.norm(self.c) / np.abs(overlap)
-        return poles, residues, np.minimum(moved, DEFECT * norm), np.abs(residues) > SHOWN * most
+        return poles, residues, np.minimum(moved, DEFECT * norm), np.abs(residues) > HIDDEN_RESIDUE * most
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """H at complex numbers s : complex128[k]; infinite at a pole."""
-        return self.measured(s)[0]
+        return self.evaluate(s)[0]
 
     @validated(s=COMPLEX)
-    def measured(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def evaluate(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(H, its error by rounding and the error of A) : complex128[k], float64[k]."""
         s = np.atleast_1d(np.asarray(s, complex))
         n = len(self.poles)
@@ -82,7 +82,7 @@ class Transfer:
     @validated(s=COMPLEX)
     def angle(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(Re H / |H|, the cosine of the phase; its error) : float64[k] each; 1 and 0 at a pole and where H = 0."""
-        value, doubt = self.measured(s)
+        value, doubt = self.evaluate(s)
         size = np.abs(value)
         finite = np.isfinite(size) & (size > 0.0)
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -101,7 +101,7 @@ class Dip:
 
 
 @dataclass(frozen=True)
-class StateVerdict(Plain):
+class StateVerdict(PlainData):
     """Result of the test; positive_real : True, False, or None if undecided within rounding.
 
     margin : least Re H / |H|, the cosine of the phase, at `worst` [rad/s]; with poles on the axis it is extrapolated
@@ -146,39 +146,39 @@ def state_positive_real(h: Transfer, tolerance: float = TOLERANCE) -> StateVerdi
     right of it, where a pole of higher order, or with a residue that is not positive, makes it negative.
     """
     size = np.abs(h.poles)
-    reach = h.doubt + 1e-12 * size
+    reach = h.pole_error + 1e-12 * size
     near = np.abs(h.poles.real) <= reach
-    slow, quick = _span(h, size[size > reach])
+    slow, quick = _rate_range(h, size[size > reach])
     shift = float(max(4.0 * np.max(reach[near]), 1e-9 * slow)) if near.any() else 0.0
     w, low, high = frequencies(h, h.poles[near], shift, slow, quick)
     raw, doubt = h.angle(shift + 1j * w)
     zero = not np.any(h(shift + 1j * w))
     right = h.poles.real > reach
-    unstable, hidden = h.poles[right & h.seen], h.poles[right & ~h.seen]
-    dips = _dips(h, shift, w, _sure(raw, doubt), tolerance)
+    unstable, hidden = h.poles[right & h.visible], h.poles[right & ~h.visible]
+    dips = _dips(h, shift, w, _certain_part(raw, doubt), tolerance)
     margin, worst = (0.0, 0.0) if zero else _margin(h, near, shift, w, raw, doubt, (low <= w) & (w <= high))
     holds = False if len(unstable) or dips else True if margin > tolerance or zero else None
     return StateVerdict(
-        holds, tuple(_words(holds, unstable, dips, hidden, margin, worst, tolerance, shift)), margin, worst, tolerance,
+        holds, tuple(_reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift)), margin, worst, tolerance,
         shift, low, high, tuple(dips), _listed(unstable), _listed(h.poles[near]), _listed(hidden),
     )  # fmt: skip
 
 
 def _margin(h, near, shift, w, raw, doubt, within) -> tuple[float, float]:
     """(least certain Re H / |H|, its frequency), extrapolated from the shift to the axis; poles on it are excluded."""
-    angle = _sure(raw, doubt)
+    angle = _certain_part(raw, doubt)
     if shift:
-        within = within & (np.min(np.abs(w[:, None] - np.abs(h.poles.imag[near])), axis=1) > NEXT * shift)
-        angle = _sure(2.0 * raw - h.angle(2.0 * shift + 1j * w)[0], 3.0 * doubt)
+        within = within & (np.min(np.abs(w[:, None] - np.abs(h.poles.imag[near])), axis=1) > POLE_DISTANCE * shift)
+        angle = _certain_part(2.0 * raw - h.angle(2.0 * shift + 1j * w)[0], 3.0 * doubt)
     k = int(np.argmin(np.where(within, angle, np.inf)))
     return float(angle[k]), float(w[k])
 
 
-def _sure(angle: np.ndarray, doubt: np.ndarray) -> np.ndarray:
+def _certain_part(angle: np.ndarray, doubt: np.ndarray) -> np.ndarray:
     return np.sign(angle) * np.maximum(np.abs(angle) - doubt, 0.0)
 
 
-def _span(h: Transfer, size: np.ndarray) -> tuple[float, float]:
+def _rate_range(h: Transfer, size: np.ndarray) -> tuple[float, float]:
     """Slowest and fastest rate of H [1/s]; if all poles are 0, the corner frequency between residue and D."""
     if len(size):
         return float(size.min()), float(size.max())
@@ -198,7 +198,7 @@ def frequencies(h: Transfer, near: np.ndarray, shift: float, slow: float, quick:
     high = max(quick * 10.0**DECADES, np.max(real, initial=0.0) * 3.0)
     marks = np.concatenate([np.abs(h.poles.imag), np.abs(zeros.imag)])
     count = max(2, int(GRID * np.log10(high / low)))
-    neighbours = (np.abs(near.imag)[:, None] + shift * BESIDE).ravel()
+    neighbours = (np.abs(near.imag)[:, None] + shift * POLE_NEIGHBOURS).ravel()
     parts = [np.geomspace(low, high, count), marks[(low < marks) & (marks < high)], neighbours[neighbours >= 0.0]]
     marks = np.unique(np.concatenate(parts))
     return np.unique(np.concatenate([marks, np.sqrt(marks[1:] * marks[:-1])])), float(low), float(high)
@@ -255,7 +255,7 @@ def _listed(poles: np.ndarray) -> tuple[complex, ...]:
     return tuple(complex(s) for s in sorted(poles, key=lambda s: (-s.real, abs(s.imag), -s.imag)))
 
 
-def _words(holds, unstable, dips, hidden, margin, worst, tolerance, shift) -> list[str]:
+def _reason_texts(holds, unstable, dips, hidden, margin, worst, tolerance, shift) -> list[str]:
     texts = []
     if len(unstable):
         texts.append(f"{_poles(unstable)} in the right half plane, the first s = {_listed(unstable)[0]:.6g} 1/s")

@@ -20,30 +20,30 @@ from fvsolve.model.energy_norm import EnergyForm, energy_form
 from fvsolve.schemes import SCHEMES, branches
 from fvsolve.steppers import automatic, method_named
 from fvsolve.steppers.built_in_methods import AUTO
-from fvsolve.studies.linear.frozen import Frozen, frozen, has_limiter, reweighted
-from fvsolve.studies.linear.linearise import Linear, linearised
-from fvsolve.studies.linear.spectrum import Spectrum, spectrum
-from fvsolve.studies.lines import lines, settled
-from fvsolve.studies.many import Bench
-from fvsolve.studies.outcome import Progress, names
-from fvsolve.studies.points import Points, key_of
-from fvsolve.studies.sent import Sent
-from fvsolve.studies.stability.bounds import WIDE, field_of_values, region_limit
-from fvsolve.studies.stability.carried import LONGEST, VECTORS, TooLarge
-from fvsolve.studies.stability.delayed_row import delayed_row
-from fvsolve.studies.stability.growth import DENSE, STEPS, THRESHOLD
-from fvsolve.studies.stability.measured import Runs, measure
-from fvsolve.studies.stability.misled import notes
-from fvsolve.studies.stability.row import StabilityRow, read
-from fvsolve.studies.stability.system import predicted, system
+from fvsolve.studies.case_pickle import PickledCase
+from fvsolve.studies.delay_line_keys import delay_lines, fixed_choices
+from fvsolve.studies.linear.eigenvalues import Spectrum, find_eigenvalues
+from fvsolve.studies.linear.linearise import Linear, linearise_at
+from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point, with_weights
+from fvsolve.studies.outcome import Progress, name_list
+from fvsolve.studies.parallel import TaskPool
+from fvsolve.studies.result_cache import ResultCache, case_key
+from fvsolve.studies.stability.bound_notes import bound_notes
+from fvsolve.studies.stability.delay_line_row import delayed_row
+from fvsolve.studies.stability.growth_method import growth_method, predicted_limit
+from fvsolve.studies.stability.power_growth import DENSE, STEPS, THRESHOLD
+from fvsolve.studies.stability.real_runs import RealRuns, measure_limit
+from fvsolve.studies.stability.region_bounds import MAX_STATES, field_of_values, region_limit
+from fvsolve.studies.stability.stability_row import StabilityRow, row_from_json
+from fvsolve.studies.stability.vector_growth import TIME_LIMIT, VECTORS, TooLarge
 from fvsolve.validation import COUNT, FLAG, FUNCTION, NAMES, NUMBER, PATH, TABLE, TEXT, validated
 
-AUTOMATIC = (
+AUTO_NOTE = (
     f"auto starts with {automatic.EXPLICIT}, for which its row holds; a run continues with {automatic.IMPLICIT} or "
     f"{automatic.TIGHT_IMPLICIT} if that is cheaper, which is not in its row"
 )
-VISIBLE = 1e-3  # of the small deviation: start for limited schemes, above the round-off level of WENO
-LONGER = 10  # factor of the number of steps in longer runs of Euler with a limiter
+LIMITED_DEVIATION = 1e-3  # of the small deviation: start for limited schemes, above the round-off level of WENO
+LONGER_FACTOR = 10  # factor of the number of steps in longer runs of Euler with a limiter
 
 
 @dataclass(frozen=True)
@@ -52,37 +52,37 @@ class Stability:
 
     case: str
     rows: tuple[StabilityRow, ...]
-    said: tuple[str, ...]
-    sides: dict[str, Callable[[str], Side]] = field(repr=False)
+    notes: tuple[str, ...]
+    systems: dict[str, Callable[[str], LinearSystem]] = field(repr=False)
 
-    def side(self, scheme: str) -> Side:
+    def system(self, scheme: str) -> LinearSystem:
         """Linear system with one of the requested linear schemes."""
-        return self.sides[scheme](scheme)
+        return self.systems[scheme](scheme)
 
     def plain(self) -> dict:
         """Data for JSON."""
-        return {"case": self.case, "rows": [row.plain() for row in self.rows], "said": self.said}
+        return {"case": self.case, "rows": [row.plain() for row in self.rows], "said": self.notes}
 
 
-class Side:
+class LinearSystem:
     """Case with one linear scheme about a state: J in the energy norm, and data that do not depend on the method."""
 
-    def __init__(self, at: Frozen) -> None:
+    def __init__(self, at: OperatingPoint) -> None:
         self.at = at
-        self.linear: Linear = linearised(at)
-        self.whole = energy_form(at.model, at.y)
-        self.form: EnergyForm = self.whole.suited_to(self.linear.a)
+        self.linear: Linear = linearise_at(at)
+        self.full_form = energy_form(at.model, at.y)
+        self.form: EnergyForm = self.full_form.suited_to(self.linear.a)
         self.e = self.form.seen(self.linear.a)
 
     @property
     def idle(self) -> list[str]:
         """Names of states with motions that store no energy."""
-        return [self.at.model.state_names[i] for i in np.flatnonzero(np.any(self.whole.idle, axis=1))]
+        return [self.at.model.state_names[i] for i in np.flatnonzero(np.any(self.full_form.idle, axis=1))]
 
     @cached_property
     def spectrum(self) -> Spectrum:
         """Eigenvalues of J."""
-        return spectrum(self.e)
+        return find_eigenvalues(self.e)
 
     @cached_property
     def field(self) -> np.ndarray:
@@ -123,22 +123,24 @@ def stability(
             f"steps = {steps}, threshold = {threshold:g}: expected at least 10 steps and a threshold above 1"
         )
     case = load(case, dict(set or {}))
-    case = load(case, settled(case))
-    if lines(case) and at is not None:
+    case = load(case, fixed_choices(case))
+    if delay_lines(case) and at is not None:
         raise FvsolveError("stability of delay lines is computed about the start only: later waves in lines are not "
                            'included; leave out --at, or set numerics.pipe_model = "finite-volume"')  # fmt: skip
-    schemes = names(schemes) or [case.numerics.scheme]
-    requested = names(methods) or [case.numerics.method]
+    schemes = name_list(schemes) or [case.numerics.scheme]
+    requested = name_list(methods) or [case.numerics.method]
     methods = list(dict.fromkeys(method_named(automatic.first_method(name)).name for name in requested))
-    texts = (AUTOMATIC,) if AUTO in requested else ()
+    texts = (AUTO_NOTE,) if AUTO in requested else ()
     requested = {"at": at, "before": before, "steps": steps, "threshold": threshold}
-    work, pairs = StabilityWork(case, **requested), [*itertools.product(schemes, methods)]
-    with Points(out) as points, Bench(work, jobs, dask) as pool:
-        rows = kept_rows(points, case, requested, pairs, pool, progress or (lambda *_: None))
-    return Stability(case.name, tuple(map(read, rows)), texts, {scheme: work.maker(scheme).side for scheme in schemes})
+    work, pairs = RowTask(case, **requested), [*itertools.product(schemes, methods)]
+    with ResultCache(out) as points, TaskPool(work, jobs, dask) as pool:
+        rows = cached_rows(points, case, requested, pairs, pool, progress or (lambda *_: None))
+    return Stability(
+        case.name, tuple(map(row_from_json, rows)), texts, {scheme: work.maker(scheme).system for scheme in schemes}
+    )
 
 
-def kept_rows(points: Points, case, options: dict, pairs: list, pool: Bench, report: Progress) -> list[dict]:
+def cached_rows(points: ResultCache, case, options: dict, pairs: list, pool: TaskPool, report: Progress) -> list[dict]:
     """Rows of pairs (scheme, method); missing rows are computed by `pool` and stored as they are finished."""
     keys = [{"study": "stability", "scheme": scheme, "method": method, **options} for scheme, method in pairs]
     rows = [points.find(case, extra) for extra in keys]
@@ -149,97 +151,97 @@ def kept_rows(points: Points, case, options: dict, pairs: list, pool: Bench, rep
         report(known + count, len(pairs), "".join(" with ".join(pairs[k]) for k in new[count : count + 1]))
 
     progress(0)
-    for count, (number, row) in enumerate(pool.do([pairs[k] for k in new]), 1):
+    for count, (number, row) in enumerate(pool.run([pairs[k] for k in new]), 1):
         index = new[number]
-        rows[index] = points.keep(key_of(case, keys[index]), keys[index], row)
+        rows[index] = points.store(case_key(case, keys[index]), keys[index], row)
         progress(count)
     return rows
 
 
-class StabilityWork:
+class RowTask:
     """Task that computes rows of a case about one state, in any process."""
 
     def __init__(self, case, **options) -> None:
-        self.sent, self.asked = Sent(case), options
-        self.makers: dict[str, Maker] = {}
+        self.pickled_case, self.options = PickledCase(case), options
+        self.makers: dict[str, SchemeRows] = {}
 
     def __call__(self, pair: tuple[str, str]) -> dict:
         scheme, method = pair
         return self.maker(scheme).row(method).plain()
 
-    def maker(self, scheme: str) -> Maker:
+    def maker(self, scheme: str) -> SchemeRows:
         """Object that computes the rows of a scheme."""
         if scheme not in self.makers:
-            self.makers[scheme] = Maker(load(self.sent.source), scheme, **self.asked)
+            self.makers[scheme] = SchemeRows(load(self.pickled_case.source), scheme, **self.options)
         return self.makers[scheme]
 
-    def lost(self, pair: tuple[str, str]) -> dict:
+    def lost_result(self, pair: tuple[str, str]) -> dict:
         """Raise RunError for a row whose process has ended."""
         raise RunError(f"the process for the row of {' with '.join(pair)} has ended repeatedly; was memory "
                        "too small?")  # fmt: skip
 
     def __getstate__(self) -> dict:
-        return {"sent": self.sent, "asked": self.asked, "makers": {}}
+        return {"sent": self.pickled_case, "asked": self.options, "makers": {}}
 
 
-class Maker:
+class SchemeRows:
     """Rows of one scheme; shared data are computed once, on first use."""
 
     def __init__(self, case, scheme: str, at: float | None, before: bool, steps: int, threshold: float) -> None:
         self.case, self.scheme, self.time, self.before = case, scheme, at, before
         self.steps, self.threshold = steps, threshold
-        self.states: dict[str, Frozen] = {}
-        self.sides: dict[str, Side] = {}
+        self.states: dict[str, OperatingPoint] = {}
+        self.systems: dict[str, LinearSystem] = {}
 
-    def at(self, scheme: str) -> Frozen:
+    def at(self, scheme: str) -> OperatingPoint:
         """Operating point with a scheme."""
         if scheme not in self.states:
-            self.states[scheme] = frozen(self.case, {"numerics.scheme": scheme}, self.time, self.before)
+            self.states[scheme] = operating_point(self.case, {"numerics.scheme": scheme}, self.time, self.before)
         return self.states[scheme]
 
-    def side(self, scheme: str) -> Side:
+    def system(self, scheme: str) -> LinearSystem:
         """Linear system with a scheme."""
-        if scheme not in self.sides:
-            self.sides[scheme] = Side(self.at(scheme))
-        return self.sides[scheme]
+        if scheme not in self.systems:
+            self.systems[scheme] = LinearSystem(self.at(scheme))
+        return self.systems[scheme]
 
-    def frozen_sides(self) -> Iterator[tuple[str, Side]]:
+    def frozen_systems(self) -> Iterator[tuple[str, LinearSystem]]:
         """Linear systems with fixed weights of the limited scheme, for equal cells and state."""
         at = self.at(self.scheme)
         if at.model.cavitates or at.model.basins:  # their only linear scheme is upwind
-            yield "upwind", Side(replace(self.at("upwind"), y=at.y))
+            yield "upwind", LinearSystem(replace(self.at("upwind"), y=at.y))
             return
         for name, weights in branches(self.scheme, at.model.case.numerics.limiter).items():
-            if name not in self.sides:
+            if name not in self.systems:
                 cells = sum(weight != 0 for weight in weights)
                 # degree of the polynomials at pipe ends
                 degree = min(cells - 1, 4) if self.scheme == "weno5" else int(name != "upwind")
                 point = replace(self.at("upwind5"), y=at.y)
-                self.sides[name] = Side(reweighted(point, tuple(map(float, weights)), degree))
-            yield name, self.sides[name]
+                self.systems[name] = LinearSystem(with_weights(point, tuple(map(float, weights)), degree))
+            yield name, self.systems[name]
 
     def row(self, name: str) -> StabilityRow:
         """Row of a method."""
         method = method_named(name)
-        if lines(self.case):
+        if delay_lines(self.case):
             return delayed_row(self.case, self.scheme, method, self.steps, self.threshold)
         if has_limiter(self.at(self.scheme).model):
-            return self.limited(method)
-        side = self.side(self.scheme)
-        growth = system(method, side.e, self.steps, self.threshold)
-        limit = predicted(growth)
+            return self.limited_row(method)
+        side = self.system(self.scheme)
+        growth = growth_method(method, side.e, self.steps, self.threshold)
+        limit = predicted_limit(growth)
         greatest = growth.growth(limit.fails) if np.isfinite(limit.fails) else None
         worst = greatest and greatest.start
-        runs = Runs(side.at, method.name, side.form, worst, self.steps, self.threshold, a=side.linear.a)
-        row = self.bounded(side, method) | {"predicted": limit.step}
+        runs = RealRuns(side.at, method.name, side.form, worst, self.steps, self.threshold, a=side.linear.a)
+        row = self.bound_columns(side, method) | {"predicted": limit.step}
         if greatest:
-            where, share = place(side.form, greatest.end)
+            where, share = dominant_part(side.form, greatest.end)
             row |= {"growth": greatest.size, "after": greatest.steps, "where": where, "share": share}
-        row |= measure(runs, limit.step, growth.size, row["left_out"])
+        row |= measure_limit(runs, limit.step, growth.size, row["left_out"])
         result = StabilityRow(**row)
-        return StabilityRow(**row | {"notes": tuple(notes(result, side, growth))})
+        return StabilityRow(**row | {"notes": tuple(bound_notes(result, side, growth))})
 
-    def bounded(self, side: Side, method) -> dict:
+    def bound_columns(self, side: LinearSystem, method) -> dict:
         """Columns of a row that need no powers: names, sizes, bounds."""
         model, left_out = side.at.model, {}
         values = side.spectrum
@@ -250,25 +252,25 @@ class Maker:
             "greatest_real": float(values.values.real.max(initial=0.0)),
         }  # fmt: skip
         if not values.complete:
-            left_out["eigenvalues"] = f"the limit may be lower; it is computed from {values.said}"
-        if model.y_size <= WIDE:
+            left_out["eigenvalues"] = f"the limit may be lower; it is computed from {values.description}"
+        if model.y_size <= MAX_STATES:
             row["field_of_values"] = region_limit(method, side.field)
         else:
-            left_out["field_of_values"] = f"{model.y_size} states; it is computed up to {WIDE}"
+            left_out["field_of_values"] = f"{model.y_size} states; it is computed up to {MAX_STATES}"
         if model.cells:
-            row["von_neumann"] = on_a_long_pipe(self.scheme, method) / float(model.wave_rates.max())
+            row["von_neumann"] = von_neumann_limit(self.scheme, method) / float(model.wave_rates.max())
         if model.y_size > DENSE:
             left_out["squaring"] = f"{model.y_size} states: predicted by powers applied to {VECTORS} vectors"
         return row | {"left_out": left_out}
 
-    def limited(self, method) -> StabilityRow:
+    def limited_row(self, method) -> StabilityRow:
         """Row of a limited scheme: limits with frozen weights, and the measured limit."""
         at = self.at(self.scheme)
-        limits, starts, left_out, latest = {}, {}, {}, time.monotonic() + LONGEST
+        limits, starts, left_out, latest = {}, {}, {}, time.monotonic() + TIME_LIMIT
         try:
-            for name, side in self.frozen_sides():
-                growth = system(method, side.e, self.steps, self.threshold, latest)
-                limit = predicted(growth)
+            for name, side in self.frozen_systems():
+                growth = growth_method(method, side.e, self.steps, self.threshold, latest)
+                limit = predicted_limit(growth)
                 limits[name] = limit.step
                 if 0.0 < limit.step < np.inf:
                     starts[limit.step] = growth.growth(limit.fails).start
@@ -278,27 +280,37 @@ class Maker:
             sorted(starts)[len(starts) // 2] if starts else np.inf
         )  # the middle value, between those of small and large slopes
         if left_out and not starts:
-            guess = on_a_long_pipe(SCHEMES[self.scheme].smooth.name, method) / side.rate or np.inf
-        runs = Runs(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, VISIBLE)
+            guess = von_neumann_limit(SCHEMES[self.scheme].smooth.name, method) / side.rate or np.inf
+        runs = RealRuns(at, method.name, side.form, starts.get(guess), self.steps, self.threshold, LIMITED_DEVIATION)
         row = {
             "scheme": self.scheme, "method": method.name, "when": at.when, "states": at.model.y_size,
             "steps": self.steps, "threshold": self.threshold, "rate": side.rate, "frozen": limits, "left_out": left_out,
         }  # fmt: skip
-        row |= measure(runs, guess, growth.size, row["left_out"])
+        row |= measure_limit(runs, guess, growth.size, row["left_out"])
         if method.stages == 1 and method.explicit and np.isfinite(row.get("measured", np.nan)):
-            longer = Runs(at, method.name, side.form, starts.get(guess), LONGER * self.steps, self.threshold, VISIBLE)
-            row["longer"] = measure(longer, row["measured"], 0.0, row["left_out"], "longer").get("measured", np.nan)
-        return StabilityRow(**row | {"notes": tuple(notes(StabilityRow(**row), side, None))})
+            longer = RealRuns(
+                at,
+                method.name,
+                side.form,
+                starts.get(guess),
+                LONGER_FACTOR * self.steps,
+                self.threshold,
+                LIMITED_DEVIATION,
+            )
+            row["longer"] = measure_limit(longer, row["measured"], 0.0, row["left_out"], "longer").get(
+                "measured", np.nan
+            )
+        return StabilityRow(**row | {"notes": tuple(bound_notes(StabilityRow(**row), side, None))})
 
 
-def on_a_long_pipe(scheme: str, method) -> float:
+def von_neumann_limit(scheme: str, method) -> float:
     """Von Neumann's limit of the Courant number."""
     from fvsolve.step_limits.advection_limit import advection_limit
 
     return advection_limit(scheme, method.name).limit
 
 
-def place(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
+def dominant_part(form: EnergyForm, end: np.ndarray) -> tuple[str, float]:
     """(part with the most energy of a unit vector, its share)."""
     shares: dict[str, float] = {}
     for part, root in zip(form.parts, form.rows @ (form.back @ end), strict=True):

@@ -1,0 +1,180 @@
+"""Courant limits of a uniform periodic grid: output of `fvsolve stability` without a case."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from fvsolve.cli import terminal
+from fvsolve.cli.app import print_json
+from fvsolve.cli.study_options import comma_list, method_names, progress_line, writable_folder
+from fvsolve.step_limits.advection_limit import AdvectionLimit, advection_limits
+from fvsolve.step_limits.symbol import WEIGHTS
+from fvsolve.studies.result_table import Column, ResultTable, cell_text
+from fvsolve.studies.stability.limited_schemes import LIMITED, LimitedLimit, limited_limits
+from fvsolve.studies.stability.periodic_limits import THRESHOLD, MeasuredLimit, measured_limits
+
+RUNS = (Column("scheme"), Column("method"), Column("predicted", words=".7g"), Column("measured", words=".7g"),
+        Column("ratio", words=".7f"))  # fmt: skip
+SHOWN_ROWS = 8  # greatest number of pairs that are printed in sentences; more are printed as a table
+SET_BY = {
+    "longest": "the longest waves (theta -> 0)",
+    "shortest": "the shortest wave (two cells)",
+    "all": "all waves together",
+    "between": "a wave of {cells:.4g} cells (theta = {theta:.6g})",
+}
+LIMIT_EXPLANATIONS = {
+    None: "no run failed",
+    True: "the measured limit does not depend on the length of the run",
+    False: "no sharp limit: it falls as runs get longer",
+}
+LEGEND = "set by l: the longest waves, s: the shortest (two cells), b: a wave between, a: all waves together"
+
+
+def without_case(
+    scheme: str | None, method: str | None, cells: int | None, steps: int | None, as_json: bool, out: Path | None,
+    courant: float | None = None,
+) -> None:  # fmt: skip
+    """Print limits of the named schemes and methods, comma separated (default all linear schemes and all methods).
+
+    With `cells` or `steps` explicit methods are also measured on a periodic pipe; limited schemes always are. Growth
+    is given at `courant`. CSV files are written into the folder `out`, if given. Raises FvsolveError for unknown names.
+    """
+    named, methods = comma_list(scheme, "--scheme") or None, method_names(method) or None
+    linear = None if named is None else [name for name in named if name not in LIMITED]
+    runs, limited = _measure(named, linear, methods, cells, steps)
+    limits = advection_limits(linear, methods, courant) if linear is None or linear else []
+    if out is not None:
+        writable_folder(out)
+        for name, rows in (("limits", [entry.plain() for entry in limits]),
+                           ("measured", [entry.plain() for entry in runs]),
+                           ("limited", [entry.flat() for entry in limited])):  # fmt: skip
+            if rows:
+                ResultTable([Column(key) for key in rows[0]], rows).write(out / f"{name}.csv")
+    if as_json:
+        print_json({"limits": limits, "measured": runs, "limited": limited})
+        return
+    if len(limits) <= SHOWN_ROWS:
+        for entry in limits:
+            _show(entry)
+    else:
+        _table(limits)
+    if runs:
+        _table_of_runs(runs)
+    for entry in limited:
+        _show_limited(entry)
+
+
+def _measure(named, linear, methods, cells: int | None, steps: int | None) -> tuple[list, list]:
+    """Limits measured by runs: (linear schemes, if `cells` or `steps` is given; limited schemes)."""
+    limited = [name for name in named or () if name in LIMITED]
+    given = {name: n for name, n in (("cells", cells), ("steps", steps)) if n is not None}
+    with progress_line() as progress:
+        runs = measured_limits(linear, methods, **given, progress=progress) if given and linear != [] else []
+        limits = limited_limits(limited, methods, **given, progress=progress) if limited else []
+    return runs, limits
+
+
+def _table_of_runs(runs: list[MeasuredLimit]) -> None:
+    console, first = terminal.console(), runs[0]
+    terminal.line(console, "")
+    head = f"Least Courant number that fails on a periodic grid of {first.cells} cells: a wave grows {THRESHOLD:g}-fold"
+    terminal.line(console, f"{head} in {first.steps} steps", "bold")
+    terminal.print_sheet(ResultTable(RUNS, [run.plain() for run in runs]), console)
+
+
+def _show_limited(limited: LimitedLimit) -> None:
+    """Print the result for one limited scheme and method."""
+    console, name = terminal.console(), f"{limited.scheme} ({limited.limiter})" if limited.limiter else limited.scheme
+    terminal.line(console, f"{name} with {limited.method}: {LIMIT_EXPLANATIONS[limited.sharp]}", "bold")
+    frozen = ", ".join(f"{branch} {_limit(limit.limit)}" for branch, limit in limited.frozen.items())
+    terminal.line(console, f"  limits with frozen weights: {frozen}")
+    if limited.monotone is not None:
+        terminal.line(console, f"  total variation cannot grow up to {limited.monotone:.6g}")
+    terminal.line(
+        console, f"  least Courant number that failed on {limited.cells} cells, in runs of the limited scheme:"
+    )
+    rows = [
+        [f"  {n}", *(cell_text(row[i], ".3g") for row in limited.measured.values())]
+        for i, n in enumerate(limited.steps)
+    ]
+    terminal.table(["  steps", *limited.measured], rows, console)
+
+
+def _show(limit: AdvectionLimit) -> None:
+    """Print the limit of one scheme and method in sentences."""
+    console = terminal.console()
+    terminal.line(console, f"{limit.scheme} with {limit.method}: {_limit_in_words(limit)}", "bold")
+    for words in _sentences(limit):
+        terminal.line(console, f"  {words}")
+
+
+def _limit(x: float) -> str:
+    return "every" if math.isinf(x) else f"{x:.7g}" if x else "none"
+
+
+def _limit_in_words(limit: AdvectionLimit) -> str:
+    if math.isinf(limit.limit):
+        return "stable at every Courant number"
+    if limit.limit == 0.0:
+        return f"no limit, a wave grows at every {'small ' if limit.stable else ''}step"
+    return f"stable up to Courant number {limit.limit:.10g}"
+
+
+def _sentences(limit: AdvectionLimit) -> list[str]:
+    sentences = []
+    if limit.limit > 0.0 and limit.theta is not None:
+        words = SET_BY[limit.wave].format(
+            theta=limit.theta, cells=2 * math.pi / limit.theta if limit.theta else math.inf
+        )
+        sentences.append(f"set by {words}")
+    if limit.steps is not None:
+        steps = f"a thousandfold in {limit.steps:.4g} steps"
+        sentences.append(f"at {limit.courant:.6g} the worst wave grows by {_growth(limit.growth)} a step, {steps}")
+    elif limit.growth is not None:
+        sentences.append(f"at {limit.courant:.6g} no wave grows")
+    for low, high in limit.stable:
+        if low > 0.0:
+            place = f"from {low:.10g} to {high:.10g}" if math.isfinite(high) else f"above {low:.10g}"
+            sentences.append(f"stable again {place}")
+    if limit.digits:
+        sentences.append(f"with the coefficients as published, to {limit.digits} digits")
+    if not limit.proved:
+        sentences.append("computed for sampled waves; not proved for waves between them")
+    return sentences
+
+
+def _growth(growth: float) -> str:
+    return f"1 + {growth:.3e}" if growth < 1e-3 else f"{1 + growth:.6g}"
+
+
+def _table(limits: list[AdvectionLimit]) -> None:
+    """Print a table, methods down and schemes across; methods stable with all schemes share one line."""
+    console, rows, free = terminal.console(), {}, []
+    for limit in limits:
+        rows.setdefault(limit.method, {})[limit.scheme] = limit
+    schemes = [name for name in WEIGHTS if any(name in row for row in rows.values())]
+    shown = []
+    for name, row in rows.items():
+        if all(math.isinf(limit.limit) for limit in row.values()):
+            free.append(name)
+        else:
+            shown.append([name, *(_cell(row[scheme]) for scheme in schemes)])
+    terminal.line(console, "Courant limits of linear advection on a uniform periodic grid (von Neumann)", "bold")
+    terminal.table(["method", *schemes], shown, console)
+    terminal.line(console, LEGEND)
+    terminal.line(
+        console, "none: grows at every step, however small; every: stable at every step; +: stable again above"
+    )
+    if free:
+        terminal.line(console, f"stable at every Courant number with all these schemes: {', '.join(free)}")
+    unproved = [f"{limit.scheme} with {limit.method}" for limit in limits if not limit.proved]
+    if unproved:
+        terminal.line(console, f"not proved between sampled waves: {', '.join(unproved)}")
+
+
+def _cell(limit: AdvectionLimit) -> str:
+    again = " +" if any(low > 0 for low, _ in limit.stable) else ""
+    if math.isinf(limit.limit):
+        return "every"
+    return (f"{limit.limit:.7f} {limit.wave[0]}" if limit.limit > 0.0 else "none") + again

@@ -1,0 +1,215 @@
+"""Settings that a chart runs: schemes, methods and resolutions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fvsolve.case import load
+from fvsolve.case.case import Case
+from fvsolve.case.sections import DEFAULT_COURANT, DEFAULT_METHOD, DEFAULT_METHOD_RTOL, DEFAULT_SCHEME
+from fvsolve.errors import CaseError, FvsolveError, did_you_mean, listing
+from fvsolve.model.model_facts import rhs_seconds
+from fvsolve.schemes import SCHEMES
+from fvsolve.steppers.built_in_methods import AUTO, METHODS
+from fvsolve.studies.accuracy.case_resolution import cell_counts, greatest_wave_rate, pipes, total_cells
+from fvsolve.studies.accuracy.method_setting import (
+    MethodSetting,
+    basin_cells,
+    cell_keys,
+    cells_setting,
+    is_adaptive,
+    lumped_setting,
+    main_part_name,
+)
+from fvsolve.studies.accuracy.timing import capped_run, compile_seconds, finished_run
+from fvsolve.studies.delay_line_keys import delay_lines
+from fvsolve.studies.outcome import study_model
+
+DEFAULT_SCHEMES = ("upwind", "muscl", "upwind5", "weno5")
+EXPLICIT_METHODS, IMPLICIT_METHOD, IMPLICIT_SCHEME = ("ssp-rk3", "rk4", "dormand-prince"), "rodas-5p", "upwind5"
+LUMPED_METHODS = ("rk4", "bogacki-shampine", "dormand-prince", "radau-iia-5", "rodas-5p", AUTO)
+DELAY_LINE_METHODS = ("euler", "trapezoid", "ssp-rk3", "rk4")
+TRAVEL_PARTS = tuple(4 * 2**k for k in range(8))  # steps, about, per travel time of the slowest delay line
+TOLERANCES = tuple(float(f"1e-{k}") for k in range(2, 11))
+STEP_COUNTS = tuple(32 * 4**k for k in range(7))  # numbers of steps of methods without an error estimate
+LEVEL_COUNT, MAX_CELLS = 5, 400
+MAX_WORK = 1e7  # greatest number of cells times steps of the finest run
+STIFFNESS_RATIO = 3.0  # a case is stiff above this ratio of its steps to those for Courant number 0.9
+CELL_TIME = 1e-8  # usual time of one call of the rates for one cell [s]
+
+
+@dataclass(frozen=True)
+class CoarseRun:
+    """Coarse run of a case with cells: its cells, the steps for Courant number 0.9, and the steps that it took.
+
+    works : cells times steps of runs with MAX_CELLS, half as many, a quarter ..., while pipes have at least one cell
+    compile_seconds : time of a first run less that of a second run [s]
+    dearness : time of the rates for one cell, in units of CELL_TIME
+    sizes : possible numbers of cells of a basin and their works, halved and doubled so that patches and holes end on
+    grid lines; None if the main part is a pipe
+    """
+
+    cells: int
+    waves: float
+    steps: int
+    works: list[float]
+    compile_seconds: float
+    dearness: float = 1.0
+    sizes: list[tuple[int, float]] | None = None
+
+    @property
+    def stiff(self) -> bool:
+        """True if a time scale other than waves limits explicit steps, for example a small chamber."""
+        return self.steps > STIFFNESS_RATIO * self.waves
+
+    @property
+    def levels(self) -> list[int]:
+        """Five numbers of cells, each twice the number before; the finest run takes about a minute."""
+        if self.sizes is not None:
+            return [n for n, work in self.sizes if self.dearness * work <= MAX_WORK][-LEVEL_COUNT:] or [
+                self.sizes[0][0]
+            ]
+        finest = MAX_CELLS
+        for work in self.works:
+            stiff = self.steps * self.cells * 16 * finest / MAX_CELLS if self.stiff else 0.0
+            if self.dearness * max(work, stiff / 10) <= MAX_WORK:
+                break
+            finest //= 2
+        return [finest // 2**k for k in range(LEVEL_COUNT - 1, -1, -1)]
+
+
+def run_coarse(case: Case) -> CoarseRun:
+    """Run a case with cells on few cells, by the program's defaults."""
+    cells = basin_cells(case) or MAX_CELLS // 16
+    model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, cells).keys)
+    span = case.numerics.end - case.numerics.start
+    waves, compile_time = span * float(model.wave_rate) / DEFAULT_COURANT, compile_seconds(model)
+    result = finished_run(model, capped_run)
+    fraction = (result.t - case.numerics.start) / span  # less than 1 if the run was stopped
+    finer_model = study_model(case, cells_setting(case, default_scheme(case), DEFAULT_METHOD, 2 * cells).keys)
+    cell_time = (rhs_seconds(finer_model) - rhs_seconds(model)) / max(
+        1, finer_model.all_cells - model.all_cells
+    )  # nodes also cost time
+    dearness = max(1.0, cell_time / CELL_TIME)
+    sizes = None if basin_cells(case) is None else basin_sizes(case)
+    works = [] if sizes else [run_work(case, MAX_CELLS >> k) for k in range(MAX_CELLS.bit_length() - LEVEL_COUNT)]
+    steps = round(result.counts["steps"] / fraction) if fraction > 0.0 else 0
+    return CoarseRun(model.all_cells, waves, steps, works, compile_time, dearness, sizes)
+
+
+def basin_sizes(case: Case) -> list[tuple[int, float]]:
+    """Possible numbers of cells of the main basin, its own halved and doubled, and their works."""
+    main_cells, sizes = basin_cells(case), []
+    for n in (main_cells * 2**k // 2**LEVEL_COUNT for k in range(2 * LEVEL_COUNT)):
+        try:
+            sizes += [(n, run_work(case, n))] if n > 0 and n * 2**LEVEL_COUNT % main_cells == 0 else []
+        except CaseError:
+            continue  # patches or holes do not end on grid lines
+    return sizes
+
+
+def run_work(case: Case, cells: int) -> float:
+    """Cells times steps of a run with this number of cells in the main part."""
+    changed = load(case, cell_keys(case, cells))
+    cells_by_key = cell_counts(changed)
+    return (
+        total_cells(changed, cells_by_key)
+        * (case.numerics.end - case.numerics.start)
+        * greatest_wave_rate(changed, cells_by_key)
+    )
+
+
+def default_scheme(case: Case) -> str:
+    """The program's default scheme, or the last scheme of the fluid if the default does not support the fluid."""
+    return DEFAULT_SCHEME if DEFAULT_SCHEME in case.schemes else case.schemes[-1]
+
+
+def default_curve(case: Case) -> str:
+    """Name of the curve of the program's defaults."""
+    if main_part_name(case):
+        return f"{default_scheme(case)} {DEFAULT_METHOD}"
+    return DEFAULT_METHOD if delay_lines(case) else DEFAULT_METHOD_RTOL
+
+
+def unsupported_schemes(case: Case, schemes: Sequence[str] | None) -> list[str]:
+    """Usual schemes of a chart that do not support the fluid of this case."""
+    return [] if schemes or not main_part_name(case) else [name for name in DEFAULT_SCHEMES if name not in case.schemes]
+
+
+def chart_settings(
+    case: Case, coarse_run: CoarseRun | None, schemes, methods, cells, rtol, step
+) -> list[MethodSetting]:
+    """All settings, curve by curve from coarse to fine; the default's curve is always included.
+
+    coarse_run : coarse run of a case with cells, None for other cases
+    Raises FvsolveError for options that the case does not support.
+    """
+    if not main_part_name(case) and delay_lines(case):
+        return _delay_line_settings(case, schemes, methods, cells, rtol, step)
+    if coarse_run is None:
+        return _lumped_settings(case, schemes, methods, cells, rtol, step)
+    if rtol or step:
+        raise FvsolveError(
+            f"{case.name} has cells, so its resolution is their number: use --cells, not --rtol or --step"
+        )
+    pairs, levels = (
+        scheme_method_pairs(case, schemes, methods, coarse_run.stiff),
+        sorted({*(cells or coarse_run.levels)}),
+    )
+    return [cells_setting(case, *pair, level) for pair in pairs for level in levels]
+
+
+def _lumped_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
+    if schemes or cells:
+        option = "scheme" if schemes else "cells"
+        raise FvsolveError(
+            f"{case.name} has no pipe, so there is no {option} to choose. Its resolution is rtol or step"
+        )
+    span = case.numerics.end - case.numerics.start
+    steps = sorted(step or [span / n for n in STEP_COUNTS], reverse=True)
+    settings_of_methods = []
+    for method in dict.fromkeys([*(methods or LUMPED_METHODS), DEFAULT_METHOD_RTOL]):
+        sizes = sorted(rtol or TOLERANCES, reverse=True) if is_adaptive(method) else steps
+        settings_of_methods += [lumped_setting(method, size) for size in sizes]
+    return settings_of_methods
+
+
+def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> list[MethodSetting]:
+    """Settings of a case with delay lines alone, whose resolution is the step.
+
+    A tolerance is no resolution here: the error of a step does not include the interpolation between steps.
+    """
+    if schemes or cells or rtol:
+        option = "scheme" if schemes else "cells" if cells else "rtol"
+        raise FvsolveError(
+            f"{case.name} has only delay lines, so there is no {option} to choose. Their resolution is step"
+        )
+    travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items())
+    steps = sorted(step or [float(f"{travel / n:.2g}") for n in TRAVEL_PARTS], reverse=True)
+    return [lumped_setting(method, size, "step")
+            for method in dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD]) for size in steps]  # fmt: skip
+
+
+def scheme_method_pairs(
+    case: Case, schemes: Sequence[str] | None, methods: Sequence[str] | None, stiff: bool = False
+) -> list[tuple[str, str]]:
+    """Pairs of scheme and method: all requested pairs, else a representative selection; always the default pair."""
+    names = list(schemes or [name for name in DEFAULT_SCHEMES if name in case.schemes])
+    if methods:
+        pairs = [(scheme, method) for scheme in names for method in methods]
+    else:
+        pairs = [("upwind", "euler")] if "upwind" in names else []
+        explicit = EXPLICIT_METHODS[:1] if stiff else EXPLICIT_METHODS  # stiffness limits all explicit methods alike
+        pairs += [(scheme, method) for scheme in names for method in explicit]
+        implicit = names if stiff else [IMPLICIT_SCHEME] if IMPLICIT_SCHEME in names else names[:1]
+        pairs += [(scheme, IMPLICIT_METHOD) for scheme in implicit]
+    return list(dict.fromkeys([*pairs, (default_scheme(case), DEFAULT_METHOD)]))
+
+
+def check_names(schemes: Sequence[str] | None, methods: Sequence[str] | None) -> None:
+    """Raises FvsolveError for an unknown name, with the nearest known names."""
+    for kind, given, names in (("scheme", schemes, tuple(SCHEMES)), ("method", methods, (AUTO, *METHODS))):
+        for name in given or ():
+            if name not in names:
+                raise FvsolveError(f"unknown {kind} {name}{did_you_mean(name, names)}. Expected {listing(names, 60)}")

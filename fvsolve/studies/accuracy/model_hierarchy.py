@@ -1,0 +1,404 @@
+"""Hierarchy of models of a case, from rigid columns to cells, under every density law: errors and computing times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case.chainage import add_bends, placed
+from fvsolve.case.sloshing import slowest
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.fluid import LAWS
+from fvsolve.kernels.schedule_pieces import value_with_limit
+from fvsolve.model.model_facts import velocities
+from fvsolve.studies.accuracy.model_levels import NotApplicable, finer_levels, level_keys, level_names, sloshing_basins
+from fvsolve.studies.accuracy.timing import GIVEN_UP, CappedRun
+from fvsolve.studies.distance import Deviation, moving_probes
+from fvsolve.studies.outcome import Outcome, outcome, refuse_basins
+from fvsolve.studies.reference import reference_of_run
+from fvsolve.validation import FUNCTION, NUMBER, TABLE, validated
+
+DEFAULT_TARGET = 1e-2
+BEST_OF, BRIEF_RUN = 3, 0.3  # timed runs of a level; time of the first run above which it is not repeated [s]
+LEVEL_CPU_LIMIT = 8.0  # CPU time after which a level is given up [s]
+STRAIN_FACTOR = 3.0  # a difference of the laws above this multiple of dp/K has another cause
+MAX_DOUBLINGS = 6  # greatest number of doublings of the cells, to find the error of the richest level itself
+REFINED_COST = 4.0  # ratio of computing times, for twice the cells and twice the steps
+SCHEDULE_SAMPLES = 4001  # sample times of each schedule, to find its steepest slope
+
+
+@dataclass(frozen=True)
+class ModelLevel:
+    """Model of a case: its name and law, number of states, errors against the richest level, and cost.
+
+    errors : probe -> root mean square over time of the difference to the richest level, over the range there [-]
+    error : greatest of these errors, None if the level is skipped; `reason` then explains it
+    greatest : greatest difference of any probe at any time, over its range [-]
+    seconds : time of the steps, the best of three runs [s]; rhs : calls of the rates
+    """
+
+    name: str
+    law: str
+    reason: str = ""
+    states: int | None = None
+    error: float | None = None
+    greatest: float | None = None
+    errors: dict[str, float] = field(default_factory=dict)
+    seconds: float | None = None
+    rhs: int | None = None
+
+    @property
+    def worst(self) -> str:
+        """Probe with the greatest error."""
+        return max(self.errors, key=self.errors.get, default="")
+
+
+@dataclass(frozen=True)
+class LawDifference:
+    """Difference of the linear law from the richest law, of the probe with the greatest difference, over its range [-].
+
+    error : root mean square over time; start : at the start of the run; moves : range over the greatest value [-]
+    level : greatest pressure at the start over the stiffness [-]
+    swift : greatest velocity head of a pipe at the start, rho v^2 / 2 [Pa], which the linear law neglects
+    """
+
+    probe: str
+    error: float
+    start: float
+    moves: float
+    level: float
+    swift: float
+
+
+@dataclass(frozen=True)
+class Hierarchy:
+    """All levels, simplest first, with the cheapest sufficient level and rules for the choice.
+
+    richest : reference of all other levels, refined until its own error is within the target
+    deep : notes on shallow-water theory for tanks on bodies; case : gives the units of all texts
+    own : approximate error of the richest level from its cells [-]; None without cells or without a finer run
+    cheapest : fastest level with an error within the target; travel_time : greatest of a wave along a pipe [s]
+    change_time : range of the fastest schedule over its steepest slope [s]
+    strain : greatest change of pressure from the start, over the stiffness of the softest pipe or of the fluid [-]
+    apart : difference of the linear law from the richest law on the same structure, None if it was not run
+    """
+
+    rungs: list[ModelLevel]
+    richest: ModelLevel
+    target: float
+    cheapest: ModelLevel
+    travel_time: float
+    change_time: float
+    strain: float
+    law_difference: LawDifference | None
+    own_error: float | None
+    shallow_water: tuple[str, ...] = ()
+    case: Any = field(default=None, repr=False)
+
+    @property
+    def own_error_note(self) -> str:
+        """Note on the richest level's own error; empty if the case has no cells."""
+        if self.richest.name == "as it is":
+            return ""
+        if self.own_error is None:
+            return f"the error of {self.richest.name} itself is not known: twice its cells could not be run"
+        text = f"{self.richest.name} itself has an error of about {self.own_error:.2g} from its cells"
+        if self.own_error <= self.target:
+            return text
+        return f"{text}, more than the target, so all errors of the table are uncertain by that. Try `fvsolve order`"
+
+    @property
+    def rules(self) -> list[str]:
+        """Rules of thumb for the choice of a model, in words."""
+        rules = list(self.shallow_water) + (
+            [] if self.law_difference is None else [self._law_rule(self.law_difference)]
+        )
+        if self.travel_time > 0.0 and math.isfinite(self.change_time):
+            ratio = self.change_time / self.travel_time
+            kind = "waves matter" if ratio < 2.0 else "waves fade" if ratio < 20.0 else "waves hardly matter"
+            crossing, change = (
+                self.case.amount(seconds, "time", 3) for seconds in (self.travel_time, self.change_time)
+            )
+            rules.append(
+                f"a wave travels along a pipe for up to {crossing}, the fastest input changes in "
+                f"{change}, {ratio:.3g} times that: {kind}"
+            )
+        return [*rules, self.own_error_note] if self.own_error_note else rules
+
+    def _law_rule(self, apart: LawDifference) -> str:
+        """Rule of thumb for the density law: its difference against dp/K."""
+        side = "within" if apart.error <= self.target else "above"
+        text = f"linear differs from {self.richest.law} by {apart.error:.3g} of the range of {apart.probe}"
+        text += f", {side} the target"
+        if apart.error <= STRAIN_FACTOR * self.strain:
+            return f"dp/K = {self.strain:.2g}: the laws differ by about this part of a change of pressure; here {text}"
+        reason = f"it is {apart.start:.3g} at the start and grows from there"
+        if apart.start >= 0.5 * apart.error:
+            reason = (
+                f"{apart.start:.3g} is there from the start: at pressures of {apart.level:.2g} K the laws differ by "
+            )
+            reason += f"that part, and the range of {apart.probe} is only {apart.moves:.2g} of its value"
+        head = self.case.amount(apart.swift, "pressure", 3, span=True)
+        reason += f"; linear neglects the velocity head, {head} at the start" if apart.swift > 0.0 else ""
+        return f"{text}, more than dp/K = {self.strain:.2g}: {reason}"
+
+    def plain(self) -> dict[str, Any]:
+        """Return the hierarchy as plain data, SI."""
+        own = {
+            "target": self.target,
+            "own_error": self.own_error,
+            "travel_time": self.travel_time,
+            "change_time": self.change_time,
+        }
+        laws = {"strain": self.strain, "apart": self.law_difference and vars(self.law_difference), "thumb": self.rules}
+        levels = {"rungs": [vars(level) for level in self.rungs]}
+        return own | laws | levels | {"richest": vars(self.richest), "cheapest": vars(self.cheapest)}
+
+
+@validated(set=TABLE, target=NUMBER, progress=FUNCTION)
+def with_whole_pipes(case):
+    """Return the case; if parts placed along pipes divide these, with the pieces as its pipes."""
+    from fvsolve.case import load
+
+    return load(case.table()) if placed(add_bends(case.raw)) else case
+
+
+def ladder(
+    case,
+    set: Mapping | None = None,
+    target: float = DEFAULT_TARGET,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Hierarchy:
+    """Run a case as rigid columns, lumped volumes, delay lines, few cells and many cells, under every possible law.
+
+    A case with water in tanks on bodies is run with frozen water, modes and cells, the same for all tanks.
+
+    A level that does not suit the case is skipped, with a reason. The richest level has at least the case's own cells
+    and the richest law that runs. Errors are those of the probes that a level has. Raises FvsolveError if the case
+    itself does not run, or if all its probes are constant.
+    """
+    from fvsolve.case import load
+
+    case, report = with_whole_pipes(load(case, dict(set or {}))), progress or (lambda *_: None)
+    refuse_basins(case, "chart --models", allow_sloshing=True)
+    models = [(name, law) for name in level_names(case) for law in possible_laws(case)]
+    runs, given_up = [], {}  # given_up: law -> level with cells that was given up under it
+    for at, (name, law) in enumerate(models):
+        report(at, len(models), f"{name}, {law}")
+        reason = f"not run: {given_up[law]} was given up already" if law in given_up else ""
+        runs.append(Outcome(reason, refused=True) if reason else _run_level(case, name, law))
+        if runs[-1].reason.startswith(GIVEN_UP) and name.endswith(("cell", "cells")):
+            given_up[law] = name
+    at = max((k for k, entry in enumerate(runs) if entry.ok and models[k][0] == models[-1][0]), default=None)
+    if at is None:
+        raise FvsolveError(f"the case itself does not run: {runs[-1].reason}")
+    own_run, law = runs[at], models[at][1]
+    finer_runs, own = refine_richest(
+        case, law, own_run, target, lambda name: report(len(models), len(models) + 1, f"{name}, {law}")
+    )
+    richest = finer_runs[-1][1] if finer_runs else own_run
+    models, runs = [*models, *((name, law) for name, _ in finer_runs)], [*runs, *(entry for _, entry in finer_runs)]
+    levels = [_level_of(*names, entry, richest) for names, entry in zip(models, runs, strict=True)]
+    accurate = [entry for entry in levels if entry.error is not None and entry.error <= target]
+    if not accurate:
+        raise FvsolveError(
+            "no probe changes, so models have no errors. Try a probe that changes, or an input that does"
+        )
+    cheapest = min(accurate, key=lambda level: level.seconds)
+    travel, change = travel_time(richest.model), change_time(richest.model)
+    linear = next(
+        (entry for entry, pair in zip(runs, models, strict=True) if pair == (models[at][0], "linear")), own_run
+    )
+    top = levels[-1] if finer_runs else levels[at]
+    rules = (
+        travel,
+        change,
+        greatest_strain(richest),
+        law_difference(linear, own_run),
+        own,
+        tuple(shallow_water_notes(case, target)),
+    )
+    return Hierarchy(levels, top, target, cheapest, *rules, case)
+
+
+def refine_richest(
+    case, law: str, own_run: Outcome, target: float, report: Callable[[str], None]
+) -> tuple[list, float | None]:
+    """(levels with 2, 4, ... times the cells as (name, run), own error of the last level, or of `own_run` without any).
+
+    The error of a level is d / (1 - r), with its difference d to the next level and the ratio r of successive
+    differences (1/2 for the first). A level that only served to find this error is left out. Refinement ends if the
+    error is within the target, or if no finer level can be run: then the last error is r times the error before it.
+    """
+    runs, differences, ratio = [("full line", own_run)], [], 0.5
+    for name in finer_levels(case, MAX_DOUBLINGS):
+        report(name)
+        if REFINED_COST * runs[-1][1].processor > LEVEL_CPU_LIMIT:
+            break
+        run = _run_level(case, name, law)
+        if not run.ok:
+            break
+        differences.append(
+            max((_rms_error(gap) for gap in moving_probes(runs[-1][1], reference_of_run(run)).values()), default=0.0)
+        )
+        if len(differences) > 1 and differences[-2] > 0.0:
+            ratio = min(max(differences[-1] / differences[-2], 0.1), 0.9)
+        if differences[-1] <= target * (1.0 - ratio):
+            return runs[1:], differences[-1] / (1.0 - ratio)
+        runs.append((name, run))
+    return runs[1:], differences[-1] * ratio / (1.0 - ratio) if differences else None
+
+
+def possible_laws(case) -> list[str]:
+    """Density laws that the fluid of a case can have; only its own law if the case contains no fluid."""
+    from fvsolve.case import load
+
+    if not case.places:
+        return [case.fluid.law]
+    names = [case.fluid.law]
+    for law in LAWS:
+        if LAWS[law].keys:  # a law with keys is possible only as the case's own
+            continue
+        try:
+            load(case, {"fluid.law": law})
+        except CaseError:
+            continue
+        names.append(law)
+    return [law for law in LAWS if law in names]
+
+
+def _run_level(case, name: str, law: str) -> Outcome:
+    """Run of a level under a law; a level that the case cannot have gives an outcome with the reason."""
+    try:
+        return outcome(
+            case, {**level_keys(case, name), "fluid.law": law}, best_of=BEST_OF, run=long_capped_level, budget=BRIEF_RUN
+        )
+    except (CaseError, NotApplicable) as error:
+        return Outcome(f"skipped: {error}", refused=True)
+
+
+def long_capped_level(model, state, sink, progress) -> CappedRun:
+    """Run with at most LEVEL_CPU_LIMIT seconds of CPU time."""
+    run = CappedRun(model, state, sink, progress)
+    run.max_seconds = LEVEL_CPU_LIMIT
+    return run
+
+
+# errors of a level, and rules of thumb ------------------------------------------------------------------------
+
+
+def _level_of(name: str, law: str, run: Outcome, richest: Outcome) -> ModelLevel:
+    """Level of a run, with its errors against the richest run."""
+    if not run.ok:
+        return ModelLevel(name, law, run.reason)
+    gaps = moving_probes(run, reference_of_run(richest))
+    errors = {name: _rms_error(gap) for name, gap in gaps.items()}
+    worst = max(errors.values(), default=None)
+    greatest = max((gap.ranges()["max"] for gap in gaps.values()), default=None)
+    reason = "" if errors else "the level has none of the probes"
+    return ModelLevel(name, law, reason, run.model.y_size, worst, greatest, errors, run.seconds, run.counts["rhs"])
+
+
+def _rms_error(gap: Deviation) -> float:
+    return gap.ranges()["L2"]
+
+
+def law_difference(linear: Outcome, richest: Outcome) -> LawDifference | None:
+    """Difference of the linear law from the richest law, same structure; None for the same run or a failed run."""
+    if linear is richest or not linear.ok:
+        return None
+    gaps = moving_probes(linear, reference_of_run(richest))
+    probe = max(gaps, key=lambda name: _rms_error(gaps[name]))
+    values = richest.rows[:, 1 + richest.probes.index(probe)]
+    level = max((float(abs(change[0])) for change in probe_pressures(richest)), default=0.0) / least_stiffness(richest)
+    moves = float(np.ptp(values) / np.max(np.abs(values)))
+    start = float(abs(gaps[probe].error[0]) / gaps[probe].span)
+    return LawDifference(probe, _rms_error(gaps[probe]), start, moves, level, velocity_head(richest.model))
+
+
+def velocity_head(model) -> float:
+    """Greatest velocity head of a pipe at the start, rho v^2 / 2 [Pa]; 0 without pipes."""
+    return 0.5 * model.case.properties.density * float(velocities(model).max(initial=0.0)) ** 2
+
+
+def shallow_water_notes(case, target: float) -> Iterator[str]:
+    """Notes for tanks on bodies: excess of the frequency of the slowest mode in shallow-water theory, if known."""
+    share = 100.0 * target
+    for name, basin in sloshing_basins(case).items():
+        mesh = {**case.meshes, **case.lumped}[name]
+        if (mode := slowest(basin, mesh)) is not None:
+            text = (
+                f"{name}: its slowest wave, with k h = {mode.kh:.2g}, is {mode.excess:.2g} % too fast in shallow water"
+            )
+            yield (
+                f"{text}, more than the target: modes are more accurate for small waves"
+                if mode.excess > share
+                else text
+            )
+
+
+def travel_time(model) -> float:
+    """Greatest travel time of a wave along a pipe [s]; 0 without pipes."""
+    return max((pipe.length / pipe.wave_speed for pipe in model.pipes), default=0.0)
+
+
+def change_time(model) -> float:
+    """Time of the fastest change of an input [s]: range of a schedule over its steepest slope, or run-down of a pump.
+
+    0 if a schedule jumps, infinite if nothing changes.
+    """
+    numerics = model.case.numerics
+    if any(jump for t, jump in model.breaks if t > numerics.start):
+        return 0.0
+    times = np.unique([*np.linspace(numerics.start, numerics.end, SCHEDULE_SAMPLES), *(t for t, _ in model.breaks)])
+    trips = {name: link.trip for name, link in model.case.links.items() if getattr(link, "trip", None) is not None}
+    quickest = min((run_down_time(model, name, t) for name, t in trips.items()), default=math.inf)
+    for index in range(len(model.tables.schedules)):
+        if any(np.ptp(schedule_values(model, index, [time_before(t), t])) for t in trips.values()):
+            continue  # a jump at the trip of a pump, whose run-down time counts instead
+        values = schedule_values(model, index, times)
+        steepest = float(np.max(np.abs(np.diff(values) / np.diff(times))))
+        if steepest > 0.0:
+            quickest = min(quickest, float(np.ptp(values)) / steepest)
+    return quickest
+
+
+def schedule_values(model, index: int, times) -> np.ndarray:
+    """Values of a schedule at the given times."""
+    return np.array([value_with_limit(model.tables.schedules, model.tables.pieces, index, t, np.inf) for t in times])
+
+
+def time_before(t: float) -> float:
+    """Greatest float below a time [s]."""
+    return math.nextafter(t, -math.inf)
+
+
+def run_down_time(model, name: str, t: float) -> float:
+    """Time in which a tripped pump would stop under constant torque [s]."""
+    rate = model.rhs(t, np.zeros(model.y_size))[model.state_names.index(f"{name}.speed")]
+    return float(model.case.links[name].speed.value[0]) / abs(rate) if rate != 0.0 else math.inf
+
+
+def greatest_strain(run: Outcome) -> float:
+    """Greatest change of a pressure or head probe from the start, over the stiffness [-]."""
+    return max((float(np.max(np.abs(p - p[0]))) for p in probe_pressures(run)), default=0.0) / least_stiffness(run)
+
+
+def probe_pressures(run: Outcome) -> list[np.ndarray]:
+    """Histories of the probes of pressure and head, a head as rho g h [Pa]."""
+    weight = run.model.case.properties.density * run.model.case.gravity
+    histories = []
+    for k, probe in enumerate(run.model.case.probes, 1):
+        if probe.quantity == "head" or probe.quantity.endswith("pressure"):
+            histories.append(run.rows[:, k] * (weight if probe.quantity == "head" else 1.0))
+    return histories
+
+
+def least_stiffness(run: Outcome) -> float:
+    """Stiffness of the softest pipe, fluid and wall, K = rho a^2 [Pa]; without pipes the bulk modulus of the fluid."""
+    fluid = run.model.case.properties
+    return min((fluid.density * pipe.wave_speed**2 for pipe in run.model.pipes), default=fluid.bulk_modulus)

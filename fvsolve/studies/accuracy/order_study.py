@@ -1,0 +1,400 @@
+"""Order study of one scheme and method: runs of all rows, errors against a reference, and fitted orders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers.built_in_methods import METHODS
+from fvsolve.studies.accuracy.basin_projection import unit_of
+from fvsolve.studies.accuracy.case_resolution import (
+    basins,
+    cell_counts,
+    greatest_wave_rate,
+    has_initial_jump,
+    order_varies,
+    scheme_order,
+)
+from fvsolve.studies.accuracy.fit import FAILED, FLOOR, LEAST_ROWS, NO_ERROR, Fit, fit
+from fvsolve.studies.accuracy.order_picture import error_scale
+from fvsolve.studies.accuracy.order_result import Order, OrderRow
+from fvsolve.studies.accuracy.refine import Level, Plan
+from fvsolve.studies.accuracy.timing import long_capped_run
+from fvsolve.studies.delay_line_keys import EXACT_NOTE, EXPECTED_ORDER, READING_ORDER, cells_for_lines, delay_lines
+from fvsolve.studies.distance import NORMS, error_norms, recording_keys, variable_size
+from fvsolve.studies.outcome import Outcome, Progress, outcome, study_model
+from fvsolve.studies.reference import ROUNDING, Reference, find_reference, reference_of_run
+from fvsolve.studies.result_cache import ResultCache
+from fvsolve.studies.run_queue import RunQueue, RunRequest
+
+BEST_OF, BRIEF_RUN = 2, 1.0  # timed runs of a row; time of the first run above which it is not repeated [s]
+EXCESS_ORDER = 1.5  # greatest excess of a fitted order over that of scheme and method; it occurs at single points
+REFERENCE_MARGIN = 10.0  # errors below this multiple of the error of the reference are not used
+UNCERTAIN = "reference"  # mark of rows with errors too close to that of the reference
+FINEST_ROW = "finest"  # mark of a row that ran, but has no finer row for comparison
+EXTRAPOLATION_ERROR = 0.25  # greatest relative error of the factor 1 / (1 - ratio^-p) of an extrapolation
+EXACT_ERROR = 1e-12  # relative to the size of a variable: smaller errors do not come from steps or stretches
+ORDER_TOLERANCE = 0.06, 0.04  # a, b: greatest distance a + b order of an order of three differences from theory
+
+
+def timed_run(case, keys: Mapping) -> Outcome:
+    """Run of a row, the faster of two if it is brief."""
+    return outcome(case, keys, best_of=BEST_OF, run=long_capped_run, budget=BRIEF_RUN)
+
+
+class OrderStudy:
+    """Rows of one study and their reference.
+
+    queue : `RunQueue` that makes the runs; settings : overrides of the case of the queue that give this case
+    """
+
+    def __init__(self, case, plan: Plan, against: str, queue: RunQueue, settings: Mapping) -> None:
+        self.case, self.plan, self.against = case, plan, against
+        self.queue, self.stages = queue, (dict(settings),)
+        self.probe_names = tuple(probe.text for probe in case.probes)
+        if against == "exact" and case.exact is None:
+            raise FvsolveError('against = "exact": the case names no solution under [exact]. Expected "finer"')
+        if against == "auto" and case.exact is None and basins(case):  # 4 times the cells along both axes take too long
+            self.against = "richardson"
+
+    @cached_property
+    def breaks(self) -> list[tuple[float, bool]]:
+        """Kinks and jumps that travel through cells, at the start too: (time [s], True for a jump)."""
+        breaks = list(study_model(self.case).breaks)
+        first, second = (level.set for level in self.plan.levels[:2])
+        if self.plan.way != "time" and has_initial_jump(self.case, first, second):
+            breaks.append((self.case.numerics.start, True))
+        return breaks
+
+    def study(self, points: ResultCache | None, progress: Progress) -> Order:
+        """Run and fit all rows, coarsest first; results in the cache `points` are reused.
+
+        With "auto", each row is compared with the next if a finer run fails, or is not more accurate than the rows.
+        """
+        if self.against == "richardson":
+            return self.richardson(progress)
+        try:
+            return self.against_reference(points, progress)
+        except FvsolveError as error:
+            if self.against != "auto" or self.case.exact is not None:
+                raise
+            result = self.richardson(progress)
+            return replace(result, notes=(f"no other reference can be used: {error}", *result.notes))
+
+    def against_reference(self, points: ResultCache | None, progress: Progress) -> Order:
+        """Study against an exact solution or a finer run."""
+        rows, levels = [], self.plan.levels
+        total = len(levels) + 1
+
+        def cached(name, make):
+            return make() if points is None else points.get(self.case, self.cache_key(name), make)
+
+        reference_data = cached("reference", lambda: self.reference_data(progress, total))
+        if points is not None and not self.queue.in_process:
+            new = [k for k in range(len(levels)) if points.find(self.case, self.cache_key(k)) is None]
+            reference = self.reference if new else None  # before other runs start, else they would wait for each other
+            for count, at in enumerate(self.queue.run_ahead([self.request(levels[k]) for k in new]), 1):
+                cached(new[at], lambda level=levels[new[at]]: self.row(level).plain())
+                progress(total - len(new) + count - 1, total, reference.words)
+        for k, level in enumerate(levels):
+            progress(k + 1, total, level_text(self.plan, level))
+            row_data = cached(k, lambda level=level: self.row(level).plain())
+            rows.append(row_of_data(level, row_data))
+        own, sizes = error_numbers(reference_data["own"]), reference_data["sizes"]
+        return self.fitted_order(rows, reference_data["kind"], reference_data["words"], own, sizes)
+
+    def cache_key(self, name) -> dict:
+        """Settings that identify a cached point of the case; name : "reference" or the number of a row."""
+        return {"study": "order", "against": self.against, "way": self.plan.way, "what": name,
+                "levels": [level.set for level in self.plan.levels]}  # fmt: skip
+
+    def reference_data(self, progress: Progress, total: int) -> dict:
+        """Description and own error of the reference, and sizes of all variables, as plain data."""
+        progress(0, total, "reference")
+        reference = self.reference
+        return {"kind": reference.kind, "words": reference.words, "own": reference.own_error, "sizes": self.sizes()}
+
+    @cached_property
+    def reference(self) -> Reference:
+        """Reference of all rows."""
+        way = "both" if self.against == "exact" else self.plan.way
+        return self.find_reference(way, self.against != "finer", errands=self.queue)
+
+    def find_reference(self, way: str, exact: bool, **options) -> Reference:
+        """Reference for the finest row, of one kind of runs with another scheme and method.
+
+        way : "time" keeps the cells and the scheme; exact : True to use the case's exact solution if it applies
+        """
+        method, last = METHODS.get(self.case.numerics.method), self.plan.levels[-1]
+        delayed = way != "time" and delay_lines(self.case)
+        keys = last.set | (cells_for_lines(self.case, last.step) if delayed else {})
+        return find_reference(
+            self.case, recording_keys(self.case, keys), opinions=1, exclude_own=True, way=way, lines=bool(delayed),
+            stiff=method is None or not method.explicit, exact=exact, stages=self.stages, **options,
+        )  # fmt: skip
+
+    def request(self, level: Level) -> RunRequest:
+        """Request for the run of a row."""
+        return RunRequest(timed_run, recording_keys(self.case, level.set), self.stages)
+
+    def run(self, level: Level) -> Outcome:
+        """Run of a row."""
+        return self.queue(self.case, self.request(level))
+
+    def sizes(self) -> dict[str, float]:
+        """Size of each variable in the first row that runs, as the scale of rounding errors."""
+        for level in self.plan.levels:
+            run = self.run(level)
+            if run.ok:
+                return {name: variable_size(run, name) for name in error_norms(run, self.reference, self.probe_names)}
+        raise FvsolveError(f"no row could be run: {run.reason}")
+
+    def row(self, level: Level) -> OrderRow:
+        """Run and errors of a row."""
+        run = self.run(level)
+        errors = error_norms(run, self.reference, self.probe_names) if run.ok else {}
+        return row_of_run(level, run, errors)
+
+    def fitted_order(self, rows, kind: str, words: str, own: dict, sizes: dict) -> Order:
+        """Order of all variables and norms, with notes; own : error of the reference, sizes : of the variables."""
+        fits, doubtful, smooth_order = {}, [], self.smooth_order()
+        for name in sizes:
+            fits[name] = {}
+            for norm in NORMS:
+                errors = [row.errors.get(name, {}).get(norm, np.nan) for row in rows]
+                floor, rounding = own.get(name, {}).get(norm, 0.0), ROUNDING * sizes[name]
+                fitted = check_order(fit([row.level.size for row in rows], errors, max(floor, rounding)), smooth_order)
+                uncertain = [e < REFERENCE_MARGIN * floor and floor > rounding for e in errors]
+                pairs = zip(uncertain, fitted.marks, strict=True)
+                marks = [UNCERTAIN if bad and mark == FLOOR else mark for bad, mark in pairs]
+                fits[name][norm] = replace(fitted, marks=tuple(marks))
+                doubtful += [name] if any(mark == UNCERTAIN for mark in marks) else []
+        self.refuse_reference(rows, fits, words)
+        left_out = self.case.exact is None and "exact" in self.case.raw
+        notes = ["[exact] does not hold with these settings and is not used"] if left_out else []
+        largest = [max(norms.values()) / sizes[name] for row in rows for name, norms in row.errors.items()
+                   if name not in ("pressure", "flow") and sizes[name] > 0.0]  # fmt: skip
+        exact = bool(delay_lines(self.case)) and max(largest, default=1.0) <= EXACT_ERROR
+        notes += row_notes(rows, [] if exact else doubtful)
+        notes += [*self.order_notes(exact), *self.step_error_note(fits)]
+        numerics = self.case.numerics
+        units = {name: unit for name in fits if (unit := unit_of(self.case, name)) is not None}
+        scales = {name: error_scale(self.case, name) for name in [*fits, "length"] if name not in units}
+        return Order(self.case.name, numerics.scheme, numerics.method, self.plan, kind, words, tuple(rows), fits, own,
+                     tuple(notes), units, scales)  # fmt: skip
+
+    def refuse_reference(self, rows, fits, words: str) -> None:
+        """Raise FvsolveError if no error of any variable is reliable against the reference."""
+        uncertain = [
+            mark == UNCERTAIN
+            for name, norms in fits.items() for norm, fitted in norms.items()
+            for row, mark in zip(rows, fitted.marks, strict=True) if row.errors.get(name, {}).get(norm, 0.0) > 0.0
+        ]  # fmt: skip
+        if uncertain and all(uncertain):
+            raise FvsolveError(
+                f"the reference is not more accurate than the rows ({words}). Name an exact solution under [exact], "
+                'or try against = "richardson", or coarser rows'
+            )
+
+    def smooth_order(self) -> float:
+        """Order of scheme and method together in smooth flow; NaN if rows are tolerances.
+
+        With delay lines it is the order of the interpolation in their history, for any method.
+        """
+        if delay_lines(self.case) and self.plan.measure != "rtol":
+            return READING_ORDER
+        numerics, space = self.case.numerics, scheme_order(self.case)
+        if self.plan.way == "space" or (self.plan.way == "both" and numerics.rtol is not None):
+            return space
+        if self.plan.measure == "rtol":
+            return np.nan
+        method = METHODS[numerics.method].order
+        return method if self.plan.way == "time" else min(space, method)
+
+    def theory(self) -> dict[str, float]:
+        """Norm -> expected order, NaN if there is none.
+
+        Jumps (s = 0) and kinks (s = 1) reduce the order p to (s + 1) p / (p + 1) in L1, (s + 1/2) p / (p + 1) in L2
+        and s p / (p + 1) in max.
+        """
+        p, breaks = self.smooth_order(), self.breaks
+        if delay_lines(self.case):
+            return dict.fromkeys(NORMS, np.nan)
+        if self.plan.way == "time" or not breaks:
+            return dict.fromkeys(NORMS, np.nan if self.plan.way != "time" and order_varies(self.case) else p)
+        s = 0.0 if any(jumps for _, jumps in breaks) else 1.0
+        if s == 0.0 and any(basin.own.steep for basin in basins(self.case).values()):
+            return {"L1": 1.0, "L2": 0.5, "max": 0.0}  # bores remain steep
+        return {"L1": (s + 1) * p / (p + 1), "L2": (s + 0.5) * p / (p + 1), "max": s * p / (p + 1)}
+
+    def order_notes(self, exact: bool) -> list[str]:
+        """Notes on the order expected with jumps or kinks in cells, or delay lines; exact : no row has an error."""
+        breaks = self.breaks
+        if delay_lines(self.case):
+            return [EXACT_NOTE if exact else EXPECTED_ORDER]
+        if self.plan.way == "time" or not breaks:
+            return []
+        jump, orders = any(jumps for _, jumps in breaks), self.theory()
+        effect = "jumps, so that fronts travel" if jump else "has kinks, which travel"
+        source = "a schedule" if study_model(self.case).breaks else "the start"
+        max_order = "none in max" if jump else f"{orders['max']:.2g} in max"
+        parts = ", as do those of parts that open or shut during the run" if study_model(self.case).events else ""
+        return [
+            f"{source} {effect} through the cells{parts}: order {self.smooth_order()} in space and time is expected "
+            f"to show as about {orders['L1']:.2g} in L1, {orders['L2']:.2g} in L2 and {max_order}"
+        ]
+
+    def step_error_note(self, fits) -> list[str]:
+        """Note with a smaller step, tolerance or Courant number, if the time error may hide the order in space."""
+        with_errors = [norms["L1"] for norms in fits.values() if norms["L1"].reason != NO_ERROR]
+        hidden = any(FLOOR in fitted.marks or fitted.reason for fitted in with_errors)
+        if self.plan.way != "space" or not hidden or len(self.plan.levels) < LEAST_ROWS:
+            return []
+        numerics, step = self.case.numerics, self.plan.levels[-1].step
+        if numerics.rtol is not None:
+            key = f"rtol={max(1e-13, 1e-3 * numerics.rtol):.2g}"
+        elif numerics.step is not None:
+            key = f"step={0.25 * step:.2g}"
+        else:
+            last = self.plan.levels[-1].set
+            cells = {name: tuple(np.atleast_1d(last[name]).tolist()) for name in cell_counts(self.case)}
+            key = f"courant={0.25 * step * greatest_wave_rate(self.case, cells):.2g}"
+        return [f"the time error is the same in all rows. If it hides the order in space, try --set numerics.{key}"]
+
+    # Richardson ------------------------------------------------------------------------------------------------
+
+    def richardson(self, progress: Progress) -> Order:
+        """Study without a reference: differences of each row to the next, extrapolated to errors."""
+        runs, levels = [], self.plan.levels
+        for count, at in enumerate(self.queue.run_ahead([self.request(level) for level in levels]), 1):
+            progress(count, len(levels), level_text(self.plan, levels[at]))
+        for k, level in enumerate(levels):
+            progress(k, len(levels), level_text(self.plan, level))
+            runs.append(self.run(level))
+        rows = []
+        for level, run, after in zip(self.plan.levels, runs, [*runs[1:], None], strict=True):
+            both = run.ok and after is not None and after.ok
+            rows.append(
+                row_of_run(level, run, error_norms(run, reference_of_run(after), self.probe_names) if both else {})
+            )
+        names = next((row.errors for row in rows if row.errors), {})
+        good = next((run for run in runs if run.ok), None)
+        if good is None:
+            raise FvsolveError(f"no row could be run: {runs[0].reason}")
+        sizes = {name: variable_size(good, name) for name in names}
+        result, theory = self.fitted_order(rows, "richardson", RICHARDSON, {}, sizes), self.theory()
+        fits = {name: {norm: mark_finest(check_three_differences(fitted, theory[norm]), rows) for norm, fitted in norms.items()}
+                for name, norms in result.fits.items()}  # fmt: skip
+        return replace(
+            result, rows=extrapolate(rows, fits), fits=fits, notes=(*result.notes, *difference_notes(rows, fits))
+        )
+
+
+def check_order(fitted: Fit, smooth_order: float) -> Fit:
+    """Return a fit, with a note if its order is far above that of scheme and method in smooth flow."""
+    if fitted.reason or not fitted.order > smooth_order + EXCESS_ORDER:
+        return fitted
+    return replace(fitted, note=f"errors fall faster than the order {smooth_order:g} of scheme and method allows: the "
+                   "motion decays, or errors change sign, so this is not the order of the method")  # fmt: skip
+
+
+RICHARDSON = "Richardson: each row against the next, extrapolated"
+
+
+def check_three_differences(fitted: Fit, theory: float) -> Fit:
+    """Return a fit of differences; without an order if there are only three and they do not show the expected order."""
+    tolerance = max(fitted.spread, ORDER_TOLERANCE[0] + ORDER_TOLERANCE[1] * theory)
+    if fitted.reason or fitted.marks.count("") > LEAST_ROWS or not abs(fitted.order - theory) > tolerance:
+        return fitted
+    reason = (f"no order: three differences show {fitted.order:.2f}, but {theory:.2g} is expected; they are too few to "
+              "decide if rows are still too coarse. Try more levels, or finer rows")  # fmt: skip
+    return replace(fitted, order=np.nan, spread=np.nan, constant=np.nan, reason=reason, note="")
+
+
+def mark_finest(fitted: Fit, rows) -> Fit:
+    """Return a fit with the mark "finest" instead of "failed" for rows that ran but have no finer row."""
+    pairs = zip(fitted.marks, rows, strict=True)
+    return replace(
+        fitted, marks=tuple(FINEST_ROW if mark == FAILED and not row.reason else mark for mark, row in pairs)
+    )
+
+
+def is_certain(fitted: Fit, ratio: float) -> bool:
+    """True if the order p is known well enough for a relative error of 1 / (1 - ratio^-p) of at most a quarter."""
+    return fitted.order > 0.0 and np.log(ratio) * fitted.spread <= EXTRAPOLATION_ERROR * (ratio**fitted.order - 1.0)
+
+
+def extrapolate(rows, fits) -> tuple[OrderRow, ...]:
+    """Rows with errors instead of differences d to the next row, if the order p is certain.
+
+    The error of a row is d plus the error of the next row; for the last difference this is d / (ratio^p - 1).
+    """
+    results: list[OrderRow] = []
+    for k in range(len(rows) - 1, -1, -1):
+        errors, after = {}, results[-1].errors if results else {}
+        for name, norms in rows[k].errors.items():
+            ratio, errors[name] = rows[k].level.size / rows[k + 1].level.size, {}
+            for norm, d in norms.items():
+                fitted = fits[name][norm]
+                rest = after[name][norm] if name in after else d / (ratio**fitted.order - 1.0)
+                errors[name][norm] = d + rest if is_certain(fitted, ratio) else d
+        results.append(replace(rows[k], errors=errors))
+    return tuple(reversed(results))
+
+
+def difference_notes(rows, fits) -> list[str]:
+    """Note that names the variables and norms whose rows are differences instead of errors."""
+    ratio = rows[0].level.size / rows[1].level.size
+    names = [f"{name} ({', '.join(uncertain)})" for name, norms in fits.items()
+             if (uncertain := [norm for norm, fitted in norms.items() if not is_certain(fitted, ratio)])]  # fmt: skip
+    if not names:
+        return []
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return [f"without a certain order nothing is extrapolated: for {', '.join(names[:3])}{more} the table shows "
+            "differences to the next row, and errors are larger"]  # fmt: skip
+
+
+def row_of_run(level: Level, run: Outcome, errors: dict) -> OrderRow:
+    """Row of the table from its run and errors."""
+    counts = run.counts
+    updates = run.cell_updates if run.model is not None else 0
+    return OrderRow(level, errors, run.seconds, counts.get("rhs", 0), updates, counts.get("steps", 0),
+               "" if run.ok else run.reason)  # fmt: skip
+
+
+def row_of_data(level: Level, data: Mapping) -> OrderRow:
+    """Row from plain data."""
+    seconds = np.nan if data["seconds"] is None else data["seconds"]
+    return OrderRow(level, error_numbers(data["errors"]), seconds, data["rhs"], data["cell_updates"], data["steps"],
+               data["reason"])  # fmt: skip
+
+
+def error_numbers(errors: Mapping) -> dict:
+    """Variable -> norm -> number, NaN instead of None."""
+    return {name: {norm: np.nan if e is None else e for norm, e in norms.items()} for name, norms in errors.items()}
+
+
+def level_text(plan: Plan, level: Level) -> str:
+    """Resolution of a row in words."""
+    if plan.way != "time" and level.cells:
+        return f"{level.cells} cells"
+    return f"{plan.measure.split(' ')[0]} {level.size:.4g}"
+
+
+def row_notes(rows, doubtful: list[str]) -> list[str]:
+    """Notes on failed rows, and on variables with errors too close to that of the reference."""
+    notes = []
+    failed = [row for row in rows if row.reason]
+    if failed:
+        notes.append(f"{len(failed)} of {len(rows)} rows failed; reason of the first: {failed[0].reason}")
+    if doubtful:
+        names = ", ".join(dict.fromkeys(doubtful))
+        notes.append(
+            f'errors of rows marked "{UNCERTAIN}" are less than {REFERENCE_MARGIN:g} times the error of the reference ({names}), so '
+            "they are not reliable. Name an exact solution under [exact], or try fewer levels"
+        )
+    return notes

@@ -1,0 +1,128 @@
+"""Work-precision front of a chart: the cheapest setting for each error, and the default next to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fvsolve.case.case import Case
+from fvsolve.studies.accuracy.method_setting import MethodSetting, cells_setting, lumped_setting
+from fvsolve.studies.accuracy.pareto import Crossing, find_crossing, interpolate_log
+
+GREATEST_RTOL = 0.1  # results of greater tolerances are meaningless
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting and the results of its run.
+
+    trajectory, greatest, end, overshoot : errors over the range of the worst component (`studies/distance.py`)
+    seconds : CPU time of the steps, the best of several runs [s]; updates : calls of the rates times cells (states)
+    """
+
+    setting: MethodSetting
+    ok: bool
+    reason: str
+    trajectory: float
+    greatest: float
+    end: float
+    overshoot: float
+    worst: str
+    seconds: float
+    rhs: int
+    updates: int
+    steps: int
+
+
+@dataclass(frozen=True)
+class FrontRow:
+    """One row of the front: the cheapest curve for a target error, and the program's default next to it.
+
+    name, by_updates : cheapest curve by CPU time and by cell updates; None if no curve reaches the target
+    """
+
+    target: float
+    name: str | None
+    fineness: str
+    seconds: float | None
+    by_updates: str | None
+    updates: float | None
+    default_fineness: str
+    default_seconds: float | None
+    default_updates: float | None
+
+
+def curves_by_name(points: Sequence[Point]) -> dict[str, list[Point]]:
+    """Points by name of scheme and method, in their order."""
+    points_by_name: dict[str, list[Point]] = {}
+    for point in points:
+        points_by_name.setdefault(point.setting.name, []).append(point)
+    return points_by_name
+
+
+def front_row(points: Sequence[Point], target: float, floor: float, default: str) -> FrontRow:
+    """Front row of a target error; default : name of the default's curve."""
+    by_time, by_work = (cheapest_curve(points, target, floor, cost) for cost in ("seconds", "updates"))
+    name, best = by_time or (None, None)
+    default_time, default_work = (
+        target_crossings(points, target, floor, cost).get(default) for cost in ("seconds", "updates")
+    )
+    return FrontRow(
+        target, name, fineness_text(points, name, best), best and best.cost, by_work and by_work[0],
+        by_work and by_work[1].cost, fineness_text(points, default, default_time), default_time and default_time.cost,
+        default_work and default_work.cost,
+    )  # fmt: skip
+
+
+def good_errors(points: Sequence[Point]) -> list[float]:
+    """Trajectory errors of the points that did not fail."""
+    return [point.trajectory for point in points if point.ok]
+
+
+def target_crossings(points: Sequence[Point], target: float, floor: float, cost: str) -> dict[str, Crossing]:
+    """Crossing of each curve with a target error, by name of the curve.
+
+    cost : "seconds" or "updates"; errors below the floor count as the floor
+    """
+    by_name = {}
+    for name, curve in curves_by_name(points).items():
+        errors = [max(point.trajectory, floor) if point.ok else math.inf for point in curve]
+        place = find_crossing(errors, [max(getattr(point, cost), 1e-12) for point in curve], target)
+        if place is not None:
+            by_name[name] = place
+    return by_name
+
+
+def cheapest_curve(points: Sequence[Point], target: float, floor: float, cost: str) -> tuple[str, Crossing] | None:
+    """Name and crossing of the curve with the least cost at a target; None if no curve reaches the target."""
+    return min(target_crossings(points, target, floor, cost).items(), key=lambda item: item[1].cost, default=None)
+
+
+def interpolated_setting(case: Case, coarse: MethodSetting, fine: MethodSetting, share: float) -> MethodSetting:
+    """Setting at the fraction `share` of the way between two settings of a curve."""
+    if coarse.cells is not None:
+        return cells_setting(
+            case, coarse.scheme, coarse.method, math.ceil(interpolate_log(coarse.cells, fine.cells, share))
+        )
+    return lumped_setting(coarse.method, float(f"{interpolate_log(coarse.size, fine.size, share):.2g}"), coarse.control)
+
+
+def coarser_setting(case: Case, setting: MethodSetting) -> MethodSetting | None:
+    """Next coarser setting of a curve: half the cells, ten times the tolerance, or twice the step; None at the end."""
+    if setting.cells is not None:
+        return cells_setting(case, setting.scheme, setting.method, setting.cells // 2) if setting.cells > 1 else None
+    size = float(f"{setting.size * (10.0 if setting.control == 'rtol' else 2.0):.6g}")
+    most = GREATEST_RTOL if setting.control == "rtol" else case.numerics.end - case.numerics.start
+    return lumped_setting(setting.method, size, setting.control) if size <= most else None
+
+
+def fineness_text(points, name: str | None, where: Crossing | None) -> str:
+    """Approximate number of cells, tolerance or step at the crossing of a curve."""
+    if name is None or where is None:
+        return ""
+    coarse, fine = (curves_by_name(points)[name][k].setting for k in (where.coarser, where.finer))
+    least = "" if where.within or where.finer else ", the coarsest"
+    if coarse.cells is not None:
+        return f"{math.ceil(interpolate_log(coarse.cells, fine.cells, where.share) - 1e-9)} cells{least}"
+    return f"{coarse.control} {interpolate_log(coarse.size, fine.size, where.share):.2g}{least}"

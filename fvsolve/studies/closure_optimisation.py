@@ -1,0 +1,182 @@
+"""Optimisation of a piecewise-linear schedule, such as a valve closure, for the least peak."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from fvsolve.case import Case, load
+from fvsolve.case.text import path
+from fvsolve.errors import CaseError, Fault, FvsolveError, collect_faults, did_you_mean, listing
+from fvsolve.parts.schedule import Schedule
+from fvsolve.run import run
+from fvsolve.units import show
+
+START_SHAPES = (
+    0.0,
+    1.0,
+    -1.0,
+)  # half the log ratio of the first slope to the last, of the schedules that searches start from
+MAX_KNOTS = 12
+SIMPLEX_SIZE = 1.0  # edge length of the first simplex
+
+
+@dataclass(frozen=True)
+class ValveSchedule:
+    """A schedule, times [s] and values [SI] of its knots, and its peak in the unit of `Optimum.unit`."""
+
+    time: list[float]
+    value: list[float]
+    peak: float | None
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Schedule of the key with the least `minimise`, and the linear schedule for comparison; runs : number of runs."""
+
+    key: str
+    minimise: str
+    unit: str
+    linear: ValveSchedule
+    best: ValveSchedule
+    runs: int
+    laws: list[ValveSchedule] = field(default_factory=list)
+
+    def plain(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {"key": self.key, "minimise": self.minimise, "unit": self.unit, "linear": vars(self.linear),
+                "best": vars(self.best), "runs": self.runs, "laws": [vars(law) for law in self.laws]}  # fmt: skip
+
+    @property
+    def schedule(self) -> str:
+        """TOML line of the best schedule for the case."""
+        times, values = ([float(f"{x:.6g}") for x in row] for row in (self.best.time, self.best.value))
+        return f"{self.key.rpartition('.')[2]} = {{ time = {times}, value = {values} }}"
+
+
+class ClosureSearch:
+    """State of a search. Unknowns z are logarithms of the rises of the pieces between fixed end times and values."""
+
+    def __init__(self, case: Case, key: str, minimise: str, span: tuple, knots: int, progress: Callable | None) -> None:
+        self.case, self.key, self.minimise, self.knots, self.progress = case, key, minimise, knots, progress
+        self.begin, self.end, self.first, self.last = span
+        self.laws: list[ValveSchedule] = []
+        self.unit = self.failure_reason = ""
+
+    def law(self, z: np.ndarray) -> tuple[list[float], list[float]]:
+        """Times [s] and values [SI] of the knots; z : float64[knots]  logarithms of rises over the last rise."""
+        rises = np.exp(np.clip(np.append(z, 0.0), -12.0, 12.0))
+        shares = np.concatenate([[0.0], np.cumsum(rises / rises.sum())])
+        shares[-1] = 1.0
+        times = np.linspace(self.begin, self.end, shares.size)
+        return times.tolist(), (self.first + (self.last - self.first) * shares).tolist()
+
+    def __call__(self, z: np.ndarray) -> float:
+        """Run a schedule and return its peak; infinite if the run does not finish."""
+        time, value = self.law(z)
+        quiet = {"output.fields": 0, "output.lines": {}, "expect": peak_expectation(self.minimise)}
+        result = run(load(self.case, {self.key: {"time": time, "value": value}, **quiet}))
+        if result.reason.startswith("interrupted"):
+            raise KeyboardInterrupt
+        expectation = result.expectations[0]
+        self.unit = expectation.unit
+        peak = expectation.found if result.ok else None
+        self.laws.append(ValveSchedule(time, value, peak))
+        self.failure_reason = self.failure_reason or ("" if result.ok else result.reason)
+        if self.progress is not None:
+            self.progress(len(self.laws), "run failed" if peak is None else f"{peak:.6g} {expectation.unit}")
+        return np.inf if peak is None else peak
+
+
+def optimise(
+    case, key: str, minimise: str, knots: int = 3, runs: int = 60, set: Mapping[str, Any] | None = None,
+    progress: Callable | None = None,
+) -> Optimum:  # fmt: skip
+    """Find the piecewise-linear schedule with inner knots that gives the least peak.
+
+    key : key of a schedule between two values, such as a ramp; minimise : a quantity as in `[expect]`, such as
+    "max(gate.pressure)" or "max(main.head)". The result is monotonic, with the end values and the duration of the
+    original schedule. Simplex searches (Nelder and Mead 1965) start from schedules that are linear, fast first and
+    slow first. Raises CaseError for an invalid case or an unsuitable key, FvsolveError if no run has a finite peak.
+    """
+    from scipy.optimize import minimize
+
+    faults: list[Fault] = []
+    loaded = None
+    with collect_faults(faults):
+        loaded = load(case, dict(set or {}))
+    faults += find_faults(loaded, key, minimise, knots, runs)
+    if faults:
+        raise CaseError(faults, "case" if loaded is None else loaded.name)
+    search = ClosureSearch(loaded, key, minimise, span_of(loaded, key), knots, progress)
+    search(np.zeros(knots))
+    for k, start in enumerate(START_SHAPES):
+        z = start * np.linspace(2.0, 0.0, knots + 1)[:-1]
+        simplex = np.vstack([z, z + SIMPLEX_SIZE * np.eye(knots)])
+        evaluations = (runs - len(search.laws)) // (len(START_SHAPES) - k)
+        minimize(search, z, method="Nelder-Mead",
+                 options={"maxfev": evaluations, "initial_simplex": simplex, "xatol": 1e-2, "fatol": 0.0})  # fmt: skip
+    if all(law.peak is None for law in search.laws):
+        raise FvsolveError(
+            f"no schedule gives {minimise} a finite value: {search.failure_reason or 'it is not a number'}"
+        )
+    linear = search.laws[0]
+    best = min(search.laws, key=lambda law: np.inf if law.peak is None else law.peak)
+    return Optimum(key, minimise, search.unit, linear, best, len(search.laws), search.laws)
+
+
+def find_faults(case: Case | None, key: str, minimise: str, knots: int, runs: int) -> list[Fault]:
+    """Faults of the arguments of a search, before any run; case : None if the case itself has faults."""
+    faults: list[Fault] = []
+    fewest = len(START_SHAPES) * (min(max(knots, 1), MAX_KNOTS) + 2)
+    if not 1 <= knots <= MAX_KNOTS:
+        faults.append(Fault("knots", f"{knots} is out of range. Expected 1 to {MAX_KNOTS}"))
+    if runs < fewest:
+        faults.append(
+            Fault("runs", f"{runs} are too few. Expected {fewest} or more for {fewest // len(START_SHAPES) - 2} knots")
+        )
+    if case is not None:
+        with collect_faults(faults, f"--schedule {key}"):
+            span_of(case, key)
+        load_faults: list[Fault] = []
+        with collect_faults(load_faults):
+            load(case, {"expect": peak_expectation(minimise)})
+        faults += [Fault(f"--minimise {minimise}", fault.message) for fault in load_faults]
+    return faults
+
+
+def peak_expectation(minimise: str) -> dict[str, Any]:
+    """Table `[expect]` with a single peak."""
+    return {minimise: {"value": 1.0, "atol": 1.0}}
+
+
+def span_of(case: Case, key: str) -> tuple[float, float, float, float]:
+    """(begin, end [s], first, last value [SI]) of the schedule of a key. Raises FvsolveError for an unsuitable key."""
+    laws = dict(schedules(case))
+    schedule = laws.get(key)
+    if schedule is None:
+        suggestion = did_you_mean(key, laws)
+        moving = [name for name, law in laws.items() if not law.constant] or ["none"]
+        raise FvsolveError(
+            f"is not a schedule of this case{suggestion or f'. Schedules that change are {listing(moving)}'}"
+        )
+    if schedule.constant or schedule.kind not in ("linear", "smooth", "ramp") or len(schedule.time) < 2:
+        example = '{ start = "1 s", duration = "10 s", value = [1, 0] }'
+        raise FvsolveError(f"does not change from a value to another. Expected a ramp or a table, such as {example}")
+    ends = float(schedule.time[0]), float(schedule.time[-1]), float(schedule.value[0]), float(schedule.value[-1])
+    if ends[2] == ends[3]:
+        raise FvsolveError(f"begins and ends at {show(ends[2])}. Expected different values at start and end")
+    return ends
+
+
+def schedules(case: Case) -> Iterator[tuple[str, Schedule]]:
+    """Pairs (key, schedule) of all parts of a case."""
+    for group in ("nodes", "links"):
+        for name, part in getattr(case, group).items():
+            values = {info.alias or field: getattr(part, field) for field, info in type(part).model_fields.items()}
+            yield from (
+                (path((group, name, key)), value) for key, value in values.items() if isinstance(value, Schedule)
+            )

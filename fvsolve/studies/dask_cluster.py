@@ -1,0 +1,148 @@
+"""Workers of a Dask scheduler that compute chunks of tasks."""
+
+from __future__ import annotations
+
+import pickle
+import queue
+import threading
+import uuid
+from typing import Any
+
+from fvsolve.errors import FvsolveError, RunError, listing
+from fvsolve.output.restart import programs
+from fvsolve.run.process_pool import compute
+
+TIMEOUT = 10.0  # timeout for a scheduler, and for its first worker [s]
+CHUNKS_PER_THREAD = 2  # chunks per thread: one in work, one that waits on the worker
+MATCHING_PACKAGES = ("python", "distributed", "msgpack", "cloudpickle", "numpy")  # versions must be equal on both sides
+
+
+class Cluster:
+    """Workers of the scheduler at an address such as "tcp://10.0.0.1:8786". They must have the same versions."""
+
+    def __init__(self, work: Any, address: str) -> None:
+        self.work, self.name, self.address = pickle.dumps(work), uuid.uuid4().hex, address
+        self.client = connect(address)
+        try:
+            check_versions(self.client, address)
+        except BaseException:
+            self.client.close()
+            raise
+        self.capacity = CHUNKS_PER_THREAD * sum(self.client.nthreads().values())
+        self.given: dict[Any, int] = {}  # future -> chunk
+        self.finished: queue.SimpleQueue = queue.SimpleQueue()
+
+    def submit(self, chunk: int, tasks: list) -> None:
+        """Send a chunk."""
+        future = self.client.submit(run_on_worker, self.name, self.work, tasks, pure=False)
+        self.given[future] = chunk
+        future.add_done_callback(self.finished.put)
+
+    def next_result(self) -> tuple[int, list | None, float]:
+        """(chunk, answers, seconds) of the next finished chunk; answers is None if its worker was killed.
+
+        Raises the exception that a worker raised, and RunError if the scheduler is lost.
+        """
+        future = self._next()
+        chunk, status = self.given.pop(future), future.status
+        if status == "finished":
+            answers, seconds = future.result()
+            if isinstance(answers, BaseException):
+                raise answers
+            return chunk, answers, seconds
+        if status == "error" and type(future.exception()).__name__ == "KilledWorker":
+            return chunk, None, 0.0
+        if status == "error":
+            raise future.exception()
+        raise RunError(self._lost_text())
+
+    def _next(self) -> Any:
+        while True:
+            try:
+                return self.finished.get(timeout=TIMEOUT)
+            except queue.Empty:
+                if self.client.status != "running":
+                    raise RunError(self._lost_text()) from None
+
+    def _lost_text(self) -> str:
+        return f"lost the Dask scheduler at {self.address}. Finished runs are kept; the same command resumes from there"
+
+    def close(self) -> None:
+        """Cancel unfinished chunks and close the connection."""
+        self.client.cancel([*self.given], force=True) if self.client.status == "running" else None
+        self.client.close()
+
+
+WORKER_CACHE = (
+    threading.local()
+)  # per worker thread: name of the last work, and the work with the data that it has read
+
+
+def run_on_worker(name: str, work: bytes, tasks: list) -> tuple[Any, float]:
+    """Compute a chunk of tasks on a worker; the unpickled work is reused for later chunks."""
+    if getattr(WORKER_CACHE, "name", None) != name:
+        WORKER_CACHE.name, WORKER_CACHE.work = name, pickle.loads(work)
+    return compute(WORKER_CACHE.work, tasks)
+
+
+def connect(address: str) -> Any:
+    """Connect to the scheduler at an address. Raises FvsolveError if there is none or the package is missing."""
+    try:
+        from distributed import Client
+    except ImportError:
+        raise FvsolveError("--dask needs the package distributed: pip install fvsolve[dask]") from None
+    try:
+        client = Client(address, timeout=TIMEOUT, set_as_default=False)
+    except Exception as error:  # Dask raises many types of exceptions
+        text = str(error).split("\n")[0] or type(error).__name__
+        raise FvsolveError(f'no Dask scheduler answers at "{address}": {text}. Expected an address such as '
+                           "tcp://10.0.0.1:8786; the command dask scheduler prints it") from None  # fmt: skip
+    return client
+
+
+def check_versions(client: Any, address: str) -> None:
+    """Check versions on scheduler and workers against this process, after waiting for the first worker.
+
+    Raises FvsolveError if no worker comes, and with all differences of versions.
+    """
+    try:
+        client.wait_for_workers(1, timeout=TIMEOUT)
+    except TimeoutError:
+        text = f"the Dask scheduler at {address} has no workers. Start workers: dask worker {address}"
+        raise FvsolveError(text) from None
+    reported = client.get_versions(check=False)
+    ends = {"the scheduler": reported["scheduler"]}
+    ends |= {f"worker {name}": text for name, text in reported["workers"].items()}
+    here = version_numbers(reported["client"])
+    faults = [
+        f"{end} has {item}" for end, text in ends.items() for item in differing_versions(here, version_numbers(text))
+    ]
+    faults = faults or [f"worker {name} has {item}" for name, text in client.run(programs, on_error="return").items()
+                        for item in program_differences(text)]  # fmt: skip
+    if faults:
+        raise FvsolveError(f"the Dask cluster at {address} has other versions, so its results could differ: "
+                           f"{listing(faults)}. Install the same versions there and here")  # fmt: skip
+
+
+def program_differences(reported: Any) -> list[str]:
+    """Differences of the programs on a worker and here, as texts; its exception if fvsolve is missing there."""
+    if not isinstance(reported, dict):
+        return [f"no fvsolve ({reported})"]
+    own = {
+        name: version for name, version in programs().items() if name != "target"
+    }  # processors of workers may differ
+    return differing_versions(own, reported)
+
+
+def version_numbers(reported: dict) -> dict[str, str]:
+    """Versions of `MATCHING_PACKAGES` in a report of Dask; Python as major.minor."""
+    host, packages = reported.get("host", {}), reported.get("packages", {})
+    numbers = {name: str(packages.get(name)) for name in MATCHING_PACKAGES[1:]}
+    return {"python": ".".join(str(host.get("python", packages.get("python"))).split(".")[:2]), **numbers}
+
+
+def differing_versions(here: dict[str, str], there: dict[str, str]) -> list[str]:
+    """Texts of versions on the remote side that differ from those here."""
+    return [
+        f"{name} {there.get(name)} (here {version})" for name, version in here.items() if there.get(name) != version
+    ]

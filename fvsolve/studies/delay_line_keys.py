@@ -1,0 +1,79 @@
+"""Delay lines in studies: their names, overrides of the pipe model, cell averages of waves, expected orders."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from fvsolve.model.delay_line_selection import line_methods
+
+POINTS = 5  # points of a cell of a line at which waves are evaluated
+WEIGHTS = np.array([275.0, 100.0, 402.0, 100.0, 275.0]) / 1152.0  # at the middles of fifths; exact to degree 5
+READING_ORDER = 6.0  # order of the interpolation in the history of a line
+EXPECTED_ORDER = (
+    "delay lines carry jumps exactly, and smooth waves without friction at whole steps; the expected order is 2 in the "
+    "length of stretches with friction (1 behind jumps) and in steps behind kinks (about 1.5 in L2, 1 in max) or in "
+    "lines shorter than steps, else up to 6 in steps, and the order of the method if there are storing parts"
+)
+EXACT_NOTE = (
+    "delay lines are exact here, at any step and stretch: rows are exact to rounding, except fields along the lines"
+)
+
+
+def delay_lines(case) -> list[str]:
+    """Names of pipes that are delay lines. With `fixed_choices` in the case, no pipe is left to `auto`."""
+    return [name for name, pipe in line_methods(case).items() if pipe.pipe_model == "delay-line"]
+
+
+def slowest_line(case) -> str:
+    """Delay line with the longest travel time; its `cells` set the length of steps."""
+    return max(delay_lines(case), key=lambda name: case.links[name].length / case.wave_speed(name))
+
+
+def fixed_choices(case) -> dict[str, str]:
+    """Overrides that fix the present choice of `auto` for each pipe, independent of the changes of a study."""
+    from fvsolve.run import model_of
+
+    undecided = [
+        name for name in delay_lines(case) if (case.links[name].pipe_model or case.numerics.pipe_model) == "auto"
+    ]
+    if not undecided:
+        return {}
+    model = model_of(case)
+    pairs = zip(model.pipes, model.tables.pipes["delay"] >= 0, strict=True)
+    return pipe_model_keys(
+        {pipe.name: "delay-line" if delayed else "finite-volume" for pipe, delayed in pairs if pipe.name in undecided}
+    )
+
+
+def as_cells(names: Iterable[str]) -> dict[str, str]:
+    """Overrides that replace these delay lines, all lines of the case, by cells."""
+    return {"numerics.pipe_model": "finite-volume"} | pipe_model_keys(dict.fromkeys(names, "finite-volume"))
+
+
+def cells_for_lines(case, step: float) -> dict:
+    """Overrides that replace delay lines by cells, each crossed by a wave in a step [s].
+
+    For step = 0 the numbers of cells stay as the case states them.
+    """
+    delayed = delay_lines(case)
+    keys = as_cells(delayed)
+    for name in delayed if step > 0.0 else ():
+        keys[f"links.{name}.cells"] = max(1, math.ceil(case.links[name].length / case.wave_speed(name) / step))
+    return keys
+
+
+def pipe_model_keys(chosen: dict[str, str]) -> dict[str, str]:
+    """Overrides of the pipe models; chosen : pipe -> "finite-volume" or "delay-line"."""
+    return {f"links.{name}.pipe_model": line for name, line in chosen.items()}
+
+
+def line_averages(run_data, t: float, out: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Delay line -> sum and difference of both waves [kg/s], averaged over its cells of output."""
+    sums = {}
+    for k, (r, l) in run_data.along(t, out, POINTS).items():  # noqa: E741
+        r, l = r.reshape(-1, POINTS) @ WEIGHTS, l.reshape(-1, POINTS) @ WEIGHTS  # noqa: E741
+        sums[run_data.model.pipes[k].name] = r + l, r - l
+    return sums

@@ -1,0 +1,247 @@
+"""Energy balance of a run: supplied, stored and dissipated energy, and energy changed by the numerical method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError, did_you_mean
+from fvsolve.model.available_energy import available_energy, datum_of
+from fvsolve.model.energy_accounts import Account
+from fvsolve.solve import initial_state
+from fvsolve.studies.energy.step_energy import EnergyRun
+from fvsolve.studies.outcome import RowSink, study_model
+from fvsolve.validation import FUNCTION, TABLE, TEXT, validated
+
+ROUNDING = 1e-12  # fraction of the energy throughput below which a remainder is rounding
+IMPLIED_KINDS = ("valve", "pump", "damper", "pipe", "chamber", "tank")  # kinds omitted in names of ledger lines
+
+
+@dataclass(frozen=True)
+class Port:
+    """Passivity at a port, condition (2): E0 + integral of p q dt >= 0, p gauge pressure, heights from the port.
+
+    work : least value of the integral [J], at `time` [s]; at_start : E0, available energy at the start [J]
+    others : energy supplied by other ports at the least margin [J]; margin : least value of E0 + work + others [J], at
+    `t_margin` [s]; course, bound : float64[k]  the integral and -(E0 + others) at the rows of the ledger [J]
+    text : verdict as a sentence, in the units of `[output]`
+    """
+
+    node: str
+    work: float
+    time: float
+    at_start: float
+    others: float
+    margin: float
+    t_margin: float
+    passive: bool
+    course: np.ndarray
+    bound: np.ndarray
+    text: str = ""
+
+    def plain(self) -> dict:
+        """Plain values for JSON, without the arrays."""
+        return {name: value for name, value in vars(self).items() if np.ndim(value) == 0}
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energy ledger of a run at ends of steps, cumulative since the start [J].
+
+    t : float64[k] [s]; supplied, stored, dissipated : {"PART": float64[k]}, stored as change since the start
+    scheme, law : {"PART": float64[k]}  energy removed by the discretisation of a pipe, or by an inexact law
+    step : float64[k]  energy removed by the time steps; newton : float64[k]  energy of Newton residuals
+    remainder : supplied - stored - dissipated, the sum of these four; positive if the numerical method dissipates
+    energy, negative if it creates energy
+    at_start : {"PART": J}  available energy at the start; datum : elevation of zero height [m]
+    marks : texts on events outside the validity of the model, with their times
+    """
+
+    reason: str
+    ok: bool
+    t: np.ndarray
+    supplied: dict[str, np.ndarray]
+    stored: dict[str, np.ndarray]
+    dissipated: dict[str, np.ndarray]
+    scheme: dict[str, np.ndarray]
+    law: dict[str, np.ndarray]
+    step: np.ndarray
+    newton: np.ndarray
+    remainder: np.ndarray
+    at_start: dict[str, float]
+    datum: float
+    settings: dict[str, object]
+    steps: int
+    marks: list[str]
+    port: Port | None = None
+
+    @property
+    def throughput(self) -> float:
+        """Energy throughput: greatest sum of energy supplied by ports and released by parts [J]."""
+        total = np.zeros(len(self.t))
+        for values in self.supplied.values():
+            total += np.maximum(values, 0.0)
+        for values in self.stored.values():
+            total += np.maximum(-values, 0.0)
+        return float(total.max(initial=0.0))
+
+    @property
+    def numerical_remainder(self) -> np.ndarray:
+        """Remainder without Newton residuals: energy removed by scheme, law and step : float64[k] [J]."""
+        return self.remainder - self.newton
+
+    @property
+    def relative(self) -> float:
+        """|`numerical_remainder`| at the end over `throughput`; 0 without throughput."""
+        return 0.0 if self.throughput == 0.0 else float(abs(self.numerical_remainder[-1]) / self.throughput)
+
+    @property
+    def newton_counts(self) -> bool:
+        """True if the energy of Newton residuals exceeds rounding at any row."""
+        return bool(np.max(np.abs(self.newton)) > ROUNDING * self.throughput)
+
+    @property
+    def verdict(self) -> str:
+        """Meaning of the remainder, without Newton residuals, which are not a property of scheme and method."""
+        if self.relative <= ROUNDING:
+            return "rounding"
+        return "the numbers dissipate" if self.numerical_remainder[-1] > 0.0 else "the numbers create energy"
+
+    def numerical(self) -> dict[str, np.ndarray]:
+        """Remainder by cause: scheme, law, step and Newton, without causes that are always zero, and their sum."""
+        zeros = np.zeros(len(self.t))
+        causes = {"scheme": sum(self.scheme.values(), zeros), "law": sum(self.law.values(), zeros), "step": self.step,
+                  "newton": self.newton if self.newton_counts else zeros}  # fmt: skip
+        return {name: values for name, values in causes.items() if values.any()} | {"remainder": self.remainder}
+
+    def plain(self) -> dict:
+        """Plain values for JSON: the ledger at the end; the table has all rows."""
+        lines = {json_name: {name: float(values[-1]) for name, values in getattr(self, kind).items()}
+                 for kind, json_name in JSON_NAMES.items()}  # fmt: skip
+        port = None if self.port is None else self.port.plain()
+        return {
+            "reason": self.reason, "ok": self.ok, "t": float(self.t[-1]), "steps": self.steps, **self.settings, **lines,
+            "step_loss": float(self.step[-1]), "newton_loss": float(self.newton[-1]),
+            "remainder": float(self.remainder[-1]), "through": self.throughput, "relative": self.relative,
+            "verdict": self.verdict, "datum": self.datum, "at_start": self.at_start, "marks": self.marks, "port": port,
+        }  # fmt: skip
+
+
+JSON_NAMES = {"supplied": "supplied", "stored": "stored", "dissipated": "dissipated", "scheme": "scheme_loss",
+         "law": "law_loss"}  # fmt: skip
+
+
+@validated(set=TABLE, port=TEXT, progress=FUNCTION)
+def energy(case, set=None, port: str | None = None, progress=None) -> Energy:
+    """Run a case with changed keys and compute its energy ledger; `case` as for `run`, or a Model.
+
+    port : a reservoir, inflow or junction with a demand, at which condition (2) of passivity is checked
+    progress : called as progress(t, seconds, steps). Raises CaseError for an invalid case, FvsolveError for an unknown
+    port.
+    """
+    model = study_model(case, set) if not hasattr(case, "tables") else case
+    check_port(model.case, port)
+    settings = model.tables.settings.copy()
+    settings["datum"] = datum_of(model, port)
+    model = replace(model, tables=model.tables._replace(settings=settings))
+    run = EnergyRun(model, initial_state(model), RowSink(), progress)
+    summary = run.go()
+    if run.times[-1] < run.loop.t:
+        run.add_row()
+    return ledger(run, summary, port)
+
+
+def ledger(run: EnergyRun, summary, port: str | None) -> Energy:
+    """Energy ledger from the recorded totals of a run."""
+    accounts, totals, holdings = run.accounts, np.array(run.totals), np.array(run.holdings)
+    lines = {
+        kind: lines_by_name(accounts.accounts, kind, totals) for kind in ("supplied", "dissipated", "scheme", "law")
+    }
+    stored = lines_by_name(accounts.stored_accounts, "stored", holdings)
+    impact_losses = np.array(run.losses)
+    for name, column in zip(run.model.column_names, impact_losses.T, strict=True):
+        if column.any():
+            lines["dissipated"][f"{name} stopped dead"] = column
+    zeros, stored_sum = np.zeros(len(run.times)), holdings.sum(axis=1)
+    supplied, dissipated = (sum(lines[kind].values(), zeros) for kind in ("supplied", "dissipated"))
+    numerics = run.model.case.numerics
+    settings = {key: getattr(numerics, key) for key in ("scheme", "method", "courant", "step", "rtol")}
+    reason = "interrupted" if summary.reason.startswith("interrupted") else summary.reason
+    return Energy(
+        reason, summary.finished, np.array(run.times), lines["supplied"], stored, lines["dissipated"],
+        lines["scheme"], lines["law"], totals[:, accounts.of("rate")].sum(axis=1)
+        - impact_losses.sum(axis=1) - stored_sum,
+        totals[:, -1], supplied - stored_sum - dissipated, available_energy(run.model),
+        float(run.model.tables.settings[0]["datum"]), settings | {"cells": run.model.cells}, summary.steps,
+        [f"{mark.text}: the ledger from {run.model.case.amount(mark.time, 'time', 6)} on is not to be trusted"
+         for mark in summary.marks],
+        None if port is None else port_verdict(run, port),
+    )  # fmt: skip
+
+
+def lines_by_name(accounts: list[Account], kind: str, columns: np.ndarray) -> dict[str, np.ndarray]:
+    """Ledger lines of a kind that are not always zero, named "PART", or "PART KIND" if a part has several kinds."""
+    lines = {}
+    for k, account in enumerate(accounts):
+        if account.category == kind and columns[:, k].any():
+            several = kind == "dissipated" and account.kind not in IMPLIED_KINDS or account.kind == "over the rim"
+            name = f"{account.place} {account.kind}" if several else account.place
+            lines[name] = lines.get(name, 0.0) + columns[:, k]
+    return lines
+
+
+def check_port(case, port: str | None) -> None:
+    """Raise FvsolveError if a node of a case is not a port."""
+    ports = [name for name, node in case.places.items() if node.driven is not None]
+    if port is not None and port not in ports:
+        hint = did_you_mean(port, ports) or f". Ports are {', '.join(ports)}"
+        hint = hint if ports else "; the case has no such node"
+        raise FvsolveError(f'no port named "{port}". Expected a reservoir, an inflow or a junction{hint}')
+
+
+def port_verdict(run: EnergyRun, port: str) -> Port:
+    """Check condition (2) of passivity at every step of a run; heights are measured from the port."""
+    lines, totals = run.accounts.accounts, np.array(run.step_totals)
+    own_lines = [k for k, account in enumerate(lines) if account.category == "supplied" and account.place == port]
+    supplied_lines = run.accounts.of("supplied")
+    work = totals[:, own_lines].sum(axis=1)
+    others = totals[:, supplied_lines].sum(axis=1) - work
+    at_rows = np.searchsorted(run.step_times, run.times, side="right") - 1
+    start = sum(available_energy(run.model).values())
+    margin = start + work + others
+    least, worst = int(np.argmin(work)), int(np.argmin(margin))
+    size = start + np.max(np.abs(work)) + np.max(np.abs(others))
+    t = run.step_times
+    verdict = Port(
+        port, float(work[least]), float(t[least]), start, float(others[worst]), float(margin[worst]), float(t[worst]),
+        bool(margin[worst] >= -ROUNDING * size), work[at_rows], -(start + others)[at_rows],
+    )  # fmt: skip
+    return replace(verdict, text=port_text(verdict, run.model.case))
+
+
+def port_text(port: Port, case) -> str:
+    """Verdict at a port as a sentence, in the units of `[output]`."""
+    work, least, own_bound, others, margin = (
+        case.amount(energy_value, "energy", 6)
+        for energy_value in (port.work, 0.0 - port.at_start, -(port.at_start + port.others), port.others, port.margin)
+    )
+    bound = f"-(E0 + others) = {own_bound}, of which {others} from other ports" if port.others else f"-E0 = {least}"
+    verdict = "passive over this run" if port.passive else "NOT passive: the network supplied more energy than it had"
+    time, margin_time = (case.amount(energy_value, "time", 6) for energy_value in (port.time, port.t_margin))
+    return (f"port {port.node}: integral of p q falls to {work} at {time}, its bound is {bound}; "
+            f"least margin {margin} at {margin_time}: {verdict}")  # fmt: skip
+
+
+def write_table(result: Energy, path: Path) -> None:
+    """Write energy.csv: time, then every ledger line [J], at ends of steps."""
+    columns = {"t [s]": result.t}
+    for kind in ("supplied", "stored", "dissipated", "scheme", "law"):
+        columns |= {f"{kind} {name} [J]": values for name, values in getattr(result, kind).items()}
+    if result.port is not None:
+        columns |= {"integral of p q [J]": result.port.course, "bound [J]": result.port.bound}
+    columns |= {"step [J]": result.step, "newton [J]": result.newton, "remainder [J]": result.remainder}
+    text = [",".join(columns)]
+    text += [",".join(repr(float(x)) for x in row) for row in np.column_stack(list(columns.values()))]
+    path.write_text("\n".join(text) + "\n", encoding="utf-8")

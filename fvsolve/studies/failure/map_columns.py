@@ -1,0 +1,147 @@
+"""Columns of a failure map: steps around the predicted limits, or values of a key."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from fvsolve.case import load
+from fvsolve.case.sections import DEFAULT_CELLS
+from fvsolve.errors import FvsolveError
+from fvsolve.studies.delay_line_keys import cells_for_lines, delay_lines
+from fvsolve.studies.failure.eigenvalue_limit import eigenvalues_of
+from fvsolve.studies.outcome import study_model
+
+COURANTS = (0.25, 0.5, 0.75, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0, 3.0)
+COLUMN_COUNT = 10  # default number of steps, if waves are not the fastest
+STIFFNESS_RATIO = 8.0  # a case is stiff if its fastest rate is above this multiple of the wave rate
+STIFF_STEPS = 1e5  # without pipes a case is stiff if its fastest rate times the time span is above this
+MAP_KEYS = tuple(f"numerics.{name}" for name in ("scheme", "method", "courant", "step", "rtol"))
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns: their key and values, and the keys that they set.
+
+    name : "step" or the varied key; sets : all keys of each column; span : time span of the run [s]
+    rates : fastest rate and wave rate [1/s] of each column, or of all columns; delay lines count as cells
+    wave_rate : cells that a wave crosses per second in the first column [1/s]; None without cells
+    """
+
+    name: str
+    values: list
+    sets: list[dict]
+    rates: list[tuple[float, float | None]]
+    span: float
+    wave_rate: float | None
+
+    def keys(self, k: int) -> dict:
+        """Keys of column k that change the case itself, not the step."""
+        return {} if self.name == "step" else {self.name: self.values[k]}
+
+    def stiff(self, k: int) -> bool:
+        """True if column k is stiff: its fastest rate is far above that of waves or, without pipes, of the run."""
+        fastest, waves = self.rates[min(k, len(self.rates) - 1)]
+        return fastest > STIFFNESS_RATIO * waves if waves else fastest * self.span > STIFF_STEPS
+
+    def label(self, k: int) -> str:
+        """Key and value of column k in words."""
+        value = self.values[k]
+        return f"{self.name} = {value:.3g}" if isinstance(value, float) else f"{self.name} = {value}"
+
+
+def map_columns(case, base: dict, courants, steps, key) -> Columns:
+    """Requested columns, or steps around the predicted limits. Raises FvsolveError for impossible columns."""
+    _check_options(courants, steps, key)
+    span = case.numerics.end - case.numerics.start
+    if key is not None:
+        name, values = key
+        control = _step_control(courants, steps)
+        sets = [{name: value, **control} for value in values]
+        rates = [_fastest_and_wave_rate(case, {**base, name: value}) for value in values]
+        return Columns(name, list(values), sets, rates, span, _wave_rate(case, {**base, name: values[0]}))
+    rates, waves = _fastest_and_wave_rate(case, base), _wave_rate(case, base)
+    if courants is not None and waves is None:
+        raise FvsolveError("Courant numbers need pipes with cells, but this case has none. Expected --step")
+    chosen = [c / waves for c in courants] if courants is not None else steps
+    chosen = list(chosen if chosen is not None else _default_steps(case, rates, waves))
+    return Columns("step", chosen, [{"numerics.step": h} for h in chosen], [rates], span, waves)
+
+
+def _step_control(courants, steps) -> dict:
+    """Step control of all columns with values of a key; empty for that of the case."""
+    if courants is not None:
+        return {"numerics.courant": courants[0]}
+    return {} if steps is None else {"numerics.step": steps[0]}
+
+
+def _fastest_and_wave_rate(case, set: dict) -> tuple[float, float | None]:
+    """(fastest rate, wave rate) [1/s] of a case; with too many states the fastest is the wave rate."""
+    set = set | cells_for_delay_lines(case, set)
+    model = study_model(case, set)
+    waves = float(model.wave_rates.max()) if model.cells else None
+    eigenvalues = eigenvalues_of(case, set)
+    fastest = float(np.abs(eigenvalues).max(initial=0.0)) if eigenvalues is not None else (waves or math.inf)
+    return fastest, waves
+
+
+def _wave_rate(case, set: dict) -> float | None:
+    """Cells that a wave crosses per second in pipes with cells [1/s]; None without such pipes."""
+    model = study_model(case, set)
+    return float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0)) or None
+
+
+def cells_for_delay_lines(case, set: dict) -> dict:
+    """Keys that replace delay lines by cells, with the default number of cells in the slowest line."""
+    case = load(case, set)
+    travel = _slowest_travel_time(case)
+    return cells_for_lines(case, travel / DEFAULT_CELLS) if travel else {}
+
+
+def _slowest_travel_time(case) -> float:
+    """Travel time of a wave along the slowest delay line [s]; 0 without delay lines."""
+    return max((case.links[name].length / case.wave_speed(name) for name in delay_lines(case)), default=0.0)
+
+
+def _default_steps(case, rates, waves: float | None) -> list[float]:
+    """Default steps [s]: around Courant number 1 if waves are the fastest, else from below 2 / |lambda| upwards.
+
+    The longest step is a tenth of the run or Courant number 1.5. For delay lines alone the steps go from a hundredth
+    of the slowest travel time, or 0.3 / |lambda| of storing parts if that is less, to this travel time.
+    """
+    fastest, span, travel = rates[0], case.numerics.end - case.numerics.start, _slowest_travel_time(case)
+    if not waves and travel:
+        quickest = float(np.abs(eigenvalues_of(case, {})).max(initial=0.0))
+        shortest = min(travel / 100, 0.3 / quickest if quickest > 0.0 else math.inf)
+        return [float(f"{h:.2g}") for h in np.geomspace(shortest, min(span / 10, travel), COLUMN_COUNT)]
+    if waves and fastest <= STIFFNESS_RATIO * waves:
+        return [c / waves for c in COURANTS]
+    longest = min(span / 10, 1.5 / waves if waves else math.inf)
+    shortest = min((1.5 if waves else 0.3) / fastest if fastest > 0 else longest, longest / 10)
+    return [float(f"{h:.2g}") for h in np.geomspace(shortest, longest, COLUMN_COUNT)]
+
+
+def default_schemes(case, columns: Columns) -> list[str]:
+    """Scheme of the case; if waves are the fastest also `upwind`, to compare the error of the scheme."""
+    own = case.numerics.scheme
+    return [own] if columns.wave_rate is None or columns.stiff(0) else ["upwind", own]
+
+
+def _check_options(courants, steps, key) -> None:
+    if courants is not None and steps is not None:
+        raise FvsolveError("--courant and --step are given; keep one")
+    for option, values in (("--courant", courants), ("--step", steps)):
+        if values is not None and not all(math.isfinite(value) and value > 0 for value in values):
+            raise FvsolveError(f"{option} must be positive numbers")
+        if values is not None and len(values) == 0:
+            raise FvsolveError(f"{option} is empty. Expected at least one number")
+    if key is not None and len(courants or steps or [0]) > 1:
+        raise FvsolveError(
+            "with --key its values are the columns. Expected at most one --step or one --courant, for all columns"
+        )
+    if key is not None and not key[1]:
+        raise FvsolveError("--key has no values. Expected KEY=a,b,c with at least one value")
+    if key is not None and key[0] in MAP_KEYS:
+        raise FvsolveError(f"--key {key[0]} is impossible: the map sets it by --scheme, --method, --courant and --step")

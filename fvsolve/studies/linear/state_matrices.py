@@ -1,0 +1,186 @@
+"""Matrices A and C at an operating point, by differences that are checked."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.kernels import dtypes as rec
+from fvsolve.studies.linear.finite_differences import (
+    FINER_STEPS,
+    ROUNDING_SHARE,
+    SLOPE_TOLERANCE,
+    STEPS,
+    best_slopes,
+    central_differences,
+    hidden_kinks,
+    side_differences,
+)
+from fvsolve.studies.linear.operating_point import OperatingPoint
+
+DENSE = 1000  # greatest number of states for which A is a full array
+C_TIME, MAX_ENTRIES = 20.0, 10_000_000  # time limit of C [s], greatest number of its entries
+RATE_FLOOR = 1e-10  # of the greatest rate per deviation: smaller rows are round-off of sums
+TRIAL_DIRECTIONS = 3  # random directions along which A is checked
+
+
+def responses(at: OperatingPoint, y: np.ndarray, outputs: int) -> np.ndarray:
+    """dy/dt and the first probes at the state y : float64[n + outputs]."""
+    model, t = at.model, float(at.t)
+    with model.slate(at.armed) as data:
+        dydt, out = data.evaluate(t, y, np.inf)
+        values = data.observe(t, y, out)[:outputs] if outputs else np.zeros(0)
+    if out[rec.STATUS] != rec.OK or not np.all(np.isfinite(dydt)):
+        place = f" at {model.node_names[int(out[rec.WHERE])]}" if out[rec.WHERE] >= 0 else ""
+        raise FvsolveError(
+            f"the state cannot be linearised: no flow supplies the demand{place}; every path to it is closed"
+        )
+    return np.concatenate([dydt, values])
+
+
+def small_deviations(at: OperatingPoint) -> np.ndarray:
+    """Small deviation of each state for differences : float64[n]."""
+    return np.maximum(at.model.scale, np.abs(at.y))
+
+
+def state_matrix(at: OperatingPoint) -> tuple[Any, np.ndarray, float, np.ndarray]:
+    """(A, size of each rate, error, steps of the differences), by colours of the Jacobian pattern of the model.
+
+    size : float64[n]  sum of |A_ij| times the small deviation of state j
+    """
+    from scipy.sparse import csc_array
+
+    model, n, width = at.model, at.model.y_size, small_deviations(at)
+    pattern = model.structure.pattern[:n].tocsc()
+    pattern.sort_indices()
+    rows, starts = pattern.indices, pattern.indptr[:-1]
+    columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
+    for steps in (STEPS, FINER_STEPS):
+        slopes, sides = matrix_entries(at, width, rows, columns, steps)
+        size = np.bincount(rows, np.abs(slopes[len(steps) // 2]), n)
+        size = np.maximum(size, RATE_FLOOR * width * np.max(size / width, initial=0.0))
+        row_size = np.where(size > 0.0, size, 1.0)[rows]
+        values, errors = best_slopes(slopes, row_size, starts)
+        coarse = np.bincount(rows, np.abs(slopes[0]), n)[rows]
+        hidden = hidden_kinks(sides, coarse, row_size, starts, steps) & ~basin_states(model)
+        kink = side_differences(sides, row_size, starts) + hidden
+        if max(np.max(errors), np.max(kink)) <= SLOPE_TOLERANCE:
+            break
+    else:
+        cause = "slope" if np.max(errors) > SLOPE_TOLERANCE else "kink"
+        refuse_state(model, int(np.argmax(errors if cause == "slope" else kink)), cause)
+    a = csc_array((values / width[columns], rows, pattern.indptr), shape=(n, n))
+    check_directions(at, a, width, size, steps)
+    return (a if n > DENSE else a.toarray()), size, float(np.max(errors)), steps
+
+
+def matrix_entries(at: OperatingPoint, width, rows, columns, steps) -> tuple[np.ndarray, np.ndarray]:
+    """(slopes, sides) of the entries at `rows` and `columns` : float64[steps, entries], per small deviation."""
+    structure, slopes, sides = at.model.structure, [], []
+    base = responses(at, at.y, 0)
+    for color in range(structure.color_count):
+        direction = np.where(structure.colors == color, width, 0.0)
+        slope, side = central_differences(lambda y: responses(at, y, 0), at.y, direction, base, steps)
+        slopes.append(slope)
+        sides.append(side)
+    picked = (slice(None), structure.colors[columns], rows)
+    return np.array(slopes).transpose(1, 0, 2)[picked], np.array(sides).transpose(1, 0, 2)[picked]
+
+
+def basin_states(model) -> np.ndarray:
+    """True for states of basins : bool[n]; upwind fluxes of water at rest have kinks of some 1e-4 of their row."""
+    names = tuple(f"{basin.name}." for basin in model.basins)
+    return np.array([name.startswith(names) for name in model.state_names]) if names else np.zeros(model.y_size, bool)
+
+
+def refuse_state(model, j: int, cause: str) -> None:
+    """Raise FvsolveError for state j, along which there is no derivative; cause : "slope" or "kink"."""
+    basin = next((part for part in model.basins if model.state_names[j].startswith(f"{part.name}.")), None)
+    if basin is not None:
+        text = (
+            "fluxes of this basin have a kink near its state (equal wave speeds from both sides, or cells that run dry)"
+        )
+        raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {text}; choose another state")
+    reason = {
+        "slope": "its slope does not converge there, as that of a valve at a drop of zero: give the valve "
+                 "laminar_reynolds, or linearise while it flows (--at)",
+        "kink": "its slope differs from side to side there (a tank dry or full, an end stop or seat just touched): "
+                "choose another time with --at",
+    }[cause]  # fmt: skip
+    raise FvsolveError(f"the state cannot be linearised along {model.state_names[j]}: {reason}")
+
+
+def check_directions(at: OperatingPoint, a, width: np.ndarray, size: np.ndarray, steps: np.ndarray) -> None:
+    """Check A along random directions of all states; raises FvsolveError if f is homogeneous but not linear."""
+    model, rng = at.model, np.random.default_rng(1)
+    base = responses(at, at.y, 0)
+    for _ in range(TRIAL_DIRECTIONS):
+        direction = width * rng.choice([-1.0, 1.0], width.size)
+        slope, _ = central_differences(lambda y: responses(at, y, 0), at.y, direction, base, steps)
+        error = np.abs(slope - a @ direction) / np.where(size > 0.0, size, 1.0)
+        worst = np.min(error, axis=0)
+        if np.max(worst) > SLOPE_TOLERANCE:
+            where = model.state_names[int(np.argmax(worst))]
+            raise FvsolveError(f"the state cannot be linearised: the rate of {where} is not a linear function of "
+                               "combined small deviations; choose another time with --at")  # fmt: skip
+
+
+def output_matrix(at: OperatingPoint, outputs: int, steps: np.ndarray) -> tuple[np.ndarray, float]:
+    """(C, error), by differences along each state that an output depends on."""
+    n, width = at.model.y_size, small_deviations(at)
+    if outputs == 0:
+        return np.zeros((0, n)), 0.0
+    if n * outputs > MAX_ENTRIES:
+        raise too_large(n, outputs)
+    latest, base = time.monotonic() + C_TIME, responses(at, at.y, outputs)
+    slopes, sides = np.zeros((2, len(steps), n, outputs))
+    for j in visible_states(at, outputs, base[n:], width):
+        if time.monotonic() > latest:
+            raise too_large(n, outputs)
+        direction = np.zeros(n)
+        direction[j] = width[j]
+        differences = central_differences(lambda y: responses(at, y, outputs), at.y, direction, base, steps)
+        slopes[:, j], sides[:, j] = (part[:, n:] for part in differences)
+    size = np.sum(np.abs(slopes[len(steps) // 2]), axis=0)
+    size = np.maximum(size, ROUNDING_SHARE / steps[0] * np.abs(base[n:]))
+    row_size = np.tile(np.where(size > 0.0, size, 1.0), n)
+    # Each entry has its own step: for a valve, the step of a hose has too much round-off.
+    starts = np.arange(n * outputs)
+    values, errors = best_slopes(slopes.reshape(len(steps), -1), row_size, starts)
+    kink = np.maximum(side_differences(sides.reshape(len(steps), -1), row_size, starts), errors)
+    if np.max(kink) > SLOPE_TOLERANCE:
+        j, k = divmod(int(np.argmax(kink)), outputs)
+        raise FvsolveError(f"{at.model.case.probes[k].text} cannot be linearised along {at.model.state_names[j]}: its "
+                           "slope differs there from side to side, or with the step; leave it out of --outputs, or "
+                           "choose another time with --at")  # fmt: skip
+    return values.reshape(n, outputs).T / width, float(np.max(errors))
+
+
+def too_large(n: int, outputs: int) -> FvsolveError:
+    """Error for a matrix C that is too large or takes too long."""
+    return FvsolveError(f"C of {n} states and {outputs} outputs is too large, or takes longer than {C_TIME:g} s: use "
+                        "fewer --outputs, or give pipes or basins fewer cells, --set links.NAME.cells=100 or "
+                        "nodes.NAME.cells=[20,20]")  # fmt: skip
+
+
+def visible_states(at: OperatingPoint, outputs: int, base: np.ndarray, width: np.ndarray) -> Iterator[int]:
+    """States that change some output, by bisection: a range that changes no output by one bit is left out."""
+    rng, n = np.random.default_rng(2), width.size
+    direction = rng.uniform(0.5, 1.0, n) * rng.choice([-1.0, 1.0], n) * width * STEPS[0]
+    ranges = [(0, n)]
+    while ranges:
+        low, high = ranges.pop()
+        deviation = np.zeros(n)
+        deviation[low:high] = direction[low:high]
+        ends = (responses(at, at.y + sign * deviation, outputs)[n:] for sign in (1.0, -1.0))
+        if all(np.array_equal(end, base) for end in ends):
+            continue
+        if high - low == 1:
+            yield low
+        else:
+            middle = (low + high) // 2
+            ranges += [(middle, high), (low, middle)]

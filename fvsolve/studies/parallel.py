@@ -1,0 +1,122 @@
+"""Parallel computation of tasks in chunks of about a second: in this process, other processes or on Dask workers.
+
+The result of a task must not depend on the process, the order or the other tasks of its chunk.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+from fvsolve.errors import FvsolveError
+
+CHUNK_TIME = 1.0  # intended time of a chunk [s]
+MAX_GROWTH = 8  # greatest ratio of sizes of successive chunks
+MAX_CRASHES = 2  # number of processes that a task may crash before it counts as lost
+
+
+class Work(Protocol):
+    """Callable that computes a task. It is sent to processes once or with each chunk, so it must be picklable."""
+
+    def __call__(self, task: Any) -> Any: ...
+
+    def lost_result(self, task: Any) -> Any:
+        """Substitute for the answer of a task that crashed its process repeatedly."""
+
+
+class Workers(Protocol):
+    """Processes that compute chunks; room : greatest number of chunks in work."""
+
+    capacity: int
+
+    def submit(self, chunk: int, tasks: list) -> None: ...
+
+    def next_result(self) -> tuple[int, list | None, float]:
+        """(chunk, answers, seconds) of the next finished chunk; answers is None if its process crashed."""
+
+    def close(self) -> None: ...
+
+
+def run_tasks(work: Work, tasks: Sequence, jobs: int = 1, dask: str | None = None) -> Iterator[tuple[int, Any]]:
+    """Compute tasks with a `TaskPool`; yields (index, answer) of each task when it is finished."""
+    with TaskPool(work, jobs, dask) as pool:
+        yield from pool.run(tasks)
+
+
+class TaskPool:
+    """Pool for tasks of one kind. The first task is computed in this process, which compiles the functions for all.
+
+    jobs : number of local processes; dask : address of a scheduler, used instead of local processes.
+    Context manager: workers are closed on exit.
+    """
+
+    def __init__(self, work: Work, jobs: int = 1, dask: str | None = None) -> None:
+        if jobs < 1:
+            raise FvsolveError(f"jobs = {jobs} is out of range. Expected 1 or more")
+        self.work, self.jobs, self.dask = work, jobs, dask
+        self.in_process, self.has_started = dask is None and jobs == 1, False
+        self.workers: Workers | None = None
+
+    def run(self, tasks: Sequence) -> Iterator[tuple[int, Any]]:
+        """Compute tasks; yields (index, answer) of each task when it is finished."""
+        local = len(tasks) if self.in_process else min(len(tasks), int(not self.has_started))
+        for number in range(local):
+            self.has_started = True
+            yield number, self.work(tasks[number])
+        if local < len(tasks):
+            self.workers = self.workers or open_pool(self.work, self.jobs, self.dask)
+            yield from distribute(self.work, tasks, self.workers, local)
+
+    def __enter__(self) -> TaskPool:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        if self.workers is not None:
+            self.workers.close()
+
+
+def open_pool(work: Work, jobs: int, dask: str | None) -> Workers:
+    """Start local processes, or connect to a Dask scheduler."""
+    if dask is not None:
+        from fvsolve.studies.dask_cluster import Cluster
+
+        return Cluster(work, dask)
+    from fvsolve.run.process_pool import ProcessPool
+
+    return ProcessPool(work, jobs)
+
+
+def distribute(work: Work, tasks: Sequence, workers: Workers, first: int) -> Iterator[tuple[int, Any]]:
+    """Distribute the tasks from index `first` on to workers; yields (index, answer).
+
+    If a process crashes, its chunk is split in two halves and repeated, so that only tasks that crash are lost.
+    """
+    waiting, retry = deque(range(first, len(tasks))), deque()
+    in_work: dict[int, list[int]] = {}
+    crashes: dict[int, int] = {}
+    size, next_chunk = 1, 0  # start with single tasks: computing times of tasks may differ by orders of magnitude
+    while waiting or retry or in_work:
+        while (waiting or retry) and len(in_work) < workers.capacity:
+            fair_share = -(-len(waiting) // workers.capacity)  # limits chunks near the end, so that no worker is idle
+            numbers_given = retry.popleft() if retry else [waiting.popleft() for _ in range(min(size, fair_share))]
+            in_work[next_chunk] = numbers_given
+            workers.submit(next_chunk, [tasks[k] for k in numbers_given])
+            next_chunk += 1
+        chunk, answers, seconds = workers.next_result()
+        numbers = in_work.pop(chunk)
+        if answers is not None:
+            size = next_chunk_size(len(numbers), seconds, size)
+            yield from zip(numbers, answers, strict=True)
+        elif len(numbers) > 1:
+            retry += [numbers[: len(numbers) // 2], numbers[len(numbers) // 2 :]]
+        elif crashes.setdefault(numbers[0], 1) < MAX_CRASHES:
+            crashes[numbers[0]] += 1
+            retry.append(numbers)
+        else:
+            yield numbers[0], work.lost_result(tasks[numbers[0]])
+
+
+def next_chunk_size(done: int, seconds: float, size: int) -> int:
+    """Number of tasks of the next chunk, after a chunk of `done` tasks took `seconds`."""
+    return max(1, min(MAX_GROWTH * size, int(done * CHUNK_TIME / max(seconds, 1e-6))))

@@ -1,0 +1,371 @@
+"""Reference solutions for errors: an exact solution, or finer runs with other schemes and methods.
+
+`find_reference(case, finest)` finds the most accurate reference for runs with the keys `finest` or coarser. A
+`Reference` gives end fields as cell averages on any cells, probe values at the rows of a run, and its own error.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+
+import numpy as np
+
+from fvsolve import exact as room
+from fvsolve.errors import FvsolveError
+from fvsolve.steppers.built_in_methods import METHODS
+from fvsolve.studies.accuracy.basin_projection import basin_fields, project_to
+from fvsolve.studies.accuracy.case_resolution import (
+    basins,
+    cell_counts,
+    cell_keys_of,
+    greatest_wave_rate,
+    pipes_with_cells,
+    scaled,
+    total_cells,
+)
+from fvsolve.studies.accuracy.timing import finished_run, long_capped_run, probe_run
+from fvsolve.studies.delay_line_keys import delay_lines as delayed
+from fvsolve.studies.distance import (
+    Distance,
+    cell_averages,
+    distance,
+    error_norms,
+    extremes_distance,
+    fields,
+    pressure_ranges,
+    variable_size,
+    wave_sums,
+)
+from fvsolve.studies.outcome import Outcome, outcome, study_model
+from fvsolve.studies.run_queue import RunQueue, RunRequest
+
+REFINEMENT = 4  # ratio of cells to those of the finest run under study
+CHARACTERISTICS_REFINEMENT = 16  # ratio of cells for characteristics at Courant number 1, whose steps are cheap
+# (scheme, method, step control, its value, ratio of cells, limiter) for each kind of case, the best first.
+WAVES = (
+    ("upwind5", "rk4", "courant", 0.8, REFINEMENT),
+    ("weno5", "ssp-rk3", "courant", 0.9, REFINEMENT),
+    ("upwind", "euler", "courant", 1.0, CHARACTERISTICS_REFINEMENT),
+)
+SEPARATION = (  # only one scheme is above first order with cavities, so the references differ by limiters
+    ("muscl", "ssp-rk3", "courant", 0.5, REFINEMENT, "van-leer"),
+    ("muscl", "rk4", "courant", 0.5, REFINEMENT, "minmod"),
+)
+STIFF = (("upwind5", "rodas-5p", "rtol", 1e-8, REFINEMENT), ("weno5", "radau-iia-5", "rtol", 1e-8, REFINEMENT))
+LUMPED = ((None, "radau-iia-9", "rtol", 1e-12, 1), (None, "rodas-5p", "rtol", 1e-11, 1))
+ALTERNATIVES = {
+    True: ("dormand-prince", "tsitouras"),
+    False: ("radau-iia-5", "esdirk-5"),
+}  # explicit -> methods of high order
+TOLERANCE_FRACTION = 0.01  # greatest ratio of the tolerance of a reference to that under study
+LEAST_RTOL = 1e-13
+TOLERANCE_RATIO = 10.0**1.5  # ratio of tolerances of successive refinements, equal to halving steps at order 5
+ORDERS = 0.5, 5.0  # limits of the observed order
+SAFETY = 1.5  # safety factor on the extrapolated error
+MEASURES = ("trajectory", "greatest", "end", "overshoot")
+ROUNDING = 1e-15  # relative to the size of a quantity
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Reference solution of a study.
+
+    kind : "exact" | "finer" | "function"; words : description for a table
+    fields : fields(model) -> {pipe: (pressure [Pa], flow [m3/s]), ("basin", name): float64[quantities, n]}, averages
+    over the cells of that model at the end
+    rows : rows(run) -> float64[k, probes]  reference values of the probes of a run at its rows; NaN if not known
+    spans : pipe -> range of its pressure over the run [Pa], as far as known
+    own : variable -> {"L1", "L2", "max"}  error of the reference [SI]; doubt : its error relative to ranges, of the
+    worst component; both at least the error from refinements, and the difference to the second reference if any
+    second : description of the second reference; told : reasons of runs that did not finish
+    run : the run that is the reference, or the nearest run to an exact solution
+    """
+
+    kind: str
+    words: str
+    fields: Callable
+    rows: Callable
+    spans: dict[str, float] = field(default_factory=dict)
+    own_error: dict[str, dict[str, float]] = field(default_factory=dict)
+    uncertainty: Distance = field(default_factory=lambda: Distance(0.0, 0.0, 0.0, 0.0))
+    second: str = ""
+    failures: tuple[str, ...] = ()
+    run: Outcome | None = None
+
+
+def capped_outcome(case, keys: Mapping) -> Outcome:
+    """Make a run that is stopped if it becomes too expensive."""
+    return outcome(case, keys, run=long_capped_run)
+
+
+def find_reference(
+    case, finest: Mapping | None = None, *, opinions: int | None = None, exclude_own: bool = False, way: str = "both",
+    stiff: bool = False, exact: bool = True, lines: bool = False, run: Callable = capped_outcome,
+    progress: Callable[[str], None] = lambda text: None, queue: RunQueue | None = None, stages: tuple[dict, ...] = (),
+) -> Reference:  # fmt: skip
+    """Find the most accurate reference for runs of a case with the keys `finest` or coarser ones.
+
+    opinions : number of kinds of reference runs (default all); at least two show errors common to one kind
+    judged : True if scheme and method of the case are under study, so that the reference must use others
+    way : "both", or "time": same cells and scheme as the case, if only the step is under study
+    lines : True if delay lines are under study, with a reference in cells of any scheme and method
+    stiff : True if explicit steps are limited by something other than waves
+    exact : True to use the solution named in [exact] of the case, if it applies
+    errands : `RunQueue` that makes the runs, instead of `run`; stages : overrides of its case that give this case
+    Raises FvsolveError if too few runs reach the end: none, or only one if several are required.
+    """
+    from fvsolve.case import load
+
+    case = load(case, finest or {})
+    exact_result = (
+        exact_reference(case)
+        if exact and case.exact is not None and not (way == "time" and pipes_with_cells(case))
+        else None
+    )
+    if exact_result is not None and opinions == 1:
+        return exact_result
+    kinds, references, failures = candidates(case, exclude_own, way, stiff, lines), [], []
+    first = list(itertools.islice(kinds, opinions))
+    if queue is not None:
+        run = submit_ahead(queue, (*stages, dict(finest or {})), first, progress)
+    for name, trials in itertools.chain(first, kinds):
+        if len(references) == opinions:
+            break
+        progress(name)
+        runs = []
+        while len(runs) < len(trials) and all(outcome_of_trial.ok for outcome_of_trial in runs):
+            runs.append(run(case, trials[len(runs)]))
+        if runs[-1].ok:
+            references.append(reference_of_refinements(name, runs))
+        else:
+            failures.append(f"{name}: {runs[-1].reason}")
+    if exact_result is not None and references:
+        nearest_run = min(references, key=_uncertainty)
+        references.insert(0, replace(exact_result, spans=nearest_run.spans, run=nearest_run.run))
+    if len(references) < min(2, opinions or 2):
+        text = f"the reference run failed, so no error is known ({'; '.join(failures)})"
+        raise FvsolveError(f"{text}. Try another method, an earlier end of the run, or [exact] in the case")
+    return best_reference(references, tuple(failures))
+
+
+def submit_ahead(errands: RunQueue, stages: tuple[dict, ...], kinds: Sequence, tell: Callable[[str], None]) -> Callable:
+    """Submit all runs of these kinds to a queue, coarse runs first; returns run(case, keys) that gives the results."""
+    tell(", ".join(name for name, _ in kinds))
+    by_level = zip(*(trials for _, trials in kinds), strict=True)
+    for _ in errands.run_ahead([RunRequest(capped_outcome, trial, stages) for level in by_level for trial in level]):
+        pass
+    return lambda case, keys: errands(case, RunRequest(capped_outcome, keys, stages))
+
+
+def best_reference(references: Sequence[Reference], failures: tuple[str, ...] = ()) -> Reference:
+    """Reference with the least uncertainty, which is at least its difference to the second best reference."""
+    first, *later = sorted(references, key=_uncertainty)
+    if not later:
+        return replace(first, failures=failures)
+    second_reference, doubt = later[0], asdict(first.uncertainty)
+    difference = asdict(distance(second_reference.run, first)) | {
+        "overshoot": extremes_distance(second_reference.run, first)
+    }
+    doubt |= {key: float(np.nanmax([0.0, difference[key], doubt[key]])) for key in MEASURES}
+    own = {name: {norm: max(error, first.own_error.get(name, {}).get(norm, 0.0)) for norm, error in norms.items()}
+           for name, norms in error_norms(second_reference.run, first).items()}  # fmt: skip
+    return replace(
+        first,
+        own_error=own,
+        uncertainty=Distance(**doubt | {"worst": difference["worst"]}),
+        second=second_reference.words,
+        failures=failures,
+    )
+
+
+def _uncertainty(reference: Reference) -> float:
+    """Uncertainty of a reference over the trajectory; infinite if not known."""
+    return reference.uncertainty.trajectory if math.isfinite(reference.uncertainty.trajectory) else math.inf
+
+
+# exact ------------------------------------------------------------------------------------------------------------
+
+
+def exact_reference(case) -> Reference:
+    """Reference from the solution named in [exact] of a case."""
+    from fvsolve.run import model_of
+
+    model = model_of(case)
+    try:
+        solution = room.solution(case, initial_values(model))
+    except OverflowError as error:
+        raise FvsolveError(f'[exact] name = "{case.exact.name}": {error}') from None
+    return reference_of_solution(solution, "exact", f'exact solution "{case.exact.name}"')
+
+
+def reference_of_solution(solution: room.Solution, kind: str, words: str) -> Reference:
+    """Reference from a solution, evaluated on the cells and at the times of runs; results are cached."""
+    cells, times = {}, {}
+
+    def fields_of(model) -> dict:
+        for pipe in model.pipes:
+            if (pipe.name, pipe.cells) not in cells:
+                cells[pipe.name, pipe.cells] = solution.averages(pipe.name, pipe.edges, model.case.numerics.end)
+        return {pipe.name: cells[pipe.name, pipe.cells] for pipe in model.pipes}
+
+    def rows_of(run: Outcome) -> np.ndarray:
+        t, probes = split_jump_times(run.rows[:, 0]), run.model.case.probes
+        at = t.tobytes(), run.probes
+        if at not in times:
+            times[at] = np.column_stack([solution.probe(probe, t) for probe in probes] or [[]])
+        return times[at]
+
+    return Reference(kind, words, fields_of, rows_of)
+
+
+def split_jump_times(t: np.ndarray) -> np.ndarray:
+    """Times of rows; the two rows of a jump are shifted by a small offset to its left and to its right."""
+    shifted, offset = t.copy(), 1e-12 * max(1e-300, float(np.ptp(t)))
+    repeated = np.flatnonzero(np.diff(t) == 0.0)
+    shifted[repeated] -= offset
+    shifted[repeated + 1] += offset
+    return shifted
+
+
+def initial_values(model) -> room.ExactStart:
+    """Initial pressures [Pa] and flows [m3/s] of a model."""
+    rho, tables = model.case.properties.density, model.tables
+    flows = {pipe.name: row["flow"] for pipe, row in zip(model.pipes, tables.pipes, strict=True)}
+    flows |= {name: row["flow"] for name, row in zip(model.column_names, tables.columns, strict=True)}
+    flows |= {name: row["flow"] for name, row in zip(model.valve_names, tables.valves, strict=True)}
+    pressures = zip(model.node_names, tables.nodes["pressure"], strict=True)
+    return room.ExactStart({n: float(p) for n, p in pressures}, {n: float(m) / rho for n, m in flows.items()})
+
+
+# finer runs -------------------------------------------------------------------------------------------------------
+
+
+def candidates(case, judged: bool, way: str, stiff: bool, lines: bool = False) -> Iterator[tuple[str, list[dict]]]:
+    """Kinds of reference runs, best first: (description, overrides of three runs from coarse to fine)."""
+    numerics, cells = case.numerics, cell_counts(case)
+    if way == "time" and (cells or basins(case) or delayed(case)):
+        yield smaller_steps(case)
+        return
+    has_all = {scheme for scheme, *_ in WAVES} <= {*case.schemes}
+    table = LUMPED if not cells else SEPARATION if not has_all else STIFF if stiff else WAVES
+    if judged:  # prefer other schemes or methods; without characteristics, which may equal the scheme under study
+        is_own = [numerics.scheme == entry[0] if cells else numerics.method == entry[1] for entry in table]
+        table = [
+            entry
+            for _, entry in sorted(zip(is_own, table, strict=True), key=lambda pair: pair[0])
+            if entry[4] != CHARACTERISTICS_REFINEMENT
+        ]
+    # in cells, only characteristics carry jumps without error
+    if lines and has_all and any(jump for _, jump in study_model(case).breaks):
+        table = sorted(WAVES, key=lambda entry: entry[4] != CHARACTERISTICS_REFINEMENT)
+    for scheme, method, control, size, factor, *limiters in table:
+        if judged and cells and not lines:
+            method = alternative_method(METHODS[method].explicit, numerics.method)
+        if control == "rtol" and numerics.rtol is not None:
+            size = max(LEAST_RTOL, min(size, TOLERANCE_FRACTION * numerics.rtol))
+        fixed = {"numerics.scheme": scheme} if cells else {}
+        fixed |= {"numerics.method": method} | dict(zip(["numerics.limiter"], limiters, strict=False))
+        trials = [fixed | {f"numerics.{control}": size if cells else size * TOLERANCE_RATIO**k}
+                  | cell_keys_of(scaled(cells, factor / 2**k)) for k in (2, 1, 0)]  # fmt: skip
+        if factor != CHARACTERISTICS_REFINEMENT or _is_characteristic(case, trials[0]):
+            yield (
+                run_text(case, " ".join([scheme or "", *limiters]), scaled(cells, factor), method, control, size),
+                trials,
+            )
+
+
+def smaller_steps(case) -> tuple[str, list[dict]]:
+    """Reference runs with the same cells and scheme, another method of its kind, smaller steps or tolerances."""
+    numerics, cells = case.numerics, cell_counts(case)
+    judged = METHODS.get(numerics.method)
+    method = alternative_method(judged is not None and judged.explicit, numerics.method)
+    if numerics.rtol is not None:
+        control, sizes = (
+            "rtol",
+            [max(LEAST_RTOL, TOLERANCE_FRACTION * numerics.rtol * TOLERANCE_RATIO ** (k - 2)) for k in (2, 1, 0)],
+        )
+    else:
+        rate = greatest_wave_rate(case, cells)
+        step = min(numerics.step or numerics.courant / rate, 1.0 / rate)
+        control, sizes = "step", [step / share for share in (1, 2, 4)]
+    words = run_text(case, numerics.scheme, cells, method, control, sizes[-1])
+    return words, [{"numerics.method": method, f"numerics.{control}": size} for size in sizes]
+
+
+def alternative_method(explicit: bool, judged: str) -> str:
+    """Method of high order other than `judged`."""
+    return next(name for name in ALTERNATIVES[explicit] if name != judged)
+
+
+def run_text(case, scheme: str, cells, method: str, control: str, size: float) -> str:
+    """Description of a run."""
+    where = f"{scheme} on {total_cells(case, cells)} cells with " if cells else ""
+    return f"{where}{method} at {control} {size:.4g}"
+
+
+def _is_characteristic(case, keys: dict) -> bool:
+    """True if waves cross exactly one cell in nearly every step (Courant number 1), without numerical diffusion."""
+    model = study_model(case, keys)
+    if model.basins:
+        return False
+    rates, span = model.wave_rates, case.numerics.end - case.numerics.start
+    if np.ptp(rates) > 1e-9 * rates.max():
+        return False
+    return finished_run(model, probe_run).counts["steps"] <= 1.01 * span * rates.max() + 2 * len(model.breaks) + 2
+
+
+def reference_of_refinements(words: str, runs: Sequence[Outcome]) -> Reference:
+    """Reference from the last and finest of three runs, with its own error from their differences."""
+    coarse, middle, fine = runs
+    fine_reference, middle_reference = reference_of_run(fine, words), reference_of_run(middle, words)
+    coarse_errors, fine_errors = error_norms(coarse, middle_reference), error_norms(middle, fine_reference)
+    own = {name: {norm: SAFETY * extrapolated_error(coarse_errors[name][norm], d, ROUNDING * variable_size(fine, name))
+                  for norm, d in norms.items()} for name, norms in fine_errors.items()}  # fmt: skip
+    coarse_errors, fine_errors = asdict(distance(coarse, middle_reference)), asdict(distance(middle, fine_reference))
+    doubt = {
+        key: SAFETY * extrapolated_error(coarse_errors[key], fine_errors[key])
+        for key in ("trajectory", "greatest", "end")
+    }
+    return replace(
+        fine_reference,
+        own_error=own,
+        uncertainty=Distance(**doubt, overshoot=SAFETY * extremes_distance(middle, fine_reference)),
+    )
+
+
+def reference_of_run(run: Outcome, words: str = "") -> Reference:
+    """Reference from a run, without an estimate of its own error."""
+
+    def fields_of(model) -> dict:
+        sums = wave_sums(run)
+        cells = {pipe.name: pipe.cells for pipe in model.pipes}
+        by_pipe = fields(
+            model, {name: tuple(cell_averages(entry, cells[name]) for entry in pair) for name, pair in sums.items()}
+        )
+        pairs = zip(run.model.basins, model.basins, strict=True)
+        return by_pipe | {("basin", other.name): project_to(entry, [*basin_fields(entry, run.y).values()], other)
+                        for entry, other in pairs}  # fmt: skip
+
+    def rows_of(other: Outcome) -> np.ndarray:
+        t = run.rows[:, 0]
+        if other.rows.shape[0] != t.size or not np.allclose(other.rows[:, 0], t, rtol=1e-12, atol=1e-300):
+            raise FvsolveError("rows of two runs are at different times. Set [output] every in the case")
+        by_probe = {name: run.rows[:, 1 + k] for k, name in enumerate(run.probes)}
+        missing = np.full(t.size, np.nan)
+        return np.column_stack([by_probe.get(name, missing) for name in other.probes] or [np.zeros((t.size, 0))])
+
+    return Reference("finer", words, fields_of, rows_of, pressure_ranges(run.envelope), run=run)
+
+
+def extrapolated_error(before: float, after: float, least: float = 0.0) -> float:
+    """Error of the finest of three runs, each with twice the resolution of the previous: d / (2^p - 1).
+
+    d : difference of the last two runs, `after`; p : order from the ratio of both differences, limited to `ORDERS`
+    """
+    if after <= least:
+        return least
+    order = min(max(math.log2(max(before, after) / after), ORDERS[0]), ORDERS[1])
+    return max(least, after / (2.0**order - 1.0))

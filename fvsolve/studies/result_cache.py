@@ -1,0 +1,134 @@
+"""Cache of finished study points on disk, so that an interrupted study resumes."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+
+from fvsolve import jit
+from fvsolve.errors import RunError
+from fvsolve.output.lock import let_go, locked
+from fvsolve.output.restart import identity
+from fvsolve.output.summary import plain
+from fvsolve.steppers.tableau import BUILT_IN, METHODS
+from fvsolve.validation import PATH, Kind
+
+
+class ResultCache:
+    """Results of earlier points by case and settings, in `points.jsonl` of a folder; in memory without a folder.
+
+    The folder is locked until the cache is closed (context manager). Raises RunError if another study has the lock.
+    A result is reused only for the same case (as resolved, with its files), the same extra settings and the same
+    versions and sources of fvsolve and its dependencies.
+    """
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.path = None if folder is None else Path(folder) / "points.jsonl"
+        self.results: dict[str, dict] = {}
+        self.reused_keys: set[str] = set()  # requested keys with results from earlier studies
+        self.new_keys: set[str] = set()  # keys with results of this study
+        self.lock = None if folder is None else locked(Path(folder), "a study")
+        self.file = None
+        if self.path is not None and self.path.is_file():
+            self._read()
+
+    def _read(self) -> None:
+        data = self.path.read_bytes()
+        complete = data.rfind(b"\n") + 1  # an incomplete line follows if a study was killed or the disk was full
+        for line in data[:complete].decode("utf-8", errors="replace").splitlines():
+            try:
+                point = json.loads(line)
+                self.results[point["key"]] = point["found"]
+            except (ValueError, KeyError, TypeError):
+                continue
+        if complete < len(data):
+            with write_errors(self.path), open(self.path, "r+b") as file:
+                file.truncate(complete)
+
+    def __enter__(self) -> ResultCache:
+        return self
+
+    def __exit__(self, *_) -> None:
+        """Close the file and release the lock."""
+        if self.file is not None:
+            self.file.close()
+        if self.lock is not None:
+            let_go(self.lock)
+
+    @property
+    def reused(self) -> int:
+        """Number of requested points with results from earlier studies."""
+        return len(self.reused_keys)
+
+    def get(self, case, extra: dict, make: Callable[[], dict]) -> dict:
+        """Result for a case and settings, computed by `make` if it is new; values that are not finite become None."""
+        known = self.find(case, extra)
+        return self.store(case_key(case, extra), extra, make()) if known is None else known
+
+    def find(self, case, extra: dict) -> dict | None:
+        """Earlier result for a case and settings, or None."""
+        return self.lookup(case_key(case, extra))
+
+    def lookup(self, key: str) -> dict | None:
+        """Earlier result of a key, or None."""
+        known = self.results.get(key)
+        if known is not None and key not in self.new_keys:
+            self.reused_keys.add(key)
+        return known
+
+    def store(self, key: str, settings: Any, result: dict) -> dict:
+        """Store the result of a key and return it as plain values. Raises RunError if it cannot be written."""
+        result = self.results[key] = plain(result)
+        self.new_keys.add(key)
+        if self.path is not None:
+            line = json.dumps({"key": key, "of": plain(settings), "found": result}) + "\n"
+            with write_errors(self.path):
+                self.file = self.file or open(self.path, "ab", buffering=0)
+                if self.file.write(line.encode()) < len(line.encode()):
+                    raise OSError(28, "No space left on device")
+        return result
+
+
+@contextmanager
+def write_errors(path: Path) -> Iterator[None]:
+    """Context manager that turns an OSError of writing a file into a RunError."""
+    try:
+        yield
+    except OSError as error:
+        raise RunError(f"{path}: cannot be written: {error.strerror or error}. Finished results are kept; remove the "
+                       "cause and repeat the command to resume") from None  # fmt: skip
+
+
+def case_key(case, extra: dict) -> str:
+    """Hash of a case, its programs and the settings."""
+    return digest_of(identity(case) | {"resolved": case.table(), "extra": plain(extra)})
+
+
+@functools.cache
+def package_hash() -> str:
+    """Hash of all sources of the package."""
+    digest = hashlib.sha256()
+    for path in sorted(jit.PACKAGE.rglob("*.py")):
+        digest.update(path.read_bytes() + b"\0")
+    return digest.hexdigest()
+
+
+def digest_of(who: dict) -> str:
+    """Hash of everything that a point depends on, with the sources of fvsolve, plugins and user-defined methods."""
+    who = who | {"package": package_hash(), "outside": sorted(jit.EXTRA_FOLDERS.values())}
+    text = json.dumps(who, sort_keys=True, default=str)
+    arrays = [method.text for name, method in METHODS.items() if name not in BUILT_IN and f'"{name}"' in text]
+    return hashlib.sha256("\n".join([text, *arrays]).encode()).hexdigest()[:24]
+
+
+OUT = Kind(lambda given: PATH.accepts(given) or isinstance(given, ResultCache), PATH.expected)
+
+
+def cache_in(out: str | Path | ResultCache | None):
+    """Context manager of a result cache: opens that of a folder, or passes on an open one without closing it."""
+    return nullcontext(out) if isinstance(out, ResultCache) else ResultCache(out)

@@ -1,0 +1,95 @@
+"""Queue of the runs of a study, computed in parallel if other processes are available."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from fvsolve.case import Case, load
+from fvsolve.errors import RunError
+from fvsolve.studies.case_pickle import PickledCase
+from fvsolve.studies.outcome import Outcome, study_model
+from fvsolve.studies.parallel import TaskPool
+
+
+class RunRequest(NamedTuple):
+    """Request for a run: how(case, keys) is a module-level function that returns an `Outcome` or a collection with it.
+
+    stages : overrides applied to the study's case before, in order
+    """
+
+    function: Callable[[Case, Mapping[str, Any]], Any]
+    keys: dict[str, Any]
+    stages: tuple[dict[str, Any], ...] = ()
+
+
+class RunQueue:
+    """Runs of a study. A result computed ahead is returned once; other runs are computed when requested.
+
+    jobs : number of local processes; dask : address of a scheduler, used instead of local processes.
+    Context manager: workers are closed on exit.
+    """
+
+    def __init__(self, source: Any, jobs: int = 1, dask: str | None = None) -> None:
+        self.pool = TaskPool(RequestRunner(source), jobs, dask)
+        self.results: dict[str, Any] = {}
+
+    @property
+    def in_process(self) -> bool:
+        """True if all runs are computed in this process, one after another."""
+        return self.pool.in_process
+
+    def run_ahead(self, requests: Sequence[RunRequest]) -> Iterator[int]:
+        """Compute runs ahead of their request; yields the index of each finished run.
+
+        The first, cheapest run comes first, then runs from the end, where the most expensive are. With a single
+        process nothing is computed ahead; each run is computed when requested.
+        """
+        if self.in_process or not requests:
+            return
+        order = [0, *range(len(requests) - 1, 0, -1)]
+        for position, answer in self.pool.run([requests[k] for k in order]):
+            self.results[repr(requests[order[position]])] = answer
+            yield order[position]
+
+    def __call__(self, case: Case, request: RunRequest) -> Any:
+        """Result of a run, computed now unless it was computed ahead; `case` is the case with the stages applied."""
+        answer = self.results.pop(repr(request), None)
+        if answer is None:
+            return request.function(case, request.keys)
+        if isinstance(answer, Outcome) and not answer.refused and answer.model is None:
+            return replace(answer, model=study_model(case, request.keys))
+        return answer
+
+    def __enter__(self) -> RunQueue:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.pool.__exit__()
+
+
+class RequestRunner:
+    """Callable that makes runs of a case, in this or another process; cases after stages are reused."""
+
+    def __init__(self, source: Any) -> None:
+        self.sent = PickledCase(source)
+        self.staged: dict[str, Case] = {}
+
+    def __call__(self, request: RunRequest) -> Any:
+        name = repr(request.stages)
+        if name not in self.staged:
+            first_stage, *later = request.stages or ({},)
+            case = load(self.sent.source, first_stage)
+            for stage in later:
+                case = load(case, stage)
+            self.staged[name] = case
+        return request.function(self.staged[name], request.keys)
+
+    def lost_result(self, request: RunRequest) -> Any:
+        """Raise RunError: a study cannot continue without the run."""
+        keys = ", ".join(f"{key} = {value}" for key, value in request.keys.items())
+        raise RunError(f"the process that made the run with {keys} was killed repeatedly. Is there enough memory?")
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"sent": self.sent, "staged": {}}

@@ -1,0 +1,54 @@
+"""Bisection for the least step that fails."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+BRACKET_WIDTH = 1e-4  # relative width of the final bracket
+STEP_RATIO = 1.3  # ratio of consecutive steps of the search upwards
+
+
+class StepLimit(NamedTuple):
+    """Greatest step [s] below which none fails (inf: no failure found), and the failing end of the bracket [s]."""
+
+    step: float
+    fails: float
+
+
+def bisect_limit(
+    fails: Callable[[float], bool], first: float, far: float, rise: float = STEP_RATIO, fine: float = BRACKET_WIDTH
+) -> StepLimit:
+    """Search upwards for the least h at which `fails` is true, by factors `rise` from `first`; then bisect to `fine`.
+
+    If `first` fails, it is halved down to 1e-9 of its value; if all these fail, the limit is 0. Above `far` it is inf.
+    """
+    low, high = 0.0, first
+    if fails(high):
+        while high > 1e-9 * first:
+            low, high = 0.5 * high, high
+            if not fails(low):
+                break
+            high = low
+        else:
+            return StepLimit(0.0, high)
+    else:
+        while not fails(rise * high):
+            high *= rise
+            if high > far:
+                return StepLimit(np.inf, np.inf)
+        low, high = high, rise * high
+    return bisect(fails, low, high, fine)
+
+
+def bisect(fails: Callable[[float], bool], low: float, high: float, fine: float = BRACKET_WIDTH) -> StepLimit:
+    """Bisect a bracket (`low` safe, `high` failing) to the relative width `fine`."""
+    while high - low > fine * high:
+        middle = 0.5 * (low + high)
+        if fails(middle):
+            high = middle
+        else:
+            low = middle
+    return StepLimit(low, high)

@@ -1,0 +1,135 @@
+"""Notes on a row of a stability study: where a bound misleads, and the reason."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.errors import listing
+from fvsolve.studies.linear.operating_point import has_limiter
+from fvsolve.studies.stability.vector_growth import TooLarge
+
+AGREEMENT = 0.02  # relative difference of a bound and the prediction below which no note is needed
+GROWTH_FLOOR = 1e-9  # of the greatest wave rate or eigenvalue: real parts below are round-off
+
+
+def bound_notes(row, side, system) -> list[str]:
+    """Notes for the reader of a row."""
+    texts = [*case_notes(row, side)]
+    if row.limited:
+        return texts + limiter_notes(row, side.at.model)
+    if not np.isfinite(row.predicted):
+        return [*texts, "no step up to 1e4 / ||J|| fails", *nonlinear_failure_notes(row)]
+    if "eigenvalues" not in row.left_out:
+        texts += eigenvalue_notes(row, system)
+    texts += field_of_values_notes(row, side)
+    texts += von_neumann_notes(row)
+    if np.isinf(row.measured):
+        texts.append(f"no real run fails, up to h = {row.measured_up_to:.3g} s: the state moves away from the "
+                     "linearised state, or nonlinear laws stop the growth")  # fmt: skip
+    if np.isfinite(row.difference) and abs(row.difference) > 0.01:
+        texts.append(
+            f"prediction and measurement differ by {100 * row.difference:+.1f} %: {difference_reason(row, side)}"
+        )
+    return texts
+
+
+def difference_reason(row, side) -> str:
+    """Reason for a difference between the limits of real runs and of the linear system."""
+    if not state_moves(side):
+        return "the deviation does not stay linear"
+    return (f"{row.steps} such steps take {row.steps * row.predicted:.3g} s, and meanwhile the state leaves the "
+            "linearised state; the prediction is for that state only")  # fmt: skip
+
+
+def nonlinear_failure_notes(row) -> list[str]:
+    """Note on a run that fails although the linear system never fails."""
+    if not np.isfinite(row.measured):
+        return []
+    return [f"this holds for the linear system; real runs fail from h = {row.measured:.5g} s on: in so long a "
+            "time they leave the linearised state, and nonlinear laws decide"]  # fmt: skip
+
+
+def case_notes(row, side) -> list[str]:
+    """Notes on the state itself."""
+    texts = []
+    growing = row.greatest_real > 0.0
+    if growing and row.greatest_real > GROWTH_FLOOR * max(row.rate, np.abs(side.spectrum.values).max(initial=0.0)):
+        texts.append(f"the case itself grows, at {row.greatest_real:.3g} 1/s: this is not caused by long steps")
+    if side.full_form is not side.form:
+        texts.append(f"{listing(side.idle)}: no stored energy, but states with energy depend on it: it counts, "
+                     "with the least weight of all")  # fmt: skip
+    elif side.idle:
+        texts.append(f"{listing(side.idle)}: no stored energy where it moves freely; this motion is left out")
+    model = side.at.model
+    if model.cells and model.case.scalars and model.case.numerics.scheme != "upwind" and not has_limiter(model):
+        texts.append("scalars in pipes are computed without slopes, whose limiter has no derivative")
+    if state_moves(side):
+        texts.append("the state moves: runs are compared with a run from the same state, schedules held")
+    return texts
+
+
+def state_moves(side) -> bool:
+    """True if the operating point is not steady."""
+    return bool(np.max(np.abs(side.at.rate) / side.at.model.scale) > 1e-9)
+
+
+def eigenvalue_notes(row, system) -> list[str]:
+    """Notes on the bound by eigenvalues, compared with powers."""
+    if np.isinf(row.eigenvalues) or row.eigenvalues > (1.0 + AGREEMENT) * row.predicted:
+        if np.isinf(row.eigenvalues):
+            return ["by eigenvalues no step fails, by powers some do: J is not normal"]
+        try:
+            after = system.failing_after(0.99 * row.eigenvalues)
+        except TooLarge:
+            after = 0
+        if after:
+            return [f"eigenvalues mislead: J is not normal, 1 % below their limit growth exceeds {row.threshold:g} "
+                    f"after {after} steps"]  # fmt: skip
+        return ["eigenvalues allow longer steps than powers do: J is not normal"]
+    if row.eigenvalues < (1.0 - AGREEMENT) * row.predicted:
+        return [f"above the limit of eigenvalues a mode grows, but not by {row.threshold:g} in {row.steps} steps: "
+                "longer runs fail at smaller steps"]  # fmt: skip
+    return []
+
+
+def field_of_values_notes(row, side) -> list[str]:
+    """Notes on the bound by the field of values, which is too strict with pipe ends of high order."""
+    if np.isnan(row.field_of_values) or row.field_of_values > (1.0 - AGREEMENT) * row.predicted:
+        return []
+    if row.field_of_values == 0.0:
+        reach = float(side.field.real.max())
+        if reach > GROWTH_FLOOR * np.abs(side.field).max():
+            return [f"the field of values gives 0: it reaches {reach:.3g} 1/s into the right half plane; energy can "
+                    "grow at first (ends of a scheme above first order, a gain in the case): no failure"]  # fmt: skip
+        return [
+            "the field of values gives 0: it touches the imaginary axis, which lies outside the region of the method"
+        ]
+    return ["the bound by the field of values is on the safe side here"]
+
+
+def von_neumann_notes(row) -> list[str]:
+    """Notes on von Neumann's limit (interior of a uniform pipe), compared with the limit of the case."""
+    if np.isnan(row.von_neumann):
+        return []
+    if row.von_neumann > (1.0 + AGREEMENT) * row.predicted:
+        return [
+            "von Neumann's limit misleads: the step is limited by pipe ends, nodes or other parts, not by the interior"
+        ]
+    if row.von_neumann < (1.0 - AGREEMENT) * row.predicted:
+        return ["von Neumann's limit holds for any number of steps and any wavelength; in this pipe and number of "
+                "steps growth remains below the threshold"]  # fmt: skip
+    return []
+
+
+def limiter_notes(row, model) -> list[str]:
+    """Notes on a limited scheme with frozen weights."""
+    frozen = "its weights give the limits in this row"
+    if model.cavitates:
+        frozen = "its weights in pipes with cavities are only upwind"
+    elif model.basins:
+        frozen = "its weights in basins are only upwind"
+    texts = [f"{row.scheme} has no derivative at a constant state: its limit is measured; if frozen, {frozen}"]
+    if np.isfinite(row.longer):
+        texts.append(f"Euler with a limiter has no sharp limit: {row.courant(row.measured):.3g} in {row.steps} steps, "
+                     f"{row.courant(row.longer):.3g} in {10 * row.steps}")  # fmt: skip
+    return texts

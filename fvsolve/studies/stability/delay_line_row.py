@@ -1,0 +1,139 @@
+"""Stability of a case with delay lines: greatest step by the linear system of steps, and by real runs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.errors import CaseError, FvsolveError
+from fvsolve.schemes import LIMITED
+from fvsolve.step_limits.delay_line_growth import REFLECTION_BOUND, lines_at, storing_nodes
+from fvsolve.studies.linear.operating_point import with_held_schedules
+from fvsolve.studies.outcome import study_model
+from fvsolve.studies.stability.bisection import StepLimit, bisect, bisect_limit
+from fvsolve.studies.stability.delay_line_runs import DelayLineRuns
+from fvsolve.studies.stability.delay_line_system import DelayLineSystem
+from fvsolve.studies.stability.real_runs import too_long
+from fvsolve.studies.stability.stability_row import StabilityRow
+
+TRAVEL_PARTS, TRAVEL_FACTOR = (
+    32.0,
+    2.0,
+)  # first step: this part of the longest travel time at most; last step: times that time
+RATE_MARGIN = 0.1  # greatest product of the first step and the rates of other states
+LINE_COUNT = 4  # greatest number of lines at stores for which integer parts of the delay are checked
+RISE, FINE = 1.6, 1e-3  # ratio of consecutive steps of the search, relative width of the final bracket
+MAX_STATES = 400  # greatest number of states
+UNKNOWN_REASON = "stages of Rosenbrock methods use the slope of arriving waves, which the linear system does not model"
+NO_LIMIT_NOTE = "no step up to twice the slowest line's travel time fails"
+
+
+class DelayLineLimits:
+    """Limit of the step of one case and method, by models divided for each step and their linear systems."""
+
+    def __init__(self, case, scheme: str, method, steps: int, threshold: float) -> None:
+        self.case, self.method, self.steps, self.threshold = case, method, steps, threshold
+        self.set = {"numerics.scheme": scheme, "numerics.method": method.name}
+        self.refused: dict[float, str] = {}
+        self.base_model = self.model(None)
+        rows = self.base_model.tables.delays
+        slowest = float((rows["tau"] * rows["stretches"]).max())
+        self.far, self.first = TRAVEL_FACTOR * slowest, slowest / TRAVEL_PARTS
+        rates = self.system(self.first).a
+        if rates.size:
+            self.first = min(self.first, RATE_MARGIN / max(1e-300, float(np.linalg.norm(rates, 2))))
+        for _, i, rate in storing_nodes(self.base_model, 1.0):
+            travel = min(float(line["tau"] * line["stretches"]) for line in lines_at(self.base_model, i))
+            self.first = min(self.first, float(np.sqrt(2.0 * travel / (REFLECTION_BOUND * rate * steps))))
+
+    def model(self, h: float | None):
+        """Model at the start with held schedules, lines divided for steps of h [s]; for None for those of the case."""
+        step = {} if h is None else {"numerics.step": h}
+        model = study_model(self.case, self.set | step)
+        if model.case.numerics.scheme in LIMITED and (model.tables.pipes["delay"] < 0).any():
+            raise FvsolveError(f"with delay lines stability needs a linear scheme; {model.case.numerics.scheme} "
+                               "limits slopes: use for example scheme = \"upwind5\"")  # fmt: skip
+        if model.y_size > MAX_STATES:
+            raise FvsolveError(f"{model.y_size} states, one for each delay line; with lines stability is computed for "
+                               f"at most {MAX_STATES}: use fewer cells, or a part of the network")  # fmt: skip
+        return with_held_schedules(model, model.case.numerics.start)
+
+    def system(self, h: float) -> DelayLineSystem:
+        """Linear system of steps of h [s]."""
+        return DelayLineSystem(self.model(h), self.method, h)
+
+    def fails(self, h: float) -> bool:
+        """True if the growth of a deviation exceeds the threshold, or the case is refused with steps of h [s]."""
+        try:
+            return not self.system(h).growth(self.steps, self.threshold).size <= self.threshold
+        except CaseError as error:
+            self.refused[h] = error.faults[0].message
+            return True
+
+    def predicted(self) -> StepLimit:
+        """Greatest step [s] below which none fails; nan for a method whose steps are not modelled."""
+        if self.method.kind == "linear":
+            return StepLimit(np.nan, np.nan)
+        rough = bisect_limit(self.fails, self.first, self.far, RISE, FINE)
+        least = min(
+            [rough, *(self.limit_at_parts(d, rough.fails) for d in self.delays_at_stores(rough))], key=lambda b: b.fails
+        )
+        return least
+
+    def delays_at_stores(self, rough: StepLimit) -> list[float]:
+        """Longest delays of lines at stores [s]; waves grow most with steps that divide such a delay."""
+        at_stores = [line for _, i, _ in storing_nodes(self.base_model, 1.0) for line in lines_at(self.base_model, i)]
+        delays = {float(line["tau"] * line["stretches"]) for line in at_stores} if 0.0 < rough.step < np.inf else set()
+        return sorted(delays, reverse=True)[:LINE_COUNT]
+
+    def limit_at_parts(self, delay: float, fails: float) -> StepLimit:
+        """Least step that fails near integer parts of a delay, where interpolation does not damp waves."""
+        low = int(np.ceil(delay / fails))
+        if low < 1 or not self.fails(delay / low):
+            return StepLimit(np.inf, np.inf)
+        high = 2 * low
+        while self.fails(delay / high):
+            low, high = high, 2 * high
+        while high - low > 1:
+            middle = (low + high) // 2
+            low, high = (middle, high) if self.fails(delay / middle) else (low, middle)
+        between = delay / (low + 0.5)
+        return bisect(self.fails, delay / high if self.fails(between) else between, delay / low, FINE)
+
+
+def delayed_row(case, scheme: str, method, steps: int, threshold: float) -> StabilityRow:
+    """Limits of a scheme and method about the start: predicted by the linear system of steps, and measured."""
+    limits, left_out, notes = DelayLineLimits(case, scheme, method, steps, threshold), {}, []
+    predicted, model = limits.predicted(), limits.base_model
+    rate = float(max(model.wave_rates[model.tables.pipes["delay"] < 0], default=0.0))
+    row = {
+        "scheme": scheme, "method": method.name, "when": "the start, delay lines as they are", "states": model.y_size,
+        "steps": steps, "threshold": threshold, "rate": rate, "predicted": predicted.step, "lines": True,
+    }  # fmt: skip
+    if np.isnan(predicted.step):
+        left_out["predicted"] = UNKNOWN_REASON
+    elif np.isinf(predicted.step):
+        notes.append(NO_LIMIT_NOTE)
+    if np.isfinite(predicted.fails) and predicted.fails not in limits.refused:
+        linear = limits.system(predicted.fails)
+        growth = linear.growth(steps, threshold)
+        where, share = linear.dominant_part(growth)
+        row |= {"growth": growth.size, "after": growth.steps, "where": where, "share": share}
+    if limits.refused:
+        h = min(limits.refused)
+        notes.append(f"steps from {h:.4g} s on are refused: {limits.refused[h]}")
+    if not limits.refused or predicted.fails not in limits.refused:
+        row |= measured_entries(DelayLineRuns(limits, steps, threshold, predicted.fails), predicted.step, left_out)
+    return StabilityRow(**row, left_out=left_out, notes=tuple(notes))
+
+
+def measured_entries(runs: DelayLineRuns, guess: float, left_out: dict[str, str]) -> dict:
+    """Columns of a row with the limit of real runs; if it is not found in time, `left_out` gets the reason."""
+    try:
+        measured = runs.limit(guess)
+    except TimeoutError:
+        left_out["measured"] = too_long(runs)
+        return {}
+    return {
+        "measured": measured.step,
+        "measured_up_to": measured.fails if np.isfinite(measured.fails) else runs.longest_tried,
+    }

@@ -1,0 +1,120 @@
+"""Growth of small deviations in real runs with delay lines, including the waves in the lines."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from fvsolve.kernels.delay_lines import wave_history as at
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.steppers import loop_indices
+from fvsolve.studies.stability.bisection import STEP_RATIO, StepLimit, bisect, bisect_limit
+from fvsolve.studies.stability.delay_line_system import BAR_PRESSURE, DelayLineSystem
+from fvsolve.studies.stability.power_growth import checked_powers
+from fvsolve.studies.stability.real_runs import SAFE_PARTS, TIME_LIMIT, RealRuns
+
+NEAR_PREDICTION, STEP_RATIO_UP = (
+    0.99,
+    2.0,
+)  # lower end of the bracket over the prediction; ratio of steps if all are predicted safe
+SMALL_WAVE = 1e-5  # deviation at the start, in units of a wave of 1 bar over one step
+
+
+class DelayLineRuns(RealRuns):
+    """Real runs at fixed steps, each from the deviation with the greatest growth in the linear system of the step.
+
+    limits : see `delay_line_row.DelayLineLimits`; failing_step : a step that is predicted to fail [s], nan for none
+    """
+
+    def __init__(self, limits, steps: int, threshold: float, end: float) -> None:
+        self.failing_step, self.first, self.far = end, limits.first, limits.far
+        self.system, self.states, self.longest_tried = limits.system, limits.base_model.y_size, 0.0
+        self.steps, self.threshold = steps, threshold
+        self.check_steps = checked_powers(self.steps)
+        self.strides = np.diff([0, *self.check_steps]).astype(float)
+        self.latest = time.monotonic() + TIME_LIMIT
+
+    def start_run(self, system: DelayLineSystem, x: np.ndarray, history: np.ndarray) -> RunLoop:
+        """Run from the start plus x, with entries `history` in its lines."""
+        model, t = system.model, float(system.model.case.numerics.start)
+        changes = {"method": system.method.name, "step": system.h, "courant": None, "rtol": None}
+        numerics = model.case.numerics.model_copy(update=changes)
+        loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), lambda: model.structure)
+        loop.now[:] = model.start
+        loop.now[system.states] += x
+        loop.loop_state[loop_indices.T] = t
+        write_history(loop.slate.past, model.tables.delays, t, system.h, history)
+        loop.begin(t + 2.0 * self.steps * system.h, NO_LIMIT)
+        return loop
+
+    def limit(self, guess: float) -> StepLimit:
+        """Measured limit, searched close to the prediction: steps beside integer parts of delays may be safe again.
+
+        Without a prediction all steps are searched.
+        """
+        if not np.isfinite(guess):
+            return bisect_limit(self.fails, self.first, self.far, STEP_RATIO if np.isnan(guess) else STEP_RATIO_UP)
+        if any(self.fails(part * guess) for part in SAFE_PARTS) or not self.fails(self.failing_step):
+            return super().limit(guess)
+        return bisect(
+            self.fails,
+            NEAR_PREDICTION * guess if self.safe(NEAR_PREDICTION * guess) else SAFE_PARTS[-1] * guess,
+            self.failing_step,
+        )
+
+    def growth(self, h: float) -> tuple[float, int]:
+        """(greatest growth, its number of steps); infinite for a run that stops."""
+        system = self.system(h)
+        predicted = system.growth(self.steps, self.threshold)
+        small = SMALL_WAVE * float(system.weight.max()) * greatest_wave(system)
+        runs = [self.start_run(system, width * predicted.x, width * predicted.history) for width in (small, 0.0)]
+        size, after = 1.0, 0
+        for n, budget in zip(self.check_steps, self.strides, strict=True):
+            if time.monotonic() > self.latest:
+                raise TimeoutError
+            if any(run.run(budget) != loop_indices.BUDGET_SPENT for run in runs):
+                return np.inf, n
+            moved, base = ((run.now[system.states], read_history(run.slate.past, system)) for run in runs)
+            growth = float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small
+            if not growth <= self.threshold:
+                return growth if growth > self.threshold else np.inf, n
+            if growth > size:
+                size, after = growth, n
+        return size, after
+
+
+def greatest_wave(system: DelayLineSystem) -> float:
+    """Wave of 1 bar in the line with the greatest admittance [kg/s]."""
+    tables = system.model.tables
+    return BAR_PRESSURE * float(tables.pipes["admittance"][tables.delays["pipe"]].max())
+
+
+def write_history(past: np.ndarray, delays: np.ndarray, t: float, h: float, history: np.ndarray) -> None:
+    """Write entries of lines : float64[count, 2, stretches] at t - count h, ..., t - h."""
+    count, places = history.shape[0], at.offsets_of(past)
+    numbers = at.PROFILE_ENTRIES + np.arange(count)
+    past[at.COUNT] = at.PROFILE_ENTRIES + count
+    past[[at.LAST_STEP, at.STEP_BEFORE]], past[[at.EQUAL_STEPS, at.EQUAL_STEPS_BEFORE]] = h, 1e18
+    past[at.HEADER_SIZE + (numbers & (int(past[at.CAPACITY]) - 1))] = t + h * np.arange(-count, 0)
+    for where, s, wave in ring_offsets(places, delays, numbers):
+        past[where] = history[:, wave, s]
+
+
+def read_history(past: np.ndarray, system: DelayLineSystem) -> np.ndarray:
+    """Entries of all stretches before the last entry : float64[history_steps, 2, stretches]."""
+    values = np.zeros((system.history_steps, 2, system.delays.size))
+    numbers = int(past[at.COUNT]) - 1 - system.history_steps + np.arange(system.history_steps)
+    for where, s, wave in ring_offsets(at.offsets_of(past), system.model.tables.delays, numbers):
+        values[:, wave, s] = past[where]
+    return values
+
+
+def ring_offsets(places, delays: np.ndarray, numbers: np.ndarray):
+    """(offsets of entries with given numbers, stretch, wave) for all stretches and waves."""
+    for row in delays:
+        for q in range(row["stretches"]):
+            ring, mask = at.ring_of(places, row, q)
+            for wave in range(2):
+                yield ring + 2 * (numbers & mask) + wave, int(row["stretch"]) + q, wave

@@ -1,0 +1,172 @@
+"""Courant limits of linear schemes on a periodic pipe: predicted for each wave, and measured by real runs.
+
+Failure: the L2 norm of some start grows by more than `THRESHOLD` within n steps. On a periodic grid the matrix of a
+step is normal, so the greatest growth over all starts is exactly max_k |R(nu z(theta_k))|^n, theta_k = 2 pi k / cells.
+This growth is measured from one impulse, all of whose waves have equal size: max_k |u_k(n)| / |u_k(0)|.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fvsolve.errors import FvsolveError
+from fvsolve.kernels import dtypes as rec
+from fvsolve.kernels.table_handle import make_handle
+from fvsolve.model.scheme_codes import scheme_settings
+from fvsolve.step_limits.symbol import WEIGHTS, symbol, weights_of
+from fvsolve.steppers import loop_indices
+from fvsolve.steppers.analysis.method_facts import analyse
+from fvsolve.steppers.integrator import Integrator
+from fvsolve.steppers.ode import observers
+from fvsolve.steppers.structure import Structure
+from fvsolve.steppers.tableau import METHODS, method_named
+from fvsolve.studies.outcome import Progress, name_list
+from fvsolve.studies.result_table import PlainData
+from fvsolve.validation import COUNT, FUNCTION, NAMES, validated
+
+THRESHOLD = 1e3
+CELLS, STEPS = 100, 1000
+SMALLEST_COURANT, LARGEST_COURANT, COURANT_RATIO = (
+    0.05,
+    20.0,
+    1.1,
+)  # first and last Courant number of the search, ratio of consecutive numbers
+LIMIT_TOLERANCE = 1e-8  # relative width of the bracket of a limit
+FAR_TIME = 1e300
+WENO_NOISE = 1e-18  # small number of WENO, for values of size 1
+
+
+@dataclass(frozen=True)
+class MeasuredLimit(PlainData):
+    """Least Courant number that fails on a periodic grid, predicted and measured; None if none fails."""
+
+    scheme: str
+    method: str
+    cells: int
+    steps: int
+    predicted: float | None
+    measured: float | None
+
+    also = ("ratio",)
+
+    @property
+    def ratio(self) -> float | None:
+        """Predicted over measured."""
+        return self.predicted / self.measured if self.predicted and self.measured else None
+
+
+class PeriodicPipe:
+    """Linear advection on a periodic grid by one scheme and one method; a run is one call of compiled code."""
+
+    def __init__(self, scheme: str, method: str, cells: int, limiter: str = "minmod") -> None:
+        self.tables = _tables(scheme, limiter, cells)
+        self.stepper = Integrator(method_named(method), cells, 0, lambda: Structure.full(cells), np.ones(cells))
+        self.handle, self.functions = make_handle(self.tables), (*observers(), _rhs())
+
+    def run(self, start: np.ndarray, courant: float, steps: int) -> np.ndarray | None:
+        """Cell values after `steps` at a Courant number; None if they do not remain finite."""
+        stepper = self.stepper
+        stepper.loop_state[:], stepper.controls[loop_indices.CONTROL] = 0.0, loop_indices.FIXED_STEP
+        stepper.controls[[loop_indices.SIZE, loop_indices.STEP_MAX, loop_indices.STOP_AT]] = courant, FAR_TIME, FAR_TIME
+        stepper.controls[[loop_indices.END, loop_indices.BUDGET]] = 2.0 * courant * (steps + 1), steps
+        stepper.progress[[loop_indices.PHASE, loop_indices.HAS_LAST_STEP]] = loop_indices.FRESH, 0
+        stepper.y[stepper.progress[loop_indices.NOW]] = start
+        code = stepper.call(*self.functions, self.handle, loop_indices.PLACE + 1, stepper.no_floats)
+        if code != loop_indices.BUDGET_SPENT:
+            return None
+        return stepper.y[stepper.progress[loop_indices.NOW]].copy()
+
+
+@validated(schemes=NAMES, methods=NAMES, cells=COUNT, steps=COUNT, progress=FUNCTION)
+def measured_limits(
+    schemes: Sequence[str] | None = None, methods: Sequence[str] | None = None, cells: int = CELLS, steps: int = STEPS,
+    progress: Progress | None = None,
+) -> list[MeasuredLimit]:  # fmt: skip
+    """Predicted and measured limits of linear schemes and explicit methods, by default of all.
+
+    Raises FvsolveError for unknown names, and for too few cells or steps.
+    """
+    check_size(cells, steps)
+    report = progress or (lambda *_: None)
+    schemes = name_list(schemes) or list(WEIGHTS)
+    chosen = [method_named(name) for name in name_list(methods) or ()] or list(METHODS.values())
+    pairs = [(scheme, tableau.name) for tableau in dict.fromkeys(chosen) if tableau.explicit for scheme in schemes]
+    for scheme in schemes:
+        weights_of(scheme)
+    limits = []
+    for scheme, method in pairs:
+        report(len(limits), len(pairs), f"{scheme} with {method}")
+        limits.append(measured_limit(scheme, method, cells, steps))
+    return limits
+
+
+def measured_limit(scheme: str, method: str, cells: int = CELLS, steps: int = STEPS) -> MeasuredLimit:
+    """Least Courant number at which growth exceeds the threshold, predicted and measured."""
+    predicted = first_failure(lambda courant: predicted_growth(scheme, method, cells, steps, courant))
+    circle = PeriodicPipe(scheme, method, cells)
+    measured = first_failure(lambda courant: measured_growth(circle, cells, steps, courant))
+    return MeasuredLimit(scheme, method, cells, steps, predicted, measured)
+
+
+def predicted_growth(scheme: str, method: str, cells: int, steps: int, courant: float) -> float:
+    """log10 of the greatest |R(nu z(theta_k))|^n over the waves of the periodic grid."""
+    theta = 2 * np.pi * np.arange(cells // 2 + 1) / cells
+    r = analyse(method).stability_function
+    return steps * math.log10(np.abs(r(courant * symbol(weights_of(scheme), theta))).max())
+
+
+def measured_growth(circle: PeriodicPipe, cells: int, steps: int, courant: float) -> float:
+    """log10 of the greatest growth of a wave in a run from one impulse; inf if values do not remain finite."""
+    start = np.zeros(cells)
+    start[0] = 1.0
+    end = circle.run(start, courant, steps)
+    return math.inf if end is None else math.log10(np.abs(np.fft.rfft(end)).max())
+
+
+def first_failure(
+    growth: Callable[[float], float],
+    width: float = LIMIT_TOLERANCE,
+    smallest: float = SMALLEST_COURANT,
+    ratio: float = COURANT_RATIO,
+) -> float | None:
+    """Least Courant number whose growth (log10) exceeds the threshold: search upwards, then bisection to `width`."""
+    low, high = 0.0, smallest
+    while growth(high) <= math.log10(THRESHOLD):
+        low, high = high, high * ratio
+        if high > LARGEST_COURANT:
+            return None
+    while high - low > width * high:
+        middle = (low + high) / 2
+        if growth(middle) <= math.log10(THRESHOLD):
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def check_size(cells: int, steps: int) -> None:
+    """Raise FvsolveError for too few cells or steps."""
+    if cells < 6:
+        raise FvsolveError(f"cells = {cells}: expected 6 or more, the widest scheme uses 5 cells")
+    if steps < 10:
+        raise FvsolveError(f"steps = {steps}: expected 10 or more, failure is growth over many steps")
+
+
+def _tables(scheme: str, limiter: str, cells: int) -> tuple:
+    """Tables of a handle: settings of the scheme, small number of the pipe and work space; all else empty."""
+    tables = {name: np.zeros(1, rec.RECORDS.get(name, float)) for name in (*rec.Tables._fields, *rec.RunArrays._fields)}
+    tables["scratch"] = np.zeros(2 * cells + 7)
+    scheme_settings(tables["settings"][0], scheme, limiter)
+    tables["pipes"]["noise"] = WENO_NOISE
+    return tuple(tables.values())
+
+
+def _rhs():
+    from fvsolve.kernels.periodic_advection import rhs_periodic
+    from fvsolve.steppers.signatures import RHS, compiled_as
+
+    return compiled_as(rhs_periodic, RHS)

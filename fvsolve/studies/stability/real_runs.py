@@ -1,0 +1,227 @@
+"""Growth of small deviations in real runs of the compiled program, and the measured limit of the step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from fvsolve.model.energy_norm import EnergyForm
+from fvsolve.solve.run_loop import NO_LIMIT, RunLoop
+from fvsolve.steppers import loop_indices
+from fvsolve.studies.linear.operating_point import OperatingPoint
+from fvsolve.studies.stability.bisection import STEP_RATIO, StepLimit, bisect
+from fvsolve.studies.stability.power_growth import STEPS, THRESHOLD, checked_powers
+
+SMALL_DEVIATIONS = 10.0 ** -np.arange(
+    6.0, 16.0
+)  # greatest deviation at the start, in units of the small deviation of states
+CLEAR_DEVIATION = 1e-6  # a deviation of this size at the start is above round-off and Newton residuals
+DEVIATION_RATIO, GROWTH_AGREEMENT = (
+    10.0,
+    0.02,
+)  # ratio of a larger start; relative difference of growth up to which both starts agree
+END_TOLERANCE = 2.0  # greatest number of steps between the ends of two runs that stop for the same reason
+STAGE_REACH = 10.0  # greatest deviation of stages of a step over that of states
+RANDOM_STARTS = 2  # random starts, besides the start with the greatest predicted growth
+SAFE_PARTS = (0.3, 0.6, 0.85)  # of the predicted limit: steps that are checked to be safe
+TIME_LIMIT = 20.0  # time limit of a measured limit [s]
+UNLIMITED_STEPS = (10.0, 100.0)  # steps over 1 / ||J|| that are run if no step is predicted to fail
+MAX_WIDENINGS, MAX_REDUCTIONS = (
+    12,
+    40,
+)  # greatest number of factors 1.3 upwards and downwards in the search for a bracket
+
+
+class RealRuns:
+    """Real runs about an operating point by one method with fixed steps; growth of the difference of two runs.
+
+    form : energy norm; worst : float64[r]  a start in its coordinates, used besides two random starts
+    small : greatest deviation at the start, in units of the small deviation of states; if None, the size for which
+    rates are most nearly `a` (their derivative) times the deviation, at the start and after growth to the threshold
+    """
+
+    def __init__(self, at: OperatingPoint, method: str, form: EnergyForm, worst=None, steps: int = STEPS,
+                 threshold: float = THRESHOLD, small: float | None = None, a=None) -> None:  # fmt: skip
+        self.at, self.method, self.form, self.longest_tried = at, method, form, 0.0
+        self.states = at.model.y_size
+        self.steps, self.threshold = steps, threshold
+        rng = np.random.default_rng(7)
+        starts = [*([] if worst is None else [worst]), *rng.standard_normal((RANDOM_STARTS, form.size))]
+        deviations = [self.as_deviation(start) for start in starts]
+        self.starts = [(y, small or self.linear_width(y, a)) for y in deviations]
+        self.check_steps = checked_powers(self.steps)
+        self.strides = np.diff([0, *self.check_steps]).astype(float)
+        self.at_rest = not np.any(at.rate)
+        self.structure = at.model.structure
+        self.latest = time.monotonic() + TIME_LIMIT
+
+    def as_deviation(self, start: np.ndarray) -> np.ndarray:
+        """Start in coordinates of the energy norm as a deviation of states; the greatest equals its small deviation."""
+        y = self.form.back @ start
+        return y / np.max(np.abs(y) / self.at.model.scale)
+
+    def linear_width(self, y: np.ndarray, a) -> float:
+        """Size of the start deviation for which growth remains linear up to the threshold and is above round-off.
+
+        After growth the deviation may have any shape, with all its energy in one state; stages of a step exceed it.
+        """
+        base, rng = self.at.rate, np.random.default_rng(11)
+        grown = self.at.model.scale * rng.choice([-1.0, 1.0], y.size)
+        reach = STAGE_REACH * self.threshold * np.sqrt(y.size)
+
+        def nonlinearity(z: np.ndarray, width: float) -> float:
+            change = self.at.model.rhs(self.at.t, self.at.y + width * z) - base
+            slope = a @ z
+            return float(np.max(np.abs(change / width - slope))) / (np.max(np.abs(slope)) or 1.0)
+
+        return float(
+            min(SMALL_DEVIATIONS, key=lambda width: max(nonlinearity(y, width), nonlinearity(grown, reach * width)))
+        )
+
+    def loop(self, y: np.ndarray, h: float) -> RunLoop:
+        """Run from the state y with fixed steps of h [s]."""
+        model = self.at.model
+        changes = {"method": self.method, "step": h, "courant": None, "rtol": None}
+        numerics = model.case.numerics.model_copy(update=changes)
+        loop = RunLoop(replace(model, case=replace(model.case, numerics=numerics)), lambda: self.structure)
+        loop.now[:], loop.armed[:] = y, self.at.armed
+        loop.loop_state[loop_indices.T] = self.at.t
+        loop.begin(self.at.t + 2.0 * self.steps * h, NO_LIMIT)
+        return loop
+
+    def growth(self, h: float) -> tuple[float, int]:
+        """(greatest growth over all starts, its number of steps); infinite for a run that stops.
+
+        If growth exceeds the threshold, a larger start is run. If its growth agrees, the start has grown, and not
+        round-off or Newton residuals, whose size does not depend on the start. Otherwise the larger start counts, and
+        the check is repeated.
+        """
+        size, after, base_at = 1.0, 0, self.base_states(h)
+        for start, width in self.starts:
+            growth, n = self.growth_of_start(width * start, h, base_at)
+            while growth > self.threshold and width < CLEAR_DEVIATION:
+                width, smaller, smaller_after = DEVIATION_RATIO * width, growth, n
+                growth, n = self.growth_of_start(width * start, h, base_at)
+                if n == smaller_after and (growth == smaller or abs(growth - smaller) <= GROWTH_AGREEMENT * smaller):
+                    break
+            if growth > size:
+                size, after = growth, n
+            if size > self.threshold:
+                break
+        return size, after
+
+    def base_states(self, h: float) -> Callable[[int], np.ndarray | None]:
+        """Function k -> state relative to which deviations are measured at check k; None if a run from it stops."""
+        run, states = None if self.at_rest else self.loop(self.at.y, h), []
+
+        def state(k: int) -> np.ndarray | None:
+            while run and len(states) <= k:
+                states.append(
+                    run.now.copy() if run.run(self.strides[len(states)]) == loop_indices.BUDGET_SPENT else None
+                )
+            return states[k] if run else self.at.y
+
+        return state
+
+    def growth_of_start(self, start: np.ndarray, h: float, base_at: Callable) -> tuple[float, int]:
+        """(greatest growth of one start, its number of steps); stops above the threshold."""
+        size, after, run = 1.0, 0, self.loop(self.at.y + start, h)
+        first = np.linalg.norm(self.form.forward @ start)
+        for k, n in enumerate(self.check_steps):
+            if time.monotonic() > self.latest:
+                raise TimeoutError
+            base = base_at(k)
+            if base is None or run.run(self.strides[k]) != loop_indices.BUDGET_SPENT:
+                return (size, after) if self.state_end_time(h) <= n * h else (np.inf, n)
+            growth = float(np.linalg.norm(self.form.forward @ (run.now - base))) / first
+            if not growth <= self.threshold:
+                return growth if growth > self.threshold else np.inf, n
+            if growth > size:
+                size, after = growth, n
+        return size, after
+
+    def state_end_time(self, h: float) -> float:
+        """Time [s] after which a run from the state itself stops, equal for this step and for half of it; else inf.
+
+        Then the model ends there (a piston at the end of its cylinder), and no step has failed.
+        """
+        ends = [self.break_time(self.loop(self.at.y, step), self.steps * h / step) for step in (h, 0.5 * h)]
+        return min(ends) if abs(ends[0] - ends[1]) <= END_TOLERANCE * h else np.inf
+
+    def break_time(self, run: RunLoop, steps: float) -> float:
+        """Time [s] after which a run stops within a number of steps; inf if it does not."""
+        return np.inf if run.run(steps) in (loop_indices.BUDGET_SPENT, loop_indices.DONE) else run.t - self.at.t
+
+    def fails(self, h: float) -> bool:
+        """True if the growth of a run exceeds the threshold."""
+        self.longest_tried = max(self.longest_tried, h)
+        return self.growth(h)[0] > self.threshold
+
+    def limit(self, guess: float) -> StepLimit:
+        """Greatest safe step by bisection around a guess, after a check that smaller steps are safe."""
+        for part in SAFE_PARTS:
+            if self.fails(part * guess):
+                return self.limit_below(part * guess)
+        high = guess
+        for _ in range(MAX_WIDENINGS):
+            if self.fails(high * 1.03):
+                return bisect(
+                    self.fails,
+                    high / STEP_RATIO if self.safe(high / STEP_RATIO) else SAFE_PARTS[-1] * guess,
+                    high * 1.03,
+                )
+            high *= STEP_RATIO
+        return StepLimit(np.inf, np.inf)
+
+    def safe(self, h: float) -> bool:
+        """True if no run fails."""
+        return not self.fails(h)
+
+    def limit_below(self, high: float) -> StepLimit:
+        """Limit below a step that fails; nan if none is found."""
+        for _ in range(MAX_REDUCTIONS):
+            if self.safe(high / STEP_RATIO):
+                return bisect(self.fails, high / STEP_RATIO, high)
+            high /= STEP_RATIO
+        return StepLimit(np.nan, high)
+
+
+def measure_limit(
+    runs: RealRuns, guess: float, size: float, left_out: dict[str, str], quantity: str = "measured"
+) -> dict:
+    """Measured limit around a guess; if it is not found in time, `left_out` gets the reason."""
+    try:
+        return measured_limit_of(runs, guess, size)
+    except TimeoutError:
+        left_out[quantity] = too_long(runs)
+        return {}
+
+
+def too_long(runs: RealRuns) -> str:
+    """Reason for a missing measured limit: real runs take too long."""
+    return f"real runs of {runs.states} states take longer than {TIME_LIMIT:g} s"
+
+
+def measured_limit_of(runs: RealRuns, guess: float, size: float) -> dict:
+    """Measured limit around a guess; if no step is predicted to fail, two long steps are run."""
+    if np.isfinite(guess) and guess > 0.0:
+        limit = runs.limit(guess)
+        return {
+            "measured": limit.step,
+            "measured_up_to": limit.fails if np.isfinite(limit.fails) else runs.longest_tried,
+        }
+    if guess == 0.0 or size == 0.0:
+        return {}
+    passed = 0.0
+    try:
+        for factor in UNLIMITED_STEPS:
+            if runs.fails(factor / size):
+                return {"measured": runs.limit_below(factor / size).step, "measured_up_to": factor / size}
+            passed = factor / size
+    except TimeoutError:
+        if passed == 0.0:
+            raise
+    return {"measured": np.inf, "measured_up_to": passed}
