@@ -9,15 +9,15 @@ bounds up to their coefficient times these numbers.
 The boundary faces of a grid are ordered west (ny), east (ny), south (nx), north (nx).
 """
 
-from fvsolve.basins.bounds import bound, bound_work
-from fvsolve.basins.fifth_order import grid_excesses, grid_excesses_work, settle_excesses
+from fvsolve.basins.fifth_order import add_excesses, grid_excesses, grid_excesses_work
+from fvsolve.basins.flux_correction import limit_excesses, limit_excesses_work
 from fvsolve.basins.second_order import second_order_rates, second_order_work
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import MUSCL, UPWIND, WENO5
 
 INFINITE = float("inf")
 THIN = 1e-6  # depth below which values fade to zero [m]
-BOUND = 0.5  # Courant number up to which weno5 keeps its bounds
+WENO_COURANT = 0.5  # Courant number up to which weno5 keeps its bounds
 
 
 @njit
@@ -28,7 +28,7 @@ def put_values(s, depth, c):
 
 
 @njit
-def near_values(nx, ny, begin, stop, s, depth, c):
+def stencil_values(nx, ny, begin, stop, s, depth, c):
     """Values of cells of rows `begin` to `stop`, and of three rows on either side."""
     a, z = nx * max(begin - 3, 0), nx * min(stop + 3, ny)
     put_values(s[a:z], depth[a:z], c[a:z])
@@ -60,7 +60,7 @@ def advection_work(scheme, nx, ny):
     """Length of the work array of a scheme."""
     if scheme == UPWIND or scheme == MUSCL:
         return nx * ny + second_order_work(nx, ny)
-    most = max(grid_excesses_work(nx, ny), bound_work(nx, ny), second_order_work(nx, ny))
+    most = max(grid_excesses_work(nx, ny), limit_excesses_work(nx, ny), second_order_work(nx, ny))
     return nx * ny + (nx + 1) * ny + nx * (ny + 1) + most
 
 
@@ -78,7 +78,7 @@ def grid_advection(scheme, limiter, nx, ny, begin, stop, kx, ky, factor, flow_x,
     """
     c, rest, first = s, work[nx * ny :], scheme if scheme == MUSCL else UPWIND
     if depth.size > 0:
-        near_values(nx, ny, begin, stop, s, depth, work)
+        stencil_values(nx, ny, begin, stop, s, depth, work)
         c = work[: nx * ny]
     second_order_rates(
         first, limiter, nx, ny, begin, stop, stop, True, kx, ky, factor, flow_x, flow_y, outside, c, rest, rate
@@ -102,5 +102,7 @@ def add_fifth_order(
     grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, rest, ax, ay)
     pace = abs(factor) * fastest
     if scheme == WENO5 and pace > 0.0 and (least > -INFINITE or most < INFINITE):
-        bound(nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, BOUND / pace, s, rate, ax, ay, rest)
-    settle_excesses(nx, ny, kx, ky, factor, ax, ay, rate)
+        limit_excesses(
+            nx, ny, kx, ky, factor, flow_x, flow_y, depth, least, most, WENO_COURANT / pace, s, rate, ax, ay, rest
+        )
+    add_excesses(nx, ny, kx, ky, factor, ax, ay, rate)

@@ -12,18 +12,18 @@ holds at the face.
 
 import numpy as np
 
-from fvsolve.basins.faces import (
+from fvsolve.basins.cell_sides import (
     BLOCK,
     CELL,
     DISTANCES,
-    GAP,
     HEAD,
     INDICES,
-    LEAN_X,
-    LEAN_Y,
     MEASURES,
+    OBLIQUE_X,
+    OBLIQUE_Y,
+    PER_AREA,
+    PER_DISTANCE,
     REACH,
-    SHARE,
     SIDE,
     TINY,
     WX,
@@ -31,8 +31,8 @@ from fvsolve.basins.faces import (
     blocks,
     edges_before,
     gather,
-    place,
-    put_sides,
+    limited_sides,
+    ring_place,
 )
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import UPWIND
@@ -41,8 +41,15 @@ THIN = 1e-6  # depth below which values fade to zero [m]
 
 # Rows of BLOCK in the scratch of a block: four for `limited_sides`, also used for value, depth and gradients beyond;
 # then value beyond the side, outward flow, rate, divergence, sum for the step.
-_DEPTH, _GX, _GY, _VALUE, _FLOW, _RATE, _DIVERGENCE, _GONE, _TOP, _FREE = (k * BLOCK for k in range(1, 11))
-_REACH, _WX, _WY, _GAP, _LX, _LY = REACH * BLOCK, WX * BLOCK, WY * BLOCK, GAP * BLOCK, LEAN_X * BLOCK, LEAN_Y * BLOCK
+_DEPTH, _GX, _GY, _VALUE, _FLOW, _RATE, _DIVERGENCE, _OUTFLOW, _TOP, _FREE = (k * BLOCK for k in range(1, 11))
+_REACH, _WX, _WY, _PER_DISTANCE, _OBLIQUE_X, _OBLIQUE_Y = (
+    REACH * BLOCK,
+    WX * BLOCK,
+    WY * BLOCK,
+    PER_DISTANCE * BLOCK,
+    OBLIQUE_X * BLOCK,
+    OBLIQUE_Y * BLOCK,
+)
 ROWS = 11
 
 
@@ -85,48 +92,48 @@ def gather_flows(faces, factor, flow, out):
 
 
 @njit
-def put_room(c, least, most, allowed):
+def put_allowed(c, least, most, allowed):
     """Greatest allowed deviation of sides from a block of cells: the distance to the nearer bound."""
     for i in range(BLOCK):
         allowed[i] = max(min(c[i] - least, most - c[i]), 0.0)
 
 
 @njit
-def carry(count, c, d, cl, far, w):
+def add_advection(count, c, d, cl, far, w):
     """Subtract from the rates of a block of cells the outflow through one side, beyond that of a uniform c.
 
     count : factor of the outflow in the rate that limits the step
     """
     for i in range(BLOCK):
-        q = far[SHARE * BLOCK + i] * w[_FLOW + i]
+        q = far[PER_AREA * BLOCK + i] * w[_FLOW + i]
         w[_RATE + i] -= q * ((cl[i] if q > 0.0 else w[_VALUE + i]) - c[i])
         w[_DIVERGENCE + i] += q
-        w[_GONE + i] += count * max(q, 0.0) / max(d[i], THIN)
+        w[_OUTFLOW + i] += count * max(q, 0.0) / max(d[i], THIN)
 
 
 @njit
-def diffuse(diffusivity, c, d, gx, gy, geo, far, w):
+def add_diffusion(diffusivity, c, d, gx, gy, geo, far, w):
     """Add to the rates of a block of cells the diffusive inflow through one side of each."""
     for i in range(BLOCK):
         a, b = d[i], w[_DEPTH + i]
         k = diffusivity * geo[_REACH + i] * (2.0 * a * b / (a + b + TINY))
-        oblique = far[_LX + i] * (gx[i] + w[_GX + i]) + far[_LY + i] * (gy[i] + w[_GY + i])
-        w[_RATE + i] += k * (far[_GAP + i] * (w[i] - c[i]) + 0.5 * oblique)
-        w[_GONE + i] += k * far[_GAP + i] / max(a, THIN)
+        oblique = far[_OBLIQUE_X + i] * (gx[i] + w[_GX + i]) + far[_OBLIQUE_Y + i] * (gy[i] + w[_GY + i])
+        w[_RATE + i] += k * (far[_PER_DISTANCE + i] * (w[i] - c[i]) + 0.5 * oblique)
+        w[_OUTFLOW + i] += k * far[_PER_DISTANCE + i] / max(a, THIN)
 
 
 @njit
 def clear(w):
     """Set rates and sums to zero."""
     for i in range(BLOCK):
-        w[_RATE + i], w[_DIVERGENCE + i], w[_GONE + i] = 0.0, 0.0, 0.0
+        w[_RATE + i], w[_DIVERGENCE + i], w[_OUTFLOW + i] = 0.0, 0.0, 0.0
 
 
 @njit
 def put_rates(c, w, rate):
     """Rates of a block of cells, and the greatest sum so far in each lane."""
     for i in range(BLOCK):
-        w[_TOP + i] = max(w[_TOP + i], w[_GONE + i])
+        w[_TOP + i] = max(w[_TOP + i], w[_OUTFLOW + i])
     for i in range(rate.size):
         rate[i] = w[_RATE + i] - c[i] * w[_DIVERGENCE + i]
 
@@ -181,13 +188,13 @@ def advection_rates(
             k, wall = wall, edges_before(edges, wall, 4 * (sides_done + 1) * BLOCK)
             here, bounds, ends = edges[k:wall], shown[k:], shown[b + k :]
             for q in range(k, wall):
-                value, face = c[place(edges[q], ring)], f - b + number[q]
+                value, face = c[ring_place(edges[q], ring)], f - b + number[q]
                 enters = factor * flow[face] < 0.0
                 shown[q] = outside[number[q]] if enters else value
                 shown[b + q] = 2.0 * shown[q] - value if depth.size == 0 else value
             if limited:
-                put_room(c[sides_done % ring * BLOCK :], least, most, free)
-                put_sides(sides_done, floats, integers, c, wide_by, free, bounds, here, w, cs)
+                put_allowed(c[sides_done % ring * BLOCK :], least, most, free)
+                limited_sides(sides_done, floats, integers, c, wide_by, free, bounds, here, w, cs)
             if diffuses:
                 put_gradients(sides_done, floats, integers, c, ends, here, w, gx, gy)
             sides_done += 1
@@ -202,7 +209,7 @@ def advection_rates(
             i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
             for q in range(i, edge):
                 w[_VALUE + edges[q] % BLOCK] = outside[number[q]]
-            carry(twice, c[o:], d[o:], cs[own:], far, w)
+            add_advection(twice, c[o:], d[o:], cs[own:], far, w)
             if diffuses:
                 gather(c, where, w)
                 gather(d, where, w[_DEPTH:])
@@ -210,7 +217,7 @@ def advection_rates(
                 gather(gy, where, w[_GY:])
                 for q in range(i, edge):
                     w[edges[q] % BLOCK] = shown[b + q]
-                diffuse(diffusivity, c[o:], d[o:], gx[o:], gy[o:], geo, far, w)
+                add_diffusion(diffusivity, c[o:], d[o:], gx[o:], gy[o:], geo, far, w)
         put_rates(c[o:], w, rate[first:last])
     max_rate = 0.0
     for i in range(BLOCK):

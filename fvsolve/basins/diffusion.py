@@ -3,29 +3,29 @@
 s_t = div(D depth grad c) - decay (s - depth ambient), for amounts s = depth c per area.
 """
 
-from fvsolve.basins.advection import THIN, near_values
+from fvsolve.basins.advection import THIN, stencil_values
 from fvsolve.jit import inline, njit
 
 
 @njit
-def between(a, b):
+def harmonic_mean(a, b):
     """Harmonic mean, of depths or of cells per length: 0 if both are 0."""
     return 2.0 * a * b / (a + b) if a + b > 0.0 else 0.0
 
 
 @inline
-def conduct(across, a, b, to):
+def put_conductances(across, a, b, to):
     """Conductances of a row of faces: `across` times the depth between a and b, which are empty if the depth is 1."""
     if a.size == 0:
         for i in range(to.size):
             to[i] = across
     else:
         for i in range(to.size):
-            to[i] = across * between(max(a[i], 0.0), max(b[i], 0.0))
+            to[i] = across * harmonic_mean(max(a[i], 0.0), max(b[i], 0.0))
 
 
 @inline
-def spread(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
+def add_row_diffusion(kx, ky, p, wx, south, ws, here, north, wn, depth, rate, top):
     """Add diffusion to the rates of a row. p : its values, with one beyond either end.
 
     top : greatest rate by column so far
@@ -55,7 +55,7 @@ def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flo
     """
     c, rest = s, work[nx * ny :]
     if depth.size > 0:
-        near_values(nx, ny, begin, stop, s, depth, work)
+        stencil_values(nx, ny, begin, stop, s, depth, work)
         c = work[: nx * ny]
     p, wx, rest = rest[: nx + 2], rest[nx + 2 : 2 * nx + 3], rest[2 * nx + 3 :]
     rows, beyond, top = rest[: 2 * nx], rest[2 * nx : 4 * nx], rest[4 * nx : 5 * nx]
@@ -71,20 +71,20 @@ def grid_diffusion(nx, ny, begin, stop, kx, ky, diffusivity, factor, flow_x, flo
         for i in range(nx):
             inner_p[i] = row[i]
         p[0], p[nx + 1] = outside[j], outside[ny + j]
-        conduct(1.0, h, h[1:], inner_w)
+        put_conductances(1.0, h, h[1:], inner_w)
         for i in range(nx - 1):
-            inner_w[i] *= diffusivity * between(kx[i], kx[i + 1])
+            inner_w[i] *= diffusivity * harmonic_mean(kx[i], kx[i + 1])
         wx[0] = kx[0] * inflow_factor if factor * flow_x[f] > 0.0 else 0.0
         wx[nx] = kx[nx - 1] * inflow_factor if factor * flow_x[f + nx] < 0.0 else 0.0
         ws, wn = rows[(j % 2) * nx :], rows[((j + 1) % 2) * nx : ((j + 1) % 2 + 1) * nx]
         south, north = c[a - nx : a] if j > 0 else below, c[z : z + nx] if j < ny - 1 else above
         if j < ny - 1:
-            conduct(diffusivity * between(ky[j], ky[j + 1]), h, hn, wn)
+            put_conductances(diffusivity * harmonic_mean(ky[j], ky[j + 1]), h, hn, wn)
         else:
             for i in range(nx):
                 wn[i] = ky[j] * inflow_factor if factor * flow_y[z + i] < 0.0 else 0.0
         if j >= begin:
-            spread(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
+            add_row_diffusion(kx, ky[j], p, wx, south, ws, row, north, wn, h, rate[a:z], top)
     for i in range(nx):
         most = max(most, top[i])
     return most

@@ -11,11 +11,11 @@ from fvsolve.kernels.dtypes import WENO5
 
 SMALL = 1e-30  # prevents a division by zero between squares of differences
 GHOSTS = 3
-NARROW = 5  # with fewer cells, values beyond a side are those of its last cells
+LEAST_CELLS = 5  # with fewer cells, values beyond a side are those of its last cells
 
 
 @njit
-def beyond(known, o, a, b, c, d, e):
+def ghost_means(known, o, a, b, c, d, e):
     """Means of the two cells beyond a side, from the polynomial of degree 4 through the means of the cells inside.
 
     a : the nearest cell; o : value at the side, used in place of e if `known`
@@ -28,13 +28,13 @@ def beyond(known, o, a, b, c, d, e):
 
 
 @njit
-def lean_linear(p, q, r, s):
+def face_difference_linear(p, q, r, s):
     """Value at the face after a cell minus its own, from the differences between it and two cells on either side."""
     return (24.0 * r + 11.0 * q - 2.0 * p - 3.0 * s) / 60.0
 
 
 @njit
-def lean_weno(p, q, r, s):
+def face_difference_weno(p, q, r, s):
     """Value at the face after a cell minus its own by WENO-Z, with one common divisor of all weights."""
     b0 = 13.0 / 12.0 * (q - p) ** 2 + 0.25 * (3.0 * q - p) ** 2 + SMALL
     b1 = 13.0 / 12.0 * (r - q) ** 2 + 0.25 * (r + q) ** 2 + SMALL
@@ -45,14 +45,14 @@ def lean_weno(p, q, r, s):
 
 
 @njit
-def excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
+def face_excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
     """Values q at faces between c and d, and the flux in excess of that of the upwind value."""
     if scheme == WENO5:
         for i in range(q.size):
             forward = factor * flow[i] > 0.0
             p, s = b[i] - a[i], g[i] - e[i]
             m, r, n = c[i] - b[i], d[i] - c[i], e[i] - d[i]
-            difference = lean_weno(p if forward else s, m if forward else n, r, n if forward else m)
+            difference = face_difference_weno(p if forward else s, m if forward else n, r, n if forward else m)
             q[i] = c[i] + difference if forward else d[i] - difference
             excess[i] = flow[i] * (difference if forward else -difference)
     else:
@@ -60,7 +60,7 @@ def excesses(scheme, factor, flow, a, b, c, d, e, g, q, excess):
             forward = factor * flow[i] > 0.0
             p, s = b[i] - a[i], g[i] - e[i]
             m, r, n = c[i] - b[i], d[i] - c[i], e[i] - d[i]
-            difference = lean_linear(p if forward else s, m if forward else n, r, n if forward else m)
+            difference = face_difference_linear(p if forward else s, m if forward else n, r, n if forward else m)
             q[i] = c[i] + difference if forward else d[i] - difference
             excess[i] = flow[i] * (difference if forward else -difference)
 
@@ -74,24 +74,24 @@ def pad_sides(nx, ny, factor, flow_x, flow_y, outside, c, v):
         inner, row = to[GHOSTS:], c[j * nx :]
         for i in range(nx):
             inner[i] = row[i]
-        to[2], to[1] = ghosts(nx, factor * fx[0] > 0.0, outside[j], to, GHOSTS, 1)
-        to[nx + 3], to[nx + 4] = ghosts(nx, factor * fx[nx] < 0.0, outside[ny + j], to, nx + 2, -1)
+        to[2], to[1] = ghost_values(nx, factor * fx[0] > 0.0, outside[j], to, GHOSTS, 1)
+        to[nx + 3], to[nx + 4] = ghost_values(nx, factor * fx[nx] < 0.0, outside[ny + j], to, nx + 2, -1)
         to[0], to[nx + 5] = to[1], to[nx + 4]
     south, north, last = outside[2 * ny :], outside[2 * ny + nx :], ny * nx
     for i in range(nx):
         at, end = GHOSTS * wide + GHOSTS + i, (ny + 2) * wide + GHOSTS + i
-        low, lower = ghosts(ny, factor * flow_y[i] > 0.0, south[i], v, at, wide)
-        high, higher = ghosts(ny, factor * flow_y[last + i] < 0.0, north[i], v, end, -wide)
+        low, lower = ghost_values(ny, factor * flow_y[i] > 0.0, south[i], v, at, wide)
+        high, higher = ghost_values(ny, factor * flow_y[last + i] < 0.0, north[i], v, end, -wide)
         v[at - wide], v[at - 2 * wide], v[at - 3 * wide] = low, lower, lower
         v[end + wide], v[end + 2 * wide], v[end + 3 * wide] = high, higher, higher
 
 
 @njit
-def ghosts(n, known, o, v, at, step):
+def ghost_values(n, known, o, v, at, step):
     """Both values of `ghost_means` for the cells v[at], v[at + step], ... inward."""
-    if n < NARROW:
+    if n < LEAST_CELLS:
         return (o, o) if known else (v[at], v[at])
-    return beyond(known, o, v[at], v[at + step], v[at + 2 * step], v[at + 3 * step], v[at + 4 * step])
+    return ghost_means(known, o, v[at], v[at + step], v[at + 2 * step], v[at + 3 * step], v[at + 4 * step])
 
 
 @inline
@@ -106,12 +106,12 @@ def add_products(fa, fb, fc, fd, fe, qa, qb, qc, qd, qe, excess):
 
 
 @njit
-def extend(v, wide, rows):
+def extrapolate_rows(v, wide, rows):
     """Extrapolate two rows before and after the rows of v, which start at row 2."""
     first, last = 2 * wide, (rows + 1) * wide
     for i in range(wide):
-        v[wide + i], v[i] = ghosts(rows, False, 0.0, v, first + i, wide)
-        v[last + wide + i], v[last + 2 * wide + i] = ghosts(rows, False, 0.0, v, last + i, -wide)
+        v[wide + i], v[i] = ghost_values(rows, False, 0.0, v, first + i, wide)
+        v[last + wide + i], v[last + 2 * wide + i] = ghost_values(rows, False, 0.0, v, last + i, -wide)
 
 
 @njit
@@ -120,8 +120,8 @@ def pad_line(v, n, to):
     middle = to[2:]
     for i in range(n):
         middle[i] = v[i]
-    to[1], to[0] = ghosts(n, False, 0.0, to, 2, 1)
-    to[n + 2], to[n + 3] = ghosts(n, False, 0.0, to, n + 1, -1)
+    to[1], to[0] = ghost_values(n, False, 0.0, to, 2, 1)
+    to[n + 2], to[n + 3] = ghost_values(n, False, 0.0, to, n + 1, -1)
 
 
 def grid_excesses_work(nx, ny):
@@ -143,7 +143,7 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
         fj, flow = fx[(j + 2) * m :], flow_x[j * m :]
         for i in range(m):
             fj[i] = flow[i]
-        excesses(scheme, factor, flow, p, p[1:], p[2:], p[3:], p[4:], p[5:], qj, a)
+        face_excesses(scheme, factor, flow, p, p[1:], p[2:], p[3:], p[4:], p[5:], qj, a)
         west, east = factor * flow[0], factor * flow[nx]
         if west >= 0.0:
             qj[0], a[0] = outside[j] if west > 0.0 else p[GHOSTS], 0.0
@@ -152,7 +152,7 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
     for j in range(ny + 1):
         p, qj, a = v[j * wide + GHOSTS :], qy[j * nx : (j + 1) * nx], ay[j * nx : (j + 1) * nx]
         fy, b, d, e = flow_y[j * nx :], p[wide:], p[3 * wide :], p[4 * wide :]
-        excesses(scheme, factor, fy, p, b, p[2 * wide :], d, e, p[5 * wide :], qj, a)
+        face_excesses(scheme, factor, fy, p, b, p[2 * wide :], d, e, p[5 * wide :], qj, a)
         if j == 0 or j == ny:
             side, turn = (outside[2 * ny :], 1.0) if j == 0 else (outside[2 * ny + nx :], -1.0)
             own = d if j == 0 else p[2 * wide :]
@@ -160,8 +160,8 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
                 inflow = turn * factor * fy[i]
                 if inflow >= 0.0:
                     qj[i], a[i] = side[i] if inflow > 0.0 else own[i], 0.0
-    extend(fx, m, ny)
-    extend(qx, m, ny)
+    extrapolate_rows(fx, m, ny)
+    extrapolate_rows(qx, m, ny)
     for j in range(ny):
         r, o = fx[j * m :], qx[j * m :]
         fb, fc, fd, fe, qb, qc = r[m:], r[2 * m :], r[3 * m :], r[4 * m :], o[m:], o[2 * m :]
@@ -173,7 +173,7 @@ def grid_excesses(scheme, nx, ny, factor, flow_x, flow_y, outside, c, work, ax, 
 
 
 @njit
-def settle_excesses(nx, ny, kx, ky, factor, ax, ay, rate):
+def add_excesses(nx, ny, kx, ky, factor, ax, ay, rate):
     """Add the excesses of their faces to the rates of all cells."""
     for j in range(ny):
         k, to = ky[j], rate[j * nx : (j + 1) * nx]

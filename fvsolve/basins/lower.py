@@ -12,7 +12,7 @@ from fvsolve.kernels import dtypes as rec
 def lower_basins(draft) -> None:
     """Fill the tables of basins and their patches, and add states for their cells."""
     case = draft.case
-    draft.basins = [lowered_by(case.nodes[name].own)(case, name) for name in case.meshes]
+    draft.basins = [rows_class(case.nodes[name].own)(case, name) for name in case.meshes]
     draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
     for basin, row in zip(draft.basins, draft.basin_table, strict=True):
         basin.lower_common(draft, row)
@@ -27,14 +27,14 @@ def lower_basins(draft) -> None:
         draft.basins[row["basin"]].lower_patch(draft, place.patch, row)
 
 
-def lowered_by(physics: type) -> type:
+def rows_class(physics: type) -> type:
     """Class that fills the rows of a physics: from the module `lower` next to its declaration."""
     home = physics.__module__.rpartition(".")[0]
     import_module(f"{home}.lower")
     return import_module("fvsolve.basins.lower_basin").BasinRows.physics[home]
 
 
-def at_start(basins: list, size: int, attitudes: dict[str, np.ndarray] | None = None) -> np.ndarray:
+def basin_start(basins: list, size: int, attitudes: dict[str, np.ndarray] | None = None) -> np.ndarray:
     """States at the start: deviations from the profile, zero unless a basin states a start.
 
     attitudes : of bodies by name, instead of those at the start
@@ -42,7 +42,7 @@ def at_start(basins: list, size: int, attitudes: dict[str, np.ndarray] | None = 
     states = np.zeros(size)
     for basin in basins:
         on = basin.part.on if attitudes else None
-        basin.own(states)[:] = basin.start() if on is None else basin.start(attitudes[on])
+        basin.states_of(states)[:] = basin.start() if on is None else basin.start(attitudes[on])
         if basin.scalars:
             basin.start_scalars(states)
     return states

@@ -10,10 +10,10 @@ import numpy as np
 
 from fvsolve.basins import advection_faces
 from fvsolve.basins.advection import THIN, advection_work
+from fvsolve.basins.basin_probes import SPEED, U, V
 from fvsolve.basins.diffusion import diffusion_work
-from fvsolve.basins.kinds import kind_of
 from fvsolve.basins.lower_mesh import lower_mesh
-from fvsolve.basins.observe import SPEED, U, V
+from fvsolve.basins.physics_codes import physics_code
 from fvsolve.case.basins import boundary_cells
 from fvsolve.case.cell_means import is_grid, means, samples
 from fvsolve.case.sections import DEFAULT_COURANT as COURANT
@@ -27,7 +27,7 @@ from fvsolve.steppers.built_in_methods import METHODS
 
 if TYPE_CHECKING:
     from fvsolve.kernels.rhs_assembly import RhsTerms
-    from fvsolve.mesh.points import MeshPoints
+    from fvsolve.mesh.mesh_points import MeshPoints
 
 ROUNDING = 1e-12  # relative error of rates
 VELOCITIES = {"u": U, "v": V, "speed": SPEED}
@@ -40,9 +40,9 @@ class BasinRows:
     units: ClassVar[dict[str, str]] = {}  # of fields
     deep: ClassVar[bool] = False  # True if its first quantity is a depth (minus that in `plan`) that contains scalars
     given: ClassVar[bool] = False  # True if flows through its faces are those of a given velocity
-    far_ends: ClassVar[bool] = True  # True if outgoing waves are extrapolated by a polynomial of five cells
+    has_wide_closure: ClassVar[bool] = True  # True if outgoing waves are extrapolated by a polynomial of five cells
     banded: ClassVar[bool] = False  # True if threads can step bands of rows of a grid
-    gathers: float = 0.0  # greatest divergence of a given velocity [1/s]
+    max_divergence: float = 0.0  # greatest divergence of a given velocity [1/s]
 
     def __init_subclass__(cls) -> None:
         BasinRows.physics[cls.__module__.rpartition(".")[0]] = cls
@@ -91,9 +91,9 @@ class BasinRows:
         """Least and greatest values at the start that determine its waves, SI."""
         return {}
 
-    def pace(self, y: np.ndarray) -> tuple[float, float]:
+    def max_rate(self, y: np.ndarray) -> tuple[float, float]:
         """Greatest rate [1/s] of its waves or flows at a model's state y, and the fraction of x in it."""
-        velocity, speed = self.speeds(self.of(y))
+        velocity, speed = self.speeds(self.deviations(y))
         if not self.is_grid:
             left, right = self.mesh.left, self.mesh.right[: self.mesh.inner]
             across = np.abs(np.einsum("fd,fd->f", velocity[left, :2], self.mesh.normal)) + speed[left]
@@ -112,12 +112,12 @@ class BasinRows:
         raise NotImplementedError
 
     @property
-    def waving(self) -> bool:
+    def has_waves(self) -> bool:
         """True if it has waves of its own, besides the transport of scalars."""
         return bool(self.quantities)
 
     @property
-    def even_paced(self) -> bool:
+    def has_constant_speed(self) -> bool:
         """True if the wave speed is constant."""
         return False
 
@@ -158,7 +158,7 @@ class BasinRows:
         return SCHEMES[self.scheme].reach.behind
 
     @property
-    def whole(self) -> str:
+    def undivided_reason(self) -> str:
         """Reason why its rows cannot be distributed over threads, "" if they can."""
         if not self.is_grid:
             return "its mesh is not a full rectangle"
@@ -166,7 +166,7 @@ class BasinRows:
             return "its walls move"
         if self.part.on is not None:
             return "it is on a body"
-        if self.scalars and self.fifth:
+        if self.scalars and self.is_fifth_order:
             return f"its scalars use {self.scheme}"
         if self.scalars and self.opening is not None:
             return f"scalars flow through its open boundary {self.opening}"
@@ -175,7 +175,7 @@ class BasinRows:
         return "" if self.banded else f"rows of {self.part.physics} cannot be distributed"
 
     @property
-    def sums_rows(self) -> bool:
+    def forms_stages(self) -> bool:
         """True if the kernel of its rates can form sums of stages too, because nothing is added to these rates later.
 
         Rows of cells at patches, which many functions read, are excluded.
@@ -183,14 +183,14 @@ class BasinRows:
         return False
 
     @property
-    def fifth(self) -> bool:
+    def is_fifth_order(self) -> bool:
         """True if its scheme has an order above 2."""
         return SCHEMES[self.scheme].order > 2
 
     @cached_property
     def points(self) -> MeshPoints:
         """Search for points of its mesh, and the cells read there."""
-        from fvsolve.mesh.points import MeshPoints
+        from fvsolve.mesh.mesh_points import MeshPoints
 
         return MeshPoints(self.mesh)
 
@@ -198,7 +198,7 @@ class BasinRows:
         """Means of a formula over cells : float64[n]; on grids by nine Gauss points, else values at centres."""
         return means(samples(shape, self.mesh))
 
-    def reflects(self) -> np.ndarray:
+    def reflections(self) -> np.ndarray:
         """Reflection coefficients of waves at boundary faces in the order of the kernels : float64[outer].
 
         Empty for walls only.
@@ -225,7 +225,7 @@ class BasinRows:
         """Reflection coefficient of waves at a patch."""
         return 0.0 if patch.boundary == "open" else 1.0
 
-    def opens(self, patch: str) -> bool:
+    def is_open(self, patch: str) -> bool:
         """True if there is flow through a patch without a link."""
         stated = self.part.patches.get(patch)
         return stated is not None and self.reflection(stated) != 1.0
@@ -233,20 +233,20 @@ class BasinRows:
     @property
     def opening(self) -> str | None:
         """A patch with flow that does not belong to a link, if any."""
-        return next((patch for patch in self.part.patches if self.opens(patch)), None)
+        return next((patch for patch in self.part.patches if self.is_open(patch)), None)
 
-    def own(self, y: np.ndarray) -> np.ndarray:
+    def states_of(self, y: np.ndarray) -> np.ndarray:
         """Its part of the states of a model : float64[quantities, n]."""
         at = int(self.row["y"])
         return y[at : at + len(self.quantities) * self.n].reshape(-1, self.n)
 
-    def of(self, y: np.ndarray) -> np.ndarray:
+    def deviations(self, y: np.ndarray) -> np.ndarray:
         """Its deviations in a state of a model : float64[quantities, n]."""
         if not self.moves:
-            return self.own(y)
-        wide, rest = self.stretched(y), np.zeros((len(self.quantities), self.n))
+            return self.states_of(y)
+        wide, rest = self.area_ratios(y), np.zeros((len(self.quantities), self.n))
         rest[0] = self.at_rest()
-        return (self.own(y) - rest * (wide - 1.0)) / wide
+        return (self.states_of(y) - rest * (wide - 1.0)) / wide
 
     @property
     def walls(self) -> list[str]:
@@ -258,7 +258,7 @@ class BasinRows:
         """True if it has moving walls."""
         return bool(self.walls)
 
-    def stretched(self, y: np.ndarray) -> np.ndarray:
+    def area_ratios(self, y: np.ndarray) -> np.ndarray:
         """Areas of cells over undeformed areas in a state of a model : float64[n]."""
         return 1.0 + sum((y[at] * per for at, per, _ in self.stretches), np.zeros(self.n))
 
@@ -294,7 +294,7 @@ class BasinRows:
         numerics, mesh, before = self.case.numerics, self.mesh, draft.room()
         self.row, row["n"] = row, self.n
         row["kind"], row["deep"], row["given"] = (
-            kind_of(type(self).__module__.rpartition(".")[0]),
+            physics_code(type(self).__module__.rpartition(".")[0]),
             self.deep,
             self.given,
         )
@@ -313,7 +313,7 @@ class BasinRows:
             row["mesh"], row["faces"] = draft.to_plane(floats), mesh.left.size
             row["links"] = len(draft.integers)
             draft.integers += self.integers.tolist()
-        reflections = self.reflects()
+        reflections = self.reflections()
         row["reflect"], row["outer_given"] = draft.to_plane(reflections), reflections.size
         row["outer"] = mesh.left.size - mesh.inner
         row["through"] = draft.to_work(reflections.size) if reflections.size else -1
@@ -355,7 +355,7 @@ class BasinRows:
         if row["flows"] < 0:
             row["flows"] = draft.to_work(flows)
         row["scalar_work"] = draft.to_work(work_size)
-        violation = self.may_leave(row)
+        violation = self.bounds_violation(row)
         if violation:
             numerics = self.case.numerics
             limited = f", {numerics.limiter}" if self.scheme == "muscl" else ""
@@ -363,7 +363,7 @@ class BasinRows:
             key, reason, value, limit = violation
             draft.warnings.append(Notice("bounds", f"nodes.{self.name}", text + reason, key, value, limit))
 
-    def may_leave(self, row) -> tuple[str, str, float | None, float | None] | None:
+    def bounds_violation(self, row) -> tuple[str, str, float | None, float | None] | None:
         """Reason why scalars may leave the bounds of the case: (key, text, value, limit); None if they cannot."""
         numerics, method = self.case.numerics, METHODS.get(self.case.numerics.method)
         if row["scheme"] == rec.LINEAR:
@@ -379,11 +379,9 @@ class BasinRows:
                 None,
                 None,
             )
-        if self.gathers > ROUNDING * row["fastest"]:
-            reason = (
-                f"the velocity has a divergence of up to {self.gathers:.3g} 1/s, which concentrates or dilutes scalars"
-            )
-            return "velocity", f"{reason}; a stream function has none", self.gathers, 0.0
+        if self.max_divergence > ROUNDING * row["fastest"]:
+            reason = f"the velocity has a divergence of up to {self.max_divergence:.3g} 1/s, which concentrates or dilutes scalars"
+            return "velocity", f"{reason}; a stream function has none", self.max_divergence, 0.0
         radius = ssp_radius(method)
         if numerics.courant > radius:
             advice = (
@@ -408,7 +406,7 @@ class BasinRows:
         for name, amounts in zip(self.scalars, self.amounts(y), strict=True):
             given = self.part.scalars.get(name)
             value = self.case.scalars[name].initial if given is None else self.formula(given)
-            amounts[:] = value * self.depth_of(self.of(y))
+            amounts[:] = value * self.depth_of(self.deviations(y))
 
     def amounts(self, y: np.ndarray) -> np.ndarray:
         """Amounts per area in the states of a model : float64[scalars, n]."""
@@ -417,10 +415,10 @@ class BasinRows:
 
     def values(self, y: np.ndarray) -> dict[str, np.ndarray]:
         """Values of scalars in cells, by name."""
-        depth = np.maximum(self.depth_of(self.of(y)), THIN) * (self.stretched(y) if self.moves else 1.0)
+        depth = np.maximum(self.depth_of(self.deviations(y)), THIN) * (self.area_ratios(y) if self.moves else 1.0)
         return {name: amounts / depth for name, amounts in zip(self.scalars, self.amounts(y), strict=True)}
 
-    def held(self) -> np.ndarray:
+    def mass_per_depth(self) -> np.ndarray:
         """Mass that contains a scalar, per depth : float64[n] [kg/m]."""
         return np.zeros(self.n)
 
@@ -436,14 +434,14 @@ class BasinRows:
         length = self.mesh.length[faces]
         sizes = [self.mesh.area[cells].sum(), length.sum()]
         if self.deep and self.part.on is not None:
-            from fvsolve.basins.lower_frames import place_in_frame
+            from fvsolve.basins.lower_frames import position_in_frame
 
-            sizes += place_in_frame(draft, self, patch)
+            sizes += position_in_frame(draft, self, patch)
         row["sizes"] = draft.to_plane(np.array(sizes))
         per_area = [length / self.mesh.area[cells_of_faces]] * (2 if self.moves else 1)
         row["normals"] = draft.to_plane(np.array([*self.mesh.normal[faces].T, *per_area]))
         stated = self.part.patches.get(patch)
-        row["open"], row["moves"] = self.opens(patch), patch in self.walls
+        row["open"], row["moves"] = self.is_open(patch), patch in self.walls
         given = stated.scalars if stated is not None else {}
         row["values"] = len(draft.integers)
         draft.integers += [draft.schedules.add(given[name]) if name in given else -1 for name in self.scalars]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins.faces import BLOCK, blocks
-from fvsolve.basins.frames import FRAME, LEVEL, PHI, PLACES, SURFACE
+from fvsolve.basins.basin_frames import CELL_POSITIONS, FRAME_SIZE, POTENTIALS, REST_LEVEL, REST_SURFACE
+from fvsolve.basins.cell_sides import BLOCK, blocks
 from fvsolve.case.basins_on_bodies import carriers, free_joints
 from fvsolve.case.patches_on_bodies import level_over
 
@@ -22,19 +22,19 @@ def lower_frame(draft, basin, row) -> None:
     if basin.is_grid:
         lines = [line - at for line, at in zip((grid.x, grid.y), middle, strict=True)]
         places = [0.5 * (line[1:] + line[:-1]) for line in lines]
-    numbers = np.zeros(FRAME)
+    numbers = np.zeros(FRAME_SIZE)
     numbers[:3] = np.array(part.place) + part.turn[:, :2] @ middle
     numbers[3:12] = part.turn.ravel()
     if basin.deep:
-        numbers[LEVEL] = part.level
-        numbers[SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
+        numbers[REST_LEVEL] = part.level
+        numbers[REST_SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
     else:
-        sides = lines if basin.is_grid else places_of_sides(basin) - middle[:, None]
+        sides = lines if basin.is_grid else side_positions(basin) - middle[:, None]
         face_count = sides[0].size * grid.ny + grid.nx * sides[1].size if basin.is_grid else sides[0].size
-        numbers[PHI], places = draft.to_work(basin.n + face_count), [*places, *sides]
-    numbers[PLACES] = draft.to_plane(np.concatenate(places))
+        numbers[POTENTIALS], places = draft.to_work(basin.n + face_count), [*places, *sides]
+    numbers[CELL_POSITIONS] = draft.to_plane(np.concatenate(places))
     row["body"], row["frame"] = draft.body_names.index(part.on), draft.to_plane(numbers)
-    joint_probes = asked_of_joints(draft.case)
+    joint_probes = joint_load_probes(draft.case)
     row["loads_body"] = any(joint_probes) or any(free_joints(part.on, draft.case.nodes))
     chain = set(carriers(part.on, draft.case.nodes))
     for k, body in joint_probes:
@@ -43,20 +43,20 @@ def lower_frame(draft, basin, row) -> None:
             draft.fault(f"output.probes[{k}]", f"{text}. Expected no probe of a joint load, or a wall at that patch")
 
 
-def asked_of_joints(case) -> list[tuple[int, str]]:
+def joint_load_probes(case) -> list[tuple[int, str]]:
     """(number, body) of the probes of joint loads."""
     probes = enumerate(case.probes)
     return [(k, probe.name) for k, probe in probes if probe.part == "nodes" and probe.quantity.startswith("joint_")]
 
 
-def places_of_sides(basin) -> np.ndarray:
+def side_positions(basin) -> np.ndarray:
     """Middles of sides of cells in the order of `cell_sides`, equal for both cells of a face : float64[2, sides]."""
     count = int(blocks(basin.integers) * basin.integers[0] * BLOCK)
     face = basin.integers[-count:]
     return basin.mesh.middle[np.where(face >= 0, face, ~face)].T
 
 
-def place_in_frame(draft, basin, patch: str) -> list[float]:
+def position_in_frame(draft, basin, patch: str) -> list[float]:
     """Position of a patch in the axes of the kernels, z from the level at rest [m], and g depth at rest [J/kg]."""
     place, part = draft.case.places[f"{basin.name}.{patch}"], basin.part
     own = part.turn.T @ (np.array(place.at) - np.array(part.place))

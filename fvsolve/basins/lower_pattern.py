@@ -7,10 +7,10 @@ from scipy.sparse import coo_array, csr_array, eye_array, kron
 
 from fvsolve.kernels import dtypes as rec
 
-WIDE = 3  # stencil radius of the fifth order
+STENCIL_RADIUS = 3  # stencil radius of the fifth order
 
 
-def inside(basin) -> tuple[np.ndarray, np.ndarray]:
+def interior_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
     """(rates, states on which they depend) of all cells and their neighbours."""
     near, count = neighbours(basin), len(basin.quantities)
     pattern = kron(coo_array(np.ones((count, count), dtype=bool)), near).tocoo()
@@ -18,9 +18,9 @@ def inside(basin) -> tuple[np.ndarray, np.ndarray]:
     return at + pattern.row.astype(np.int64), at + pattern.col.astype(np.int64)
 
 
-def carried(basin) -> tuple[np.ndarray, np.ndarray]:
+def scalar_pattern(basin) -> tuple[np.ndarray, np.ndarray]:
     """(rates, states) of amounts of scalars: each depends on itself, and all on the flow states, if there are any."""
-    near, count = looked_at(basin), len(basin.scalars)
+    near, count = scalar_neighbours(basin), len(basin.scalars)
     own = kron(eye_array(count, dtype=bool), near).tocoo()
     by_flow = kron(coo_array(np.ones((count, len(basin.quantities)), dtype=bool)), near).tocoo()
     rows, first = np.concatenate([own.row, by_flow.row]), int(basin.row["carried"])
@@ -28,7 +28,7 @@ def carried(basin) -> tuple[np.ndarray, np.ndarray]:
     return first + rows.astype(np.int64), columns
 
 
-def looked_at(basin) -> csr_array:
+def scalar_neighbours(basin) -> csr_array:
     """Cells on which the rate of an amount depends : bool[n, n].
 
     Fifth order on grids reads along its faces too, four cells from a side; flux correction (weno5) reads further.
@@ -37,29 +37,29 @@ def looked_at(basin) -> csr_array:
     if basin.is_grid and basin.row["scheme"] in (rec.LINEAR, rec.WENO5):
         near = near @ near if basin.row["scheme"] == rec.WENO5 else near
         box = eye_array(basin.n, dtype=bool)
-        for ring in rings(basin):
+        for ring in neighbour_rings(basin):
             box = box @ ring @ ring @ ring @ ring
         near = near + box
     return csr_array(near, dtype=bool)
 
 
-def amounts(basin, q: int, cells: np.ndarray) -> np.ndarray:
+def amount_states(basin, q: int, cells: np.ndarray) -> np.ndarray:
     """States of the amounts of scalar q in cells."""
     return int(basin.row["carried"]) + q * basin.n + cells
 
 
-def about(near: csr_array, cells: np.ndarray) -> np.ndarray:
+def cells_read(near: csr_array, cells: np.ndarray) -> np.ndarray:
     """Cells on which the rates of some cells depend, themselves included."""
     return np.unique(near[np.unique(cells)].indices)
 
 
-def of_cells(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
+def cell_states(basin, cells: np.ndarray, quantities: int | None = None) -> np.ndarray:
     """States of cells, of the first `quantities` quantities or of all."""
     count = len(basin.quantities) if quantities is None else quantities
     return (int(basin.row["y"]) + np.arange(count)[:, None] * basin.n + cells).ravel()
 
 
-def all_of(basin) -> np.ndarray:
+def all_states(basin) -> np.ndarray:
     """All states of a basin."""
     own = int(basin.row["y"]) + np.arange(len(basin.quantities) * basin.n)
     return np.concatenate([own, int(basin.row["carried"]) + np.arange(len(basin.scalars) * basin.n)])
@@ -72,10 +72,10 @@ def neighbours(basin) -> csr_array:
     """
     pattern, reach = csr_array(eye_array(basin.n, dtype=bool)), basin.reach
     edge = np.unique(basin.mesh.left[basin.mesh.inner :])
-    if reach < WIDE or not basin.far_ends or not basin.row["outer_given"]:
+    if reach < STENCIL_RADIUS or not basin.has_wide_closure or not basin.row["outer_given"]:
         edge = edge[:0]
     at_edge = csr_array(coo_array((np.ones(edge.size, dtype=bool), (edge, edge)), shape=pattern.shape))
-    for ring in rings(basin):
+    for ring in neighbour_rings(basin):
         reached = ring
         for _ in range(reach - 1):
             reached = reached @ ring
@@ -85,7 +85,7 @@ def neighbours(basin) -> csr_array:
     return csr_array(pattern, dtype=bool)
 
 
-def rings(basin) -> list[csr_array]:
+def neighbour_rings(basin) -> list[csr_array]:
     """Each cell and its next neighbours : bool[n, n] each; along x and along y for a grid, else in all directions."""
     mesh, patterns = basin.mesh, []
     left, right = mesh.left[: mesh.inner], mesh.right[: mesh.inner]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins import faces, moving_meshes
+from fvsolve.basins import cell_sides, moving_meshes
 from fvsolve.basins.lower_mesh import lower_ends
-from fvsolve.basins.walls import BESIDE
+from fvsolve.basins.moving_walls import VECTOR_MARGIN
 from fvsolve.case import moving_wall_checks as case
 from fvsolve.kernels import dtypes as rec
 
-SCALE = 1e-2  # a small travel [m]
+TRAVEL_SCALE = 1e-2  # a small travel [m]
 
 
 def lower_walls(draft) -> None:
@@ -21,7 +21,7 @@ def lower_walls(draft) -> None:
         stated, (axis, side) = basin.part.patches[patch], case.outward(basin.mesh, patch)
         row["basin"], row["outward"] = draft.basins.index(basin), side
         row["node"] = draft.node_index[f"{basin.name}.{patch}"]
-        row["y"] = draft.states([f"{basin.name}.{patch}.travel"], SCALE)
+        row["y"] = draft.states([f"{basin.name}.{patch}.travel"], TRAVEL_SCALE)
         row["mass"] = draft.mass_index.get(stated.body, -1) if stated.body is not None else -1
         row["body"] = draft.body_names.index(stated.body) if stated.body in draft.body_names else -1
         if row["body"] >= 0:
@@ -62,7 +62,7 @@ def lower_lines(draft, basin, row) -> None:
         return
     drawn = 1.0 / np.diff((mesh.grid.x, mesh.grid.y)[axis])
     row["stretch"] = draft.to_plane(np.concatenate([np.ones(2 * drawn.size), drawn, np.ones(2 * mesh.grid.nx)]))
-    row["lines"] = draft.to_plane(np.zeros(drawn.size + 1 + BESIDE))
+    row["lines"] = draft.to_plane(np.zeros(drawn.size + 1 + VECTOR_MARGIN))
 
 
 def lower_corners(draft, basin, row, axis: int) -> None:
@@ -70,10 +70,10 @@ def lower_corners(draft, basin, row, axis: int) -> None:
     mesh, (x, y) = basin.mesh, basin.mesh.points.T
     row["corners"], row["stretch"] = x.size, draft.to_plane(np.ones(2 * basin.n))
     row["lines"] = draft.to_plane(np.zeros(x.size))
-    scratch = np.zeros(moving_meshes.ROOM)
+    scratch = np.zeros(moving_meshes.SCRATCH)
     row["places"] = draft.to_plane(np.concatenate([x, y, mesh.points[:, axis], *mesh.centre.T, scratch]))
     moves = sum(case.weights(basin.part, mesh, patch, mesh.points[:, axis]) for patch in basin.walls) > 0.0
     moving_blocks, pairs = lower_ends(mesh, moves)
-    row["sides"] = draft.to_plane(np.zeros(4 * faces.BLOCK * moving_blocks.size))
+    row["sides"] = draft.to_plane(np.zeros(4 * cell_sides.BLOCK * moving_blocks.size))
     row["ends"] = len(draft.integers)
     draft.integers += [moving_blocks.size, *moving_blocks.tolist(), *pairs.tolist()]

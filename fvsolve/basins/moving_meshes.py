@@ -15,21 +15,21 @@ from math import sqrt
 
 import numpy as np
 
-from fvsolve.basins.faces import (
+from fvsolve.basins.cell_sides import (
     BLOCK,
     DISTANCES,
     DX,
     DY,
-    GAP,
     HEAD,
     INDICES,
-    LEAN_X,
-    LEAN_Y,
     MEASURES,
     NX,
     NY,
+    OBLIQUE_X,
+    OBLIQUE_Y,
+    PER_AREA,
+    PER_DISTANCE,
     REACH,
-    SHARE,
     TINY,
     WX,
     WY,
@@ -42,8 +42,8 @@ from fvsolve.kernels.table_handle import open_tables
 START, STOP, BEYOND, ENDS = range(4)
 # Rows of BLOCK in the scratch of a block: sums over sides, 1 / area, centre; of the current side its ends, the centre
 # beyond, 1 where there is a cell, length.
-_XX, _XY, _YY, _SHARE, _CX, _CY, _XA, _YA, _XB, _YB, _OX, _OY, _INSIDE, _LONG = (k * BLOCK for k in range(14))
-ROOM = 14 * BLOCK
+_XX, _XY, _YY, _SHARE, _CX, _CY, _XA, _YA, _XB, _YB, _OX, _OY, _INSIDE, _LENGTH = (k * BLOCK for k in range(14))
+SCRATCH = 14 * BLOCK
 _NX, _NY, _REACH, _DX, _DY, _WX, _WY = (k * BLOCK for k in (NX, NY, REACH, DX, DY, WX, WY))
 
 
@@ -54,12 +54,12 @@ def on_moving_mesh(basin):
 
 
 @njit(forceinline=True)
-def places_of(plane, basin):
+def mesh_positions(plane, basin):
     """(x, y, undeformed coordinate along the axis of motion) of corners, (x, y) of centres of cells, and scratch."""
     at, p, n = basin["places"], basin["corners"], basin["n"]
     x, y, drawn = plane[at : at + p], plane[at + p : at + 2 * p], plane[at + 2 * p : at + 3 * p]
     at += 3 * p
-    return x, y, drawn, plane[at : at + n], plane[at + n : at + 2 * n], plane[at + 2 * n : at + 2 * n + ROOM]
+    return x, y, drawn, plane[at : at + n], plane[at + n : at + 2 * n], plane[at + 2 * n : at + 2 * n + SCRATCH]
 
 
 @njit(forceinline=True)
@@ -71,13 +71,13 @@ def ends_of(integers, basin):
 
 
 @njit
-def see_meshes(t, y, seen, out, handle):
+def update_meshes(t, y, seen, out, handle):
     """Compute corners, centres, sides and patches of meshes at y."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         if on_moving_mesh(tables.basins[b]):
             move_corners(tables, tables.basins[b], y)
-            move_sides(tables, tables.basins[b])
+            update_sides(tables, tables.basins[b])
             for p in range(tables.patches.size):
                 if tables.patches[p]["basin"] == b:
                     size_patch(tables, tables.basins[b], tables.patches[p])
@@ -87,7 +87,7 @@ def see_meshes(t, y, seen, out, handle):
 def move_corners(tables, basin, y):
     """Move corners with the walls."""
     plane, walls = tables.plane, tables.walls
-    x, north, drawn, _, _, _ = places_of(plane, basin)
+    x, north, drawn, _, _, _ = mesh_positions(plane, basin)
     along = north if basin["turn"] == 1 else x
     for i in range(along.size):
         along[i] = drawn[i]
@@ -148,7 +148,7 @@ def put_side(scratch, geo):
             scratch[_OY + i] - cy if inside else mirror_distance * ny,
         )
         weight = 1.0 / (ax * ax + ay * ay) if exists else 0.0
-        scratch[_LONG + i] = length
+        scratch[_LENGTH + i] = length
         geo[_NX + i], geo[_NY + i], geo[_REACH + i] = nx, ny, length * scratch[_SHARE + i]
         geo[_DX + i], geo[_DY + i] = to_x, to_y
         geo[_WX + i], geo[_WY + i] = weight * ax, weight * ay
@@ -163,13 +163,13 @@ def put_distance(scratch, geo, far):
     for i in range(BLOCK):
         nx, ny = geo[_NX + i], geo[_NY + i]
         mirror_distance = 2.0 * (geo[_DX + i] * nx + geo[_DY + i] * ny)
-        inside, exists = scratch[_INSIDE + i] > 0.0, scratch[_LONG + i] > 0.0
+        inside, exists = scratch[_INSIDE + i] > 0.0, scratch[_LENGTH + i] > 0.0
         ax = scratch[_OX + i] - scratch[_CX + i] if inside else mirror_distance * nx
         ay = scratch[_OY + i] - scratch[_CY + i] if inside else mirror_distance * ny
         gap = 1.0 / (ax * nx + ay * ny) if exists else 0.0
-        far[SHARE * BLOCK + i], far[GAP * BLOCK + i] = scratch[_SHARE + i] if exists else 0.0, gap
-        far[LEAN_X * BLOCK + i] = nx - ax * gap if exists else 0.0
-        far[LEAN_Y * BLOCK + i] = ny - ay * gap if exists else 0.0
+        far[PER_AREA * BLOCK + i], far[PER_DISTANCE * BLOCK + i] = scratch[_SHARE + i] if exists else 0.0, gap
+        far[OBLIQUE_X * BLOCK + i] = nx - ax * gap if exists else 0.0
+        far[OBLIQUE_Y * BLOCK + i] = ny - ay * gap if exists else 0.0
 
 
 @njit
@@ -182,7 +182,7 @@ def invert(scratch):
 
 
 @njit
-def weigh_side(scratch, geo):
+def put_weights(scratch, geo):
     """Weights of a side's difference in the gradient."""
     for i in range(BLOCK):
         wx, wy, cross = geo[_WX + i], geo[_WY + i], scratch[_XY + i]
@@ -190,10 +190,10 @@ def weigh_side(scratch, geo):
 
 
 @njit
-def move_sides(tables, basin):
+def update_sides(tables, basin):
     """Compute all measures of `cell_sides`, in blocks where anything moves."""
     floats, integers = tables.plane[basin["mesh"] :], tables.integers[basin["links"] :]
-    x, y, _, cx, cy, scratch = places_of(tables.plane, basin)
+    x, y, _, cx, cy, scratch = mesh_positions(tables.plane, basin)
     area = tables.plane[basin["area"] :]
     moving_blocks, corners, ends = ends_of(tables.integers, basin)
     slots, n, f, b = integers[0], integers[1], integers[2], integers[3]
@@ -220,10 +220,10 @@ def move_sides(tables, basin):
             if basin["carried"] >= 0:
                 put_distance(scratch, geo, distances[slot * DISTANCES * BLOCK :])
             if basin["flows"] >= 0:
-                put_lengths(face[slot * BLOCK :], scratch[_LONG:], lengths)
+                put_lengths(face[slot * BLOCK :], scratch[_LENGTH:], lengths)
         invert(scratch)
         for slot in range(j * slots, (j + 1) * slots):
-            weigh_side(scratch, floats[slot * MEASURES * BLOCK :])
+            put_weights(scratch, floats[slot * MEASURES * BLOCK :])
     for q in range(b):
         side = edges[q] // BLOCK
         geo = floats[(side // 4 * slots + side % 4) * MEASURES * BLOCK + edges[q] % BLOCK :]
@@ -256,7 +256,7 @@ def size_patch(tables, basin, patch):
 
 
 @njit
-def drive_sides(t, y, dydt, out, handle):
+def set_side_speeds(t, y, dydt, out, handle):
     """Compute the speeds of all sides along their normals; the speeds limit the step."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
@@ -286,7 +286,7 @@ def put_speeds(tables, basin):
 
 
 @njit(forceinline=True)
-def moves_of(tables, basin):
+def mesh_motion(tables, basin):
     """Speeds of sides, array for pressures and energy losses on boundary faces, and stretching `wide` of cells."""
     sides, thrust, rows = basin["sides"], basin["thrust"], basin["stretch"]
     count = 4 * BLOCK * blocks(tables.integers[basin["links"] :])

@@ -12,21 +12,21 @@ from fvsolve.kernels.limiters import by_limiter, limited, slope
 
 
 @njit
-def value(limiter, forward, b, c, d, e):
+def limited_value(limiter, forward, b, c, d, e):
     """Value at the face between cells c and d, from c if the flow is forward; b and e are the cells next to them."""
     half = 0.5 * slope(limiter, c - b if forward else e - d, d - c)
     return c + half if forward else d - half
 
 
 @inline
-def along_limited(limiter, factor, flow, b, c, d, e, q):
+def put_face_values_limited(limiter, factor, flow, b, c, d, e, q):
     """Values q at faces between c and d with a limiter."""
     for i in range(q.size):
-        q[i] = value(limiter, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
+        q[i] = limited_value(limiter, factor * flow[i] > 0.0, b[i], c[i], d[i], e[i])
 
 
 @njit
-def settled(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
+def cell_rate(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
     """Rate of a cell from flows and values at its four faces."""
     x = fw * (qw - own) - fe * (qe - own)
     y = fs * (qs - own) - fn * (qn - own)
@@ -34,18 +34,18 @@ def settled(scale, own, fw, fe, fs, fn, qw, qe, qs, qn):
 
 
 @inline
-def along(scheme, limiter, factor, flow, b, c, d, e, q):
+def put_face_values(scheme, limiter, factor, flow, b, c, d, e, q):
     """Values q at faces between c and d, from the upwind side of factor times flow."""
     if scheme == UPWIND:
         for i in range(q.size):
             low, high = c[i], d[i]  # read both first, so that the choice compiles without a branch
             q[i] = low if factor * flow[i] > 0.0 else high
     else:
-        by_limiter(along_limited, limiter, factor, flow, b, c, d, e, q)
+        by_limiter(put_face_values_limited, limiter, factor, flow, b, c, d, e, q)
 
 
 @njit
-def one_value(scheme, limiter, forward, b, c, d, e):
+def single_face_value(scheme, limiter, forward, b, c, d, e):
     """Value at a single face."""
     if scheme == UPWIND:
         return c if forward else d
@@ -60,30 +60,30 @@ def row_values(scheme, limiter, nx, factor, flow, c, west, east, q):
     The loop continues into the next row, where there is one, so that it fills whole vectors.
     """
     if nx > 3:
-        along(scheme, limiter, factor, flow[2:], c, c[1:], c[2:], c[3:], q[2 : min(c.size, nx + 3) - 1])
+        put_face_values(scheme, limiter, factor, flow[2:], c, c[1:], c[2:], c[3:], q[2 : min(c.size, nx + 3) - 1])
     before = west if factor * flow[0] > 0.0 else c[0]
     after = east if factor * flow[nx] < 0.0 else c[nx - 1]
     q[0], q[nx] = before, after
     if nx > 1:
         e = c[2] if nx > 2 else 2.0 * after - c[1]
-        q[1] = one_value(scheme, limiter, factor * flow[1] > 0.0, 2.0 * before - c[0], c[0], c[1], e)
+        q[1] = single_face_value(scheme, limiter, factor * flow[1] > 0.0, 2.0 * before - c[0], c[0], c[1], e)
     if nx > 2:
         e = 2.0 * after - c[nx - 1]
-        q[nx - 1] = one_value(scheme, limiter, factor * flow[nx - 1] > 0.0, c[nx - 3], c[nx - 2], c[nx - 1], e)
+        q[nx - 1] = single_face_value(scheme, limiter, factor * flow[nx - 1] > 0.0, c[nx - 3], c[nx - 2], c[nx - 1], e)
 
 
 @inline
-def across_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
+def north_values_and_rates_limited(limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
     """`north_values_and_rates` with a limiter."""
     fe, qe = fx[1:], qx[1:]
     for i in range(rate.size):
-        q = value(limiter, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
+        q = limited_value(limiter, factor * fn[i] > 0.0, b[i], c[i], d[i], e[i])
         qn[i] = q
-        rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+        rate[i] = cell_rate(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
 
 
 @inline
-def across(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
+def north_values_and_rates(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate):
     """Values qn at the northern faces of a row of cells c, and rates of the row. ky : 1 / height of the row"""
     if scheme == UPWIND:
         fe, qe = fx[1:], qx[1:]
@@ -91,9 +91,9 @@ def across(scheme, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, 
             low, high = c[i], d[i]
             q = low if factor * fn[i] > 0.0 else high
             qn[i] = q
-            rate[i] = settled(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
+            rate[i] = cell_rate(factor * (kx[i] * ky), c[i], fx[i], fe[i], fs[i], fn[i], qx[i], qe[i], qs[i], q)
     else:
-        by_limiter(across_limited, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate)
+        by_limiter(north_values_and_rates_limited, limiter, factor, ky, b, c, d, e, fx, qx, fs, qs, fn, kx, qn, rate)
 
 
 def second_order_work(nx, ny):
@@ -131,4 +131,6 @@ def second_order_rates(
             fx, qx = flow_x[j * (nx + 1) :], rest[(j % 2) * (nx + 2) :]
             qs, qn = rows[(j % 2) * nx :], rows[((j + 1) % 2) * nx :]
             fs, fn = flow_y[a:], flow_y[z:]
-            across(scheme, limiter, factor, ky[j], b, c[a:], d, e, fx, qx, fs, qs, fn, kx, qn, rate[a:z])
+            north_values_and_rates(
+                scheme, limiter, factor, ky[j], b, c[a:], d, e, fx, qx, fs, qs, fn, kx, qn, rate[a:z]
+            )

@@ -27,7 +27,7 @@ from fvsolve.units import show
 
 if TYPE_CHECKING:
     from fvsolve.mesh import Mesh
-    from fvsolve.mesh.points import MeshPoints
+    from fvsolve.mesh.mesh_points import MeshPoints
 
 Faults = Iterator[tuple[tuple, str]]
 
@@ -64,7 +64,7 @@ class BasinFields:
     @cached_property
     def points(self) -> MeshPoints:
         """Locator of points in the mesh."""
-        from fvsolve.mesh.points import MeshPoints
+        from fvsolve.mesh.mesh_points import MeshPoints
 
         return MeshPoints(self.mesh)
 

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from fvsolve.mesh.shapes import cross
 
-NEAR = 1e-6  # of a face's length: distance of a contact
+CONTACT_DISTANCE = 1e-6  # of a face's length: distance of a contact
 BLOCK = 1 << 14  # number of segments per pass; the search ends after a pass with contacts
 
 
@@ -31,7 +31,7 @@ def contacts(a: np.ndarray, b: np.ndarray, thin: np.ndarray) -> tuple[dict[str, 
 
 def _pairs(tree: cKDTree, middle: np.ndarray, length: np.ndarray, block: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers (i, j) of all candidates, i of the block and not shorter; the distance of middles is below its length."""
-    near = tree.query_ball_point(middle[block], (1.0 + NEAR) * length[block], return_sorted=False)
+    near = tree.query_ball_point(middle[block], (1.0 + CONTACT_DISTANCE) * length[block], return_sorted=False)
     i = np.repeat(block, np.fromiter(map(len, near), np.int64, len(near)))
     j = np.concatenate(near).astype(np.int64)
     valid = (length[j] < length[i]) | ((length[j] == length[i]) & (i < j))
@@ -39,14 +39,14 @@ def _pairs(tree: cKDTree, middle: np.ndarray, length: np.ndarray, block: np.ndar
 
 
 def _touching(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> dict[str, np.ndarray]:
-    near = NEAR * np.hypot(*(b[i] - a[i]).T)
-    same = (_apart(a[i], b[j]) <= near) & (_apart(b[i], a[j]) <= near)
-    same |= (_apart(a[i], a[j]) <= near) & (_apart(b[i], b[j]) <= near)
+    near = CONTACT_DISTANCE * np.hypot(*(b[i] - a[i]).T)
+    same = (_distance(a[i], b[j]) <= near) & (_distance(b[i], a[j]) <= near)
+    same |= (_distance(a[i], a[j]) <= near) & (_distance(b[i], b[j]) <= near)
     within_i, within_j = (
         _within(a, b, i, a[j]) | _within(a, b, i, b[j]),
         _within(a, b, j, a[i]) | _within(a, b, j, b[i]),
     )
-    through = _astride(a, b, i, j) & _astride(a, b, j, i)
+    through = _on_both_sides(a, b, i, j) & _on_both_sides(a, b, j, i)
     return {
         "same": np.stack([i[same], j[same]], axis=1),
         "middle": np.concatenate(
@@ -56,7 +56,7 @@ def _touching(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> dic
     }
 
 
-def _apart(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+def _distance(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     return np.hypot(*(p - q).T)
 
 
@@ -65,12 +65,16 @@ def _within(a: np.ndarray, b: np.ndarray, i: np.ndarray, p: np.ndarray) -> np.nd
     along, to = b[i] - a[i], p - a[i]
     square = np.sum(along * along, axis=1)
     share = np.sum(along * to, axis=1) / square
-    return (NEAR < share) & (share < 1.0 - NEAR) & (np.abs(cross(along, to)) <= NEAR * square)
+    return (
+        (CONTACT_DISTANCE < share)
+        & (share < 1.0 - CONTACT_DISTANCE)
+        & (np.abs(cross(along, to)) <= CONTACT_DISTANCE * square)
+    )
 
 
-def _astride(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+def _on_both_sides(a: np.ndarray, b: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
     """True if the ends of segment j lie on different sides of the line through i."""
     along = b[i] - a[i]
-    least = NEAR * np.sum(along * along, axis=1)
+    least = CONTACT_DISTANCE * np.sum(along * along, axis=1)
     start, stop = cross(along, a[j] - a[i]), cross(along, b[j] - a[i])
     return ((start > least) & (stop < -least)) | ((start < -least) & (stop > least))

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
 
-ALONE, CROWDED = -1, -2  # no mate: a boundary edge; more than one neighbour, or a neighbour on the same side
+NO_NEIGHBOUR, CROWDED = -1, -2  # no mate: a boundary edge; more than one neighbour, or a neighbour on the same side
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class Edges:
     @cached_property
     def outer(self) -> np.ndarray:
         """Edges on the boundary."""
-        return np.flatnonzero(self.mate == ALONE)
+        return np.flatnonzero(self.mate == NO_NEIGHBOUR)
 
     def pieces(self, cells: int) -> np.ndarray:
         """Number of the connected piece of each cell : int64[cells]; cells are connected by faces only."""
@@ -68,7 +68,7 @@ def _mates(key: np.ndarray, start: np.ndarray) -> np.ndarray:
     runs = np.flatnonzero(np.diff(key[order], prepend=-1))
     count = np.diff(runs, append=key.size)
     mate = np.full(key.size, CROWDED)
-    mate[order[runs[count == 1]]] = ALONE
+    mate[order[runs[count == 1]]] = NO_NEIGHBOUR
     pairs = runs[count == 2]
     first, second = order[pairs], order[pairs + 1]
     opposite = start[first] != start[second]

@@ -13,7 +13,7 @@ from fvsolve.mesh.mesh import WALL, Grid, Mesh
 from fvsolve.mesh.shapes import assemble
 
 SIDES = {"west": 1, "east": 1, "south": 0, "north": 0}  # axis along each side
-NEAR = 1e-6  # of the size: greatest distance of a number from its grid line
+LINE_TOLERANCE = 1e-6  # of the size: greatest distance of a number from its grid line
 
 Side = str | tuple[str, float, float]
 
@@ -39,7 +39,8 @@ def rectangle(
     lines = [_graded(*axis) for axis in zip(origin, size, cells, grading, strict=True)]
     if any(np.diff(axis).min() <= 0.0 for axis in lines):
         raise MeshError(
-            [Fault("grading", f"{_shown(grading)}: the smallest cells vanish; expected weaker grading")], "rectangle"
+            [Fault("grading", f"{_list_text(grading)}: the smallest cells vanish; expected weaker grading")],
+            "rectangle",
         )
     solid = np.ones((cells[1], cells[0]), bool)
     for k, hole in enumerate(holes):
@@ -76,17 +77,17 @@ def _bad_numbers(size: Sequence, cells: Sequence, origin: Sequence, grading: Seq
         ("grading", grading, is_positive, "two positive ratios of last to first spacing, along x and y"),
     ]
     faults = [
-        Fault(key, f"{_shown(given)}; expected {expected}")
+        Fault(key, f"{_list_text(given)}; expected {expected}")
         for key, given, is_valid, expected in checks
         if not (is_pair(given) and all(is_valid(value) for value in given))
     ]
     if not faults and any(n == 1 and g != 1.0 for n, g in zip(cells, grading, strict=True)):
-        text = f"{_shown(grading)} with cells {_shown(cells)}; expected 1 along an axis with one cell"
+        text = f"{_list_text(grading)} with cells {_list_text(cells)}; expected 1 along an axis with one cell"
         faults.append(Fault("grading", text))
     return faults
 
 
-def _shown(given: Sequence) -> str:
+def _list_text(given: Sequence) -> str:
     return "[" + ", ".join(f"{value:.9g}" if isinstance(value, float) else str(value) for value in given) + "]"
 
 
@@ -104,7 +105,7 @@ def _graded(start: float, size: float, cells: int, grading: float) -> np.ndarray
 def _line(lines: np.ndarray, value: float) -> int | None:
     """Number of the grid line at a value, None if there is none near."""
     k = int(np.argmin(np.abs(lines - value)))
-    return k if abs(lines[k] - value) <= NEAR * (lines[-1] - lines[0]) else None
+    return k if abs(lines[k] - value) <= LINE_TOLERANCE * (lines[-1] - lines[0]) else None
 
 
 def _nearest(lines: np.ndarray, value: float) -> str:
@@ -118,7 +119,7 @@ def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Seque
     """Remove a hole from `solid`; returns its faults."""
     names = ("x0", "y0", "x1", "y1")
     if len(hole) != 4 or not all(math.isfinite(v) for v in hole) or not (hole[0] < hole[2] and hole[1] < hole[3]):
-        return [Fault(place, f"{_shown(hole)}; expected [x0, y0, x1, y1] [m] with x0 below x1 and y0 below y1")]
+        return [Fault(place, f"{_list_text(hole)}; expected [x0, y0, x1, y1] [m] with x0 below x1 and y0 below y1")]
     indices = [_line(lines[k % 2], value) for k, value in enumerate(hole)]
     faults = [
         Fault(place, f"{name} = {value:.9g} m is on no grid line; nearest {name[0]}: {_nearest(lines[k % 2], value)} m")
@@ -127,7 +128,7 @@ def _cut(solid: np.ndarray, lines: Sequence[np.ndarray], place: str, hole: Seque
     ]
     if not faults and (indices[0] == indices[2] or indices[1] == indices[3]):
         return [
-            Fault(place, f"{_shown(hole)} contains no cells; expected x0 and x1, y0 and y1 on different grid lines")
+            Fault(place, f"{_list_text(hole)} contains no cells; expected x0 and x1, y0 and y1 on different grid lines")
         ]
     if not faults:
         solid[indices[1] : indices[3], indices[0] : indices[2]] = False
@@ -160,7 +161,7 @@ def _patches(
     a, b = points[edges.start[edges.outer]], points[edges.stop[edges.outer]]
     for name, side in given.items():
         where, *span = (side,) if isinstance(side, str) else side
-        limits = _span(f"patches.{name}", where, span, lines, solid)
+        limits = _patch_range(f"patches.{name}", where, span, lines, solid)
         if isinstance(limits, Fault):
             faults.append(limits)
             continue
@@ -177,7 +178,7 @@ def _patches(
     return names, np.minimum(patch, len(names) - 1)
 
 
-def _span(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple | Fault:
+def _patch_range(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid: np.ndarray) -> tuple | Fault:
     """(from, to) on grid lines [m], or the fault of the span."""
     if side not in SIDES:
         return Fault(place, f'unknown side "{side}"; expected {", ".join(SIDES)}{did_you_mean(str(side), SIDES)}')
@@ -188,7 +189,7 @@ def _span(place: str, side: str, span: list, lines: Sequence[np.ndarray], solid:
     if not span:
         return along[0], along[-1]
     if len(span) != 2 or not all(math.isfinite(value) for value in span) or not span[0] < span[1]:
-        return Fault(place, f"{_shown(span)}; expected from below to, coordinates along the {side} side [m]")
+        return Fault(place, f"{_list_text(span)}; expected from below to, coordinates along the {side} side [m]")
     first, last = (_line(along, value) for value in span)
     text = f"{span[0]:.9g} to {span[1]:.9g} m"
     if first is None or last is None or first == last:

@@ -42,7 +42,7 @@ def available_energy(model: Model) -> dict[str, float]:
         if row["y"] >= 0:
             energies[name] = 0.5 * row["velocity"] ** 2 / row["lightness"]
     for basin in model.basins:
-        energies[basin.name] = basin.above(basin.of(model.start), datum)
+        energies[basin.name] = basin.above(basin.deviations(model.start), datum)
     for (name, *_), row in zip(rows_in(model.case, "brace"), tables.braces, strict=True):
         if row["stiffness"] > 0.0:
             energies[name] = 0.5 * row["force"] ** 2 / row["stiffness"]

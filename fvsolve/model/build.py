@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fvsolve.basins.lower import at_start, lower_basins
+from fvsolve.basins.lower import basin_start, lower_basins
 from fvsolve.case.case import Case
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import dtypes as rec
@@ -266,12 +266,12 @@ def scratch_size(draft: ModelDraft) -> int:
 
 def model_of(draft: ModelDraft) -> Model:
     """Model of a draft. Its start deviates from the profile in basins only, and by amounts of scalars."""
-    case, start = draft.case, at_start(draft.basins, draft.size)
+    case, start = draft.case, basin_start(draft.basins, draft.size)
     start_amounts(draft, start)
     inside = sorted(
         (t, jump) for t, jump in draft.schedules.breaks.items() if case.numerics.start <= t <= case.numerics.end
     )
-    basin_notices = [notice for basin in draft.basins for notice in basin.notices(basin.of(start))]
+    basin_notices = [notice for basin in draft.basins for notice in basin.notices(basin.deviations(start))]
     draft.warnings += [*basin_notices, *coarse_for_cavities(draft), *flow_notices(draft), *too_few_cells(draft)]
     return Model(
         case, draft.tables, draft.shapes, draft.state_names, np.array(draft.scale), inside, draft.schedules.spacing,

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins.lower import at_start
+from fvsolve.basins.lower import basin_start
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model.mass_tables import pushed_masses
 from fvsolve.model.static_forces import GAPS, HOLD, LINES, MOTION, StaticForces
@@ -52,9 +52,9 @@ class Configuration(StaticForces):
         for row in self.draft.piston_table:
             self.out[[first + row["a"], first + row["b"]]] = 0.0
         if (self.draft.basin_table["frame"] >= 0).any():
-            level = at_start(self.draft.basins, self.draft.size, self.attitudes())
+            level = basin_start(self.draft.basins, self.draft.size, self.attitudes())
             for basin in self.draft.basins:
-                basin.own(self.y)[:] = basin.own(level)
+                basin.states_of(self.y)[:] = basin.states_of(level)
 
     def force(self, y: np.ndarray) -> np.ndarray:
         """Forces of freedoms, then of masses."""

@@ -171,7 +171,7 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
             first = row["strain"] + k * row["cells"]
             weights[first : first + row["cells"]] = 0.5 * row["dx"] / (rho * row["area"]) * gain / rate
     for basin in model.basins:
-        basin.own(weights)[:] = basin.weights(basin.of(y))
+        basin.states_of(weights)[:] = basin.weights(basin.deviations(y))
         for q, amount in enumerate(basin.amounts(weights) if basin.scalars else ()):
             amount[:] = SCALAR_WEIGHT * 0.5 * basin.mesh.area / greatest_value(model, q) ** 2
     for row in tables.nodes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
-from fvsolve.basins.lower_pattern import all_of
+from fvsolve.basins.lower_pattern import all_states
 from fvsolve.model.scalar_couplings import scalar_pairs
 from fvsolve.model.state_couplings import Couplings
 
@@ -25,6 +25,6 @@ def lumped_states(model) -> np.ndarray:
     if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
         return np.zeros(0, dtype=np.int64)
     pipes = model.tables.pipes[model.tables.pipes["delay"] < 0]
-    cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes] + [all_of(basin) for basin in model.basins]
+    cells = [pipe["y"] + np.arange(2 * pipe["cells"]) for pipe in pipes] + [all_states(basin) for basin in model.basins]
     walls = [[at for at, _, _ in basin.stretches] for basin in model.basins]  # every cell's volume follows these
     return np.setdiff1d(np.arange(model.y_size), np.concatenate([[], *cells, *walls]))

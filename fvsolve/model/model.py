@@ -234,14 +234,14 @@ class Model(Displayable):
     @cached_property
     def functions(self):
         """Compiled functions (`kernels.compiled_functions.Functions`) for the density law and parts of this model."""
-        from fvsolve.basins.lower_pieces import of_basins, of_scalars
+        from fvsolve.basins.basin_terms import terms_of_basins, terms_of_scalars
         from fvsolve.kernels.compiled_functions import functions
         from fvsolve.kernels.rhs_assembly import ModelFeatures
 
         has = rec.Tables(*(len(table) > 0 for table in self.tables))
         mechanics = [has.clusters, has.columns, has.masses, has.bodies, has.lines, has.pins, has.bushings]
         mechanics.append(has.rides)
-        basins, carried, valves = of_basins(self.basins, has.valves), of_scalars(self.basins), has.valves
+        basins, carried, valves = terms_of_basins(self.basins, has.valves), terms_of_scalars(self.basins), has.valves
         alone = bool(self.basins) and not (self.pipes or valves or has.devices or any(mechanics))
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())
         cells = bool((self.tables.pipes["cells"] > 0).any())
@@ -414,7 +414,7 @@ class Model(Displayable):
         nodes = self.tables.nodes
         at = int(self.layout["pressure"])
         for basin in self.basins:
-            fields[basin.name] = basin.fields(basin.of(y)) | (basin.values(y) if basin.scalars else {})
+            fields[basin.name] = basin.fields(basin.deviations(y)) | (basin.values(y) if basin.scalars else {})
         fields["points"] = {basin.name: basin.points_at(y, out, self.layout) for basin in self.basins
                            if basin.moves or basin.part.on is not None}  # fmt: skip
         fields["nodes"] = {}
@@ -442,7 +442,7 @@ class Model(Displayable):
                 change += float(y[row["y"]])
         for basin in self.basins:
             rest, per = basin.mass()
-            for own, start in zip(basin.own(y)[:1], basin.own(self.start)[:1], strict=True):
+            for own, start in zip(basin.states_of(y)[:1], basin.states_of(self.start)[:1], strict=True):
                 initial += rest + float(np.sum(per * start))
                 change += float(np.sum(per * (own - start)))
         for row in self.tables.pistons:  # mass of chambers on an axis: state plus swept mass

@@ -114,7 +114,7 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
     """Notice if explicit steps are many because a part is much faster than waves."""
     numerics, start = model.case.numerics, model.case.numerics.start
     explicit = numerics.method != AUTO and method_named(numerics.method).explicit
-    waves = max([*model.wave_rates, *(basin.pace(model.start)[0] for basin in model.basins)], default=0.0)
+    waves = max([*model.wave_rates, *(basin.max_rate(model.start)[0] for basin in model.basins)], default=0.0)
     if not explicit or numerics.step is not None or not waves > 0.0:
         return []
     rate = float(model.evaluate(start, model.start, start)[1][rec.RATE])

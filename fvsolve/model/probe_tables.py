@@ -58,7 +58,7 @@ def lower_basin_point(draft, row, probe) -> None:
         return lower_surface(draft, row, probe)
     k = list(draft.case.meshes).index(probe.name)
     basin = draft.basins[k]
-    cells, weights = basin.points.reading(*probe.point)
+    cells, weights = basin.points.cell_weights(*probe.point)
     row["index"], row["count"], row["cell"] = k, cells.size, len(draft.integers)
     row["weights"] = len(draft.floats)
     draft.integers += cells.tolist()

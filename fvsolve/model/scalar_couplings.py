@@ -48,7 +48,7 @@ class ScalarCouplings:
         """Amounts in the cells behind a patch."""
         row = self.of.patches[i]
         cells = self.of.integers[row["first"] : row["first"] + row["count"]]
-        return pattern.amounts(self.of.basins[row["basin"]], self.q, cells)
+        return pattern.amount_states(self.of.basins[row["basin"]], self.q, cells)
 
     def edge(self, pipe, right: int) -> list[np.ndarray]:
         """Amounts and waves of the cells that give the value at an end of a pipe."""
@@ -80,7 +80,7 @@ class ScalarCouplings:
             affected = [self.places[i]] if self.stores[i] else [self.behind(i)] if i in self.of.patches else []
             yield all_pairs(unique_states(*affected, self.ledger + i), unique_states(*read))
         if self.q == 0:
-            yield from map(pattern.carried, self.of.basins)
+            yield from map(pattern.scalar_pattern, self.of.basins)
         for basin in self.of.basins:
             yield from self.boundary_pairs(basin)
         if self.row["losses"] > 0:
@@ -96,8 +96,8 @@ class ScalarCouplings:
         nodes = [i for i, row in self.of.patches.items() if self.of.basins[row["basin"]] is basin]
         if basin.row["through"] >= 0:
             behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
-            cells = pattern.about(pattern.looked_at(basin), np.concatenate(behind))
-            read = unique_states(pattern.amounts(basin, self.q, cells), pattern.of_cells(basin, cells))
+            cells = pattern.cells_read(pattern.scalar_neighbours(basin), np.concatenate(behind))
+            read = unique_states(pattern.amount_states(basin, self.q, cells), pattern.cell_states(basin, cells))
             yield all_pairs(self.ledger + np.array(nodes), read)
 
     def decay_pairs(self) -> Iterator[Pairs]:
@@ -113,7 +113,7 @@ class ScalarCouplings:
             yield all_pairs(np.atleast_1d(pick(self.places[i] - self.row["y"])), read)
         for basin in self.of.basins:
             cells = np.arange(basin.n)
-            for first in (pattern.amounts(basin, self.q, 0), *([basin.row["y"]] if basin.quantities else [])):
+            for first in (pattern.amount_states(basin, self.q, 0), *([basin.row["y"]] if basin.quantities else [])):
                 yield pick(basin.row["lost"] + cells), first + cells
 
     def inside(self, pipe) -> Iterator[Pairs]:

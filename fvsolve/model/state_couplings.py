@@ -67,7 +67,7 @@ class Couplings:
             yield from self.friction_memory_pairs(pipe)
             yield from self.creep_pairs(pipe)
         for basin in self.basins:
-            yield pattern.inside(basin)
+            yield pattern.interior_pattern(basin)
         yield from self.boundary_pairs()
         yield from self.stored()
         yield from self.column_pairs()
@@ -81,8 +81,8 @@ class Couplings:
         for i, row in self.patches.items():
             basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
             if row["open"]:
-                cells = pattern.about(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
-                yield all_pairs(unique_states(self.size + i), pattern.of_cells(basin, cells))
+                cells = pattern.cells_read(pattern.neighbours(basin), self.integers[behind : behind + row["faces"]])
+                yield all_pairs(unique_states(self.size + i), pattern.cell_states(basin, cells))
 
     # nodes ------------------------------------------------------------------------------------------------------
 
@@ -105,7 +105,7 @@ class Couplings:
             return unique_states()
         row = self.patches[i]
         cells = self.integers[row["first"] : row["first"] + row["count"]]
-        return pattern.of_cells(self.basins[row["basin"]], cells, quantities)
+        return pattern.cell_states(self.basins[row["basin"]], cells, quantities)
 
     def pressure_states(self, i: int) -> np.ndarray:
         """States that set the pressure of a node that stores: its mass, its cells, its piston's position."""
@@ -253,11 +253,11 @@ class Couplings:
             speed = unique_states(mass + 1) if mass >= 0 else unique_states()
             if wall["body"] >= 0:
                 speed = self.joint_states(self.bodies[wall["body"]], 1)
-            yield all_pairs(pattern.all_of(basin), unique_states(wall["y"], speed))
+            yield all_pairs(pattern.all_states(basin), unique_states(wall["y"], speed))
             yield all_pairs(unique_states(wall["y"]), speed)
             behind = self.integers[wall["faces"] + wall["count"] :][: wall["count"]]
-            cells = pattern.about(pattern.neighbours(basin), behind)
-            yield all_pairs(speed, unique_states(wall["y"], pattern.of_cells(basin, cells)))
+            cells = pattern.cells_read(pattern.neighbours(basin), behind)
+            yield all_pairs(speed, unique_states(wall["y"], pattern.cell_states(basin, cells)))
 
     def moving_fluid_pairs(self) -> Iterator[Pairs]:
         """Fluid on bodies, and the bodies it moves: all states on each other and on chambers that push the bodies."""
@@ -265,7 +265,7 @@ class Couplings:
         for basin in self.basins:
             if basin.row["body"] >= 0:
                 trees.setdefault(self.tree_root(self.bodies[basin.row["body"]]["root"]), []).append(
-                    pattern.all_of(basin)
+                    pattern.all_states(basin)
                 )
         for index, cells in self.moving_fluid_states() if len(self.rides) else ():
             trees.setdefault(self.tree_root(self.bodies[self.rides[index]["body"]]["root"]), []).append(cells)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins.lower import at_start
+from fvsolve.basins.lower import basin_start
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.table_handle import make_handle
 from fvsolve.model.run_data import zeros_for_run
@@ -16,8 +16,8 @@ WEIGH, ACCELERATE = f"{FOLDER}.matrix: weigh", f"{FOLDER}.matrix: accelerate"
 BUSHINGS = f"{FOLDER}.bushings: push_bushings"
 PINNED, GAPS, HOLD = (f"{FOLDER}.pins: {one}" for one in ("accelerate_pinned", "gaps", "hold"))
 # loads on bodies of fluid at rest, in addition to pushes
-FLUID_LOADS = ("basins.frames: set_frames", "basins.frames_flow: turn_fluid")
-WALL_LOADS = ("basins.walls: press_at_rest",)
+FLUID_LOADS = ("basins.basin_frames: set_frames", "basins.frame_forces: add_frame_forces")
+WALL_LOADS = ("basins.moving_walls: push_bodies_at_rest",)
 DRIVES = f"{FOLDER}.rides: set_rides"
 LOADS = f"{FOLDER}.freight: load_networks"
 NETWORKS = (DRIVES, *(f"{FOLDER}.rides: {one}" for one in ("press_tanks", "push_cells", "push_columns")), LOADS)
@@ -69,7 +69,7 @@ class StaticForces:
             self.pushes += NETWORKS
         if moving_basins:
             self.y, self.tables = (
-                at_start(draft.basins, draft.size),
+                basin_start(draft.basins, draft.size),
                 draft.tables._replace(plane=draft.tables.plane.copy()),
             )
         self.run(MOTION)

@@ -55,7 +55,7 @@ class LineReading:
         start, end = np.array(line.from_), np.array(line.to)
         points = start + share[:, None] * (end - start)
         self.places = np.column_stack([share * np.hypot(*(end - start)), points])
-        read = [basin.points.reading(*p) if basin.points.cell(*p) >= 0 else (np.zeros(0, int), np.zeros(0))
+        read = [basin.points.cell_weights(*p) if basin.points.cell(*p) >= 0 else (np.zeros(0, int), np.zeros(0))
                 for p in points]  # fmt: skip
         self.cells, self.weights = (np.concatenate([sample[k] for sample in read]) for k in (0, 1))
         self.row = np.repeat(np.arange(line.points), [sample[0].size for sample in read])

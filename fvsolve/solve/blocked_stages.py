@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.basins.bands import REACH
+from fvsolve.basins.row_bands import BAND_MARGIN
 from fvsolve.kernels import stage_sums
 from fvsolve.solve.partition import Partition, common_cells, quantities
 
@@ -16,7 +16,9 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
     """Table `sums` of band k, see `kernels.sums`; empty if no stages are formed in blocks : int64[...]."""
     model = cut.model
     blocked_basins = [
-        b for b in cut.basins if model.basins[b].sums_rows and quantities(model, b) * model.basins[b].n >= LEAST_STATES
+        b
+        for b in cut.basins
+        if model.basins[b].forms_stages and quantities(model, b) * model.basins[b].n >= LEAST_STATES
     ]
     if not blocked_basins:
         return np.zeros(0, dtype=np.int64)
@@ -27,8 +29,8 @@ def blocked_sums(cut: Partition, k: int) -> np.ndarray:
             if b not in blocked_basins:
                 others.append(rows_at(model, b, q, first, stop))
                 continue
-            edges.append(rows_at(model, b, q, first, min(first + REACH, stop)))
-            edges.append(rows_at(model, b, q, max(stop - REACH, first), stop))
+            edges.append(rows_at(model, b, q, first, min(first + BAND_MARGIN, stop)))
+            edges.append(rows_at(model, b, q, max(stop - BAND_MARGIN, first), stop))
             common_cells += cells_at(model, b, q, first, stop)
     head = np.zeros(stage_sums.HEAD + len(model.basins), dtype=np.int64)
     head[[stage_sums.OTHERS, stage_sums.CHECKED, stage_sums.EDGES]] = len(others), len(common_cells), len(edges)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fvsolve.basins.bands import REACH
+from fvsolve.basins.row_bands import BAND_MARGIN
 from fvsolve.errors import FvsolveError, Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.model import Model
@@ -75,7 +75,7 @@ class Partition:
         for rows, b in zip(self.firsts, self.basins, strict=True):
             basin = self.model.tables.basins[b]
             nx, ny = int(basin["nx"]), int(basin["ny"])
-            near = np.arange(max(rows[k] - REACH, 0), min(rows[k + 1] + REACH, ny))
+            near = np.arange(max(rows[k] - BAND_MARGIN, 0), min(rows[k + 1] + BAND_MARGIN, ny))
             cells = [(nx * near[:, None] + np.arange(nx)).ravel(), *common_cells(self.model, b)]
             for q in range(quantities(self.model, b)):
                 parts.append(runs(np.concatenate(cells), nx, rows, k, int(basin["y"] + q * basin["n"])))
@@ -133,7 +133,7 @@ def merged_runs(places: np.ndarray, owner: np.ndarray, k: int, at: int) -> np.nd
 
 def make_partition(model: Model, count: int) -> Partition:
     """Partition of the divisible basins of a model into `count` bands of about equal numbers of rows."""
-    basins = tuple(b for b, basin in enumerate(model.basins) if not basin.whole)
+    basins = tuple(b for b, basin in enumerate(model.basins) if not basin.undivided_reason)
     rows = model.tables.basins["ny"][[*basins]] if basins else np.zeros(0, dtype=np.int64)
     return Partition(model, count, basins, np.arange(count + 1) * rows[:, None] // count)
 
@@ -145,19 +145,19 @@ def single_thread_reason(model: Model) -> str:
         return f"{method} solves for all states at once; only explicit methods can be distributed over threads"
     if not model.basins:
         return "there is no basin; only rows of basins are distributed over threads"
-    return "" if not all(basin.whole for basin in model.basins) else undivided_basins(model)
+    return "" if not all(basin.undivided_reason for basin in model.basins) else undivided_basins(model)
 
 
 def undivided_basins(model: Model) -> str:
     """Basins that every thread steps completely, with the reasons."""
-    return "; ".join(f"{basin.name}: {basin.whole}" for basin in model.basins if basin.whole)
+    return "; ".join(f"{basin.name}: {basin.undivided_reason}" for basin in model.basins if basin.undivided_reason)
 
 
 def divisible_rows(model: Model) -> dict:
     """Divisible rows of basins, undivided basins with reasons, greatest number of threads; for `check`."""
     reason = single_thread_reason(model)
-    rows = {} if reason else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.whole}
-    undivided = {basin.name: basin.whole for basin in model.basins if basin.whole}
+    rows = {} if reason else {basin.name: int(basin.row["ny"]) for basin in model.basins if not basin.undivided_reason}
+    undivided = {basin.name: basin.undivided_reason for basin in model.basins if basin.undivided_reason}
     return {"rows": rows, "whole": undivided, "most": min(rows.values(), default=1), "why": reason}
 
 

@@ -49,7 +49,7 @@ class RunChecks:
     def check(self, t: float, y: np.ndarray) -> str:
         """Check a state and update the wave rates of basins; returns the reason to stop the run, or ""."""
         for basin in self.moving:
-            self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.pace(y)[0])
+            self.rates[basin.name] = max(self.rates.get(basin.name, 0.0), basin.max_rate(y)[0])
         if stops := self.sloshing.check(t, y):
             return stops
         ratio = np.abs(y) / self.largest

@@ -113,7 +113,7 @@ class Run:
         self.loop.now[:] = state.y
         self.loop.loop_state[loop_indices.T] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
-        self.watches = [watch for basin in model.basins for watch in basin.watches(basin.of(model.start))]
+        self.watches = [watch for basin in model.basins for watch in basin.watches(basin.deviations(model.start))]
         self.checks = RunChecks(self.slate)
         self.loop.stepper.largest = self.checks.largest_if_needed
         if self.checks.needs_frequent_checks:
@@ -142,7 +142,7 @@ class Run:
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
         crowd = self.loop.recent_events
         own += [float(len(switched)), *switched, float(len(crowd)), *crowd, self.loop.last_switch, self.loop.at_once]
-        own += [x for watch in self.watches for x in watch.kept]
+        own += [x for watch in self.watches for x in watch.greatest]
         own += [self.checks.rates.get(watch.name, 0.0) for watch in self.checks.moving]
         views = (view.ravel() for view in self.loop.stepper.restart_arrays())
         own += self.checks.sloshing.restart_data.ravel().tolist()
@@ -167,7 +167,7 @@ class Run:
         self.loop.recent_events.extend(crowd.tolist())
         self.loop.last_switch, self.loop.at_once, memory = float(memory[0]), int(memory[1]), memory[2:]
         for watch in self.watches:
-            watch.kept[:], memory = memory[: watch.kept.size], memory[watch.kept.size :]
+            watch.greatest[:], memory = memory[: watch.greatest.size], memory[watch.greatest.size :]
         for basin in self.checks.moving:
             self.checks.rates[basin.name], memory = float(memory[0]), memory[1:]
         sloshing_data = self.checks.sloshing.restart_data.ravel()
@@ -220,7 +220,7 @@ class Run:
     def check_basins(self, t: float, y: np.ndarray) -> None:
         """Pass a state to the checks of basins."""
         for watch in self.watches:
-            watch.look(t, y)
+            watch.check(t, y)
 
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.check_basins(t, y)

@@ -24,9 +24,9 @@ def forcing_sizes(model) -> np.ndarray:
         own = slice(row["y"], row["y"] + 2 * mesh.cells)
         largest[own] = np.maximum(max(pressure * float(row["admittance"]), flow), model.scale[own])
     for basin in model.basins:
-        states, scales = basin.own(largest), basin.own(model.scale)
+        states, scales = basin.states_of(largest), basin.states_of(model.scale)
         ratio = 1.0 + pressure / (linear.density * model.case.gravity)
-        for own, scale, start in zip(states, scales, basin.own(model.start), strict=True):
+        for own, scale, start in zip(states, scales, basin.states_of(model.start), strict=True):
             own[:] = np.maximum(ratio * scale, np.ptp(start))
     return largest
 

@@ -209,7 +209,7 @@ def basin_checks(model, method: str, rates: dict[str, float]) -> list[CourantChe
     """Checks of all basins whose waves grow; Courant numbers are those of the parts of a cell that its steps use."""
     numerics, checks = model.case.numerics, []
     for basin, row in zip(model.basins, model.tables.basins, strict=True):
-        rate, share = basin.pace(model.start)
+        rate, share = basin.max_rate(model.start)
         parts = float(row["unsplit"]) or 1.0
         rate = max(rate, rates.get(basin.name, 0.0))
         if numerics.step is not None:
@@ -218,13 +218,13 @@ def basin_checks(model, method: str, rates: dict[str, float]) -> list[CourantChe
             courant = numerics.courant
         scheme, limited = smooth_scheme(basin.scheme)
         share = round(share, 2) if basin.is_grid else 1.0
-        if is_stable_with_margin(scheme, method, courant / parts, share, basin.is_grid and basin.waving):
+        if is_stable_with_margin(scheme, method, courant / parts, share, basin.is_grid and basin.has_waves):
             continue
         if basin.is_grid:
-            limit = plane_limit(scheme, method, share, basin.waving)
+            limit = plane_limit(scheme, method, share, basin.has_waves)
         else:
             limit = advection_limit(scheme, method).limit
-        fixed = basin.is_grid and basin.even_paced
+        fixed = basin.is_grid and basin.has_constant_speed
         grows = math.inf if limit > 0.0 else growth(scheme, method, courant / parts, span(model) * rate)
         if grows >= LEAST_GROWTH:
             checks.append(CourantCheck(f"nodes.{basin.name}", courant, limit * parts, scheme, fixed and not limited,

@@ -16,14 +16,14 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.spatial import Delaunay
 
 import fvsolve
-from fvsolve.basins.liquid.observe import observe_liquid
-from fvsolve.basins.observe import observe_dense_flows, observe_flows
+from fvsolve.basins.basin_probes import observe_dense_flows, observe_flows
+from fvsolve.basins.liquid.liquid_probes import observe_liquid
 from fvsolve.draw import frames as of_view
 from fvsolve.draw.scene import DrawnScene
 from fvsolve.draw.sheet import PictureSheet, span
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.mesh import read, rectangle
-from fvsolve.mesh.points import MeshPoints
+from fvsolve.mesh.mesh_points import MeshPoints
 from fvsolve.model import RunData
 from fvsolve.output.fields import parted, shape, write_frame
 from fvsolve.run.plot_scene import lengths_of, unit_of
@@ -73,7 +73,7 @@ def test_points_read_linear_fields_exactly_inside_and_no_value_beyond_those_of_t
             cell = points.cell(x, y)
             if cell < 0:
                 continue
-            cells, weights = points.reading(x, y)
+            cells, weights = points.cell_weights(x, y)
             assert weights.min() > 0.0 and weights.sum() == approx(1.0, abs=1e-14)
             if not np.isin(mesh.cells[cell], outer).any() and hull.find_simplex((x, y)) >= 0:
                 many += 1
@@ -81,7 +81,7 @@ def test_points_read_linear_fields_exactly_inside_and_no_value_beyond_those_of_t
         assert many > 20
         for k, centre in enumerate(mesh.centre):
             assert points.cell(*centre) == k
-            cells, weights = points.reading(*centre)
+            cells, weights = points.cell_weights(*centre)
             assert weights[cells == k] == approx(1.0, abs=1e-12)
 
 

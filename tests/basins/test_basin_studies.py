@@ -13,7 +13,7 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, pipe, ramp, reservoir, scene
 
 import fvsolve
 from fvsolve.basins.free_surface.lower import FreeSurfaceRows
-from fvsolve.basins.free_surface.lower_dispersion import on_grid, on_mesh, waves
+from fvsolve.basins.free_surface.lower_dispersion import on_grid, on_mesh, surface_waves
 from fvsolve.errors import FvsolveError
 from fvsolve.model import RunData
 from fvsolve.model.energy_accounts import Accounts
@@ -318,11 +318,13 @@ def test_wavenumbers_are_those_of_the_waves_that_there_are():
     level = f"1 + 0.01*cos({2.0 * math.pi / 10.0!r}*x)*cos({math.pi / 5.0!r}*y)"
     model = built(alone(pool((32, 16), level), 1.0))
     (basin,), y = model.basins, model.start
-    assert waves(basin, basin.of(y)).k == approx(k, rel=1e-12)
-    surface = basin.of(y)[0]
+    assert surface_waves(basin, basin.deviations(y)).k == approx(k, rel=1e-12)
+    surface = basin.deviations(y)[0]
     assert on_mesh(basin, surface) == approx(on_grid(basin, surface), rel=2.0 * (k * 10.0 / 32.0) ** 2 / 12.0)
     dam = built(alone(pool((64, 4), "where(x < 5, 1, 0.4)"), 1.0))
-    assert waves(dam.basins[0], dam.basins[0].of(dam.start)).k == approx(math.sqrt(12.0) / 10.0, rel=1e-3)
+    assert surface_waves(dam.basins[0], dam.basins[0].deviations(dam.start)).k == approx(
+        math.sqrt(12.0) / 10.0, rel=1e-3
+    )
 
 
 def test_waves_that_come_about_in_a_run_are_warned_of_once(tmp_path):

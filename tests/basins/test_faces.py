@@ -15,8 +15,8 @@ from scipy.optimize import brentq
 from scipy.special import erfc
 
 from fvsolve.basins import advection_faces
-from fvsolve.basins.free_surface import faces as shallow_faces
-from fvsolve.basins.liquid import faces as liquid_faces
+from fvsolve.basins.free_surface import surface_mesh as shallow_faces
+from fvsolve.basins.liquid import liquid_mesh as liquid_faces
 from fvsolve.basins.lower_mesh import lower_mesh
 from fvsolve.kernels.dtypes import LAW_LINEAR, LAW_LOG, MUSCL, UPWIND
 from fvsolve.mesh import Mesh, read, rectangle

@@ -236,7 +236,7 @@ def test_films_that_move_go_as_an_implicit_method_has_them(tmp_path, kind):
     for numerics in ({"method": "ssp-rk2", "courant": 0.5}, {"method": "rodas-5p", "rtol": 1e-6}):
         model = fvsolve.build(fvsolve.load(scene(nodes, {}, 0.8, {"scheme": "muscl", **numerics})))
         state = fvsolve.advance(model, fvsolve.initial_state(model), 0.8)
-        found.append(model.basins[0].of(state.y)[1])
+        found.append(model.basins[0].deviations(state.y)[1])
     size = np.abs(found[1]).max()
     assert size > 1e-4 and np.abs(found[0] - found[1]).max() < 0.02 * size
 

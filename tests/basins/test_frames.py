@@ -32,7 +32,7 @@ def moved(body, basin, until, numerics=None, **nodes):
     numerics = {"scheme": "muscl", "method": "ssp-rk3", "courant": 0.5, **(numerics or {})}
     model = build(load(scene({"body": body, "b": basin, **nodes}, {}, until, numerics)))
     state = advance(model, State(0.0, model.start.copy()), until)
-    return model, state, model.basins[0].of(state.y)
+    return model, state, model.basins[0].deviations(state.y)
 
 
 def steady(rate, span=100.0):
@@ -51,9 +51,9 @@ def test_water_that_turns_with_its_box_rests_as_a_paraboloid_wherever_the_axis_i
     case = {"scheme": "muscl", "method": method, **({"courant": 0.5} if method == "ssp-rk3" else {"step": 0.05})}
     model = build(load(scene({"body": turning(steady(rate), axis), "b": basin}, {}, 1.0, case)))
     state = advance(model, State(0.0, model.start.copy()), 1.0)
-    found = model.basins[0].of(state.y)
+    found = model.basins[0].deviations(state.y)
     assert np.abs(found[1:]).max() < (1e-13 if method == "ssp-rk3" else 1e-10)
-    assert found[0] == pytest.approx(model.basins[0].of(model.start)[0], abs=1e-10)
+    assert found[0] == pytest.approx(model.basins[0].deviations(model.start)[0], abs=1e-10)
 
 
 def test_a_box_that_turns_so_fast_that_its_middle_is_dry_rests_too():
@@ -120,7 +120,7 @@ def test_a_box_that_swings_a_little_has_the_waves_of_the_closed_form(way):
         numerics = {"scheme": "upwind5", "method": "rk4", "step": 0.2 * length / n}
         case = scene({"body": body, "b": tank(cells, size, **more)}, {}, 1.0, numerics)
         model = build(load(case))
-        found = model.basins[0].of(advance(model, State(0.0, model.start.copy()), 1.0).y)
+        found = model.basins[0].deviations(advance(model, State(0.0, model.start.copy()), 1.0).y)
         x = model.basins[0].mesh.centre[:, 0 if along == "x" else 1]
         wanted = 0.3 * forced(x, length, w, push) * math.cos(w)
         errors.append(np.abs(found[1 if along == "x" else 2] - wanted).max() / np.abs(wanted).max())

@@ -88,7 +88,7 @@ def test_a_free_tank_on_rails_keeps_its_momentum():
     basin, at = model.basins[0], model.state_names.index("cart.travel_rate")
 
     def momentum(y):
-        found, area = basin.of(y), basin.mesh.area
+        found, area = basin.deviations(y), basin.mesh.area
         v = 0.3 + y[at]
         return 50.0 * v + RHO * np.sum(area * ((basin.depth + found[0]) * v + found[1]))
 

@@ -13,8 +13,8 @@ from reference.plain import boundary, triangles
 from reference.scenes import NO_FRICTION, junction, ramp, reservoir, scene, stiff_pipe, valve
 
 import fvsolve
-from fvsolve.basins.liquid import waves
-from fvsolve.basins.liquid.lower_waves import Waves
+from fvsolve.basins.liquid import riemann_invariants
+from fvsolve.basins.liquid.lower_invariants import RiemannInvariants
 from fvsolve.errors import CaseError
 from fvsolve.fluid import Fluid, FluidTable
 from fvsolve.kernels import density as law
@@ -40,7 +40,7 @@ def model_of(pool: dict, end: float = 1.0, **more):
 def ended(model, end: float) -> np.ndarray:
     """Density and mass flow density along x at the end : float64[2, n]."""
     pool = model.basins[0]
-    found = pool.of(fvsolve.advance(model, fvsolve.initial_state(model), end).y)
+    found = pool.deviations(fvsolve.advance(model, fvsolve.initial_state(model), end).y)
     return np.array([found[0] + pool.density, found[1]])
 
 
@@ -91,7 +91,7 @@ def test_a_wave_in_a_row_of_cells_is_that_of_a_pipe_under_the_same_law():
     for n in (200, 400):
         pool = basin(size=[100.0, 1.0], cells=[n, 1], start={"pressure": f"4e6*{PULSE}", "u": f"3*{PULSE}"})
         model = model_of(pool, end, limiter="monotonized-central")
-        start = model.basins[0].of(model.start)[:2]
+        start = model.basins[0].deviations(model.start)[:2]
         found = ended(model, end) - [[model.basins[0].density], [0.0]]
         other = pipe_of(n, start, end)
         assert np.abs(found - start).max(axis=1) == approx([16.0, 6400.0], rel=0.5)  # it has gone its way
@@ -112,7 +112,7 @@ def test_pressures_are_those_of_the_fluids_own_table(wave_speed):
     for p, r in zip(pressures, deviations, strict=True):
         held = np.log1p(r / pool.density)  # over that at rest, which is the fluid's reference
         assert law.pressure_of_log(st, floats, compliance, held) == approx(p, rel=1e-9, abs=1.0)
-        found, square = waves.pressure(table, pool.density, r)
+        found, square = riemann_invariants.pressure(table, pool.density, r)
         assert found + REST == approx(p, rel=1e-7, abs=1.0)
         if not wave_speed and TRUTH.low < p < TRUTH.high:
             assert r + pool.density == approx(TRUTH.rho(p), rel=1e-9)
@@ -124,7 +124,7 @@ def of_log(rest: float, rho: float = RHO, c: float = C) -> np.ndarray:
     bulk = rho * c**2
     p = rest + bulk * np.linspace(-0.5, 0.5, 33)
     table = FluidTable(p, np.log(rho) + (p - rest) / bulk, np.full(p.size, 1.0 / bulk), 0.0)
-    return Waves(Fluid("x", "table", 300.0, rest, rho, bulk, None, p[0], table, ""), rest).table()
+    return RiemannInvariants(Fluid("x", "table", 300.0, rest, rho, bulk, None, p[0], table, ""), rest).table()
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
@@ -190,7 +190,7 @@ def test_the_pressure_of_a_patch_is_that_of_the_cells_behind(over):
     stiffness = model.evaluate(0.0, model.start)[1][model.layout["stiffness"] + node["row"]]
     behind = 0.1 * 16 * own.mesh.area[0]  # [m3]
     assert stiffness == approx(TRUTH.c(REST + over) ** 2 / behind, rel=1e-5)
-    assert own.of(model.start)[0] == approx(TRUTH.rho(REST + over) - TRUTH.rho(REST), rel=1e-6, abs=1e-6)
+    assert own.deviations(model.start)[0] == approx(TRUTH.rho(REST + over) - TRUTH.rho(REST), rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize("holes", [None, HOLE], ids=["grid", "faces"])
@@ -208,7 +208,7 @@ def test_probes_and_frames_have_the_isentropes_pressures(holes):
     for place, (p, u) in zip(places, found.reshape(-1, 2), strict=True):
         x, y = map(float, place.split(","))
         k = int(np.argmin(np.hypot(own.x - x, own.y - y)))
-        rho = own.density + own.of(model.start)[0, k]
+        rho = own.density + own.deviations(model.start)[0, k]
         assert [p, u] == approx([TRUTH.p(rho), x], rel=1e-6)
         assert [frame["pressure"][k], frame["velocity"][k, 0]] == approx([p, u], rel=1e-9)
 
@@ -234,9 +234,9 @@ def test_walls_that_give_much_leave_pressure_what_it_is(wave_speed):
     fluid = {"name": "Water", "temperature": 293.15, "law": "table"}
     model = fvsolve.build(fvsolve.load(scene({"b": pool}, {}, 1.0, {"scheme": "muscl"}, fluid=fluid)))
     basin = model.basins[0]
-    rates = basin.own(model.evaluate(0.0, model.start.copy())[0])
+    rates = basin.states_of(model.evaluate(0.0, model.start.copy())[0])
     assert rates[1].reshape(2, 10)[:, 2:-2] == approx(-1000.0, rel=1e-5)
-    assert basin.fields(basin.of(model.start))["pressure"] == approx(3e5 + 1000.0 * (basin.x - 0.5), rel=1e-9)
+    assert basin.fields(basin.deviations(model.start))["pressure"] == approx(3e5 + 1000.0 * (basin.x - 0.5), rel=1e-9)
 
 
 def test_walls_make_no_wave_quicker_than_the_fluids_own():

@@ -84,7 +84,7 @@ def test_what_is_known_of_sides_is_that_of_the_mesh_with_corners_where_they_are(
     with model.run_data() as slate:
         model.functions.rhs(0.0, y, np.zeros(y.size), model.new_out(), slate.handle)
     now = as_it_is(basin.mesh, basin.mesh.points + sum(y[at] * goes for at, _, goes in basin.stretches))
-    assert now.area / basin.mesh.area == pytest.approx(basin.stretched(y), rel=1e-13)
+    assert now.area / basin.mesh.area == pytest.approx(basin.area_ratios(y), rel=1e-13)
     floats, integers = lower_mesh(now)
     assert (integers == basin.integers).all()
     at = int(basin.row["mesh"])
@@ -105,7 +105,7 @@ def test_homologous_expansion_is_exact_to_round_off_under_every_method(tmp_path,
                      {**STEPPED, "method": method, "step": 5e-3})  # fmt: skip
         model, state = moved(case, 0.5)
         basin = model.basins[0]
-        found, grown = basin.of(state.y), 1.0 + 0.5 * rate
+        found, grown = basin.deviations(state.y), 1.0 + 0.5 * rate
         # Rosenbrock methods step by differences for a Jacobian; the iteration for two stages ends short of round-off
         close = {"rodas-4": 1e-10, "gauss-4": 2e-12}.get(method, 1e-13)
         assert 1.0 + found[0] == pytest.approx(1.0 / grown, abs=close)
@@ -142,9 +142,9 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_lake_as_it_is(tmp_p
     model, state = moved(case, 6e-3)  # three steps of four stages at most, each of which looks one cell further
     basin = model.basins[0]
     far = np.abs(basin.mesh.centre[:, 0] - 1.0) < 0.1
-    assert np.abs(basin.stretched(state.y)[far] - 1.0).min() > 1e-5
-    assert basin.of(state.y)[:, far] == pytest.approx(np.zeros((3, far.sum())), abs=1e-15)
-    assert np.abs(basin.of(state.y)[0]).max() > 1e-4
+    assert np.abs(basin.area_ratios(state.y)[far] - 1.0).min() > 1e-5
+    assert basin.deviations(state.y)[:, far] == pytest.approx(np.zeros((3, far.sum())), abs=1e-15)
+    assert np.abs(basin.deviations(state.y)[0]).max() > 1e-4
 
 
 @pytest.mark.parametrize("side", SIDES)
@@ -217,7 +217,7 @@ def test_a_mesh_that_is_turned_by_a_right_angle_has_the_same_waves(tmp_path, sch
         nodes = {"b": pool(file, {"north" if turned else "east": {"travel": travel, "zone": 1.5}}, start=start)}
         model, state = moved(scene(nodes, {}, 0.5, {**STEPPED, "scheme": scheme, "step": 5e-3}), 0.5)
         basin = model.basins[0]
-        depth, x, y = basin.of(state.y)[0], *basin.mesh.centre.T
+        depth, x, y = basin.deviations(state.y)[0], *basin.mesh.centre.T
         x, y = (y, 1.0 - x) if turned else (x, y)
         found.append(depth[np.lexsort((np.round(y, 9), np.round(x, 9)))])
     assert np.abs(found[0]).max() > 0.01
@@ -265,10 +265,10 @@ def test_a_liquid_that_is_compressed_evenly_follows_its_law_as_a_chamber_of_the_
         model, state = moved(case, 0.2)
         basin, ratio = model.basins[0], 2.0 / 1.996
         wanted = law_of(basin, law, ratio)
-        assert basin.pressure(basin.of(state.y)[0]) == pytest.approx(wanted, rel=2e-3)
-        now = 1.0 / basin.stretched(state.y)[0]
+        assert basin.pressure(basin.deviations(state.y)[0]) == pytest.approx(wanted, rel=2e-3)
+        now = 1.0 / basin.area_ratios(state.y)[0]
         assert now == pytest.approx(ratio, rel=1e-8)
-        mean = np.average(basin.of(state.y)[0], weights=basin.mesh.area)
+        mean = np.average(basin.deviations(state.y)[0], weights=basin.mesh.area)
         assert mean == pytest.approx(basin.density * (now - 1.0), rel=1e-9)
         assert abs(model.contents(state.y)[1]) < 1e-12 * model.contents(state.y)[0]
         force = run(case)[f"b.{side}.force"]
@@ -306,8 +306,8 @@ def test_where_no_wave_has_come_yet_lines_that_swing_leave_a_liquid_as_it_is(tmp
     model, state = moved(case, 3e-5)
     basin = model.basins[0]
     far = np.abs(basin.mesh.centre[:, 0] - 1.0) < 0.1
-    found = basin.of(state.y)
-    assert np.abs(basin.stretched(state.y)[far] - 1.0).min() > 1e-6
+    found = basin.deviations(state.y)
+    assert np.abs(basin.area_ratios(state.y)[far] - 1.0).min() > 1e-6
     assert np.abs(found[0, far]).max() < 1e-12 * basin.density
     assert np.abs(found[1:, far]).max() < 1e-12 * basin.density * basin.speed
     assert np.abs(found[0]).max() > 1e-4 * basin.density * 1e-3
@@ -378,7 +378,7 @@ def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, schem
     basin, y = model.basins[0], model.start
     dydt, out = model.evaluate(0.0, y)
     west, east = out[int(model.layout["wall"]) :][:2]
-    rate = np.sum(basin.mesh.area * basin.own(dydt)[1]) * (RHO if water else basin.part.thickness)
+    rate = np.sum(basin.mesh.area * basin.states_of(dydt)[1]) * (RHO if water else basin.part.thickness)
     swept = 0.0
     if law == "linear":  # whose momentum does not ride along: w m is left behind, m = w (rho + r)
         for wall, force, speed in (("west", west, 0.7), ("east", east, -1.1)):
@@ -386,8 +386,8 @@ def test_momentum_changes_by_the_forces_of_both_walls_alone(tmp_path, law, schem
             dense = force / length / basin.speed**2
             swept += (1.0 if wall == "east" else -1.0) * speed**2 * (basin.density + dense) * length
     assert rate == pytest.approx(west - east + swept, rel=1e-11, abs=1e-11 * abs(east))
-    mass = np.sum(basin.mesh.area * basin.own(dydt)[0])
-    assert abs(mass) < 1e-12 * np.abs(basin.mesh.area * basin.own(dydt)[0]).sum()
+    mass = np.sum(basin.mesh.area * basin.states_of(dydt)[0])
+    assert abs(mass) < 1e-12 * np.abs(basin.mesh.area * basin.states_of(dydt)[0]).sum()
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -430,13 +430,13 @@ def test_a_grid_and_a_mesh_of_the_same_rectangles_find_the_same_rates(tmp_path, 
         deviation = np.array([0.4 * np.cos(5 * x) * np.cos(4 * z), 2e3 * np.sin(3 * x + z), 1e3 * np.cos(4 * x * z)])
         if law == "linear":  # what is along faces is a mean on grids and from behind the face on meshes
             deviation[2 if one == "west" else 1] = 0.0
-        basin.own(y)[:] = basin.stretched(y) * deviation
-        basin.own(y)[0] += basin.density * (basin.stretched(y) - 1.0)
+        basin.states_of(y)[:] = basin.area_ratios(y) * deviation
+        basin.states_of(y)[0] += basin.density * (basin.area_ratios(y) - 1.0)
         dydt, out = model.evaluate(0.0, y)
         order = np.lexsort(np.round(basin.mesh.centre.T, 9))
         walls_feel = out[int(model.layout["wall"]) :][:2]
-        found.append([*(row[order] for row in basin.own(dydt)), walls_feel])
-        assert abs(np.sum(basin.mesh.area * basin.own(dydt)[0])) < 1e-12 * np.abs(basin.own(dydt)[0]).sum()
+        found.append([*(row[order] for row in basin.states_of(dydt)), walls_feel])
+        assert abs(np.sum(basin.mesh.area * basin.states_of(dydt)[0])) < 1e-12 * np.abs(basin.states_of(dydt)[0]).sum()
     for grid, mesh in zip(*found, strict=True):
         assert grid == pytest.approx(mesh, rel=1e-10, abs=1e-11 * np.abs(mesh).max())
 

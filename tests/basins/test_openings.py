@@ -69,10 +69,10 @@ def test_what_cells_beside_an_open_side_gain_is_booked_to_it(path, scheme, law, 
     for side in (*SIDES, None):
         y, x0 = noise.copy(), MIDDLES.get(side)
         if side is not None:
-            field.of(y)[:, (field.x - x0[0]) ** 2 + (field.y - x0[1]) ** 2 > 0.09] = 0.0
+            field.deviations(y)[:, (field.x - x0[0]) ** 2 + (field.y - x0[1]) ** 2 > 0.09] = 0.0
         dydt, out = model.evaluate(0.0, y)
         booked = out[model.layout["supply"] :][: model.ledgers]
-        gains = per * field.of(dydt)[0]
+        gains = per * field.deviations(dydt)[0]
         assert np.sum(booked) == approx(np.sum(gains), abs=1e-13 * np.sum(np.abs(gains)))
         for other in SIDES:
             found = booked[model.node_names.index(f"pool.{other}")]

@@ -14,7 +14,7 @@ from pytest import approx
 from reference.scenes import WATER
 
 import fvsolve
-from fvsolve.basins.lower import lowered_by
+from fvsolve.basins.lower import rows_class
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import Basin
@@ -46,7 +46,7 @@ class Belt(Physics, name="belt"):
 ''',
     "rates.py": '''
 """Rates of the cells of a belt, and what probes read there."""
-from fvsolve.basins.kinds import kind_of
+from fvsolve.basins.physics_codes import kind_of
 from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.dtypes import CELL_FIELD, RATE
@@ -188,7 +188,7 @@ def test_every_physics_is_a_folder_that_lowers_itself():
     for one in Physics.kinds.values():
         assert set(one.model_fields) <= set(Basin.model_fields)
         assert set(one.starts.model_fields) <= set(StartOfFields.keys())
-        assert issubclass(lowered_by(one), BasinRows) and lowered_by(one) is not BasinRows
+        assert issubclass(rows_class(one), BasinRows) and rows_class(one) is not BasinRows
 
 
 @pytest.mark.parametrize("key", ["pressure", "size"])  # of a liquid, of all basins

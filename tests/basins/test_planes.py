@@ -62,7 +62,7 @@ def test_a_uniform_scalar_stays_uniform_in_sloshing_water(scheme, path, tmp_path
     model, state = ended(case(pool, 2.0, {"scheme": scheme}, scalars={"dye": {"initial": 3.0}}))
     found = model.basins[0].values(state.y)["dye"]
     assert np.abs(found - 3.0).max() < 1e-13
-    assert np.abs(model.basins[0].of(state.y)).max() > 0.05
+    assert np.abs(model.basins[0].deviations(state.y)).max() > 0.05
 
 
 @pytest.mark.parametrize("law", ["linear", "log", "table"])
@@ -88,8 +88,8 @@ def test_first_order_on_a_rectangle_is_the_same_by_both_paths(law, tmp_path):
         a, b = (model.basins[0] for model in (one, two))
         order = np.lexsort((b.x, b.y))
         same = two.start.copy()  # means of cells here, values at centres there
-        b.of(same)[:, order] = a.of(one.start)
-        rates = a.of(one.rhs(0.0, one.start)), b.of(two.rhs(0.0, same))[:, order]
+        b.deviations(same)[:, order] = a.deviations(one.start)
+        rates = a.deviations(one.rhs(0.0, one.start)), b.deviations(two.rhs(0.0, same))[:, order]
         assert np.allclose(b.x[order], a.x, atol=1e-12) and np.allclose(b.y[order], a.y, atol=1e-12)
         for k in range(3):
             assert np.abs(rates[0][k] - rates[1][k]).max() < 1e-11 * np.abs(rates[0][k]).max()
@@ -126,7 +126,7 @@ def test_what_a_boundary_sends_back_of_a_wave(boundary, left, holes):
         pool["holes"] = holes
     given = case(pool, 3.0 / SPEED)
     model, state = ended(given)
-    found = model.basins[0].fields(model.basins[0].of(state.y))["pressure"] - 2e6
+    found = model.basins[0].fields(model.basins[0].deviations(state.y))["pressure"] - 2e6
     assert found.max() == approx(left * 1e5, abs=1.5e3) and found.min() > -1.5e3
     ledger = fvsolve.run(given).ledger["mass"]
     assert abs(ledger["relative"]) < 1e-13 and (ledger["outflow"] > 0.0 or left > 0.0)
@@ -262,7 +262,7 @@ def test_normal_flow_down_a_slope_has_the_velocity_of_manning():
     pool = basin(size=[100.0, 2.0], cells=[100, 2], level=-1.0, bed="1 - 0.01*x", manning=0.03)
     pool["start"] = {"level": "1.2 - 0.01*x", "u": 1.0}
     model, state = ended(case(pool, 12.0))
-    found = model.basins[0].fields(model.basins[0].of(state.y))["velocity"][:, 0]
+    found = model.basins[0].fields(model.basins[0].deviations(state.y))["velocity"][:, 0]
     middle = np.abs(model.basins[0].x - 60.0) < 3.0
     assert found[middle] == approx(0.2 ** (2 / 3) * 0.1 / 0.03, rel=0.02)
 
@@ -324,7 +324,7 @@ def test_a_bank_gives_no_water_that_it_has_not(path):
         {"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": valve("pool.out", "outside", 0.05)}, 60.0, STEPS
     )
     model, state = ended(given)
-    depth = model.basins[0].depth + model.basins[0].of(state.y)[0]
+    depth = model.basins[0].depth + model.basins[0].deviations(state.y)[0]
     assert depth.min() >= 0.0 and 0.0 < depth.max() < 0.25
     assert fvsolve.run(given).ledger["mass"]["final"] == approx(RHO * np.sum(model.basins[0].mesh.area * depth))
 
@@ -337,7 +337,7 @@ def test_a_tank_without_friction_drains_to_the_last_film(scheme):
     tap = valve("pool.out", "outside", math.pi * 0.15**2 / 4.0 / math.sqrt(2.0), discharge_coefficient=1.0)
     given = scene({"pool": pool, "outside": reservoir(AMBIENT)}, {"tap": tap}, 600.0, STEPS | {"scheme": scheme})
     model, state = ended(given)
-    depth = model.basins[0].depth + model.basins[0].of(state.y)[0]
+    depth = model.basins[0].depth + model.basins[0].deviations(state.y)[0]
     assert depth.min() >= 0.0 and depth.max() < 1e-3
 
 

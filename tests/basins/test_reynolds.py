@@ -32,7 +32,7 @@ def run_up(cells: int):
 
 def held(model, state) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(lines, contents of the water west of each, depth and velocity at lines inside) : float64[cells + 1], ..."""
-    depth, flow, _ = model.basins[0].of(state.y)[:3]
+    depth, flow, _ = model.basins[0].deviations(state.y)[:3]
     depth, n = 1.0 + depth, len(depth)
     lines = np.linspace(0.0, LENGTH + RATE * math.sin(math.pi * state.t), n + 1)
     contents = np.concatenate([[0.0], np.cumsum(depth * np.diff(lines))])

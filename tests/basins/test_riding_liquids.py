@@ -51,8 +51,8 @@ def after(case, until, start=None):
     model = build(load(case))
     y = model.start.copy()
     if start is not None:
-        model.basins[0].own(y)[:] = start(model.basins[0])
-    return model.basins[0], model.basins[0].of(advance(model, State(0.0, y), until).y)
+        model.basins[0].states_of(y)[:] = start(model.basins[0])
+    return model.basins[0], model.basins[0].deviations(advance(model, State(0.0, y), until).y)
 
 
 def steady(rate, span=100.0):
@@ -294,7 +294,7 @@ def test_a_free_box_on_rails_keeps_its_momentum(law):
     basin, at = model.basins[0], model.state_names.index("body.travel_rate")
 
     def momentum(y):
-        found, area = basin.of(y), 0.1 * basin.mesh.area
+        found, area = basin.deviations(y), 0.1 * basin.mesh.area
         v = 0.3 + y[at]
         return 50.0 * v + np.sum(area * ((basin.density + found[0]) * v + found[1]))
 

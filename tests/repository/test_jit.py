@@ -217,7 +217,7 @@ def test_only_rooms_that_are_hashed_compile():
 def test_what_declares_or_lowers_compiles_nothing():
     """So an edit there leaves compiled code as it is: of parts laws alone are hashed, of basins all that compiles."""
     hashed = {path.relative_to(jit.PACKAGE) for path in jit._sources()}
-    assert Path("basins/liquid/grid.py") in hashed and Path("basins/carried.py") in hashed
+    assert Path("basins/liquid/grid_linear.py") in hashed and Path("basins/basin_scalars.py") in hashed
     assert {path.name[:3] for path in hashed if path.parts[0] == "parts"} == {"law"}
     assert not any(path.name.startswith(("part", "lower")) for path in hashed if path.parts[0] == "basins")
 

@@ -195,10 +195,10 @@ def test_what_was_seen_of_a_basin_before_is_known_after(tmp_path):
 
     run = Run(model, fvsolve.initial_state(model), MemorySink(model), late)
     run.left = 5.0
-    assert run.go().reason.startswith("interrupted") and run.checks.rates and run.watches[0].kept[0] >= 0.0
+    assert run.go().reason.startswith("interrupted") and run.checks.rates and run.watches[0].greatest[0] >= 0.0
     again = Run(model, run.state(), MemorySink(model), None)
     assert again.checks.rates == run.checks.rates
-    assert [one.kept.tolist() for one in again.watches] == [one.kept.tolist() for one in run.watches]
+    assert [one.greatest.tolist() for one in again.watches] == [one.greatest.tolist() for one in run.watches]
 
 
 class Keeping(MemorySink):

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from fvsolve.basins.free_surface import faces, grid, lower_dispersion, lower_films
-from fvsolve.basins.free_surface.friction import FASTEST
-from fvsolve.basins.free_surface.observe import DEPTH
-from fvsolve.basins.free_surface.rows import THIN
+from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
+from fvsolve.basins.free_surface import lower_dispersion, lower_films, surface_grid, surface_mesh
+from fvsolve.basins.free_surface.bed_friction import RATE_CAP
+from fvsolve.basins.free_surface.surface_probes import DEPTH
+from fvsolve.basins.free_surface.surface_rows import THIN
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.basins.lower_pieces import MARKED, TURNING
 from fvsolve.case.basins_on_bodies import free_joints
 from fvsolve.case.cell_means import means, samples
 from fvsolve.errors import Notice
@@ -22,17 +22,17 @@ from fvsolve.kernels.rhs_assembly import RhsTerms
 from fvsolve.steppers.analysis.absolute_monotonicity import in_euler_steps
 from fvsolve.steppers.built_in_methods import AUTO, METHODS
 
-HOME = __package__
-WATER = RhsTerms(
-    package=HOME, prepare="patches: patch_pressures", boundary_inflow="patches: patch_flows", observe="observe: observe_water",
+PACKAGE = __package__
+WATER_TERMS = RhsTerms(
+    package=PACKAGE, prepare="patches: patch_pressures", boundary_inflow="patches: patch_flows", observe="surface_probes: observe_water",
     power="energy: add_power", stored="energy: add_stored",
 )  # fmt: skip
-SCALE = 0.1  # [m] of depth
+DEPTH_SCALE = 0.1  # [m] of depth
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
-UNBOUND = 1e100  # rate of friction [1/s] above all possible rates
-UNSPLIT = 2.0  # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
-SHORES = 6.0  # and to sixths of cells under fifth order with a shore
+NO_CAP = 1e100  # rate of friction [1/s] above all possible rates
+COURANT_FACTOR = 2.0  # Courant numbers of water refer to half cells, so that no depth falls below zero at 1,
+SHORE_COURANT_FACTOR = 6.0  # and to sixths of cells under fifth order with a shore
 
 
 def depth_at_start(level: np.ndarray, bed: np.ndarray) -> np.ndarray:
@@ -57,7 +57,7 @@ class FreeSurfaceRows(BasinRows):
     """Shallow water, states depth [m] and flows per width [m2/s]."""
 
     units = {"depth": "m", "surface": "m", "bed": "m", "velocity": "m/s"}
-    deep, far_ends, banded = True, False, True
+    deep, has_wide_closure, banded = True, False, True
 
     def __init__(self, case, name: str) -> None:
         super().__init__(case, name)
@@ -67,36 +67,36 @@ class FreeSurfaceRows(BasinRows):
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         kind = "grids" if self.is_grid else "meshes"
         yield RhsTerms(
-            package=HOME, rates=f"moving: rates_on_moving_{kind}" if self.moves else f"rates: rates_on_{kind}"
+            package=PACKAGE, rates=f"moving: rates_on_moving_{kind}" if self.moves else f"rates: rates_on_{kind}"
         )
-        yield WATER
+        yield WATER_TERMS
         if self.part.on is not None:
-            yield TURNING
+            yield FRAME_FORCES
         if self.damped:
-            yield RhsTerms(package=HOME, damp="rates: damp_stages")
+            yield RhsTerms(package=PACKAGE, damp="surface_cell_rates: damp_stages")
         if self.moves:
-            yield RhsTerms(package=HOME, power="moving: add_power", stored="moving: add_stored")
-        yield MARKED
+            yield RhsTerms(package=PACKAGE, power="moving: add_power", stored="moving: add_stored")
+        yield SHORTAGES
         if valves:
-            yield RhsTerms(package=HOME, rate_limits="patches: quickest_inflow")
+            yield RhsTerms(package=PACKAGE, rate_limits="surface_patches: limit_inflow_rate")
 
     @property
-    def sums_rows(self) -> bool:
-        return not (self.whole or self.scalars)
+    def forms_stages(self) -> bool:
+        return not (self.undivided_reason or self.scalars)
 
     def scales(self) -> list[float]:
-        flow = SCALE * np.sqrt(self.case.gravity * SCALE)
-        return [SCALE, flow, flow]
+        flow = DEPTH_SCALE * np.sqrt(self.case.gravity * DEPTH_SCALE)
+        return [DEPTH_SCALE, flow, flow]
 
     def lower(self, draft, row) -> None:
-        plan = np.zeros((grid.PLANS, self.n))
+        plan = np.zeros((surface_grid.PLANS, self.n))
         plan[0], plan[1] = self.depth, np.maximum(self.bed - self.part.level, 0.0)
         part, weight = self.part, self.case.properties.density * self.case.gravity
         row["rest"] = weight * (part.level + (part.elevation or 0.0))
         if part.manning is not None or part.factor is not None:
             row["friction"] = rec.DARCY if part.manning is None else rec.MANNING
             row["roughness"] = part.factor if part.manning is None else part.manning
-            row["held"], row["damped"] = self.greatest_rate, self.damped
+            row["held"], row["damped"] = self.rate_cap, self.damped
         if self.is_grid:
             self.lower_grid(draft, row)
         else:
@@ -121,26 +121,26 @@ class FreeSurfaceRows(BasinRows):
         return self.rubs and method is not None and in_euler_steps(method) and not is_moved_by_forces
 
     @property
-    def capped(self) -> bool:
+    def has_rate_cap(self) -> bool:
         """True if the rate of friction is capped at FASTEST, so that explicit steps can follow it."""
         method = METHODS.get(self.case.numerics.method)
         return self.rubs and method is not None and method.explicit and not self.damped
 
     @property
-    def greatest_rate(self) -> float:
+    def rate_cap(self) -> float:
         """Cap of the rate of friction [1/s]; infinite where steps need not follow it."""
-        if self.capped:
-            return FASTEST
-        return UNBOUND if self.case.numerics.method == AUTO else math.inf
+        if self.has_rate_cap:
+            return RATE_CAP
+        return NO_CAP if self.case.numerics.method == AUTO else math.inf
 
     def lower_grid(self, draft, row) -> None:
         dry = not (self.depth.min() > 0.0 and (self.depth + self.start()[0]).min() > 0.0)
-        row["unsplit"] = SHORES if dry and self.fifth else UNSPLIT
-        row["work"] = draft.to_work(grid.MOVING if self.moves else grid.WORK)
+        row["unsplit"] = SHORE_COURANT_FACTOR if dry and self.is_fifth_order else COURANT_FACTOR
+        row["work"] = draft.to_work(surface_grid.MOVING if self.moves else surface_grid.WORK)
 
     def lower_faces(self, draft, row) -> None:
-        row["unsplit"] = UNSPLIT
-        row["work"] = draft.to_work(faces.work_size(self.integers))
+        row["unsplit"] = COURANT_FACTOR
+        row["work"] = draft.to_work(surface_mesh.work_size(self.integers))
 
     def start(self, attitude: np.ndarray | None = None) -> np.ndarray:
         states, given = np.zeros((3, self.n)), self.part.start
@@ -205,7 +205,7 @@ class FreeSurfaceRows(BasinRows):
         return float(self.case.properties.density * np.sum(self.mesh.area * (height + moves)))
 
     def notices(self, y: np.ndarray) -> list[Notice]:
-        return [*lower_dispersion.notices(self, y), *lower_dispersion.deep(self), *lower_films.notices(self, y)]
+        return [*lower_dispersion.notices(self, y), *lower_dispersion.body_notices(self), *lower_films.notices(self, y)]
 
     def watches(self, y: np.ndarray) -> list[Any]:
         return [*lower_dispersion.watches(self, y), *lower_films.watches(self, y)]
@@ -213,5 +213,5 @@ class FreeSurfaceRows(BasinRows):
     def depth_of(self, y: np.ndarray) -> np.ndarray:
         return np.maximum(self.depth + y[0], 0.0)
 
-    def held(self) -> np.ndarray:
+    def mass_per_depth(self) -> np.ndarray:
         return self.case.properties.density * self.mesh.area

@@ -13,26 +13,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.basins.free_surface.lower_watch import Watch
+from fvsolve.basins.free_surface.lower_watch import ErrorWatch
 from fvsolve.case.sloshing import slowest
 from fvsolve.errors import Notice
 
-WRONG = 0.01  # relative error of the speed above which there is a notice
-SEEN, MATTERS = 1e-6, 1e-3  # least root mean square of the surface over depth: at the start, during a run
+NOTICE_ERROR = 0.01  # relative error of the speed above which there is a notice
+LEAST_AT_START, LEAST_IN_RUN = (
+    1e-6,
+    1e-3,
+)  # least root mean square of the surface over depth: at the start, during a run
 
 
 class SurfaceWaves(NamedTuple):
     """Fraction by which real waves are slower, wavenumber [1/m], mean depth of wet cells [m]."""
 
-    wrong: float
+    speed_error: float
     k: float
     depth: float
 
 
-NONE = SurfaceWaves(0.0, math.nan, math.nan)
+NO_WAVES = SurfaceWaves(0.0, math.nan, math.nan)
 
 
-def waves(basin, y: np.ndarray, seen: float = SEEN) -> SurfaceWaves:
+def surface_waves(basin, y: np.ndarray, seen: float = LEAST_AT_START) -> SurfaceWaves:
     """Waves of a basin at deviations y.
 
     `NONE` if the root mean square of the surface is below `seen` times the depth.
@@ -40,13 +43,13 @@ def waves(basin, y: np.ndarray, seen: float = SEEN) -> SurfaceWaves:
     depth, area = basin.depth + y[0], basin.mesh.area
     wet = depth > 0.0
     if not wet.any():
-        return NONE
+        return NO_WAVES
     mean, reached = float(np.average(depth[wet], weights=area[wet])), wet | (basin.depth > 0.0)
     surface = np.where(reached, y[0] - np.average(y[0][reached], weights=area[reached]), 0.0)
     with np.errstate(over="ignore"):  # in an unstable run
         square = float(np.average(surface**2, weights=area))
     if not seen * mean < math.sqrt(square) < math.inf:
-        return NONE
+        return NO_WAVES
     inverse = on_grid(basin, surface) if is_even(basin) else on_mesh(basin, surface)
     k = math.sqrt(square / inverse)
     return SurfaceWaves(1.0 - math.sqrt(math.tanh(k * mean) / (k * mean)), k, mean)
@@ -54,7 +57,7 @@ def waves(basin, y: np.ndarray, seen: float = SEEN) -> SurfaceWaves:
 
 def waves_in_run(basin, y: np.ndarray) -> SurfaceWaves:
     """Waves of a basin during a run."""
-    return waves(basin, y, MATTERS)
+    return surface_waves(basin, y, LEAST_IN_RUN)
 
 
 def is_even(basin) -> bool:
@@ -100,27 +103,27 @@ def notice(basin, waves: tuple[float, float, float], when: str = "") -> Notice:
         f"{basin.name}: waves about {long} long in {deep} of water (k h = {k * depth:.2g}): real waves are "
         f"{100.0 * wrong:.2g} % slower than in shallow-water theory{when and ','}{when}"
     )
-    return Notice("dispersion", f"nodes.{basin.name}", text, None, wrong, WRONG)
+    return Notice("dispersion", f"nodes.{basin.name}", text, None, wrong, NOTICE_ERROR)
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
     """Notice if waves of a basin are too short at deviations y."""
-    state = waves(basin, y)
-    return [notice(basin, state)] if state.wrong > WRONG else []
+    state = surface_waves(basin, y)
+    return [notice(basin, state)] if state.speed_error > NOTICE_ERROR else []
 
 
-def watches(basin, y: np.ndarray) -> list[Watch]:
+def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
     """Check of a run for waves that are too short; none if those at deviations y are."""
-    return [] if notices(basin, y) else [Watch(basin, waves_in_run, notice, WRONG)]
+    return [] if notices(basin, y) else [ErrorWatch(basin, waves_in_run, notice, NOTICE_ERROR)]
 
 
-def deep(basin) -> list[Notice]:
+def body_notices(basin) -> list[Notice]:
     """Notice if water in a basin on a body is too deep for shallow-water theory, with the better model."""
     mode = slowest(basin.part, basin.mesh) if basin.part.on else None
-    if mode is None or mode.excess <= 100.0 * WRONG:
+    if mode is None or mode.excess <= 100.0 * NOTICE_ERROR:
         return []
     text = (
         f"{basin.name}: in shallow-water theory the slowest wave is {mode.excess:.2g} % too fast "
         f'(k h = {mode.kh:.2g}); sloshing = "modes" is correct for small waves'
     )
-    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * mode.excess, WRONG)]
+    return [Notice("dispersion", f"nodes.{basin.name}", text, "sloshing", 0.01 * mode.excess, NOTICE_ERROR)]

@@ -6,17 +6,17 @@ import math
 
 import numpy as np
 
-from fvsolve.basins.free_surface.friction import FASTEST, add_friction
-from fvsolve.basins.free_surface.lower_watch import Watch
+from fvsolve.basins.free_surface.bed_friction import RATE_CAP, add_friction
+from fvsolve.basins.free_surface.lower_watch import ErrorWatch
 from fvsolve.errors import Notice
 from fvsolve.kernels.dtypes import DARCY, MANNING
 
-DRY = 1e-4  # depth [m] below which water is ignored here
-WRONG = 0.005  # relative error of the speed above which there is a notice
-WORSE = 1.2  # factor on the error at the start above which a run gives another notice
+DRY_DEPTH = 1e-4  # depth [m] below which water is ignored here
+NOTICE_ERROR = 0.005  # relative error of the speed above which there is a notice
+REPEAT_FACTOR = 1.2  # factor on the error at the start above which a run gives another notice
 
 
-def too_slow(basin, y: np.ndarray) -> tuple[float, float, float]:
+def slow_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
     """(1 - speed over the correct speed, depth, fall of the bed between cells [m]) of the deepest film at deviations y.
 
     Both sides of a face use the higher bed. So the force on a film of depth h above a fall d > h is g h^2 / 2 instead
@@ -27,31 +27,31 @@ def too_slow(basin, y: np.ndarray) -> tuple[float, float, float]:
     down = basin.bed[left] > basin.bed[right]
     upper, lower = np.where(down, left, right), np.where(down, right, left)
     fall, deep = basin.bed[upper] - basin.bed[lower], depth[upper]
-    film = (deep > DRY) & (depth[lower] > DRY) & (fall > deep) & (fall + deep - depth[lower] > deep)
+    film = (deep > DRY_DEPTH) & (depth[lower] > DRY_DEPTH) & (fall > deep) & (fall + deep - depth[lower] > deep)
     if not film.any():
         return 0.0, math.nan, math.nan
     at = int(np.argmax(np.where(film, deep, 0.0)))
     return 1.0 - math.sqrt(deep[at] / (2.0 * fall[at])), float(deep[at]), float(fall[at])
 
 
-def too_fast(basin, y: np.ndarray) -> tuple[float, float, float]:
+def fast_film_error(basin, y: np.ndarray) -> tuple[float, float, float]:
     """(speed over the correct speed - 1, mean depth [m], mean rate of friction [1/s]), all means over the flow.
 
     Friction that balances a slope at r (u) = C u is capped at r / (1 + r / FASTEST): u^2 is 1 + r / FASTEST times too
     great.
     """
     depth, part = basin.depth_of(y), basin.part
-    flow = np.where(depth > DRY, np.hypot(y[1], y[2]) * basin.mesh.area, 0.0)
+    flow = np.where(depth > DRY_DEPTH, np.hypot(y[1], y[2]) * basin.mesh.area, 0.0)
     if not flow.any():
         return 0.0, math.nan, math.nan
     law, value = (DARCY, part.factor) if part.manning is None else (MANNING, part.manning)
     rate, zeros, gravity = np.zeros(depth.size), np.zeros(depth.size), basin.case.gravity
     add_friction(law, gravity, np.array([value]), depth, zeros, y[1], y[2], zeros - 1.0, zeros, rate, zeros)
-    error = np.sqrt(1.0 + rate / FASTEST) - 1.0
+    error = np.sqrt(1.0 + rate / RATE_CAP) - 1.0
     return tuple(float(np.average(values, weights=flow)) for values in (error, depth, rate))
 
 
-def film(basin, error: tuple[float, float, float], when: str = "") -> Notice:
+def slow_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
     """Notice that films are too slow, with the time."""
     deep, fall = (basin.case.amount(value, "length", 3) for value in error[1:])
     text = (
@@ -59,31 +59,34 @@ def film(basin, error: tuple[float, float, float], when: str = "") -> Notice:
         f'cell to cell, runs {100.0 * error[0]:.2g} % too slowly; use scheme = "muscl", or cells so small that '
         "the bed falls by less than the depth"
     )
-    return Notice("film", f"nodes.{basin.name}", text, "scheme", error[0], WRONG)
+    return Notice("film", f"nodes.{basin.name}", text, "scheme", error[0], NOTICE_ERROR)
 
 
-def friction(basin, error: tuple[float, float, float], when: str = "") -> Notice:
+def fast_film_notice(basin, error: tuple[float, float, float], when: str = "") -> Notice:
     """Notice that films are too fast, with the time."""
     remedy = 'method = "rodas-5p"' if basin.part.on is not None else 'method = "ssp-rk3" or "ssp-rk2"'
     deep, method = basin.case.amount(error[1], "length", 3), basin.case.numerics.method
     text = (
         f"{basin.name}: water runs {100.0 * error[0]:.2g} % too fast{when}: with {method} the rate of friction, "
-        f"{error[2]:.2g} 1/s in {deep} of water, is capped below {FASTEST:g} 1/s; use {remedy}, without a cap"
+        f"{error[2]:.2g} 1/s in {deep} of water, is capped below {RATE_CAP:g} 1/s; use {remedy}, without a cap"
     )
-    return Notice("friction", f"nodes.{basin.name}", text, "method", error[0], WRONG)
+    return Notice("friction", f"nodes.{basin.name}", text, "method", error[0], NOTICE_ERROR)
 
 
-def watches(basin, y: np.ndarray) -> list[Watch]:
+def watches(basin, y: np.ndarray) -> list[ErrorWatch]:
     """Checks of a run for films with greater errors than at the deviations y."""
-    return [Watch(basin, look, notice, max(WRONG, WORSE * look(basin, y)[0])) for look, notice in kinds(basin)]
+    return [
+        ErrorWatch(basin, look, notice, max(NOTICE_ERROR, REPEAT_FACTOR * look(basin, y)[0]))
+        for look, notice in film_checks(basin)
+    ]
 
 
 def notices(basin, y: np.ndarray) -> list[Notice]:
     """Notices of films at deviations y."""
-    return [notice(basin, error) for look, notice in kinds(basin) if (error := look(basin, y))[0] > WRONG]
+    return [notice(basin, error) for look, notice in film_checks(basin) if (error := look(basin, y))[0] > NOTICE_ERROR]
 
 
-def kinds(basin) -> list[tuple]:
+def film_checks(basin) -> list[tuple]:
     """Kinds of films with a wrong speed in a basin: (function for the greatest error, function for its notice)."""
-    pairs = [(too_slow, film)] if basin.scheme == "upwind" else []
-    return [*pairs, (too_fast, friction)] if basin.capped else pairs
+    pairs = [(slow_film_error, slow_film_notice)] if basin.scheme == "upwind" else []
+    return [*pairs, (fast_film_error, fast_film_notice)] if basin.has_rate_cap else pairs

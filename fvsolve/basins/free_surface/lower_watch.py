@@ -7,7 +7,7 @@ import numpy as np
 from fvsolve.errors import Notice
 
 
-class Watch:
+class ErrorWatch:
     """Greatest error of one kind during a run of a basin.
 
     by(basin, y) : size of the error and two related values; notice(basin, values, when) : its notice
@@ -16,17 +16,17 @@ class Watch:
     """
 
     def __init__(self, basin, by, notice, least: float) -> None:
-        self.basin, self.by, self.notice, self.least, self.kept = basin, by, notice, least, np.full(4, np.nan)
+        self.basin, self.by, self.notice, self.least, self.greatest = basin, by, notice, least, np.full(4, np.nan)
 
-    def look(self, t: float, y: np.ndarray) -> None:
+    def check(self, t: float, y: np.ndarray) -> None:
         """Check a model's state."""
-        error = self.by(self.basin, self.basin.of(y))
-        if error[0] > 0.0 and not error[0] <= self.kept[1]:
-            self.kept[:] = t, *error
+        error = self.by(self.basin, self.basin.deviations(y))
+        if error[0] > 0.0 and not error[0] <= self.greatest[1]:
+            self.greatest[:] = t, *error
 
     def notices(self) -> list[Notice]:
         """Notices of the greatest error."""
-        t, *error = self.kept.tolist()
+        t, *error = self.greatest.tolist()
         if not error[0] > self.least:
             return []
         return [self.notice(self.basin, error, f" at {self.basin.case.amount(t, 'time')}")]

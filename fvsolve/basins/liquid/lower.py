@@ -7,18 +7,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fvsolve.basins.liquid import faces, grid, grid_full
-from fvsolve.basins.liquid.observe import PRESSURE
+from fvsolve.basins.basin_terms import FRAME_FORCES, SHORTAGES
+from fvsolve.basins.liquid import grid_linear, grid_nonlinear, liquid_mesh
+from fvsolve.basins.liquid.liquid_probes import PRESSURE
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.basins.lower_pieces import MARKED, TURNING
 from fvsolve.kernels.rhs_assembly import RhsTerms
 
-HOME = __package__
-LIQUID = RhsTerms(
-    package=HOME, prepare="patches: patch_pressures", boundary_inflow="patches: patch_flows", observe="observe: observe_liquid",
+PACKAGE = __package__
+LIQUID_TERMS = RhsTerms(
+    package=PACKAGE, prepare="patches: patch_pressures", boundary_inflow="patches: patch_flows", observe="liquid_probes: observe_liquid",
     power="energy: add_power", stored="energy: add_stored",
 )  # fmt: skip
-SCALE = 1e5  # [Pa]
+PRESSURE_SCALE = 1e5  # [Pa]
 STEPS = 8  # midpoint steps up to the height of a cell; the error of each is the cube of its strain
 SMALL = 1e-9  # negligible velocity over the wave speed
 
@@ -37,9 +37,9 @@ class LiquidRows(BasinRows):
         fluid = case.properties
         self.linear, self.waves = case.law.linear, None
         if case.law.tabulated:
-            from fvsolve.basins.liquid.lower_waves import Waves
+            from fvsolve.basins.liquid.lower_invariants import RiemannInvariants
 
-            self.waves = Waves(fluid, self.part.pressure, self.part.wave_speed)
+            self.waves = RiemannInvariants(fluid, self.part.pressure, self.part.wave_speed)
             self.density, self.speed = self.waves.density, self.waves.speed
             return
         strain = (self.part.pressure - fluid.pressure) / fluid.bulk_modulus
@@ -47,15 +47,19 @@ class LiquidRows(BasinRows):
         self.speed = self.part.wave_speed or math.sqrt(fluid.bulk_modulus / self.density)
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
-        yield RhsTerms(package=HOME, rates=self.rates())
-        yield LIQUID
+        yield RhsTerms(package=PACKAGE, rates=self.rates())
+        yield LIQUID_TERMS
         if self.part.on is not None:
-            yield TURNING
+            yield FRAME_FORCES
         if self.moves:
-            yield RhsTerms(package=HOME, power="moving: add_power", stored="moving: add_stored")
-        yield MARKED
+            yield RhsTerms(package=PACKAGE, power="moving: add_power", stored="moving: add_stored")
+        yield SHORTAGES
         if self.waves is not None:
-            yield RhsTerms(package=HOME, prepare="table: patch_pressures", observe="table: observe_pressures")
+            yield RhsTerms(
+                package=PACKAGE,
+                prepare="liquid_table_law: patch_pressures",
+                observe="liquid_table_law: observe_pressures",
+            )
 
     def rates(self) -> str:
         """Term of the rates of its cells."""
@@ -68,15 +72,15 @@ class LiquidRows(BasinRows):
         return f"{'table' if self.waves is not None else 'rates'}: {function}_on_{shape}"
 
     @property
-    def even_paced(self) -> bool:
+    def has_constant_speed(self) -> bool:
         return self.linear and not self.moves
 
     @property
-    def sums_rows(self) -> bool:
-        return self.linear and not self.whole
+    def forms_stages(self) -> bool:
+        return self.linear and not self.undivided_reason
 
     def scales(self) -> list[float]:
-        return [SCALE / self.speed**2, SCALE / self.speed, SCALE / self.speed]
+        return [PRESSURE_SCALE / self.speed**2, PRESSURE_SCALE / self.speed, PRESSURE_SCALE / self.speed]
 
     def reflection(self, patch) -> float:
         if patch.impedance is None:
@@ -96,14 +100,14 @@ class LiquidRows(BasinRows):
         if self.is_grid:
             nx, ny = self.mesh.grid.nx, self.mesh.grid.ny
             more = nx + 1 if self.moves else 0
-            row["work"] = draft.to_work((grid if self.linear else grid_full).work_size(nx, ny) + more)
+            row["work"] = draft.to_work((grid_linear if self.linear else grid_nonlinear).work_size(nx, ny) + more)
         else:
-            row["work"] = draft.to_work(faces.work_size(self.integers))
+            row["work"] = draft.to_work(liquid_mesh.work_size(self.integers))
 
     def lower_waves(self, draft, row) -> None:
         """Table of its waves. A wall cannot make the wave speed greater than that of the fluid."""
-        if self.waves.speed > (1.0 + 1e-9) * self.waves.own_speed:
-            speed, sound = (draft.case.amount(value, "velocity", 6) for value in (self.speed, self.waves.own_speed))
+        if self.waves.speed > (1.0 + 1e-9) * self.waves.fluid_speed:
+            speed, sound = (draft.case.amount(value, "velocity", 6) for value in (self.speed, self.waves.fluid_speed))
             draft.fault(f"nodes.{self.name}.wave_speed", f"{speed} is faster than sound in the fluid, {sound}; "
                         "expected at most that, or another law")  # fmt: skip
         row["table"] = draft.to_plane(self.waves.table())

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.basins.transport.lower_velocity import around_outside, face_flows, grid_flows, velocity_flows
+from fvsolve.basins.transport.lower_velocity import face_flows, grid_flows, is_outer_loop, velocity_flows
 from fvsolve.errors import CaseError
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.rhs_assembly import RhsTerms
@@ -19,12 +19,12 @@ class TransportRows(BasinRows):
     given = banded = True
 
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
-        yield RhsTerms(package=__package__, observe="observe: observe_given_flows")
+        yield RhsTerms(package=__package__, observe="transport_probes: observe_given_flows")
 
     @property
-    def sums_rows(self) -> bool:
+    def forms_stages(self) -> bool:
         spreads = any(self.case.scalars[name].diffusivity > 0.0 for name in self.scalars)
-        return not (self.whole or self.fifth or spreads)
+        return not (self.undivided_reason or self.is_fifth_order or spreads)
 
     def lower(self, draft, row) -> None:
         given, mesh = self.part.velocity, self.mesh
@@ -48,12 +48,12 @@ class TransportRows(BasinRows):
             row["fastest"], self.share = (0.5 * through / mesh.area).max(), 1.0
         net = np.bincount(mesh.left, flows, self.n)
         net -= np.bincount(mesh.right[: mesh.inner], flows[: mesh.inner], self.n)
-        self.gathers = float(np.abs(net / mesh.area).max())
+        self.max_divergence = float(np.abs(net / mesh.area).max())
         self.passing = passing = [name for name in mesh.patches if flows[mesh.patch(name)].any()]
         if mesh.patches[-1] in passing:
             own = np.arange(flows.size)[mesh.patch(mesh.patches[-1])]
             speed = np.abs(flows[own]) / mesh.length[own]
-            around = around_outside(mesh)[own - mesh.inner]  # report the outer outline, before the outlines of holes
+            around = is_outer_loop(mesh)[own - mesh.inner]  # report the outer outline, before the outlines of holes
             at = mesh.middle[own[np.argmax(np.where(around, speed, 0.0) if speed[around].any() else speed)]]
             text = f"it crosses the outline at x = {at[0]:.6g} m, y = {at[1]:.6g} m, where there is no named patch"
             draft.fault(f"nodes.{self.name}.velocity", f"{text}. Expected a patch with a name there")
@@ -69,15 +69,15 @@ class TransportRows(BasinRows):
             return 1.0
         return 3.0 if row["scheme"] == rec.MUSCL and self.is_grid and passing else 2.0
 
-    def opens(self, patch: str) -> bool:
+    def is_open(self, patch: str) -> bool:
         return patch in self.passing
 
     def flows(self, draft) -> np.ndarray:
         """Flow through every face of the mesh along its normal, per thickness [m2/s]."""
         given, mesh = self.part.velocity.given, self.mesh
-        if self.part.velocity.way == "u, v":
+        if self.part.velocity.form == "u, v":
             return velocity_flows(mesh, *(given[key].at(*np.ascontiguousarray(mesh.middle.T)) for key in "uv"))
-        if self.part.velocity.way == "stream":
+        if self.part.velocity.form == "stream":
             given = {"stream": given["stream"].at(*np.ascontiguousarray(mesh.points.T))}
         try:
             return face_flows(mesh, given)
@@ -86,8 +86,8 @@ class TransportRows(BasinRows):
             draft.check()
             raise
 
-    def pace(self, y: np.ndarray) -> tuple[float, float]:
+    def max_rate(self, y: np.ndarray) -> tuple[float, float]:
         return float(self.row["fastest"]), self.share
 
-    def held(self) -> np.ndarray:
+    def mass_per_depth(self) -> np.ndarray:
         return self.row["density"] * self.row["thickness"] * self.mesh.area

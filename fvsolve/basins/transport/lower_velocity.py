@@ -19,7 +19,9 @@ COLUMNS = (("x", "y", "u", "v"), ("x", "y", "psi"))  # of a file
 DIMENSIONS = {"x": "length", "y": "length", "u": "velocity", "v": "velocity", "psi": "diffusivity"}
 EXACT_BITS = 50  # bits of a stream function after rounding, so that sums of its differences are exact
 ROUNDING = 64 * np.finfo(float).eps  # relative error of a stream function and of the positions of corners
-SLANT = 1e-9  # of the greatest velocity: smaller velocities across the outline are rounding, and set to zero
+ROUNDED_CROSSFLOW = (
+    1e-9  # of the greatest velocity: smaller velocities across the outline are rounding, and set to zero
+)
 
 
 def constant(x, y, u, v):
@@ -117,11 +119,11 @@ def _by_corners(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
         x, y = mesh.points[np.flatnonzero(~np.isfinite(stream))[0]]
         raise ValueError(f"the stream function is not finite at ({x:.6g}, {y:.6g}) m")
     unit = 2.0 ** (np.frexp(np.abs(stream).max())[1] - EXACT_BITS)
-    psi = np.round(along_walls(mesh, stream) / unit) * unit
+    psi = np.round(constant_along_walls(mesh, stream) / unit) * unit
     return psi[mesh.ends[:, 1]] - psi[mesh.ends[:, 0]]
 
 
-def along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
+def constant_along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
     """Stream function made constant along stretches of the outline where it differs by rounding only : float64[p]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -134,7 +136,7 @@ def along_walls(mesh: Mesh, stream: np.ndarray) -> np.ndarray:
     return stream[first[stretch]]
 
 
-def around_outside(mesh: Mesh) -> np.ndarray:
+def is_outer_loop(mesh: Mesh) -> np.ndarray:
     """True for outline faces of the outer loop, False for those around holes : bool[outline faces]."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -148,7 +150,7 @@ def around_outside(mesh: Mesh) -> np.ndarray:
 def velocity_flows(mesh: Mesh, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Flows from velocities at the middles of faces : float64[f]; zero across the outline where it is rounding."""
     normal = u * mesh.normal[:, 0] + v * mesh.normal[:, 1]
-    still = np.abs(normal) <= SLANT * np.hypot(u, v).max()
+    still = np.abs(normal) <= ROUNDED_CROSSFLOW * np.hypot(u, v).max()
     still[: mesh.inner] = False
     return np.where(still, 0.0, normal * mesh.length)
 

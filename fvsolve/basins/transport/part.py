@@ -25,14 +25,14 @@ class Velocity:
     said : the table of the case
     """
 
-    way: str
+    form: str
     given: dict[str, Any]
     period: float | None
-    said: dict[str, Any]
+    stated: dict[str, Any]
 
     def table(self) -> dict[str, Any]:
         """Table of the case file."""
-        return self.said
+        return self.stated
 
 
 PARAMETERS: dict[str, Value] = {  # of velocities by name
@@ -45,7 +45,7 @@ PARAMETERS: dict[str, Value] = {  # of velocities by name
 }
 
 
-class Flowing(Value):
+class VelocityValue(Value):
     """Value of the key `velocity`: { u, v } or { stream }, formulas of x and y, { expression, ... } or { file }."""
 
     about = (
@@ -92,7 +92,7 @@ class Transport(Physics, name="transport"):
 
     joined: ClassVar[bool] = False
 
-    velocity: Annotated[Any, Flowing()]
+    velocity: Annotated[Any, VelocityValue()]
     thickness: Annotated[
         float | None,
         Quantity("length", positive, "thickness normal to the plane [m]; required for a liquid, else default 1"),

@@ -13,7 +13,7 @@ SPLINE_DEGREE = 5  # degree of the spline through cumulative contents, for edges
 
 def basin_fields(basin, y: np.ndarray) -> dict[str, np.ndarray]:
     """Fields of a basin by quantity, from the states `y` of a model; scalars as amounts in each cell."""
-    fields = dict(zip(basin.quantities, basin.of(y), strict=True))
+    fields = dict(zip(basin.quantities, basin.deviations(y), strict=True))
     scalars = getattr(basin, "scalars", ())
     return fields | (dict(zip(scalars, basin.amounts(y), strict=True)) if scalars else {})
 

@@ -1,0 +1,158 @@
+"""Accelerated frame of reference of a basin on a body, and the potential of its inertial and gravity forces.
+
+In the axes of the basin, z is along its normal and r = (x, y, 0) is the distance from its middle. The middle has the
+acceleration a, and the axes rotate at W. The equation of motion is (65)
+u_t + u.grad u + grad(p) / rho + grad(phi) = - 2 W_z x u - dW_z/dt x r, with G = R' ((0, 0, -g) - a) and
+
+    phi = - G_x x - G_y y - ((W_y^2 + W_z^2) x^2 - 2 W_x W_y x y + (W_x^2 + W_z^2) y^2) / 2
+
+The water below a free surface has the weight g_n = -G_z along the normal, and phi / g_n is added to the bed elevation:
+tilt, accelerations and centrifugal forces act like a moving bed. In a liquid, phi is added to the reconstructed
+pressure (`liquid_on_body`). So water at rest in the frame stays at rest to round-off. Neglected are accelerations along
+z away from the origin, and vertical momentum: both are of the order of angle times depth over wave length.
+"""
+
+from fvsolve.jit import inline, njit
+from fvsolve.kernels.dtypes import GN, NO_WEIGHT, STATUS, WHERE
+from fvsolve.kernels.mechanism.body_layout import ATTITUDE, BIAS, SPIN, SPIN_BIAS, body_row, cross, rotate
+from fvsolve.kernels.table_handle import open_tables
+
+# Places of the numbers of a frame in `plane`, from the offset basin["frame"].
+ORIGIN, AXES = 0, 3  # position of the origin and rotation matrix (by rows) in the axes of the body
+GX, GY, _, WX, WY, WZ, AX, AY, AZ = range(12, 21)  # G, g_n (GN of the kernels), W and dW/dt in the axes of the basin
+REST_SURFACE = (
+    21  # offset in `plane` of the undisturbed surface above the level at rest [m]: 0, or a bed above that level
+)
+CELL_POSITIONS = 22  # offset in `plane` of the positions of columns and rows of a grid, or of cells
+FRAME_GRAVITY = 23  # gravity alone, three numbers
+REST_LEVEL = 26  # level of the water at rest above the origin [m]
+POTENTIALS = (
+    27  # liquid: offset in `work` of potentials; positions of grid lines or of sides of cells follow those at PLACES
+)
+FRAME_SIZE = 28  # number of numbers
+
+
+@njit
+def set_frames(t, y, dydt, out, handle):
+    """Compute the motion of all frames, and tilt the beds of basins with a free surface.
+
+    Sets the status NO_WEIGHT if a basin with a free surface has no weight along its normal.
+    """
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["frame"] >= 0:
+            set_frame(tables, basin, out)
+            if basin["deep"] == 1:
+                if not tables.plane[basin["frame"] + GN] > 0.0:
+                    out[STATUS], out[WHERE] = NO_WEIGHT, b
+                tilt_bed(tables.plane, basin)
+
+
+@njit
+def frame_component(out, row, plane, at, k, x, y, z):
+    """Component of a vector of the world along axis k of a frame.
+
+    Its rotation matrix relative to its body is at plane[at].
+    """
+    ax, ay, az = rotate(out, row + ATTITUDE, plane[at + k : at + k + 7 : 3], 0)
+    return ax * x + ay * y + az * z
+
+
+@njit
+def set_frame(tables, basin, out):
+    """Compute G, W, dW/dt and gravity alone in the axes of a basin."""
+    plane, at, row = tables.plane, basin["frame"], body_row(tables, basin["body"])
+    rx, ry, rz = rotate(out, row + ATTITUDE, plane[at : at + 3], 0)
+    ex, ey, ez = cross(out, row + SPIN_BIAS, rx, ry, rz)
+    vx, vy, vz = cross(out, row + SPIN, rx, ry, rz)
+    cx, cy, cz = cross(out, row + SPIN, vx, vy, vz)
+    b, s, e = row + BIAS, row + SPIN, row + SPIN_BIAS
+    gx, gy = -(out[b] + ex + cx), -(out[b + 1] + ey + cy)
+    gz = -tables.settings[0]["gravity"] - (out[b + 2] + ez + cz)
+    axes = at + AXES
+    plane[at + GX] = frame_component(out, row, plane, axes, 0, gx, gy, gz)
+    plane[at + GY] = frame_component(out, row, plane, axes, 1, gx, gy, gz)
+    plane[at + GN] = -frame_component(out, row, plane, axes, 2, gx, gy, gz)
+    for k in range(3):
+        plane[at + WX + k] = frame_component(out, row, plane, axes, k, out[s], out[s + 1], out[s + 2])
+        plane[at + AX + k] = frame_component(out, row, plane, axes, k, out[e], out[e + 1], out[e + 2])
+        plane[at + FRAME_GRAVITY + k] = frame_component(
+            out, row, plane, axes, k, 0.0, 0.0, -tables.settings[0]["gravity"]
+        )
+
+
+@njit(forceinline=True)
+def potential_coefficients(plane, at, per):
+    """Coefficients (fx, fy, xx, xy, yy) of a potential for the frame at plane[at].
+
+    per phi = x (fx + xx x + xy y) + y (fy + yy y)
+    """
+    wx, wy, wz = plane[at + WX], plane[at + WY], plane[at + WZ]
+    fx, fy = -per * plane[at + GX], -per * plane[at + GY]
+    return fx, fy, -0.5 * per * (wy * wy + wz * wz), per * wx * wy, -0.5 * per * (wx * wx + wz * wz)
+
+
+@njit
+def tilt_bed(plane, basin):
+    """Add phi / g_n to the bed elevation above the level at rest."""
+    at, n = basin["frame"], basin["n"]
+    to, drawn = basin["plan"] + n, int(plane[at + REST_SURFACE])
+    add_potential(plane, basin, 1.0 / plane[at + GN], plane[drawn : drawn + n], plane[to : to + n])
+
+
+@njit
+def add_potential(plane, basin, per, values, lifted):
+    """Write the values of all cells plus per phi to `lifted`."""
+    n, nx, at = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
+    phi = potential_coefficients(plane, basin["frame"], per)
+    if nx == 0:
+        add_potential_points(phi, plane[at : at + n], plane[at + n : at + 2 * n], values, lifted)
+    else:
+        add_potential_rows(phi, plane[at : at + nx], plane[at + nx : at + nx + basin["ny"]], values, lifted)
+
+
+@njit
+def add_potential_points(phi, x, y, values, lifted):
+    """Write values plus the potential at points to `lifted`; values None count as 0.
+
+    phi : coefficients of `potential`
+    """
+    fx, fy, xx, xy, yy = phi
+    for i in range(lifted.size):
+        rise = x[i] * (fx + xx * x[i] + xy * y[i]) + y[i] * (fy + yy * y[i])
+        lifted[i] = rise if values is None else values[i] + rise
+
+
+@njit
+def add_potential_rows(phi, x, y, values, lifted):
+    """Write values plus the potential at the cells of a grid with columns at x and rows at y to `lifted`."""
+    fx, fy, xx, xy, yy = phi
+    for j in range(y.size):
+        a, z = j * x.size, (j + 1) * x.size
+        base = None if values is None else values[a:z]
+        add_potential_row(x, base, fx + xy * y[j], xx, y[j] * (fy + yy * y[j]), lifted[a:z])
+
+
+@inline
+def add_potential_row(x, values, slope, xx, constant, lifted):
+    """Write values plus the potential at a row of cells to `lifted`."""
+    for i in range(lifted.size):
+        rise = x[i] * (slope + xx * x[i]) + constant
+        lifted[i] = rise if values is None else values[i] + rise
+
+
+@njit(forceinline=True)
+def cell_position(plane, basin, i):
+    """Centre of cell i in the axes of its basin [m]."""
+    n, nx, places = basin["n"], basin["nx"], int(plane[basin["frame"] + CELL_POSITIONS])
+    if nx == 0:
+        return plane[places + i], plane[places + n + i]
+    return plane[places + i % nx], plane[places + nx + i // nx]
+
+
+@njit(forceinline=True)
+def bed_height(plane, basin, i):
+    """Height of the bed of cell i above the origin of its basin [m]."""
+    at = basin["frame"]
+    return plane[int(plane[at + REST_SURFACE]) + i] - plane[basin["plan"] + i] + plane[at + REST_LEVEL]

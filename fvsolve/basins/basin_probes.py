@@ -1,0 +1,48 @@
+"""Probes common to all basins: flows through patches, and velocities.
+
+Each physics reads its own cells. The number of a field is `side` in a probe of kind CELL_FIELD.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+from fvsolve.kernels.density import density
+from fvsolve.kernels.dtypes import PATCH_FLOW
+from fvsolve.kernels.table_handle import open_tables
+
+U, V, SPEED, FIRST_OWN = range(4)  # fields of velocities; numbers from OWN on are fields of the physics
+
+
+@njit
+def velocity_value(field, u, v):
+    """Value of a velocity field: u, v or speed."""
+    return u if field == U else v if field == V else sqrt(u * u + v * v)
+
+
+@njit
+def observe_flows(t, y, out, handle, values):
+    """Write values[k] of the probes of flows through patches [m3/s]."""
+    tables = open_tables(handle)
+    probes = tables.probes
+    for k in range(probes.size):
+        if probes[k]["kind"] == PATCH_FLOW:
+            values[k] = probes[k]["scale"] * patch_flow(tables, probes[k], out)
+
+
+@njit
+def observe_dense_flows(t, y, out, handle, values):
+    """Write the flows through patches [m3/s] with the density at the patch, under all laws but linear."""
+    tables = open_tables(handle)
+    st, probes, at = tables.settings[0], tables.probes, tables.layout[0]["pressure"]
+    for k in range(probes.size):
+        if probes[k]["kind"] == PATCH_FLOW:
+            i = probes[k]["index"]
+            rho = density(st, tables.floats, tables.nodes[i]["pressure"] + out[at + i])
+            values[k] = patch_flow(tables, probes[k], out) / rho
+
+
+@njit
+def patch_flow(tables, probe, out):
+    """Mass flow into a basin through a patch [kg/s]."""
+    layout, i = tables.layout[0], probe["index"]
+    return out[layout["net"] + i] + out[layout["supply"] + i]

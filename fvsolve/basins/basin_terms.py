@@ -1,0 +1,73 @@
+"""Terms of the right-hand side and probes common to basins of all physics (`kernels.rhs_assembly`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fvsolve.kernels.rhs_assembly import MIXED, RhsTerms
+
+PACKAGE = "fvsolve.basins"
+COMMON = RhsTerms(package=PACKAGE, observe="basin_probes: observe_flows", power="basin_energy: patch_power")
+DENSITY_LAWS = RhsTerms(package=PACKAGE, observe="basin_probes: observe_dense_flows")  # all laws but linear
+SHORTAGES = RhsTerms(package=PACKAGE, record="basin_patches: record_patches")
+WALLS = RhsTerms(
+    package=PACKAGE, derive_state="moving_walls: update_geometry", prepare="moving_walls: set_line_speeds", boundary_inflow="moving_walls: add_wall_forces", stretching="moving_walls: stretch_scalar_rates",
+    observe="moving_walls: observe_walls", power="moving_walls: wall_power",
+)  # fmt: skip
+MOVING_SIDES = RhsTerms(
+    package=PACKAGE, derive_state="moving_meshes: update_meshes", prepare="moving_meshes: set_side_speeds"
+)
+FRAMES = RhsTerms(package=PACKAGE, prepare="basin_frames: set_frames")  # before patches
+FRAME_FORCES = RhsTerms(
+    package=PACKAGE, boundary_inflow="frame_forces: add_frame_forces", fluid_response="frame_forces: correct_for_bodies",
+    power="frame_energy: add_power", stored="frame_energy: add_stored",
+)  # fmt: skip
+PATCH_VALUES = RhsTerms(
+    package=PACKAGE, outlet_values="basin_scalars: patch_values", observe="basin_scalars: observe_values"
+)
+GRIDS = RhsTerms(package=PACKAGE, scalar_rates="grid_scalars: advect_on_grids")
+FIFTH = RhsTerms(package=PACKAGE, scalar_rates="grid_scalars: add_fifth_order_on_grids")
+DIFFUSION = RhsTerms(package=PACKAGE, scalar_rates="grid_scalars: diffuse_on_grids")
+MESHES = RhsTerms(package=PACKAGE, scalar_rates="mesh_scalars: advect_on_meshes")
+SOURCES = RhsTerms(package=PACKAGE, scalar_rates="basin_scalars: add_sources")
+SCALAR_TERMS = (
+    PATCH_VALUES,
+    MIXED,
+    GRIDS,
+    FIFTH,
+    DIFFUSION,
+    MESHES,
+    SOURCES,
+)  # in the order in which they run within a phase
+
+
+def terms_of_basins(basins: list, valves: bool) -> tuple[RhsTerms, ...]:
+    """Terms of basins without scalars. valves : True if there are valves in the network"""
+    shared = [COMMON] if basins and basins[0].case.law.linear else [COMMON, DENSITY_LAWS] if basins else []
+    shared += [FRAMES] if any(basin.part.on is not None for basin in basins) else []
+    moving = [WALLS] if any(basin.moves for basin in basins) else []
+    moving += [MOVING_SIDES] if any(basin.moves and not basin.is_grid for basin in basins) else []
+    return tuple(dict.fromkeys([*shared, *(terms for basin in basins for terms in basin.pieces(valves)), *moving]))
+
+
+def terms_of_scalars(basins: list) -> tuple[RhsTerms, ...]:
+    """Terms of scalars in basins; each term selects its basins itself."""
+    needed = {piece for basin in basins for piece in scalar_terms(basin)}
+    return tuple(terms for terms in SCALAR_TERMS if terms in needed)
+
+
+def scalar_terms(basin) -> Iterator[RhsTerms]:
+    """Terms of the scalars of a basin, if it has scalars."""
+    if not basin.scalars:
+        return
+    yield from (PATCH_VALUES, SOURCES)
+    if not basin.given:
+        yield MIXED
+    if not basin.is_grid:
+        yield MESHES
+        return
+    yield GRIDS
+    if basin.is_fifth_order:
+        yield FIFTH
+    if any(basin.case.scalars[name].diffusivity > 0.0 for name in basin.scalars):
+        yield DIFFUSION

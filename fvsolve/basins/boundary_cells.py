@@ -1,0 +1,70 @@
+"""Cells next to a patch, and their weights in the flow through it."""
+
+from fvsolve.jit import njit
+
+SHALLOW = 1e-3  # depth at a patch below which only a fraction of the demanded outflow can leave [m]
+LEAST_DEPTH = 1e-9  # volume at a patch over its area below which its surface tends to the lowest bed [m]
+
+
+@njit
+def available_fraction(depth):
+    """Fraction of the demanded outflow that water of a depth supplies."""
+    s = min(max(depth, 0.0) / SHALLOW, 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+@njit(forceinline=True)
+def patch_area(tables, patch):
+    """Area of the cells next to a patch [m2]."""
+    return tables.plane[patch["sizes"]]
+
+
+@njit(forceinline=True)
+def patch_length(tables, patch):
+    """Length of the faces of a patch [m]."""
+    return tables.plane[patch["sizes"] + 1]
+
+
+@njit
+def depth_at_patch(plane, basin, i, y):
+    """Depth of cell i of a basin of water."""
+    return max(plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
+
+
+@njit
+def outflow_weight(depth):
+    """Weight of a cell in the outflow: its depth, so that all water has one speed, times the available fraction."""
+    return depth * available_fraction(depth)
+
+
+@njit
+def flow_weight(plane, basin, leaves, i, y):
+    """Weight of cell i in the flow through a patch [m]; for inflow, a dry cell has the depth of a film."""
+    depth = depth_at_patch(plane, basin, i, y)
+    return outflow_weight(depth) if leaves else max(depth, SHALLOW)
+
+
+@njit
+def weighted_volume(tables, patch, leaves, y):
+    """Sum of area times `weight` of the cells next to a patch [m3], always positive."""
+    basin, plane, total = tables.basins[patch["basin"]], tables.plane, 0.0
+    for m in range(patch["count"]):
+        i = tables.integers[patch["first"] + m]
+        total += plane[basin["area"] + i] * flow_weight(plane, basin, leaves, i, y)
+    return max(total, LEAST_DEPTH * patch_area(tables, patch))
+
+
+@njit(forceinline=True)
+def has_given_flows(basin):
+    """True if flows through faces are those of a given velocity, in `plane`; computed flows are in `work`."""
+    return basin["given"] == 1
+
+
+@njit
+def patch_inflow(tables, patch):
+    """Total inflow through all faces of a patch."""
+    basin, total = tables.basins[patch["basin"]], 0.0
+    flows = tables.plane if has_given_flows(basin) else tables.work
+    for m in range(patch["faces"]):
+        total += flows[basin["through"] + tables.integers[patch["ring"] + m]]
+    return total

@@ -1,0 +1,145 @@
+"""Sides of cells of any mesh: layout of their arrays, least-squares gradients, and the limiter.
+
+A cell has `slots` sides, three or four. Cells are stored in blocks of BLOCK; the last block is padded. Every cell reads
+the values beyond its sides and computes its own rates. Both cells of a face compute the same flux to the bit, so the
+scheme is conservative. A missing side (a triangle among quadrilaterals) has length 0 and itself as neighbour.
+
+Temporary values of cells and their sides are stored in a ring of the last `ring` blocks, so that they stay in a near
+cache: cell i of block j at (j BLOCK + i) modulo ring BLOCK, its side k at ((4 j + k) BLOCK + i) modulo 4 ring BLOCK.
+Rates of block j are computed once the sides of blocks before need[j] are known, and these once the cells before need[]
+of theirs. Loops run over BLOCK cells and a few arrays at constant distances, so that the compiler knows that they do
+not overlap.
+
+integers : int64[:]  slots, cells, faces, boundary faces, ring; by block, side and row of BLOCK, two int32 to an
+           int64: places of the neighbour cell and of its side (on the boundary its own); need[blocks]; of the boundary
+           in order of sides: side not taken modulo, number; by block and side: face (~f where its normal points
+           inwards)
+floats : float64[:]  by block, side and row of BLOCK: outward normal, length / area, vector from the centre to the
+side's
+         middle, weights of its difference in the gradient; of the boundary in order of sides: outward normal; of faces:
+         length; by block, side and row again: 1 / area, 1 / distance to the next cell along the normal, the normal
+         minus
+         that distance's direction
+"""
+
+import numpy as np
+
+from fvsolve.jit import njit
+
+CELL, SIDE, INDICES = 0, 1, 2
+NX, NY, REACH, DX, DY, WX, WY, MEASURES = range(8)
+PER_AREA, PER_DISTANCE, OBLIQUE_X, OBLIQUE_Y, DISTANCES = range(5)
+HEAD = 5
+BLOCK = 256  # cells whose geometry and neighbours stay in the nearest cache
+TINY = 1e-300
+HUGE = 1e300
+
+_WX, _WY, _DX, _DY, _SIDE = WX * BLOCK, WY * BLOCK, DX * BLOCK, DY * BLOCK, MEASURES * BLOCK
+
+
+@njit
+def blocks(integers):
+    """Number of blocks of the cells."""
+    return (integers[1] + BLOCK - 1) // BLOCK
+
+
+@njit
+def edges_before(edges, first, side):
+    """Index of the first boundary side, from `first` on, that is not before `side`."""
+    while first < edges.size and edges[first] < side:
+        first += 1
+    return first
+
+
+@njit
+def ring_place(side, ring):
+    """Place in the ring of the cell of a boundary side."""
+    return (side // (4 * BLOCK)) % ring * BLOCK + side % BLOCK
+
+
+@njit
+def gather(values, where, out):
+    """out[i] = values[where[i]]."""
+    for i in range(BLOCK):
+        out[i] = values[where[i]]
+
+
+@njit
+def put_inward(edges, number, flux, length, through):
+    """Inward flows through the boundary sides `edges`, all of the same side number of a block, from outward fluxes."""
+    for q in range(edges.size):
+        through[number[q]] = -flux[edges[q] % BLOCK] * length[number[q]]
+
+
+@njit
+def limit_three_sides(p, wide, cap, beyond, geo, out):
+    """Limited values at three sides of a block of cells, from the values beyond them.
+
+    If the neighbours differ from the cell by `least` to `most`, a side rises by no more than wide most, -2 wide least
+    and `cap`, and falls no further than wide least, -2 wide most and -cap. So no side of a local extremum differs from
+    its cell. With wide = 1 all values at sides lie in the range of the neighbours.
+    """
+    back = 2.0 * wide
+    for i in range(BLOCK):
+        here = p[i]
+        a, b, c = beyond[i] - here, beyond[BLOCK + i] - here, beyond[2 * BLOCK + i] - here
+        gx = geo[_WX + i] * a + geo[_SIDE + _WX + i] * b + geo[2 * _SIDE + _WX + i] * c
+        gy = geo[_WY + i] * a + geo[_SIDE + _WY + i] * b + geo[2 * _SIDE + _WY + i] * c
+        r = gx * geo[_DX + i] + gy * geo[_DY + i]
+        s = gx * geo[_SIDE + _DX + i] + gy * geo[_SIDE + _DY + i]
+        t = -(r + s)  # the middles of a triangle's sides have its centre
+        most, least = max(max(a, b), max(c, 0.0)), min(min(a, b), min(c, 0.0))
+        low, high = max(max(wide * least, -back * most), -cap[i]), min(min(wide * most, -back * least), cap[i])
+        out[i] = here + min(max(r, low), high)
+        out[BLOCK + i] = here + min(max(s, low), high)
+        out[2 * BLOCK + i] = here + min(max(t, low), high)
+
+
+@njit
+def limit_four_sides(p, wide, cap, beyond, geo, out):
+    """Limited values at four sides.
+
+    Opposite sides of a rectangle are added first, so that mirror cells give mirror sums.
+    """
+    back = 2.0 * wide
+    for i in range(BLOCK):
+        here = p[i]
+        a, b = beyond[i] - here, beyond[BLOCK + i] - here
+        c, d = beyond[2 * BLOCK + i] - here, beyond[3 * BLOCK + i] - here
+        gx = (geo[_WX + i] * a + geo[2 * _SIDE + _WX + i] * c) + (
+            geo[_SIDE + _WX + i] * b + geo[3 * _SIDE + _WX + i] * d
+        )
+        gy = (geo[_WY + i] * a + geo[2 * _SIDE + _WY + i] * c) + (
+            geo[_SIDE + _WY + i] * b + geo[3 * _SIDE + _WY + i] * d
+        )
+        r = gx * geo[_DX + i] + gy * geo[_DY + i]
+        s = gx * geo[_SIDE + _DX + i] + gy * geo[_SIDE + _DY + i]
+        t = gx * geo[2 * _SIDE + _DX + i] + gy * geo[2 * _SIDE + _DY + i]
+        u = gx * geo[3 * _SIDE + _DX + i] + gy * geo[3 * _SIDE + _DY + i]
+        most, least = max(max(a, b), max(max(c, d), 0.0)), min(min(a, b), min(min(c, d), 0.0))
+        low, high = max(max(wide * least, -back * most), -cap[i]), min(min(wide * most, -back * least), cap[i])
+        out[i] = here + min(max(r, low), high)
+        out[BLOCK + i] = here + min(max(s, low), high)
+        out[2 * BLOCK + i] = here + min(max(t, low), high)
+        out[3 * BLOCK + i] = here + min(max(u, low), high)
+
+
+@njit
+def limited_sides(j, floats, integers, values, wide, cap, shown, edges, scratch, sides):
+    """Limited values of block j at its sides.
+
+    values : float64[ring BLOCK]; wide, cap : see `limit_three_sides`; scratch : float64[4 BLOCK]
+    sides : float64[4 ring BLOCK]
+    shown : float64[:]  values beyond the boundary at its sides `edges`, int64[:], of this block
+    """
+    slots, ring, places = integers[0], integers[4], integers[HEAD:].view(np.int32)
+    for k in range(slots):
+        gather(values, places[((j * slots + k) * INDICES + CELL) * BLOCK :], scratch[k * BLOCK :])
+    for q in range(edges.size):
+        scratch[edges[q] % (4 * BLOCK)] = shown[q]
+    at = (j % ring) * BLOCK
+    p, geo, out = values[at:], floats[j * slots * MEASURES * BLOCK :], sides[4 * at :]
+    if slots == 3:
+        limit_three_sides(p, wide, cap, scratch, geo, out)
+    else:
+        limit_four_sides(p, wide, cap, scratch, geo, out)

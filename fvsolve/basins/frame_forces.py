@@ -1,0 +1,56 @@
+"""Coriolis and Euler forces on the water in basins on bodies, and the coupling of water and body accelerations.
+
+For the forces see `basin_frames`. If forces move the body, its acceleration must be solved together with that of the
+water in its basins. Lagrange's equations (70) are those of columns that are point masses at mid depth and slide along
+the bed. The force along the bed depends on the state alone, so flow rates are first computed with locked joints. The
+water then loads the body by its missing momentum (`frame_reaction`). Along the normal it acts by its mass and moments,
+together with those of bodies (`kernels.mechanism.basin_inertia`). After the accelerations are solved, the flow rates
+are corrected for them (`correct_for_bodies`). A liquid is such a layer without height. The total momentum is conserved
+to the order of the method.
+"""
+
+from fvsolve.basins.basin_frames import AZ, WZ
+from fvsolve.basins.frame_momentum import accelerate_flow
+from fvsolve.basins.frame_reaction import extra_accelerations, load_body
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import LAW_LINEAR, RATE
+from fvsolve.kernels.mechanism.basin_inertia import EAST, TANK_OUT
+from fvsolve.kernels.mechanism.body_layout import dot
+from fvsolve.kernels.table_handle import open_tables
+
+
+@njit
+def add_frame_forces(t, y, dydt, out, handle):
+    """Add Coriolis and Euler forces to rates of flow, and the loads of the contents of basins to their bodies.
+
+    Under law linear the inertia of a liquid is that at rest.
+    """
+    tables = open_tables(handle)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["frame"] < 0:
+            continue
+        twice, euler = 2.0 * tables.plane[basin["frame"] + WZ], tables.plane[basin["frame"] + AZ]
+        out[RATE] = max(out[RATE], abs(twice))
+        to, first = (dydt, basin["y"]) if dydt.size > 0 else (tables.work, basin["boundary_rates"])
+        own = 0.0 if basin["deep"] == 0 and tables.settings[0]["law"] == LAW_LINEAR else 1.0
+        if (twice != 0.0 or euler != 0.0) and (basin["loads_body"] == 0 or basin["nx"] == 0):
+            accelerate_flow(tables.plane, basin, y, to, first, own, twice, 0.0, 0.0, euler)
+        if basin["loads_body"] == 1:
+            load_body(tables, basin, b, y, to, first, own, twice, euler, out)
+
+
+@njit
+def correct_for_bodies(t, y, dydt, out, handle):
+    """Correct the rates of flow for the accelerations of the body beyond those with locked joints."""
+    tables = open_tables(handle)
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
+        if basin["frame"] < 0:
+            continue
+        ax, ay, az, wx, wy, wz = extra_accelerations(tables, basin, out)
+        e = tables.layout[0]["tank"] + TANK_OUT * b + EAST
+        x_part, y_part, turn = dot(out, e, ax, ay, az), dot(out, e + 3, ax, ay, az), dot(out, e + 6, wx, wy, wz)
+        if x_part == 0.0 and y_part == 0.0 and turn == 0.0:
+            continue
+        accelerate_flow(tables.plane, basin, y, dydt, basin["y"], 1.0, 0.0, -x_part, -y_part, turn)

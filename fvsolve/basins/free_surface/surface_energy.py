@@ -1,0 +1,120 @@
+"""Power and stored energy of water with a free surface.
+
+The stored energy per area is rho (g h^2 / 2 + g h z_bed + |q|^2 / (2 h)). For the rows see `basin_energy`.
+"""
+
+from math import sqrt
+
+from fvsolve.basins.basin_energy import basin_first_row, rest_potential
+from fvsolve.basins.boundary_cells import flow_weight, patch_area, patch_length, weighted_volume
+from fvsolve.basins.free_surface.bed_friction import drag_per_flow
+from fvsolve.basins.free_surface.surface_rows import THIN
+from fvsolve.basins.physics_codes import physics_code
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import NO_DRAG
+from fvsolve.kernels.table_handle import open_tables
+
+MINE = physics_code(__package__)
+
+
+@njit(forceinline=True)
+def velocity_factor(depth):
+    """Velocity over unit flow at a depth [1/m]."""
+    wet = max(depth, THIN)
+    return 2.0 * depth / (depth * depth + wet * wet)
+
+
+@njit
+def add_power(t, y, dydt, out, handle, power):
+    """Write the rows of its basins: losses at patches, friction, rate of storage."""
+    tables = open_tables(handle)
+    patches, layout = tables.patches, tables.layout[0]
+    for b in range(tables.basins.size):
+        if tables.basins[b]["kind"] == MINE:
+            rows = power[basin_first_row(tables, power, b) :]
+            water_power(tables.settings[0], tables.basins[b], tables.plane, y, dydt, rows)
+    for k in range(patches.size):
+        patch, node = patches[k], patches[k]["node"]
+        if tables.basins[patch["basin"]]["kind"] == MINE and patch["moves"] == 0:
+            flow = out[layout["net"] + node] + out[layout["supply"] + node]
+            power[basin_first_row(tables, power, patch["basin"]) + 1] += patch_loss(tables, patch, flow, y)
+
+
+@njit
+def water_power(st, basin, plane, y, dydt, rows):
+    """Friction, capped as in the rates, and rate of storage of water with a free surface."""
+    n, o = basin["n"], basin["y"]
+    depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
+    weight, rest, area = st["rho"] * st["gravity"], rest_potential(st, basin), plane[basin["area"] :]
+    drawn = plane[basin["drawn"] :]
+    friction, rate = 0.0, 0.0
+    for i in range(n):
+        d, qx, qy = y[o + i], y[o + n + i], y[o + 2 * n + i]
+        depth = max(depths[i] + d, 0.0)
+        share = velocity_factor(depth)
+        u, v = share * qx, share * qy
+        level = rest + weight * (surface[i] + d) - 0.5 * st["rho"] * (u * u + v * v)
+        kinetic = u * dydt[o + n + i] + v * dydt[o + 2 * n + i]
+        rate += drawn[i] * (level * dydt[o + i] + st["rho"] * kinetic)
+        friction += area[i] * drag_power(st, basin, depth, sqrt(qx * qx + qy * qy), u * u + v * v)
+    rows[2], rows[3] = friction, rate
+
+
+@njit
+def drag_power(st, basin, depth, flow, square):
+    """Power of bed friction per area [W/m2]. square : of the velocity"""
+    if basin["friction"] == NO_DRAG:
+        return 0.0
+    rate = drag_per_flow(basin["friction"], st["gravity"], basin["roughness"], depth) * flow
+    return st["rho"] * depth * square * rate / (1.0 + rate / basin["held"])
+
+
+@njit
+def patch_loss(tables, patch, flow, y):
+    """Power lost by `flow` [kg/s] into the cells at a patch, or out of them [W]; see `surface_patches`."""
+    st, basin, plane, integers = (
+        tables.settings[0],
+        tables.basins[patch["basin"]],
+        tables.plane,
+        tables.integers,
+    )
+    n, o, total, leaves = basin["n"], basin["y"], 0.0, flow < 0.0
+    depths, area = plane[basin["plan"] :], plane[basin["area"] :]
+    each = flow / weighted_volume(tables, patch, leaves, y)
+    for m in range(patch["count"]):
+        i = integers[patch["first"] + m]
+        share = velocity_factor(max(depths[i] + y[o + i], 0.0))
+        square = share * share * (y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2)
+        total += 0.5 * area[i] * square * each * flow_weight(plane, basin, leaves, i, y)
+    for m in range(patch["faces"]):
+        i, at, count = integers[patch["ring"] + patch["faces"] + m], patch["normals"], patch["faces"]
+        depth = max(depths[i] + y[o + i], 0.0)
+        share, wide = velocity_factor(depth), plane[at + 2 * count + m] * plane[basin["drawn"] + i]
+        u, v = share * y[o + n + i], share * y[o + 2 * n + i]
+        away = -each * flow_weight(plane, basin, leaves, i, y) * patch_area(tables, patch) / patch_length(tables, patch)
+        along = u * plane[at + m] + v * plane[at + count + m]
+        net_outflow = away - st["rho"] * depth * along  # at a wall the inflow of momentum is lost
+        total -= wide * along * (abs(along) + sqrt(st["gravity"] * depth)) * net_outflow
+        if away > 0.0:
+            total += wide * away * (u * u + v * v - along * along)
+    return total
+
+
+@njit
+def add_stored(t, y, dydt, out, handle, stored):
+    """Write the stored energy of its basins."""
+    tables = open_tables(handle)
+    st, basins, plane = tables.settings[0], tables.basins, tables.plane
+    weight = st["rho"] * st["gravity"]
+    for b in range(basins.size):
+        basin, total = basins[b], 0.0
+        if basin["kind"] != MINE:
+            continue
+        n, o, rest, area = basin["n"], basin["y"], rest_potential(st, basin), plane[basin["area"] :]
+        depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]
+        for i in range(n):
+            d, square = y[o + i], y[o + n + i] ** 2 + y[o + 2 * n + i] ** 2
+            share = velocity_factor(max(depths[i] + d, 0.0))
+            height = (rest + weight * surface[i]) * d + 0.5 * weight * d * d
+            total += area[i] * (height + 0.5 * st["rho"] * share * square)
+        stored[stored.size - basins.size + b] = total

@@ -1,0 +1,84 @@
+"""Fifth-order values of shallow water at faces, where it is deep enough.
+
+Depth, surface and unit flows are reconstructed from cell means; velocities are their quotients. The integral of h de/dx
+over a cell is exact for cubics: the product of the parabolas through both face values and the mean, plus the products
+of third differences with second differences.
+"""
+
+from math import sqrt
+
+from fvsolve.basins.free_surface.surface_rows import EAST, FLOW_EAST, HIGH, NORTH, PUSH, STRIDE, SURFACE, THIN, WAVE
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import WENO5
+from fvsolve.kernels.reconstruction import value_weno5
+
+SMALL = 1e-20  # squares of differences below which WENO's weights are its linear weights [m2, m4/s2]
+LEAST_DEPTH_RATIO = 0.5  # shallowest of five depths over the deepest, below which values are limited
+
+
+@njit
+def value_upwind5(a, b, c, d, e):
+    """Fifth-order value at the face after c."""
+    return ((2.0 * a - 13.0 * b) + (47.0 * c + 27.0 * d) - 3.0 * e) / 60.0
+
+
+@njit
+def put_smooth_flags(p, q, r, s, t, deep):
+    """Set `deep` to 1 where the shallowest of five cells has more than the fraction STEEP of the deepest, else to 0."""
+    for i in range(deep.size):
+        least = min(min(min(p[i], q[i]), min(s[i], t[i])), r[i])
+        most = max(max(max(p[i], q[i]), max(s[i], t[i])), r[i])
+        deep[i] = 1.0 if least > LEAST_DEPTH_RATIO * most else 0.0
+
+
+@njit
+def put_fifth(scheme, p, q, r, s, t, deep, low, high):
+    """Values at both faces of a row of cells r, where `deep` is 1."""
+    if scheme == WENO5:
+        for i in range(deep.size):
+            a = value_weno5(t[i], s[i], r[i], q[i], p[i], SMALL)
+            b = value_weno5(p[i], q[i], r[i], s[i], t[i], SMALL)
+            low[i], high[i] = (a if deep[i] > 0.0 else low[i]), (b if deep[i] > 0.0 else high[i])
+    else:
+        for i in range(deep.size):
+            a = value_upwind5(t[i], s[i], r[i], q[i], p[i])
+            b = value_upwind5(p[i], q[i], r[i], s[i], t[i])
+            low[i], high[i] = (a if deep[i] > 0.0 else low[i]), (b if deep[i] > 0.0 else high[i])
+
+
+@njit
+def put_velocities(g, deep, side):
+    """Velocities from unit flows where `deep` is 1, and wave speeds."""
+    for i in range(deep.size):
+        depth = max(side[i], 0.0)
+        wet = max(depth, THIN)
+        part = 2.0 * depth / (depth * depth + wet * wet) if deep[i] > 0.0 else 1.0
+        side[i + EAST], side[i + NORTH], side[i + WAVE] = part * side[i + EAST], part * side[i + NORTH], sqrt(g * depth)
+
+
+@njit
+def put_push(h, deep, hl, hr, el, er, ph, qh, sh, th, pe, qe, re, se, te, push):
+    """Integral of h de/dx over cells where `deep` is 1, from values at both faces and the means of five cells."""
+    for i in range(push.size):
+        h2, e2 = 3.0 * ((hl[i] + hr[i]) - 2.0 * h[i]), 3.0 * ((el[i] + er[i]) - 2.0 * re[i])
+        h3, e3 = 0.5 * ((th[i] - ph[i]) - 2.0 * (sh[i] - qh[i])), 0.5 * ((te[i] - pe[i]) - 2.0 * (se[i] - qe[i]))
+        integral = h[i] * (er[i] - el[i]) + (hr[i] - hl[i]) * e2 / 6.0 + (h2 * e3 - e2 * h3) / 360.0
+        push[i] = integral if deep[i] > 0.0 else push[i]
+
+
+@njit
+def put_smooth(g, scheme, p, q, r, s, t, sides, deep):
+    """Replace limited values at both faces of a row of cells r by fifth-order values, from two cells on either side."""
+    low, high = sides, sides[HIGH:]
+    put_smooth_flags(p, q, r, s, t, deep)
+    for f in range(4):
+        at = f * STRIDE
+        o = at if at < EAST else at - EAST + FLOW_EAST
+        put_fifth(scheme, p[o:], q[o:], r[o:], s[o:], t[o:], deep, low[at:], high[at:])
+    e = SURFACE
+    put_push(
+        r, deep, low, high, low[e:], high[e:], p, q, s, t, p[e:], q[e:], r[e:], s[e:], t[e:],
+        sides[PUSH : PUSH + deep.size],
+    )  # fmt: skip
+    put_velocities(g, deep, low)
+    put_velocities(g, deep, high)

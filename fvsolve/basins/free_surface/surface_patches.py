@@ -1,0 +1,160 @@
+"""Patches of water with a free surface: their pressures, and the flows of links in the cells next to them."""
+
+from math import inf, sqrt
+
+from fvsolve.basins.basin_frames import potential_coefficients
+from fvsolve.basins.basin_patches import add_link_momentum, normal_gravity
+from fvsolve.basins.boundary_cells import (
+    LEAST_DEPTH,
+    SHALLOW,
+    available_fraction,
+    depth_at_patch,
+    flow_weight,
+    outflow_weight,
+    patch_area,
+    patch_length,
+    weighted_volume,
+)
+from fvsolve.basins.cell_stretching import deviations_of, stretch_of_cell
+from fvsolve.basins.free_surface.surface_rows import THIN
+from fvsolve.basins.physics_codes import physics_code
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import GN, PATCH, RATE
+from fvsolve.kernels.restrictions import head_drop
+from fvsolve.kernels.table_handle import open_tables
+
+MINE = physics_code(__package__)
+
+
+@njit
+def water_at_patch(tables, patch, y):
+    """(rise of the surface, depth, volume, sum of area times weight squared) of the cells at a patch.
+
+    The weight of a cell is its area times `outflow_weight`, so that a dry bank does not count; the volume is the sum.
+    The rise is from the surface at rest (of a dry patch, from its lowest bed); in a basin on a body, from the level,
+    including phi.
+    """
+    basin, plane = tables.basins[patch["basin"]], tables.plane
+    n, plan, low, lowest = basin["n"], basin["plan"], inf, 0.0
+    for m in range(patch["count"]):
+        i = tables.integers[patch["first"] + m]
+        bed = plane[plan + n + i] - plane[plan + i]  # above the level at rest
+        if bed < low:
+            low, lowest = bed, plane[plan + n + i] + y[basin["y"] + i]
+    rest, rise, depth, volume, squares = max(low, 0.0) if basin["frame"] < 0 else 0.0, 0.0, 0.0, 0.0, 0.0
+    for m in range(patch["count"]):
+        i = tables.integers[patch["first"] + m]
+        h = depth_at_patch(plane, basin, i, y)
+        part = plane[basin["area"] + i] * outflow_weight(h)
+        volume, squares = volume + part, squares + part * outflow_weight(h)
+        rise += part * (plane[plan + n + i] + y[basin["y"] + i] - rest)
+        depth += part * h
+    filling = max(LEAST_DEPTH * patch_area(tables, patch) - volume, 0.0)
+    total = volume + filling
+    return (rise + filling * (lowest - rest)) / total, depth / total, volume, squares
+
+
+@njit
+def bottom_pressure_at_patch(plane, basin, patch, rise, depth):
+    """Bottom pressure over density at a patch on a body, minus that of the profile [J/kg], at rest in its frame.
+
+    The surface is an equipotential, so its height over each position follows from phi. A dry position has no pressure.
+    """
+    at, (fx, fy, xx, xy, yy) = patch["sizes"] + 2, potential_coefficients(plane, basin["frame"], 1.0)
+    x, y, z, profile = plane[at], plane[at + 1], plane[at + 2], plane[at + 3]
+    phi = x * (fx + xx * x + xy * y) + y * (fy + yy * y)
+    return available_fraction(depth) * max(plane[basin["frame"] + GN] * (rise - z) - phi, 0.0) - profile
+
+
+@njit
+def patch_pressures(t, y, dydt, out, handle):
+    """Deviation of the pressure at every patch from the profile, and its slope with mass [Pa/kg]."""
+    tables = open_tables(handle)
+    st, layout = tables.settings[0], tables.layout[0]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin = tables.basins[patch["basin"]]
+        if basin["kind"] != MINE:
+            continue
+        node, seen = tables.nodes[patch["node"]], deviations_of(basin, tables.seen, y)
+        stored, depth, volume, squares = water_at_patch(tables, patch, seen)
+        area = patch_area(tables, patch)
+        slope, content = st["rho"] * normal_gravity(st, tables.plane, basin), st["rho"] * area
+        spread = area * squares / (volume * volume) if volume > LEAST_DEPTH * area else 1.0
+        pressure = slope * stored
+        if basin["frame"] >= 0:
+            pressure = st["rho"] * bottom_pressure_at_patch(tables.plane, basin, patch, stored, depth)
+        out[layout["pressure"] + patch["node"]] = pressure
+        out[layout["supply"] + patch["node"]] = 0.0
+        out[layout["outflow_fraction"] + node["row"]] = available_fraction(depth)
+        out[layout["stiffness"] + node["row"]] = slope * spread / content
+
+
+@njit
+def patch_flows(t, y, dydt, out, handle):
+    """Add the flows through patches to the rates of the cells next to them."""
+    tables = open_tables(handle)
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin = tables.basins[patch["basin"]]
+        if basin["kind"] == MINE:
+            inflow, seen = out[tables.layout[0]["net"] + patch["node"]], deviations_of(basin, tables.seen, y)
+            add_patch_flow(tables, patch, inflow, seen, dydt, out)
+
+
+@njit
+def add_patch_flow(tables, patch, demand, y, dydt, out):
+    """Add the flow through a patch to rates; in thin water the outflow may be smaller than the demand."""
+    st, layout, integers, plane = tables.settings[0], tables.layout[0], tables.integers, tables.plane
+    basin, rho = tables.basins[patch["basin"]], st["rho"]
+    n, o, first = basin["n"], basin["y"], patch["first"]
+    _, depth, volume, _ = water_at_patch(tables, patch, y)
+    leaves, available = demand < 0.0, 1.0
+    total = weighted_volume(tables, patch, leaves, y)
+    if leaves:
+        available = available_fraction(depth)  # the rest comes from outside
+        slope = (
+            -2.0 * demand * available * min(depth / SHALLOW, 1.0) / (rho * total)
+        )  # 2: more than the slope of `outflow_weight`
+        out[RATE] = max(out[RATE], slope)
+        out[layout["supply"] + patch["node"]] += (available * volume / total - 1.0) * demand
+    flow = available * demand / (rho * total)  # of depth, over weights [1/s]
+    for m in range(patch["count"] if dydt.size > 0 else 0):
+        i = integers[first + m]
+        dydt[o + i] += flow * flow_weight(plane, basin, leaves, i, y) * stretch_of_cell(plane, basin, i)
+    per_width = -flow * patch_area(tables, patch) / patch_length(tables, patch)  # over weights [m/s]
+    for m in range(patch["faces"] if dydt.size > 0 and flow != 0.0 else 0):
+        k = integers[patch["ring"] + patch["faces"] + m]
+        out_per_width = per_width * flow_weight(plane, basin, leaves, k, y)
+        h = depth_at_patch(plane, basin, k, y)
+        i, at, count = o + k, patch["normals"], patch["faces"]
+        share = 2.0 * h / (h * h + max(h, THIN) * max(h, THIN))
+        along_x, along_y = plane[at + m], plane[at + count + m]
+        u = share * (y[i + n] * along_x + y[i + 2 * n] * along_y)
+        add_link_momentum(
+            plane,
+            patch,
+            m,
+            (abs(u) + sqrt(normal_gravity(st, plane, basin) * h)) * out_per_width,
+            dydt,
+            i + n,
+            i + 2 * n,
+        )
+        if out_per_width > 0.0:  # outflow takes its tangential momentum along
+            across, per_area = share * (y[i + 2 * n] * along_x - y[i + n] * along_y), plane[at + 2 * count + m]
+            dydt[i + n] += out_per_width * per_area * across * along_y
+            dydt[i + 2 * n] -= out_per_width * per_area * across * along_x
+
+
+@njit
+def limit_inflow_rate(t, y, dydt, out, handle):
+    """Limit the step by waves that valves may start: with the speed of the head across a valve, over a dry bed too."""
+    tables = open_tables(handle)
+    st, valves, patches = tables.settings[0], tables.valves, tables.patches
+    for k in range(valves.size):
+        drop = head_drop(tables, out, k)[1]
+        receiver = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
+        for p in range(patches.size if tables.nodes[receiver]["kind"] == PATCH else 0):
+            if patches[p]["node"] == receiver and tables.basins[patches[p]["basin"]]["kind"] == MINE:
+                wide = sqrt(patch_area(tables, patches[p]) / patches[p]["count"])
+                out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)

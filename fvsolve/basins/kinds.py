@@ -1,8 +1,0 @@
-"""Codes by which compiled functions of a physics recognise its basins."""
-
-from zlib import crc32
-
-
-def kind_of(package: str) -> int:
-    """Code of the physics of a package: each of its compiled files contains `MINE = physics_code(__package__)`."""
-    return crc32(package.encode())

@@ -1,0 +1,331 @@
+"""Pressure waves of a liquid on any mesh, under all its laws.
+
+States, waves and their fluxes are those of the grid (`grid_linear` and `grid_nonlinear`): across a side (w + u) / 2
+comes from inside and (w - u) / 2 from beyond. Under `linear` w = c r and u = m; under `log` u = m / rho and w = 2 (c0 -
+c); under `table` w is read from the table.
+"""
+
+from math import sqrt
+
+import numpy as np
+
+from fvsolve.basins.cell_sides import (
+    BLOCK,
+    HEAD,
+    HUGE,
+    INDICES,
+    MEASURES,
+    NX,
+    NY,
+    REACH,
+    SIDE,
+    blocks,
+    edges_before,
+    gather,
+    limited_sides,
+    put_inward,
+    ring_place,
+)
+from fvsolve.basins.cell_stretching import stretch_rates
+from fvsolve.basins.liquid.grid_nonlinear import log1p_small, log1p_vector, stiffness, subtract_potential
+from fvsolve.basins.liquid.moving_wall_waves import wall_flow
+from fvsolve.basins.liquid.riemann_invariants import invariant, invariant_at_potential, state
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import LAW_LOG, UPWIND
+
+# Rows of BLOCK in the scratch of a block: values beyond, rates, sum for the step, flow through the side.
+_U, _V, _RR, _RX, _RY, _FAST, _C, _TOP, _FREE, _MASS = (k * BLOCK for k in range(1, 11))
+_NX, _NY, _REACH = NX * BLOCK, NY * BLOCK, REACH * BLOCK
+_PUSH, _LOSS = 11 * BLOCK, 12 * BLOCK  # of moving sides: pressure at the side, energy lost there
+_PER, _BULK, _PHI = (k * BLOCK for k in range(13, 16))  # with a potential: see `grid_nonlinear.stiffness`
+ROWS = 16
+
+
+@njit
+def put_primitives(law, c0, rho, table, r, mx, my, w, u, v, c):
+    """w, both velocities (mass-flow densities under law linear) and wave speed of a block of cells."""
+    if table is not None:
+        for i in range(r.size):
+            w[i], slope = invariant(table, r[i])
+            volume = 1.0 / (rho + r[i])
+            u[i], v[i], c[i] = volume * mx[i], volume * my[i], (rho + r[i]) * slope
+        return
+    if law == LAW_LOG:
+        per, twice = 1.0 / rho, 2.0 * c0
+        for i in range(r.size):
+            x = per * r[i]
+            s = sqrt(1.0 + x)
+            volume = per / (s * s)
+            w[i], u[i], v[i], c[i] = twice * (x / (s * (1.0 + s))), volume * mx[i], volume * my[i], c0 / s
+    else:
+        for i in range(r.size):
+            w[i], u[i], v[i], c[i] = c0 * r[i], mx[i], my[i], c0
+
+
+@njit
+def put_ghosts(law, c0, rho, table, edges, ring, nx, ny, number, reflect, w, u, v, shown_w, shown_u, shown_v, moves):
+    """Values beyond the boundary: mirror images with reflection coefficients 1 and -1, equal values at 0 (open)."""
+    for q in range(edges.size):
+        i = ring_place(edges[q], ring)
+        r = reflect[number[q]] if reflect.size > 0 else 1.0
+        out = u[i] * nx[q] + v[i] * ny[q]
+        if moves is not None:
+            out -= wall_flow(table is not None or law == LAW_LOG, c0, rho, moves[0][edges[q]], w[i] + out)
+        across = (min(1.0, 1.0 - 2.0 * r) - 1.0) * out
+        shown_w[q], shown_u[q], shown_v[q] = (
+            min(1.0, 1.0 + 2.0 * r) * w[i],
+            u[i] + across * nx[q],
+            v[i] + across * ny[q],
+        )
+
+
+@njit
+def put_reflections(law, c0, rho, table, edges, nx, ny, number, reflect, wl, ul, vl, w, moves):
+    """Write the reflected wave beyond boundary sides: w - u beyond is `reflect` times w + u inside.
+
+    A moving wall reflects waves so that u at the wall is its own.
+    """
+    for q in range(edges.size):
+        i = edges[q] % BLOCK
+        r = reflect[number[q]] if reflect.size > 0 else 1.0
+        out = ul[i] * nx[q] + vl[i] * ny[q]
+        if moves is not None:
+            out -= wall_flow(table is not None or law == LAW_LOG, c0, rho, moves[0][edges[q]], wl[i] + out)
+        across = -(1.0 + r) * out
+        w[i], w[_U + i], w[_V + i] = r * wl[i], ul[i] + across * nx[q], vl[i] + across * ny[q]
+
+
+@njit
+def add_side_linear(c0, wl, ul, vl, geo, w):
+    """Subtract from the rates of a block of cells the outflow through one side of each.
+
+    wl, ul, vl : values at the side from inside; those from beyond are in w
+    """
+    for i in range(BLOCK):
+        nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+        forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
+        backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
+        push = reach * (c0 * (forward + backward))
+        w[_RR + i] -= reach * (forward - backward)
+        w[_MASS + i] = forward - backward
+        w[_RX + i] -= push * nx
+        w[_RY + i] -= push * ny
+        w[_FAST + i] += reach * c0
+
+
+@njit
+def add_side_linear_moving(c0, rho, wl, ul, vl, geo, w, speeds):
+    """Subtract the outflow through moving sides, F(U) - speed U.
+
+    Tangential momentum is not carried by a moving side.
+    """
+    for i in range(BLOCK):
+        nx, ny, reach, speed = geo[_NX + i], geo[_NY + i], geo[_REACH + i], speeds[i]
+        forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
+        backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
+        m, pressure = forward - backward, c0 * (forward + backward)
+        mass = m - speed * (rho + (forward + backward) / c0)
+        tangent = vl[i] * nx - ul[i] * ny if speed < 0.0 else w[_V + i] * nx - w[_U + i] * ny
+        push, along = pressure - speed * m, -speed * tangent
+        w[_RR + i] -= reach * mass
+        w[_MASS + i] = mass
+        w[_RX + i] -= reach * (push * nx - along * ny)
+        w[_RY + i] -= reach * (push * ny + along * nx)
+        w[_FAST + i] += reach * (c0 + abs(speed))
+        w[_PUSH + i] = pressure
+        w[_LOSS + i] = speed * (pressure * pressure / (c0 * c0) - m * m - tangent * tangent)
+
+
+@njit
+def add_side_nonlinear(c0, rho, table, u0, v0, c, wl, ul, vl, geo, w, speeds, phi):
+    """Subtract the outflow through one side of each cell with the full momentum flux.
+
+    u0, v0, c : of the cells, for the step; speeds : of the sides, or None
+    phi : None, or a potential at the sides, subtracted from the waves; its force on cells is that of `balance_side`
+    """
+    bulk, per = rho * c0 * c0, 0.5 / c0
+    for i in range(BLOCK):
+        nx, ny, reach = geo[_NX + i], geo[_NY + i], geo[_REACH + i]
+        forward = 0.5 * (wl[i] + (ul[i] * nx + vl[i] * ny))
+        backward = 0.5 * (w[i] - (w[_U + i] * nx + w[_V + i] * ny))
+        u = forward - backward
+        through, own, invariant_sum = u, u0[i] * nx + v0[i] * ny, forward + backward
+        if phi is not None:
+            invariant_sum = invariant_at_potential(c0, rho, table, invariant_sum, phi[i])
+        if speeds is not None:
+            through, own = u - speeds[i], own - speeds[i]
+        if table is not None:
+            r, p = state(table, invariant_sum)
+            mass = (rho + r) * through
+            push = mass * u + p
+        else:
+            y = -per * invariant_sum  # c = c0 (1 + y)
+            mass = rho * through / ((1.0 + y) * (1.0 + y))
+            p = -2.0 * bulk * log1p_vector(y)
+            push = mass * u + p
+        along = mass * (vl[i] * nx - ul[i] * ny if through > 0.0 else w[_V + i] * nx - w[_U + i] * ny)
+        w[_RR + i] -= reach * mass
+        w[_RX + i] -= reach * (push * nx - along * ny)
+        w[_RY + i] -= reach * (push * ny + along * nx)
+        w[_FAST + i] += reach * (abs(own) + c[i])
+        w[_MASS + i] = mass
+        if speeds is not None:
+            w[_PUSH + i], w[_LOSS + i] = p, 0.0
+
+
+@njit
+def put_stiffness(c0, rho, table, r, phi, w):
+    """1 / c^2, rho c^2 and potential of a block of cells."""
+    for i in range(r.size):
+        w[_PER + i], w[_BULK + i] = stiffness(c0, rho, table, r[i])
+        w[_PHI + i] = phi[i]
+
+
+@njit
+def balance_side(phi, geo, w):
+    """Subtract from the rates of a block of cells the pressures that would keep them at rest, at one side of each."""
+    for i in range(BLOCK):
+        push = geo[_REACH + i] * w[_BULK + i] * log1p_small(w[_PER + i] * (phi[i] - w[_PHI + i]))
+        w[_RX + i] -= push * geo[_NX + i]
+        w[_RY + i] -= push * geo[_NY + i]
+
+
+@njit
+def close_walls(edges, number, reflect, geo, w, thrust):
+    """Set the mass flow through walls to zero; write the pressure on them, and the energy lost by their motion."""
+    count = thrust.size // 2
+    for q in range(edges.size):
+        i = edges[q] % BLOCK
+        thrust[number[q]], thrust[count + number[q]] = w[_PUSH + i], w[_LOSS + i]
+        if reflect.size == 0 or reflect[number[q]] == 1.0:
+            w[_RR + i] += geo[_REACH + i] * w[_MASS + i]
+            w[_MASS + i] = 0.0
+
+
+@njit
+def clear(w):
+    """Set rates and sum to zero."""
+    for i in range(BLOCK):
+        w[_RR + i], w[_RX + i], w[_RY + i], w[_FAST + i] = 0.0, 0.0, 0.0, 0.0
+
+
+@njit
+def put_rates(w, rate_r, rate_x, rate_y):
+    """Rates of a block of cells, and the greatest sum so far in each lane."""
+    for i in range(BLOCK):
+        w[_TOP + i] = max(w[_TOP + i], w[_FAST + i])
+    for i in range(rate_r.size):
+        rate_r[i], rate_x[i], rate_y[i] = w[_RR + i], w[_RX + i], w[_RY + i]
+
+
+@njit
+def work_size(integers):
+    """Length of the work array of `liquid_rates`."""
+    return 16 * integers[4] * BLOCK + 3 * integers[3] + ROWS * BLOCK
+
+
+@njit
+def liquid_rates(
+    law, c0, rho, table, scheme, wide_by, floats, integers, reflect, r, mx, my, through, work, rate_r, rate_x, rate_y,
+    moves, phi,
+):  # fmt: skip
+    """Rates of all cells; returns the greatest sum of L (|u| + c) / (2 A) [1/s].
+
+    law : LAW_LINEAR or LAW_LOG; c0, rho : wave speed [m/s] and density [kg/m3] at rest
+    table : of `riemann_invariants` in place of a law, or None
+    scheme : UPWIND or MUSCL; wide_by : allowed excess of values at sides over the range of neighbours, 1 for none
+    reflect : float64[b]  reflection coefficients, -1 to 1, empty for walls
+    r : float64[n]  deviation of density [kg/m3]; mx, my : mass-flow densities [kg/(m2 s)]
+    through : float64[b]  inward flows through the boundary [kg/(m s)], or empty
+    work : float64[work_size(integers)]
+    moves : None, or a tuple: speeds of sides along their normals [m/s], see `moving_meshes`; array float64[2 b] for
+    pressures above that at rest on boundary faces [Pa], then for energy lost there by law linear,
+    speed (c^2 r^2 - m^2) [kg^2/(m3 s3)]; stretching `wide`, see `basins.cell_stretching`
+    phi : None, or under laws with the full momentum flux a potential [J/kg] of cells, padded, and of sides
+    """
+    slots, n, f, b, ring = integers[0], integers[1], integers[2], integers[3], integers[4]
+    count, first_order = blocks(integers), scheme == UPWIND
+    m = count * slots * BLOCK
+    at, to = HEAD + INDICES * m // 2, MEASURES * m
+    need, edges, number = integers[at : at + count], integers[at + count :][:b], integers[at + count + b :][:b]
+    bx, by, lengths = floats[to : to + b], floats[to + b : to + 2 * b], floats[to + 2 * b :][:f]
+    places = integers[HEAD:].view(np.int32)
+    near, wide = ring * BLOCK, 4 * ring * BLOCK
+    p, u, v, c = work[:near], work[near : 2 * near], work[2 * near : 3 * near], work[3 * near : 4 * near]
+    rest = work[4 * near :]
+    ps, us, vs = rest[:wide], rest[wide : 2 * wide], rest[2 * wide : 3 * wide]
+    if first_order:
+        ps, us, vs = p, u, v
+    shown, w = rest[3 * wide : 3 * wide + 3 * b], rest[3 * wide + 3 * b :]
+    free = w[_FREE:]
+    for i in range(BLOCK):
+        w[_TOP + i], free[i] = 0.0, HUGE
+    cells_done, sides_done, wall, edge = (
+        0,
+        0,
+        0,
+        0,
+    )  # blocks with computed cells and sides; boundary sides done in both loops
+    for j in range(count):
+        while sides_done < need[j]:
+            while cells_done < need[sides_done]:
+                i, k, o = cells_done * BLOCK, min((cells_done + 1) * BLOCK, n), (cells_done % ring) * BLOCK
+                put_primitives(law, c0, rho, table, r[i:k], mx[i:k], my[i:k], p[o:], u[o:], v[o:], c[o:])
+                if phi is not None and (table is not None or law == LAW_LOG):
+                    subtract_potential(c0, rho, table, phi[0][i:k], p[o : o + k - i])
+                cells_done += 1
+            if not first_order:
+                k, wall = wall, edges_before(edges, wall, 4 * (sides_done + 1) * BLOCK)
+                here, sp, su, sv = edges[k:wall], shown[k:], shown[b + k :], shown[2 * b + k :]
+                put_ghosts(
+                    law, c0, rho, table, here, ring, bx[k:wall], by[k:wall], number[k:wall], reflect, p, u, v,
+                    sp, su, sv, moves,
+                )  # fmt: skip
+                limited_sides(sides_done, floats, integers, p, wide_by, free, sp, here, w, ps)
+                limited_sides(sides_done, floats, integers, u, wide_by, free, su, here, w, us)
+                limited_sides(sides_done, floats, integers, v, wide_by, free, sv, here, w, vs)
+            sides_done += 1
+        clear(w)
+        first, last, o = j * BLOCK, min((j + 1) * BLOCK, n), (j % ring) * BLOCK
+        if phi is not None:
+            put_stiffness(c0, rho, table, r[first:last], phi[0][first:last], w)
+        for k in range(slots):
+            slot = j * slots + k
+            where, geo = places[slot * INDICES * BLOCK :], floats[slot * MEASURES * BLOCK :]
+            beyond, own = (where, o) if first_order else (where[SIDE * BLOCK :], 4 * o + k * BLOCK)
+            gather(ps, beyond, w)
+            gather(us, beyond, w[_U:])
+            gather(vs, beyond, w[_V:])
+            i, edge = edge, edges_before(edges, edge, (4 * j + k + 1) * BLOCK)
+            put_reflections(
+                law, c0, rho, table, edges[i:edge], bx[i:edge], by[i:edge], number[i:edge], reflect, ps[own:], us[own:],
+                vs[own:], w, moves,
+            )  # fmt: skip
+            full = table is not None or law == LAW_LOG
+            if moves is not None:
+                speeds = moves[0][(4 * j + k) * BLOCK :]
+                if full:
+                    add_side_nonlinear(
+                        c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w, speeds, None
+                    )
+                else:
+                    add_side_linear_moving(c0, rho, ps[own:], us[own:], vs[own:], geo, w, speeds)
+                close_walls(edges[i:edge], number[i:edge], reflect, geo, w, moves[1])
+            elif full:
+                raised = None if phi is None else phi[1][slot * BLOCK :]
+                add_side_nonlinear(
+                    c0, rho, table, u[o:], v[o:], c[o:], ps[own:], us[own:], vs[own:], geo, w, None, raised
+                )
+                if phi is not None:
+                    balance_side(phi[1][slot * BLOCK :], geo, w)
+            else:
+                add_side_linear(c0, ps[own:], us[own:], vs[own:], geo, w)
+            if through.size > 0:
+                put_inward(edges[i:edge], number[i:edge], w[_MASS:], lengths[f - b :], through)
+        put_rates(w, rate_r[first:last], rate_x[first:last], rate_y[first:last])
+        if moves is not None:
+            stretch_rates(moves[2][first:last], rate_r[first:last], rate_x[first:last], rate_y[first:last])
+    most = 0.0
+    for i in range(BLOCK):
+        most = max(most, w[_TOP + i])
+    return 0.5 * most

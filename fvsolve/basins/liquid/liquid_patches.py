@@ -1,0 +1,67 @@
+"""Patches of a liquid: their pressures, and the flows of links in the cells next to them."""
+
+from math import log1p
+
+from fvsolve.basins.basin_patches import add_link_momentum
+from fvsolve.basins.boundary_cells import patch_area, patch_length
+from fvsolve.basins.cell_stretching import deviations_of, stretch_of_cell
+from fvsolve.basins.physics_codes import physics_code
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import LAW_LOG
+from fvsolve.kernels.table_handle import open_tables
+
+MINE = physics_code(__package__)
+
+
+@njit
+def mean_deviation(tables, patch, y):
+    """Mean deviation of density in the cells next to a patch, by area."""
+    basin, total = tables.basins[patch["basin"]], 0.0
+    for m in range(patch["count"]):
+        i = tables.integers[patch["first"] + m]
+        total += tables.plane[basin["area"] + i] * y[basin["y"] + i]
+    return total / patch_area(tables, patch)
+
+
+@njit
+def patch_pressures(t, y, dydt, out, handle):
+    """Deviation of the pressure at every patch from the profile, and its slope with mass [Pa/kg]."""
+    tables = open_tables(handle)
+    layout = tables.layout[0]
+    for k in range(tables.patches.size):
+        patch = tables.patches[k]
+        basin, node = tables.basins[patch["basin"]], tables.nodes[patch["node"]]
+        if basin["kind"] != MINE:
+            continue
+        stored, slope = (
+            mean_deviation(tables, patch, deviations_of(basin, tables.seen, y)),
+            basin["speed"] * basin["speed"],
+        )
+        pressure = slope * stored
+        if tables.settings[0]["law"] == LAW_LOG:
+            strain = stored / basin["density"]
+            pressure, slope = slope * basin["density"] * log1p(strain), slope / (1.0 + strain)
+        out[layout["pressure"] + patch["node"]] = pressure
+        out[layout["supply"] + patch["node"]] = 0.0
+        out[layout["outflow_fraction"] + node["row"]] = 1.0
+        out[layout["stiffness"] + node["row"]] = slope / (basin["thickness"] * patch_area(tables, patch))
+
+
+@njit
+def patch_flows(t, y, dydt, out, handle):
+    """Add the flows through patches to the rates of the cells next to them."""
+    tables = open_tables(handle)
+    for k in range(tables.patches.size if dydt.size > 0 else 0):
+        patch = tables.patches[k]
+        basin = tables.basins[patch["basin"]]
+        if basin["kind"] != MINE:
+            continue
+        inflow = out[tables.layout[0]["net"] + patch["node"]]
+        n, flow = basin["n"], inflow / (basin["thickness"] * patch_area(tables, patch))
+        for m in range(patch["count"]):
+            i = tables.integers[patch["first"] + m]
+            dydt[basin["y"] + i] += flow * stretch_of_cell(tables.plane, basin, i)
+        for m in range(patch["faces"]):
+            i = basin["y"] + tables.integers[patch["ring"] + patch["faces"] + m]
+            push = -basin["speed"] * inflow / (basin["thickness"] * patch_length(tables, patch))
+            add_link_momentum(tables.plane, patch, m, push, dydt, i + n, i + 2 * n)

@@ -1,0 +1,41 @@
+"""Probes of a liquid."""
+
+from math import log1p
+
+from fvsolve.basins.basin_probes import FIRST_OWN, velocity_value
+from fvsolve.basins.physics_codes import physics_code
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import CELL_FIELD, LAW_LINEAR, LAW_LOG
+from fvsolve.kernels.table_handle import open_tables
+
+MINE = physics_code(__package__)
+PRESSURE = FIRST_OWN
+
+
+@njit
+def observe_liquid(t, y, out, handle, values):
+    """Write values[k] of the probes of cells: scale * pressure over its slope at rest + offset, or velocities."""
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        probe = tables.probes[k]
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == MINE:
+            dense, u, v = read_liquid(tables, probe, y)
+            own = probe["side"] == PRESSURE
+            values[k] = probe["scale"] * dense + probe["offset"] if own else velocity_value(probe["side"], u, v)
+
+
+@njit
+def read_liquid(tables, probe, y):
+    """Weighted sums of density deviations (under law log c0^2-scaled pressure), and of velocities [m/s]."""
+    basin, law, total, u, v = tables.basins[probe["index"]], tables.settings[0]["law"], 0.0, 0.0, 0.0
+    n, o = basin["n"], basin["y"]
+    for m in range(probe["count"]):
+        i, weight = tables.integers[probe["cell"] + m], tables.floats[probe["weights"] + m]
+        value = y[o + i]
+        share = 1.0 / (basin["density"] + (0.0 if law == LAW_LINEAR else value)) * weight
+        if law == LAW_LOG:
+            value = basin["density"] * log1p(value / basin["density"])
+        total += weight * value
+        u += share * y[o + n + i]
+        v += share * y[o + 2 * n + i]
+    return total, u, v

@@ -1,0 +1,74 @@
+"""Riemann invariants of a liquid of any density law, by cubics on uniform grids.
+
+w = integral of c / rho over the density from rest; r [kg/m3] and p [Pa] are deviations from rest. A table contains
+    1/dr, first interval, number of further intervals, offset, 1/dw, first interval, number of further intervals, offset
+and four coefficients of s in [0, 1] per interval: of w over r, then of r and of p over w. Intervals are counted from
+rest, where all values are 0 to the bit. The first and the last are straight and have no end. Built by
+`lower_invariants`.
+"""
+
+from math import sqrt
+
+from fvsolve.jit import njit
+
+HEAD = 8  # floats before the cubics
+W_OF_R, OF_W = 0, 4  # places of both grids in it
+
+
+@njit(forceinline=True)
+def locate(table, grid, x, size):
+    """(offset of the cubics of the interval of x, each `size` floats, position s in it).
+
+    NaN gives the first interval and NaN.
+    """
+    z, first, last = x * table[grid], table[grid + 1], table[grid + 2]
+    k = z - first
+    k = k if k > 0.0 else 0.0
+    k = k if k < last else last
+    i = int(k)
+    return int(table[grid + 3]) + size * i, z - (i + first)
+
+
+@njit(forceinline=True)
+def invariant(table, r):
+    """(w, dw/dr = c / rho) at a deviation of density."""
+    k, s = locate(table, W_OF_R, r, 4)
+    b, c, d = table[k + 1], table[k + 2], table[k + 3]
+    return table[k] + s * (b + s * (c + s * d)), table[W_OF_R] * (b + s * (2.0 * c + 3.0 * s * d))
+
+
+@njit(forceinline=True)
+def state(table, w):
+    """(r, p) at the invariant w."""
+    k, s = locate(table, OF_W, w, 8)
+    r = table[k] + s * (table[k + 1] + s * (table[k + 2] + s * table[k + 3]))
+    return r, table[k + 4] + s * (table[k + 5] + s * (table[k + 6] + s * table[k + 7]))
+
+
+@njit(forceinline=True)
+def speed(table, rho, w):
+    """Wave speed c at the invariant w."""
+    k, s = locate(table, OF_W, w, 8)
+    b, c, d = table[k + 1], table[k + 2], table[k + 3]
+    dense = rho + table[k] + s * (b + s * (c + s * d))
+    return dense / (table[OF_W] * (b + s * (2.0 * c + 3.0 * s * d)))
+
+
+@njit(forceinline=True)
+def invariant_at_potential(c0, rho, table, w, phi):
+    """Invariant of a liquid at rest, w, after its potential is raised by phi [J/kg]: dp / rho = c dw = -d(phi).
+
+    Without table, law log: the new c^2 is the old c^2 plus phi. Else a midpoint rule, with an error of (phi / c^2)^3.
+    """
+    if table is None:
+        c = c0 - 0.5 * w
+        return w - 2.0 * phi / (c + sqrt(c * c + phi))
+    return w - phi / speed(table, rho, w - 0.5 * phi / speed(table, rho, w))
+
+
+@njit(forceinline=True)
+def pressure(table, rho, r):
+    """(p, dp/dr = c^2) at a deviation from the density rho at rest."""
+    w, slope = invariant(table, r)
+    c = (rho + r) * slope
+    return state(table, w)[1], c * c

@@ -1,0 +1,378 @@
+"""Moving walls of basins, and the grid lines that move with them.
+
+The rate of the content of a cell is the sum of F - w U over its faces, with their speeds w (Reynolds' transport
+theorem, 71 to 73). So the states are contents over undeformed areas, (A U - A0 U0) / A0, and positions of walls are
+states too. Areas are then linear in the states; every Runge-Kutta method keeps this relation, and a uniform state stays
+uniform to round-off. All walls of a basin move along the same axis. Other functions read deviations U - U0 (`seen`)
+instead of contents, and present lines and areas in `plane`. On other meshes, corners take the place of grid lines (see
+`moving_meshes`).
+"""
+
+from math import sqrt
+
+from fvsolve.basins.basin_energy import basin_first_row
+from fvsolve.basins.cell_stretching import (
+    density_deviations,
+    depth_deviations,
+    fill,
+    multiply,
+    multiply_in_place,
+    row_across,
+    stretch_of_cell,
+)
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import NO_DRAG, NO_WIDTH, RATE, STATUS, WALL_VALUE, WHERE
+from fvsolve.kernels.energy_rows import WALL_ROWS, wall_power_row
+from fvsolve.kernels.mass_dynamics import motion
+from fvsolve.kernels.mechanism.body_layout import FORCE
+from fvsolve.kernels.mechanism.body_layout import body_row as row_of_body
+from fvsolve.kernels.schedule_pieces import schedule_slopes
+from fvsolve.kernels.table_handle import open_tables
+
+FORCE_OF, POWER_OF, TRAVEL_OF = 0, 1, 2  # quantities of probes, in the order of `parts.basin.part.MovingWall`
+LEAST_WIDTH = 1e-3  # least width of a cell over its undeformed width; below it the run stops
+VECTOR_MARGIN = 8  # additional speeds of lines that vector loops read beyond the last line
+
+
+@njit(forceinline=True)
+def stretching_counts(basin):
+    """Number of rows or columns of cells that stretch, and number of moving lines.
+
+    On a mesh, numbers of cells and corners.
+    """
+    if basin["nx"] == 0:
+        return basin["n"], basin["corners"]
+    count = basin["ny"] if basin["turn"] == 1 else basin["nx"]
+    return count, count + 1
+
+
+@njit
+def update_geometry(t, y, seen, out, handle):
+    """Compute lines and areas of basins at y, and the state as deviations, into `seen` of the tables.
+
+    An empty argument `seen` means that kernels of rates follow. For cells whose kernel reads contents, only the
+    deviations next to patches and walls are then computed, unless scalars or friction need all.
+    """
+    tables, done = open_tables(handle), 0
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["walls"] > 0:
+            stretch_cells(tables, basin, y)
+            copy(y[done : basin["y"]], tables.seen[done:])
+            if seen.size == 0 and reads_contents(basin) and basin["carried"] < 0 and basin["friction"] == NO_DRAG:
+                deviations_at_patches(tables, b, y)
+            else:
+                deviations_of_rows(tables, basin, y)
+            if basin["nx"] > 0:
+                stretch_patches(tables, b)
+            done = basin["y"] + (3 + (tables.scalars.size if basin["carried"] >= 0 else 0)) * basin["n"]
+    copy(y[done:], tables.seen[done:])
+
+
+@njit(forceinline=True)
+def reads_contents(basin):
+    """True if the kernel of its rates reads contents: water on grids, row by row."""
+    return basin["deep"] == 1 and basin["nx"] > 0
+
+
+@njit
+def copy(source, target):
+    """target = source."""
+    for i in range(source.size):
+        target[i] = source[i]
+
+
+@njit
+def stretch_cells(tables, basin, y):
+    """Compute the stretching of columns, rows or cells at the present positions of walls, and its reciprocal."""
+    plane, walls, at = tables.plane, tables.walls, basin["stretch"]
+    count, lines = stretching_counts(basin)
+    wide, narrow = plane[at : at + count], plane[at + count : at + 2 * count]
+    fill(1.0, wide)
+    for k in range(basin["wall"], basin["wall"] + basin["walls"]):
+        weights, travel = plane[walls[k]["weights"] + lines :], y[walls[k]["y"]]
+        for i in range(count):
+            wide[i] += weights[i] * travel
+    for i in range(count):
+        narrow[i] = 1.0 / wide[i]
+    if basin["nx"] > 0:
+        spacing = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0)
+        multiply(plane[at + 2 * count :], narrow, plane[spacing : spacing + count])  # 1 / widths as drawn
+
+
+@njit
+def factors_of(tables, basin, j):
+    """(wide, narrow) of the cells of row j of a grid, or of all cells of a mesh."""
+    plane, nx, at, (count, _) = tables.plane, basin["nx"], basin["stretch"], stretching_counts(basin)
+    if nx == 0 or basin["turn"] == 0:
+        return plane[at : at + count], plane[at + count : at + 2 * count]
+    row = at + 3 * count
+    fill(plane[at + j], plane[row : row + nx])
+    fill(plane[at + count + j], plane[row + nx : row + 2 * nx])
+    return plane[row : row + nx], plane[row + nx : row + 2 * nx]
+
+
+@njit
+def deviations_of_rows(tables, basin, y):
+    """Compute areas, and U - U0 of all cells: ((A U - A0 U0) / A0 - U0 (A / A0 - 1)) A0 / A."""
+    plane, seen, n, first = tables.plane, tables.seen, basin["n"], basin["y"]
+    rows, size = (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, n)
+    scalar_count = tables.scalars.size if basin["carried"] >= 0 else 0
+    for j in range(rows):
+        a, z, (wide, narrow) = j * size, (j + 1) * size, factors_of(tables, basin, j)
+        multiply(plane[basin["drawn"] + a :], wide, plane[basin["area"] + a : basin["area"] + z])
+        if basin["deep"] == 1:
+            depth_deviations(plane[basin["plan"] + a :], wide, narrow, y[first + a :], seen[first + a : first + z])
+        else:
+            density_deviations(basin["density"], wide, narrow, y[first + a :], seen[first + a : first + z])
+        for q in range(1, 3 + scalar_count):
+            at = first + q * n if q < 3 else basin["carried"] + (q - 3) * n
+            multiply(y[at + a :], narrow, seen[at + a : at + z])
+
+
+@njit
+def deviations_at_patches(tables, b, y):
+    """Compute areas and U - U0 of the cells of water next to patches, moving walls included."""
+    plane, seen, basin, patches = tables.plane, tables.seen, tables.basins[b], tables.patches
+    n, first = basin["n"], basin["y"]
+    for p in range(patches.size):
+        for m in range(patches[p]["count"] if patches[p]["basin"] == b else 0):
+            i = tables.integers[patches[p]["first"] + m]
+            wide = stretch_of_cell(plane, basin, i)
+            plane[basin["area"] + i] = plane[basin["drawn"] + i] * wide
+            seen[first + i] = (y[first + i] - plane[basin["plan"] + i] * (wide - 1.0)) / wide
+            seen[first + n + i], seen[first + 2 * n + i] = y[first + n + i] / wide, y[first + 2 * n + i] / wide
+
+
+@njit
+def stretch_patches(tables, b):
+    """Compute the sizes of the patches of a grid."""
+    for p in range(tables.patches.size):
+        if tables.patches[p]["basin"] == b:
+            stretch_patch(tables, tables.basins[b], tables.patches[p])
+
+
+@njit
+def stretch_patch(tables, basin, patch):
+    """Compute the sizes of a patch on a side along which lines move, or next to cells that stretch.
+
+    Rates of contents are proportional to lengths over undeformed areas.
+    """
+    plane, integers, area, length = tables.plane, tables.integers, 0.0, 0.0
+    for m in range(patch["count"]):
+        area += plane[basin["area"] + integers[patch["first"] + m]]
+    at, count = patch["normals"], patch["faces"]
+    for m in range(count):
+        i = integers[patch["ring"] + count + m]
+        is_normal = abs(plane[at + (1 if basin["turn"] == 1 else 0) * count + m]) < 0.5
+        per_area = plane[at + 3 * count + m] * (stretch_of_cell(plane, basin, i) if is_normal else 1.0)
+        plane[at + 2 * count + m] = per_area
+        length += per_area * plane[basin["drawn"] + i]
+    plane[patch["sizes"]], plane[patch["sizes"] + 1] = area, length
+
+
+@njit
+def speed_of(t, tables, wall, y):
+    """Speed of a wall along its axis [m/s], that of its mass, its body or its schedule."""
+    if wall["mass"] >= 0:
+        return motion(tables.masses[wall["mass"]], y)[1]
+    if wall["body"] >= 0:
+        body = tables.bodies[wall["body"]]
+        if body["schedule"] >= 0:
+            return wall["toward"] * schedule_slopes(tables, body["schedule"], t)[0]
+        return wall["toward"] * (body["speed"][0] + y[body["rate"]])
+    return schedule_slopes(tables, wall["schedule"], t)[0]
+
+
+@njit
+def set_line_speeds(t, y, dydt, out, handle):
+    """Compute the speeds of all lines and the rates of the travels of walls; the speeds limit the step.
+
+    Sets the status NO_ROOM if a cell is narrower than ROOM times its undeformed width.
+    """
+    tables = open_tables(handle)
+    plane, walls = tables.plane, tables.walls
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["walls"] == 0:
+            continue
+        at, (count, lines) = basin["lines"], stretching_counts(basin)
+        for i in range(lines):
+            plane[at + i] = 0.0
+        for k in range(basin["wall"], basin["wall"] + basin["walls"]):
+            speed = speed_of(t, tables, walls[k], y)
+            for i in range(lines):
+                plane[at + i] += speed * plane[walls[k]["weights"] + i]
+            if dydt.size > 0:
+                dydt[walls[k]["y"]] = speed
+        spacing, most = basin["spacing"] + (basin["nx"] if basin["turn"] == 1 else 0), 0.0
+        for i in range(count):
+            if not plane[basin["stretch"] + i] > LEAST_WIDTH:
+                out[STATUS], out[WHERE] = NO_WIDTH, wall_of_row(tables, basin, i)
+        for i in range(count if basin["nx"] > 0 else 0):
+            most = max(most, max(abs(plane[at + i]), abs(plane[at + i + 1])) * plane[spacing + i])
+        out[RATE] = max(out[RATE], most)
+
+
+@njit
+def wall_of_row(tables, basin, i):
+    """Node of the wall that changes the width of column, row or cell i most per travel."""
+    index, most, (_, lines) = basin["wall"], -1.0, stretching_counts(basin)
+    for k in range(basin["wall"], basin["wall"] + basin["walls"]):
+        per = abs(tables.plane[tables.walls[k]["weights"] + lines + i])
+        if per > most:
+            index, most = k, per
+    return tables.walls[index]["node"]
+
+
+@njit(forceinline=True)
+def grid_motion(tables, basin):
+    """Speeds of lines along x and along y, arrays for pressures on the boundary, stretching `wide` and its reciprocal.
+
+    Speeds along the axis without motion are empty.
+    """
+    plane, at, rows, (count, lines) = tables.plane, basin["lines"], basin["stretch"], stretching_counts(basin)
+    speeds, no_speeds = plane[at : at + lines + VECTOR_MARGIN], plane[:0]
+    thrust = tables.work[basin["thrust"] : basin["thrust"] + 2 * basin["outer"]]
+    wide, narrow = plane[rows : rows + count], plane[rows + count : rows + 2 * count]
+    if basin["turn"] == 1:
+        return no_speeds, speeds, thrust, wide, narrow
+    return speeds, no_speeds, thrust, wide, narrow
+
+
+@njit
+def impedance(tables, basin, i, y):
+    """Radiation impedance of one metre of wall next to cell i, force per speed [N s/m2]."""
+    st = tables.settings[0]
+    if basin["deep"] == 0:
+        return basin["density"] * basin["speed"] * basin["thickness"]
+    depth = max(tables.plane[basin["plan"] + i] + y[basin["y"] + i], 0.0)
+    return st["rho"] * depth * sqrt(st["gravity"] * depth)
+
+
+@njit
+def push_body(out, tables, wall, force):
+    """Add an outward force on a wall to the forces on its body, through that body's origin."""
+    row, along, force_along = (
+        row_of_body(tables, wall["body"]),
+        tables.basins[wall["basin"]]["turn"],
+        wall["outward"] * force,
+    )
+    out[row + FORCE + along] += force_along
+
+
+@njit
+def push_bodies_at_rest(t, y, dydt, out, handle):
+    """Add the forces at rest on walls to the forces on their bodies."""
+    tables = open_tables(handle)
+    for k in range(tables.walls.size):
+        if tables.walls[k]["body"] >= 0:
+            push_body(out, tables, tables.walls[k], tables.walls[k]["rest"])
+
+
+@njit
+def add_wall_forces(t, y, dydt, out, handle):
+    """Compute the outward forces on walls minus those at rest; add them to masses and bodies, and limit the step."""
+    tables = open_tables(handle)
+    layout, walls, masses, st = tables.layout[0], tables.walls, tables.masses, tables.settings[0]
+    seen = tables.seen
+    for k in range(walls.size):
+        wall, total, waves = walls[k], 0.0, 0.0
+        basin = tables.basins[wall["basin"]]
+        for m in range(wall["count"]):
+            face, length = tables.integers[wall["faces"] + m], tables.plane[wall["lengths"] + m]
+            total += length * tables.work[basin["thrust"] + face]
+            waves += length * impedance(tables, basin, tables.integers[wall["faces"] + wall["count"] + m], seen)
+        total *= st["rho"] if basin["deep"] == 1 else basin["thickness"]
+        out[layout["wall"] + k] = total
+        if wall["body"] >= 0:
+            body = tables.bodies[wall["body"]]
+            out[RATE] = max(out[RATE], waves / body["mass"])
+            push_body(out, tables, wall, wall["rest"] + total)
+        if wall["mass"] < 0:
+            continue
+        mass = masses[wall["mass"]]
+        force = wall["outward"] * total
+        out[layout["net_force"] + wall["mass"]] += force
+        out[RATE] = max(out[RATE], waves * mass["lightness"])
+        if dydt.size > 0 and mass["y"] >= 0:
+            dydt[mass["y"] + 1] += force * mass["lightness"]
+
+
+@njit
+def stretch_scalar_rates(t, y, dydt, out, handle):
+    """Convert rates of amounts of scalars per area to rates of contents.
+
+    Other rates are computed as rates of contents.
+    """
+    tables = open_tables(handle)
+    for b in range(tables.basins.size if dydt.size > 0 else 0):
+        basin = tables.basins[b]
+        if basin["walls"] == 0 or basin["carried"] < 0:
+            continue
+        n, (rows, size) = basin["n"], (basin["ny"], basin["nx"]) if basin["nx"] > 0 else (1, basin["n"])
+        for j in range(rows):
+            wide = factors_of(tables, basin, j)[0]
+            for q in range(tables.scalars.size):
+                at = basin["carried"] + q * n + j * size
+                multiply_in_place(wide, dydt[at : at + size])
+
+
+@njit
+def observe_walls(t, y, out, handle, values):
+    """Probe values of walls: inward force on the water [N], power supplied to it [W], travel [m]."""
+    tables = open_tables(handle)
+    for p in range(tables.probes.size):
+        probe = tables.probes[p]
+        if probe["kind"] != WALL_VALUE:
+            continue
+        wall = tables.walls[probe["index"]]
+        force = wall["rest"] + out[tables.layout[0]["wall"] + probe["index"]]
+        if probe["side"] == FORCE_OF:
+            values[p] = force
+        elif probe["side"] == POWER_OF:
+            values[p] = supplied_power(t, tables, probe["index"], y, out)
+        else:
+            values[p] = y[wall["y"]]
+
+
+@njit(forceinline=True)
+def supplied_power(t, tables, k, y, out):
+    """Power that wall k supplies to its basin [W]."""
+    wall = tables.walls[k]
+    force = wall["rest"] + out[tables.layout[0]["wall"] + k]
+    return -force * wall["outward"] * speed_of(t, tables, wall, y)
+
+
+@njit
+def wall_power(t, y, dydt, out, handle, power):
+    """Rows of `power` of walls, before those of basins: power supplied, and power dissipated by the law."""
+    tables = open_tables(handle)
+    for k in range(tables.walls.size):
+        work, dissipated = supplied_power(t, tables, k, y, out), dissipated_power(tables, tables.walls[k])
+        first = wall_power_row(tables, power) + WALL_ROWS * k
+        power[first], power[first + 1] = work, dissipated
+        power[basin_first_row(tables, power, tables.walls[k]["basin"])] += work - dissipated
+
+
+@njit
+def dissipated_power(tables, wall):
+    """Power dissipated by law linear at a wall, whose motion does not carry density and momentum along [W].
+
+    See `liquid_mesh`.
+    """
+    basin, total = tables.basins[wall["basin"]], 0.0
+    for m in range(wall["count"]):
+        at = basin["thrust"] + basin["outer"] + tables.integers[wall["faces"] + m]
+        total += tables.plane[wall["lengths"] + m] * tables.work[at]
+    return 0.5 * basin["thickness"] / tables.settings[0]["rho"] * total
+
+
+@njit
+def area_growth_rate(t, tables, basin, y, i):
+    """Rate of the area of cell i over its undeformed area [1/s]."""
+    total, (_, lines) = 0.0, stretching_counts(basin)
+    for k in range(basin["wall"], basin["wall"] + basin["walls"]):
+        wall = tables.walls[k]
+        total += tables.plane[wall["weights"] + lines + row_across(basin, i)] * speed_of(t, tables, wall, y)
+    return total

@@ -1,0 +1,34 @@
+"""Bands of basins: the rows that one thread steps, and flows through the boundary, to which all bands contribute."""
+
+from fvsolve.basins.basin_patches import put_open_flows
+from fvsolve.jit import njit
+from fvsolve.kernels import band_exchange
+from fvsolve.kernels.table_handle import open_tables
+
+BAND_MARGIN = 5  # rows beyond a band that its rates read: three, or the five of the boundary closure of a liquid
+
+
+@njit(forceinline=True)
+def band_cells(tables, b):
+    """(first, last + 1) of the cells of a basin in the band of this thread."""
+    wide = max(tables.basins[b]["nx"], 1)
+    return wide * tables.bands[2 * b], wide * tables.bands[2 * b + 1]
+
+
+@njit(forceinline=True)
+def stencil_cells(tables, b):
+    """(first, last + 1) of the cells of the band and of the rows next to it that its rates read."""
+    basin = tables.basins[b]
+    begin, stop = max(tables.bands[2 * b] - BAND_MARGIN, 0), min(tables.bands[2 * b + 1] + BAND_MARGIN, basin["ny"])
+    return (basin["nx"] * begin, basin["nx"] * stop) if basin["nx"] > 0 else (0, basin["n"])
+
+
+@njit
+def put_boundary_flows(t, y, dydt, out, handle):
+    """Compute the flows through open boundaries of all basins again, after all bands have computed their fluxes."""
+    tables = open_tables(handle)
+    band_exchange.get_runs(tables.joint, band_exchange.SEND_FLOWS, tables.work)
+    for b in range(tables.basins.size):
+        basin = tables.basins[b]
+        if basin["given"] == 0 and basin["through"] >= 0:
+            put_open_flows(tables, b, tables.settings[0]["rho"] if basin["deep"] == 1 else basin["thickness"], out)

@@ -1,0 +1,19 @@
+"""Probes of a given velocity."""
+
+from fvsolve.basins.basin_scalars import flow_factor
+from fvsolve.basins.boundary_cells import patch_inflow
+from fvsolve.jit import njit
+from fvsolve.kernels.dtypes import GIVEN_FLOW
+from fvsolve.kernels.table_handle import open_tables
+
+
+@njit
+def observe_given_flows(t, y, out, handle, values):
+    """Write values[k] of the probes of the inflow through a patch by a given velocity [m3/s]."""
+    tables = open_tables(handle)
+    for k in range(tables.probes.size):
+        if tables.probes[k]["kind"] == GIVEN_FLOW:
+            patch = tables.patches[tables.probes[k]["index"]]
+            basin, values[k] = tables.basins[patch["basin"]], 0.0
+            if patch["open"] == 1:
+                values[k] = flow_factor(t, basin) * basin["thickness"] * patch_inflow(tables, patch)

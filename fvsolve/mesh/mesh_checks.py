@@ -1,0 +1,176 @@
+"""Faults of the cells and the boundary of a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fvsolve.errors import Fault, listing
+from fvsolve.mesh.contact import contacts
+from fvsolve.mesh.edges import CROWDED, Edges, key_of
+from fvsolve.mesh.mesh import WALL
+from fvsolve.mesh.shapes import corners
+
+LEAST_HEIGHT = 1e-8  # of the longest side: smaller sides and heights count as zero
+MAX_CELLS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Sketch:
+    """A mesh during reading, in the file's unit."""
+
+    points: np.ndarray
+    cells: np.ndarray
+    unit: str
+
+    def centre(self, c: int) -> np.ndarray:
+        """Mean of a cell's corners."""
+        return self.points[[p for p in self.cells[c] if p >= 0]].mean(axis=0)
+
+    def show(self, c: int) -> str:
+        """Text like 'cell 7 at (0.31, 0.52) m'."""
+        return f"cell {c} at {self.at(self.centre(c))}"
+
+    def at(self, point: np.ndarray) -> str:
+        """Text like '(0.31, 0.52) m'."""
+        return f"({point[0]:.6g}, {point[1]:.6g}) {self.unit}"
+
+    def face(self, ends: Sequence[int]) -> str:
+        """Text like 'the face from (0, 0) m to (0.5, 0) m'."""
+        return f"the face from {self.at(self.points[ends[0]])} to {self.at(self.points[ends[1]])}"
+
+    def list(self, cells: np.ndarray) -> str:
+        """Text like '3 of 40 cells: cell 7 at ..., cell 9 at ..., cell 12 at ...'."""
+        texts = [self.show(c) for c in cells[:MAX_CELLS]] + (["..."] if len(cells) > MAX_CELLS else [])
+        return f"{len(cells)} of {len(self.cells)} cells: {', '.join(texts)}"
+
+
+def shape_faults(sketch: Sketch) -> tuple[list[Fault], np.ndarray, np.ndarray]:
+    """(faults of single cells, bool[n] bad cells, bool[n] cells with a right turn, which if valid are clockwise)."""
+    turn, _, side = corners(sketch.points, sketch.cells)
+    long = side.max(axis=1, keepdims=True)
+    left, right = turn > LEAST_HEIGHT * long**2, turn < -LEAST_HEIGHT * long**2
+    quad = sketch.cells[:, 3] >= 0
+    tests = {
+        "have coincident corners; expected three or four different corners: a collapsed quad is a triangle": (
+            side <= LEAST_HEIGHT * long
+        ).any(axis=1),
+        "cross themselves; expected corners in order around the cell": quad & (left.sum(1) == 2) & (right.sum(1) == 2),
+        "are not convex; expected every corner below 180 degrees: split them into triangles": quad
+        & left.any(axis=1)
+        & right.any(axis=1),
+        "have no area; expected corners that do not lie on one line": ~left.any(axis=1) & ~right.any(axis=1),
+    }
+    faults, bad = [], np.zeros(len(quad), bool)
+    for text, failing in tests.items():
+        failing = np.flatnonzero(failing & ~bad)
+        bad[failing] = True
+        if failing.size:
+            faults.append(Fault("cells", f"{sketch.list(failing)} {text}"))
+    return faults, bad, right.any(axis=1)
+
+
+def overlap_faults(sketch: Sketch, edges: Edges, number: np.ndarray) -> list[Fault]:
+    """Faults of faces with more than two cells, or with two on one side.
+
+    number : int64  numbers of the cells of `edges`
+    """
+    crowded = np.flatnonzero(edges.mate == CROWDED)
+    faces = np.unique(edges.key[crowded])
+    if not faces.size:
+        return []
+    at = crowded[edges.key[crowded] == faces[0]]
+    cells = np.sort(number[edges.cell[at]])
+    cell_texts = " and ".join(sketch.show(c) for c in cells[:MAX_CELLS])
+    reason = "more than two cells share it" if cells.size > 2 else "both lie on one side of it"
+    more = f" ({faces.size} such faces)" if faces.size > 1 else ""
+    where = sketch.face((edges.start[at[0]], edges.stop[at[0]]))
+    remedy = "expected one cell on each side; is a surface meshed twice, or in two physical groups?"
+    return [Fault("cells", f"they overlap at {where}{more}: {cell_texts}, {reason}; {remedy}")]
+
+
+def contact_faults(sketch: Sketch, edges: Edges, named: np.ndarray) -> list[Fault]:
+    """Faults of boundary faces with contacts other than at their ends. named : bool[outer]  True for faces in a group
+
+    Two coincident faces are the sides of a thin wall if a group contains one of them.
+    """
+    start, stop, cell = edges.start[edges.outer], edges.stop[edges.outer], edges.cell[edges.outer]
+    contact_pairs, complete = contacts(sketch.points[start], sketch.points[stop], named)
+    texts = {
+        "same": "coincide but are not connected: {cell} and {neighbour} at {face}; expected one set of points "
+        "there (Gmsh: Coherence), or a group that marks it as a thin wall",
+        "middle": "have the corner of another cell between their ends: {cell} and {neighbour} at {face}; "
+        "expected faces that touch at their ends only",
+        "cross": "cross each other: {cell} and {neighbour} at {face}; expected a boundary that does not cross itself",
+    }
+    faults = []
+    for kind, pairs in contact_pairs.items():
+        if len(pairs):
+            i, j = pairs[0]
+            text = texts[kind].format(
+                cell=sketch.show(cell[i]), neighbour=sketch.show(cell[j]), face=sketch.face((start[i], stop[i]))
+            )
+            number = len(np.unique(pairs[:, 0])) if kind == "middle" else len(pairs)
+            places = f"at {number}{'' if complete else ' or more'} places faces"
+            faults.append(Fault("boundary", f"{places} {text}"))
+    return faults
+
+
+def piece_faults(sketch: Sketch, edges: Edges) -> list[Fault]:
+    """Fault of a mesh that is not connected."""
+    piece = edges.pieces(len(sketch.cells))
+    size, first = np.bincount(piece), np.unique(piece, return_index=True)[1]
+    if size.size == 1:
+        return []
+    listed = [f"{size[k]} with {sketch.show(first[k])}" for k in np.argsort(-size, kind="stable")[:MAX_CELLS]]
+    more = ", ..." if size.size > MAX_CELLS else ""
+    return [
+        Fault(
+            "cells",
+            f"they are in {size.size} pieces that share no face: {', '.join(listed)}{more}; "
+            "expected one piece: write each to its own file",
+        )
+    ]
+
+
+def assign_patches(
+    sketch: Sketch, edges: Edges, lines: np.ndarray, groups: Mapping[str, np.ndarray]
+) -> tuple[list[Fault], list[str], np.ndarray]:
+    """(faults, patch names, int64[outer] patch of each outer edge, -1 for edges in no group)."""
+    names = [*(name for name in groups if name != WALL), WALL]
+    keys = edges.key[edges.outer]
+    order = np.argsort(keys)
+    patch, faults = np.full(keys.size, -1), []
+    for name, members in groups.items():
+        place = f"groups.{name}"
+        if not members.size:
+            remedy = "expected lines of the boundary; Gmsh omits them with Mesh.SaveAll = 1"
+            faults.append(Fault(place, f"the group contains no line of the file; {remedy}"))
+            continue
+        member_keys = key_of(lines[members], len(sketch.points))
+        spot = order[np.minimum(np.searchsorted(keys, member_keys, sorter=order), keys.size - 1)]
+        missing = keys[spot] != member_keys
+        if missing.any():
+            text = f"{missing.sum()} of {members.size} lines are not boundary faces"
+            location = _line_location(sketch, edges, lines[members][missing][0])
+            faults.append(Fault(place, f"{text}: {location}; expected a curve of the boundary"))
+        spot = spot[~missing]
+        taken = spot[(patch[spot] >= 0) & (patch[spot] != names.index(name))]
+        if taken.size:
+            others = listing(f'"{names[k]}"' for k in np.unique(patch[taken]))
+            first = edges.outer[taken[0]]
+            where = sketch.face((edges.start[first], edges.stop[first]))
+            faults.append(Fault(place, f"shares {taken.size} faces with {others}, {where}; expected each in one group"))
+        patch[spot] = names.index(name)
+    return faults, names, patch
+
+
+def _line_location(sketch: Sketch, edges: Edges, ends: np.ndarray) -> str:
+    """Position of a line that is not a boundary face."""
+    if (ends < 0).any():
+        return "a line ends at a point that belongs to no cell"
+    where = sketch.face(ends).removeprefix("the face ")
+    inside = np.isin(key_of(ends[None], len(sketch.points)), edges.key).any()
+    return f"the line {where} {'lies between two cells' if inside else 'is not a side of a cell'}"
