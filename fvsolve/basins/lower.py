@@ -12,7 +12,7 @@ from fvsolve.kernels import dtypes as rec
 def lower_basins(draft) -> None:
     """Fill the tables of basins and their patches, and add states for their cells."""
     case = draft.case
-    draft.basins = [rows_class(case.nodes[name].own)(case, name) for name in case.meshes]
+    draft.basins = [rows_class(case.nodes[name].physics_type)(case, name) for name in case.meshes]
     draft.basin_table = np.zeros(len(draft.basins), rec.BASIN)
     for basin, row in zip(draft.basins, draft.basin_table, strict=True):
         basin.lower_common(draft, row)

@@ -53,8 +53,10 @@ class BasinRows:
         self.n = self.x.size
         self.memory = 0  # size of its tables and its state [bytes]
         self.is_grid = is_grid(self.mesh)
-        self.scalars = list(case.scalars) if self.part.own.carries else []
-        self.quantities = tuple(self.part.own.states)  # state quantities of cells; the first is the stored quantity
+        self.scalars = list(case.scalars) if self.part.physics_type.carries else []
+        self.quantities = tuple(
+            self.part.physics_type.states
+        )  # state quantities of cells; the first is the stored quantity
         # for each moving wall: state, stretch of cells per travel [1/m], displacement of corners per travel
         self.stretches: list[tuple[int, np.ndarray, np.ndarray]] = []
 

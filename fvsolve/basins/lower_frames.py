@@ -23,8 +23,8 @@ def lower_frame(draft, basin, row) -> None:
         lines = [line - at for line, at in zip((grid.x, grid.y), middle, strict=True)]
         places = [0.5 * (line[1:] + line[:-1]) for line in lines]
     numbers = np.zeros(FRAME_SIZE)
-    numbers[:3] = np.array(part.place) + part.turn[:, :2] @ middle
-    numbers[3:12] = part.turn.ravel()
+    numbers[:3] = np.array(part.place) + part.rotation[:, :2] @ middle
+    numbers[3:12] = part.rotation.ravel()
     if basin.deep:
         numbers[REST_LEVEL] = part.level
         numbers[REST_SURFACE] = draft.to_plane(np.maximum(basin.bed - part.level, 0.0))
@@ -59,14 +59,14 @@ def side_positions(basin) -> np.ndarray:
 def position_in_frame(draft, basin, patch: str) -> list[float]:
     """Position of a patch in the axes of the kernels, z from the level at rest [m], and g depth at rest [J/kg]."""
     place, part = draft.case.places[f"{basin.name}.{patch}"], basin.part
-    own = part.turn.T @ (np.array(place.at) - np.array(part.place))
+    own = part.rotation.T @ (np.array(place.at) - np.array(part.place))
     return [*(own[:2] - basin.mesh.centroid).tolist(), float(own[2]) - part.level, draft.case.gravity * place.depth]
 
 
 def potential_at_start(basin) -> np.ndarray:
     """Gravity potential of cells above the middle of their basin, in the attitude of its body at the start [J/kg]."""
     pose, gravity = basin.case.poses[basin.part.on], basin.case.gravity
-    up = (pose.attitude @ basin.part.turn).T @ np.array([0.0, 0.0, gravity])
+    up = (pose.attitude @ basin.part.rotation).T @ np.array([0.0, 0.0, gravity])
     return (basin.mesh.centre - basin.mesh.centroid) @ up[:2]
 
 
@@ -76,7 +76,7 @@ def level_at_start(basin, attitude: np.ndarray | None = None) -> np.ndarray:
     attitude : rotation matrix of its body, that of the start if omitted
     """
     part, turn = basin.part, basin.case.poses[basin.part.on].attitude if attitude is None else attitude
-    down = (turn @ part.turn).T @ np.array([0.0, 0.0, -1.0])
+    down = (turn @ part.rotation).T @ np.array([0.0, 0.0, -1.0])
     drawn, tilt = basin.bed - part.level, (down[0] * basin.x + down[1] * basin.y) / down[2]
     if not np.ptp(drawn + tilt - drawn) > 0.0:
         return basin.depth
@@ -91,4 +91,4 @@ def axes_in_world(basin, out: np.ndarray, layout) -> tuple[np.ndarray, np.ndarra
 
     first = int(layout["body"]) + BODY_OUT * int(basin.row["body"])
     place, turn = out[first + POSITION :][:3], out[first + ATTITUDE :][:9].reshape(3, 3)
-    return place + turn @ np.array(basin.part.place), turn @ basin.part.turn
+    return place + turn @ np.array(basin.part.place), turn @ basin.part.rotation

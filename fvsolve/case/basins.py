@@ -19,9 +19,9 @@ from fvsolve.case.patches_on_bodies import on_body
 from fvsolve.case.resource_checks import BASIN_CELL, LONGEST_NAME, byte_text, free_memory
 from fvsolve.case.sections import Output
 from fvsolve.errors import MeshError, did_you_mean, listing
-from fvsolve.fluid.laws import named
+from fvsolve.fluid.laws import law_names
 from fvsolve.parts import Basin
-from fvsolve.parts.basin.part import MovingWall, Place, StartOfFields
+from fvsolve.parts.basin.part import BasinStart, MovingWall, PatchNode
 from fvsolve.parts.value import ReadContext, ValueFault
 from fvsolve.units import show
 
@@ -71,7 +71,11 @@ class BasinFields:
 
 def lumped_fields(basin: Basin) -> dict[str, str]:
     """Fields that probes can read in water without cells: the depth, if the water sloshes in modes."""
-    return {"depth": basin.own.fields["depth"]} if basin.sloshing == "modes" and basin.own.sloshes else {}
+    return (
+        {"depth": basin.physics_type.fields["depth"]}
+        if basin.sloshing == "modes" and basin.physics_type.has_modes
+        else {}
+    )
 
 
 def mesh_of(basin: Basin, setting: ReadContext) -> Mesh:
@@ -141,20 +145,22 @@ def boundary_cells(mesh: Mesh, patch: str) -> np.ndarray:
     return np.unique(mesh.left[mesh.patch(patch)])
 
 
-def place_kind(basin: Basin, patch: str) -> type[Place]:
-    """Class of a patch as a place: `MovingWall` or `Place`."""
+def place_kind(basin: Basin, patch: str) -> type[PatchNode]:
+    """Class of a patch as a place: `MovingWall` or `PatchNode`."""
     stated = basin.patches.get(patch)
-    return MovingWall if stated is not None and stated.moves else Place
+    return MovingWall if stated is not None and stated.moves else PatchNode
 
 
-def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, Place]:
+def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, PatchNode]:
     """Patches as places, with the water at rest.
 
     pose : pose of the body that carries the basin; without it, elevation and depth are those of an upright basin
     """
     result = {}
     for patch in patch_names(mesh):
-        rest = basin.own.rest(basin, lambda shape: means(samples(shape, mesh)), boundary_cells(mesh, patch), mesh.area)
+        rest = basin.physics_type.rest(
+            basin, lambda shape: means(samples(shape, mesh)), boundary_cells(mesh, patch), mesh.area
+        )
         if basin.on is not None:
             rest = on_body(basin, mesh, patch, rest, pose)
         kind = place_kind(basin, patch)
@@ -162,9 +168,9 @@ def places(name: str, basin: Basin, mesh: Mesh, pose: Any = None) -> dict[str, P
     return result
 
 
-def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, Place]:
+def places_on_bodies(nodes: dict[str, Any], meshes: dict[str, Mesh]) -> dict[str, PatchNode]:
     """Patches of basins on bodies as places; basins with faulty formulas are left out."""
-    result: dict[str, Place] = {}
+    result: dict[str, PatchNode] = {}
     for name, mesh in meshes.items():
         if nodes[name].on is not None:
             with suppress(ValueError):
@@ -191,10 +197,10 @@ def find_faults(
     joined = {place for link in links.values() for place in link.ports.values()}
     for name, basin in pools.items():
         key = ("nodes", name)
-        own = basin.own
-        if fluid is not None and not own.goes(fluid.law):
-            laws = named(lambda law, own=own: own.goes(law.name))
-            yield ("fluid", "law"), f"{show(fluid.law)} does not apply to {own.described}; expected {laws}"
+        own = basin.physics_type
+        if fluid is not None and not own.accepts_law(fluid.law):
+            laws = law_names(lambda law, own=own: own.accepts_law(law.name))
+            yield ("fluid", "law"), f"{show(fluid.law)} does not apply to {own.description}; expected {laws}"
         yield from basins_on_bodies.find_faults(name, basin, nodes, all_nodes)
         if name not in meshes:
             continue
@@ -211,12 +217,12 @@ def find_faults(
                     (*key, "patches", patch, key_name),
                     "a link joins here and is the boundary of the patch; leave this key out",
                 )
-            if options.impedance is not None and not own.echoes:
+            if options.impedance is not None and not own.allows_impedance:
                 yield (*key, "patches", patch, "impedance"), f"does not apply to physics {show(basin.physics)}"
-        shapes = [*own.shapes(basin, meshes[name])]
+        shapes = [*own.formulas(basin, meshes[name])]
         if basin.start is not None:
             shapes += [
-                (("start", key_name), getattr(basin.start, key_name), None) for key_name in StartOfFields.model_fields
+                (("start", key_name), getattr(basin.start, key_name), None) for key_name in BasinStart.model_fields
             ]
             for other in sorted(basin.start.model_fields_set - set(own.starts.model_fields)):
                 yield (*key, "start", other), f"does not apply to physics {show(basin.physics)}"

@@ -27,10 +27,10 @@ def find_faults(name: str, basin: Any, nodes: dict[str, Any], named: Any) -> Fau
         if basin.sloshing != "cells":
             yield (*key, "sloshing"), "applies only to water on a body; name the body with on"
         return
-    if not basin.own.rides:
-        kinds = " or ".join(show(name) for name, patch_options in Physics.kinds.items() if patch_options.rides)
+    if not basin.physics_type.on_bodies:
+        kinds = " or ".join(show(name) for name, patch_options in Physics.kinds.items() if patch_options.on_bodies)
         yield (*key, "on"), f"physics {show(basin.physics)} cannot be on a body; expected {kinds}"
-    if basin.sloshing != "cells" and not basin.own.sloshes:
+    if basin.sloshing != "cells" and not basin.physics_type.has_modes:
         yield (*key, "sloshing"), f'needs a free surface; physics {show(basin.physics)} on a body has only "cells"'
     if any(patch_options.moves for patch_options in basin.patches.values()):
         yield (
@@ -71,7 +71,9 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
     """Faults of water on fixed joints whose bed is overturned: gravity never presses it on the bed."""
     for name, node in nodes.items():
         on = getattr(node, "on", None)
-        wet = node.kind == "tank" or (node.kind == "basin" and node.own.sloshes and node.sloshing != "frozen")
+        wet = node.kind == "tank" or (
+            node.kind == "basin" and node.physics_type.has_modes and node.sloshing != "frozen"
+        )
         if not wet or on not in poses or any(nodes[body].joint.kind != "fixed" for body in carriers(on, nodes)):
             continue
         turn = poses[on].attitude @ getattr(node, "turn", np.eye(3))
@@ -94,7 +96,7 @@ def free_joints(on: str, nodes: dict[str, Any]) -> Iterator[str]:
     """Bodies from `on` down to the world whose joints move freely (neither fixed nor driven)."""
     for body in carriers(on, nodes):
         joint = nodes[body].joint
-        if joint.kind != "fixed" and joint.driven is None:
+        if joint.kind != "fixed" and joint.drive_schedule is None:
             yield body
 
 
@@ -119,12 +121,12 @@ def nodes_with_water(
         basin, body = nodes[name], result[nodes[name].on]
         mass_of = frozen_water if basin.sloshing == "frozen" else sloshing.held_water
         mass, centre, inertia = mass_of(basin, mesh, density)
-        turn = basin.turn
+        turn = basin.rotation
         centre = np.array(basin.place) + turn @ centre
         both, own = body.mass + mass, np.array(body.centre_of_mass)
         middle = (body.mass * own + mass * centre) / both
         total = (
-            body.moment()
+            body.inertia_matrix()
             + point_inertia(body.mass, own - middle)
             + turn @ inertia @ turn.T
             + point_inertia(mass, centre - middle)

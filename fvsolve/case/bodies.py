@@ -122,10 +122,10 @@ def body_pose(body: Body, up: Pose, at: np.ndarray, t: float) -> Pose:
         far = axis * joint_coordinate(joint, t)
         return Pose(turn, place + far, velocity + np.cross(spin, far) + axis * joint_rate(joint, t), spin)
     if joint.kind == "free":  # its stated velocity is that of the centre of mass
-        spin = turn @ joint.turning
-        centre = joint.speed - np.cross(spin, turn @ np.array(body.centre_of_mass))
+        spin = turn @ joint.angular_velocity
+        centre = joint.centre_velocity - np.cross(spin, turn @ np.array(body.centre_of_mass))
         return Pose(turn, place, centre, spin)
-    return Pose(turn, place, velocity, spin + turn @ joint.turning if joint.kind == "ball" else spin)
+    return Pose(turn, place, velocity, spin + turn @ joint.angular_velocity if joint.kind == "ball" else spin)
 
 
 def joint_coordinate(joint: Any, t: float) -> float:
@@ -135,10 +135,10 @@ def joint_coordinate(joint: Any, t: float) -> float:
 
 def joint_rate(joint: Any, t: float) -> float:
     """Rate of a joint at the start; of a driven joint by one-sided differences of its schedule."""
-    if joint.driven is None:
+    if joint.drive_schedule is None:
         return float(joint.rate or 0.0)
     h = 1e-4
-    now, soon, later = (float(value(joint.driven, t + k * h)) for k in range(3))
+    now, soon, later = (float(value(joint.drive_schedule, t + k * h)) for k in range(3))
     return (4.0 * soon - 3.0 * now - later) / (2.0 * h)
 
 

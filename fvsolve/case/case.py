@@ -21,7 +21,7 @@ from fvsolve.errors import FvsolveError, Notice, did_you_mean, listing
 from fvsolve.fluid import LAWS, Fluid
 from fvsolve.fluid.laws import Law
 from fvsolve.parts import Link, Node, Pipe, Scalar
-from fvsolve.parts.pipe.wall import softness
+from fvsolve.parts.pipe.pipe_wall import elastic_compliance
 from fvsolve.parts.table_model import plain_value
 from fvsolve.schemes import SCHEMES
 from fvsolve.units import show
@@ -151,7 +151,7 @@ class Case(Displayable):
     def needs_equilibrium(self) -> bool:
         """True if bodies and masses start in equilibrium and at least one of them is free to move."""
         joints = [node.joint for node in self.nodes.values() if node.kind == "body"]
-        free = any(joint.kind != "fixed" and joint.driven is None for joint in joints)
+        free = any(joint.kind != "fixed" and joint.drive_schedule is None for joint in joints)
         free = free or any(node.kind == "mass" for node in self.nodes.values())
         return free and self.numerics.initial == "equilibrium"
 
@@ -279,7 +279,7 @@ def wave_speed(pipe: Pipe, fluid: Any) -> float:
     """Wave speed in a pipe filled with a fluid [m/s]."""
     if pipe.wave_speed is not None:
         return pipe.wave_speed
-    return math.sqrt(1.0 / (1.0 / fluid.bulk_modulus + softness(pipe)) / fluid.density)
+    return math.sqrt(1.0 / (1.0 / fluid.bulk_modulus + elastic_compliance(pipe)) / fluid.density)
 
 
 def default_cells(pipes: dict[str, Pipe], fluid: Any, cell_time: float | None) -> dict[str, int]:

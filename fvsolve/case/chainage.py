@@ -331,7 +331,7 @@ def write_pieces(
             piece["minor_loss"] = whole.minor_loss * (high - low) / whole.length
         if whole.profile is not None:
             part = whole.profile.part(low, high)
-            piece["profile"] = part.said
+            piece["profile"] = part.given
             piece["length"] = part.length
         own = f"{name}-{k + 1}"
         links[own] = piece | dict(keys_of_piece(given, own))

@@ -19,14 +19,14 @@ from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.parts import KINDS, Friction, Node, Scalar
 from fvsolve.parts.accumulator.shape import Compressor
 from fvsolve.parts.attitude_keys import Attitude
-from fvsolve.parts.basin.part import Patch, StartOfFields
+from fvsolve.parts.basin.part import BasinStart, Patch
 from fvsolve.parts.body.part import Joint
 from fvsolve.parts.connection.part import Connection
 from fvsolve.parts.disc.part import Disc
 from fvsolve.parts.link import TwoPort
 from fvsolve.parts.node import PlaceOnBody
 from fvsolve.parts.pipe.materials import SI, materials
-from fvsolve.parts.pipe.wall import Lining, Wall
+from fvsolve.parts.pipe.pipe_wall import Lining, Wall
 from fvsolve.parts.table_model import Table, plain_value
 from fvsolve.parts.value import NEEDED, Quantity, Text, Value
 from fvsolve.parts.valve.part import Sized
@@ -35,7 +35,7 @@ from fvsolve.units import DIMENSIONS, show
 TABLES: dict[str, type[Table]] = {
     "every node": Node, "riding": PlaceOnBody, "every link": TwoPort, "friction": Friction, "connection": Connection,
     "compressor": Compressor,
-    "wall": Wall, "lining": Lining, "patch": Patch, "start": StartOfFields, "line": OutputLine, "scalar": Scalar,
+    "wall": Wall, "lining": Lining, "patch": Patch, "start": BasinStart, "line": OutputLine, "scalar": Scalar,
     "fluid": FluidSpec, "numerics": Numerics, "output": Output, "route": Route, "joint": Joint, "attitude": Attitude,
 }  # fmt: skip
 # base class -> part whose table lists its keys in full

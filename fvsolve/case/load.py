@@ -183,7 +183,7 @@ class _Reader:
         for name, node in self.group("nodes").items():  # faulty nodes included
             kinds["nodes"] |= dict.fromkeys(check.points_of(name, node), BodyPoint)
         for name, kind in [*kinds["nodes"].items()]:
-            if name in self.lumped and not parts["nodes"][name].own.sloshes:
+            if name in self.lumped and not parts["nodes"][name].physics_type.has_modes:
                 kinds["nodes"][name] = None  # faulty
             elif name in self.lumped:
                 kinds["nodes"][name] = basins.BasinFields(basins.lumped_fields(parts["nodes"][name]), self.lumped[name])
@@ -191,8 +191,8 @@ class _Reader:
                 kinds["nodes"][name] = None  # faulty
             if name in meshes:
                 pool = parts["nodes"][name]
-                own = dict.fromkeys(carried, "number") if pool.own.carries else {}
-                kinds["nodes"][name] = basins.BasinFields(pool.own.fields | own, meshes[name])
+                own = dict.fromkeys(carried, "number") if pool.physics_type.carries else {}
+                kinds["nodes"][name] = basins.BasinFields(pool.physics_type.fields | own, meshes[name])
                 kinds["nodes"] |= {f"{name}.{patch}": basins.place_kind(pool, patch)
                                    for patch in basins.patch_names(meshes[name])}  # fmt: skip
         routes = self.routes(parts["links"])
@@ -216,8 +216,8 @@ class _Reader:
             self.add(check.claims(expect, timed))
         if numerics is not None:
             self.add(check.numerics(numerics, has_cells))
-            carries = bool(carried) and any(parts["nodes"][name].own.carries for name in meshes)
-            rubs = any(parts["nodes"][name].own.rubs(parts["nodes"][name]) for name in meshes)
+            carries = bool(carried) and any(parts["nodes"][name].physics_type.carries for name in meshes)
+            rubs = any(parts["nodes"][name].physics_type.has_friction(parts["nodes"][name]) for name in meshes)
             numerics = numerics.filled(has_cells, carries, rubs, check.follows_cavities(fluid, has_cells))
         self.add(scalar_checks.find_faults(carried, *parts.values(), properties))
         links = self.cells(parts["links"], properties, numerics)

@@ -141,7 +141,7 @@ def patch_faults(end: str, node: Any) -> Iterator[str]:
     """Reasons why no link can join a patch of a basin on a body."""
     if not isinstance(node, Basin):
         return
-    if not node.own.docks:
+    if not node.physics_type.links_on_bodies:
         place = f"of a basin on a body, which physics {show(node.physics)} does not support yet"
         yield f"joins {end} {place}; expected a free surface, or a tank"
     elif node.lumped:

@@ -87,7 +87,7 @@ def wall_faults(
     basin: Any, mesh: Any, patch: str, options: Any, nodes: dict, times: tuple, named: Any
 ) -> Iterator[tuple[tuple, str]]:
     """Faults of one wall; keys are relative to its patch."""
-    if not basin.own.moves:
+    if not basin.physics_type.moves:
         yield (), f"physics {show(basin.physics)} does not support moving walls"
     for other in ("boundary", "impedance", "scalars"):
         if getattr(options, other):

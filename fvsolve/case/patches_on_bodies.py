@@ -19,7 +19,7 @@ def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) 
     faces = mesh.patch(patch)
     x, y = mesh.length[faces] @ mesh.middle[faces] / mesh.length[faces].sum()
     own = np.array([x, y, rest["elevation"] or 0.0])
-    at = np.array(basin.place) + basin.turn @ own
+    at = np.array(basin.place) + basin.rotation @ own
     result = rest | {"on": basin.on, "at": tuple(at.tolist())}
     if pose is not None:
         result["elevation"] = float(pose.at(at)[2])
@@ -30,7 +30,7 @@ def on_body(basin: Any, mesh: Any, patch: str, rest: dict[str, Any], pose: Any) 
 
 def depth_over(basin: Any, mesh: Any, place: np.ndarray, attitude: np.ndarray) -> float:
     """Depth of water with a horizontal surface over a place in axes of a basin, at least 0 [m]."""
-    down = (attitude @ basin.turn).T @ np.array([0.0, 0.0, -1.0])
+    down = (attitude @ basin.rotation).T @ np.array([0.0, 0.0, -1.0])
     if not down[2] < 0.0:
         return 0.0
     bed, (x, y) = means(samples(basin.bed, mesh)), mesh.centre.T

@@ -8,9 +8,9 @@ from typing import Any
 
 from fvsolve.case.resource_checks import LONGEST_NAME
 from fvsolve.errors import did_you_mean, listing
-from fvsolve.fluid.laws import LAWS, named
+from fvsolve.fluid.laws import LAWS, law_names
 from fvsolve.parts import KINDS, Basin
-from fvsolve.parts.basin.part import MOVES, Physics
+from fvsolve.parts.basin.part import VELOCITY_FIELDS, Physics
 from fvsolve.units import show
 
 Faults = Iterator[tuple[tuple, str]]
@@ -21,7 +21,7 @@ RESERVED = {"time", "t", "mass", "energy", "nodes", "pipe", "value", "min_pressu
 def reserved_names() -> set[str]:
     """Reserved names: columns of output files, quantities of parts, and fields of basins except velocities."""
     kinds = [kind for group in KINDS.values() for kind in group.values()]
-    fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in MOVES}
+    fields = {name for physics in Physics.kinds.values() for name in physics.fields if name not in VELOCITY_FIELDS}
     return RESERVED | fields | {name for kind in kinds for name in (*kind.quantities, *getattr(kind, "along", {}))}
 
 
@@ -39,7 +39,7 @@ def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str,
             for scalar, value in getattr(part, "scalars", {}).items():
                 if (text := _value_fault(scalar, value, part, scalars)) is not None:
                     yield (group, name, "scalars", scalar), text
-            if scalars and isinstance(part, Basin) and not part.own.carries:
+            if scalars and isinstance(part, Basin) and not part.physics_type.carries:
                 text = f"is a basin of {part.physics}, which does not support scalars; expected a free surface"
                 yield (group, name), text
             for patch, patch_options in getattr(part, "patches", {}).items():
@@ -47,7 +47,7 @@ def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str,
                     place = (group, name, "patches", patch, "scalars", scalar)
                     if scalar not in scalars:
                         yield place, _unknown(scalar, scalars)
-                    elif part.own.joined and patch_options.boundary != "open":
+                    elif part.physics_type.joined and patch_options.boundary != "open":
                         yield (
                             place,
                             'follows from the joined links; it applies only with a given velocity or boundary = "open"',
@@ -60,7 +60,7 @@ def find_faults(scalars: dict[str, Any], nodes: dict[str, Any], links: dict[str,
     if fluid is not None and not LAWS[fluid.law].scalars:
         yield (
             ("fluid", "law"),
-            f"{show(fluid.law)} does not support scalars yet; expected {named(lambda law: law.scalars)}",
+            f"{show(fluid.law)} does not support scalars yet; expected {law_names(lambda law: law.scalars)}",
         )
 
 

@@ -12,7 +12,7 @@ from fvsolve import units
 from fvsolve.errors import FvsolveError, did_you_mean
 from fvsolve.exact import NAMES
 from fvsolve.fluid import LAWS
-from fvsolve.fluid.coolprop import OILY
+from fvsolve.fluid.coolprop import OIL_WORDS
 from fvsolve.parts.pipe.part import LINES
 from fvsolve.parts.table_model import NamedTables, Table
 from fvsolve.parts.time_series import copy_name, find_file
@@ -117,9 +117,7 @@ class FluidSpec(Table):
     def expected(cls, given: Any) -> str:
         if not isinstance(given, str):
             return super().expected(given)
-        return (
-            f"[fluid] with name = {show('ISO VG 46' if given.casefold() in OILY else given)}, its temperature and more"
-        )
+        return f"[fluid] with name = {show('ISO VG 46' if given.casefold() in OIL_WORDS else given)}, its temperature and more"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         value, usual = self.temperature, TEMPERATURES

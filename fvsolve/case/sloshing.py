@@ -171,7 +171,7 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, 
     """Faults of basins with water as modes."""
     for name, mesh in lumped.items():
         basin, key = nodes[name], ("nodes", name)
-        if basin.sloshing != "modes" or not basin.own.sloshes:
+        if basin.sloshing != "modes" or not basin.physics_type.has_modes:
             continue
         if outline_of(mesh) is None:
             text = (
@@ -184,7 +184,7 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, 
             yield (*key, "level"), f"there is no water above the bed, at {bed[0]:g} m"
         yield from unsupported_keys(key, basin)
         if (pose := poses.get(basin.on)) is not None:
-            upright = float((pose.attitude @ basin.turn)[2, 2])
+            upright = float((pose.attitude @ basin.rotation)[2, 2])
             if upright < UPRIGHT:
                 text = f"its bed is {np.degrees(np.arccos(upright)):.3g} deg off level at the start, where modes are "
                 yield (*key, "sloshing"), text + 'not valid; expected "cells" or "frozen"'
@@ -227,7 +227,7 @@ def mode_bodies(name: str, basin: Any, mesh: Any, pose: Any, density: float, gra
     The negative mass subtracts the modes from the water with a fixed surface. In a cylinder the two modes of a number
     share a mass: it slides along y on a massless body that slides along x.
     """
-    outline, turn, all_modes, result = outline_of(mesh), basin.turn, modes_of(basin, mesh, density, gravity), {}
+    outline, turn, all_modes, result = outline_of(mesh), basin.rotation, modes_of(basin, mesh, density, gravity), {}
     bed = np.array(basin.place) + turn @ (*outline.middle, bed_of(basin, mesh))
     places = [bed + turn[:, 2] * item.height for item in all_modes]
     masses = np.array([item.mass for item in all_modes]) * (0.5 if outline.is_round else 1.0)

@@ -7,7 +7,7 @@ from typing import Any
 
 from fvsolve.case import defaults
 from fvsolve.parts import Pipe
-from fvsolve.parts.pipe.wall import softness
+from fvsolve.parts.pipe.pipe_wall import elastic_compliance
 
 # Allowed ratio. Anchoring changes the wave speed of a plastic pipe by 12 %, the spread of moduli by as much.
 ALLOWED_RATIO = 1.2
@@ -23,7 +23,7 @@ def wave_speed_mismatch(case: Any, name: str) -> tuple[float, float, str] | None
         )
     except ValueError:  # a material without a wall thickness
         return None
-    speed = math.sqrt(1.0 / (1.0 / case.properties.bulk_modulus + softness(wall)) / case.properties.density)
+    speed = math.sqrt(1.0 / (1.0 / case.properties.bulk_modulus + elastic_compliance(wall)) / case.properties.density)
     if speed / ALLOWED_RATIO <= pipe.wave_speed <= speed * ALLOWED_RATIO:
         return None
     size = " ".join(str(keys[key]) for key in ("material", "class", "nominal") if key in keys)

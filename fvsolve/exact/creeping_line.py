@@ -25,7 +25,7 @@ def find_faults(case):
         if link is None or keys[2] != "friction" or link.friction.model != "none" or link.minor_loss:
             yield keys, text
     for link, pipe in case.links.items():
-        if not pipe.yielding:
+        if not pipe.creep_elements:
             yield ("links", link, "wall"), f'the exact solution "{name}" needs a wall with creep'
 
 
@@ -41,7 +41,7 @@ class CreepDeviation(LineDeviation):
     def __init__(self, case, pipe) -> None:
         super().__init__(case, pipe)
         self.plug_flow = pipe.friction.model == "none"
-        self.elements = [(growth * self.rho * self.a**2, time) for growth, time in pipe.yielding]
+        self.elements = [(growth * self.rho * self.a**2, time) for growth, time in pipe.creep_elements]
 
     def storage_ratio(self, s):
         total = np.ones(np.shape(s), dtype=complex)

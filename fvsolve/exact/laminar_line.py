@@ -40,7 +40,7 @@ def find_faults(case):
                 f'the exact solution "{name}" needs a reservoir at one end and a junction at the other end',
             )
             continue
-        if pipe.yielding and name == "laminar-line":
+        if pipe.creep_elements and name == "laminar-line":
             yield ("links", link, "wall", "creep"), f'the exact solution "{name}" holds only for walls without creep'
         law = pipe.friction
         if law.model != "unsteady" or law.weighting == "vardy-brown" or law.roughness is None or pipe.minor_loss:

@@ -8,11 +8,11 @@ from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
 from fvsolve.fluid.air import Air, check_cavities
-from fvsolve.fluid.cache import cached
 from fvsolve.fluid.coolprop import celsius
+from fvsolve.fluid.isentrope_table import FluidTable
 from fvsolve.fluid.laws import LAWS
-from fvsolve.fluid.oils import OILS, ask_oil, oil_name
-from fvsolve.fluid.table import FluidTable
+from fvsolve.fluid.oils import OILS, oil_name, oil_properties
+from fvsolve.fluid.property_cache import cached_properties
 
 __all__ = ["LAWS", "Fluid", "FluidTable", "properties"]
 
@@ -76,7 +76,7 @@ def properties(
     _check_numbers(given | state, law)
     name = oil_name(name) or name
     LAWS[law].check(name, given)
-    values = _found(name, law, **state)
+    values = _look_up(name, law, **state)
     boiling = max(values["vapor_pressure"], given.get("vapor_pressure", 0.0))
     if state["pressure"] <= boiling:
         raise FluidError("pressure", _not_liquid(name, boiling, **state))
@@ -93,12 +93,12 @@ def properties(
     return fluid
 
 
-def _found(name: str, law: str, temperature: float, pressure: float) -> dict:
+def _look_up(name: str, law: str, temperature: float, pressure: float) -> dict:
     if name == "user":
         return USER
     if name in OILS:
-        return ask_oil(name, temperature, pressure)
-    return cached(name, temperature, pressure, law)
+        return oil_properties(name, temperature, pressure)
+    return cached_properties(name, temperature, pressure, law)
 
 
 def _check_numbers(numbers: dict[str, float], law: str) -> None:

@@ -33,7 +33,7 @@ class Air:
         return free * x ** (1.0 / self.exponent) / (1.0 - x / saturation)
 
 
-def mixed(given: dict[str, float]) -> Air:
+def air_of(given: dict[str, float]) -> Air:
     """Free gas and cavitation by the given keys."""
     fraction, cavitation = given.get("air_fraction", 0.0), bool(given.get("cavitation"))
     if not 0.0 <= fraction < 1.0:

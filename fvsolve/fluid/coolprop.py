@@ -6,14 +6,14 @@ import re
 from typing import Any
 
 from fvsolve.errors import FluidError, did_you_mean
+from fvsolve.fluid.isentrope_table import isentrope, value_or_none
 from fvsolve.fluid.laws import LAWS
 from fvsolve.fluid.oils import OILS
-from fvsolve.fluid.table import isentrope, known
 
-OILY = ("oil", "hydraulic oil", "mineral oil", "hydraulic fluid", "hlp", "hm", "iso vg", "vg")
+OIL_WORDS = ("oil", "hydraulic oil", "mineral oil", "hydraulic fluid", "hlp", "hm", "iso vg", "vg")
 
 
-def ask(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
+def coolprop_properties(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
     """Fields of Fluid from CoolProp; None: density of a boiling fluid, bulk_modulus of INCOMP."""
     backend, _, rest = name.rpartition("::")
     if backend not in ("", "HEOS", "INCOMP"):
@@ -21,11 +21,11 @@ def ask(name: str, temperature: float, pressure: float, law: str) -> dict[str, A
             "name", f'"{name}" has an unknown prefix; expected a CoolProp fluid without a prefix, or "INCOMP::..."'
         )
     if backend == "INCOMP":
-        return _ask_incompressible(name, temperature, pressure)
-    return _ask_pure(rest, temperature, pressure, law)
+        return _incompressible_properties(name, temperature, pressure)
+    return _pure_properties(rest, temperature, pressure, law)
 
 
-def _ask_pure(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
+def _pure_properties(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
     from CoolProp import CoolProp
 
     state = _pure_state(name)
@@ -41,7 +41,7 @@ def _ask_pure(name: str, temperature: float, pressure: float, law: str) -> dict[
             "pressure", f"{name} is two-phase at that state, or has no data there (CoolProp: {error})"
         ) from None
     values |= dict(density=state.rhomass(), bulk_modulus=state.rhomass() * state.speed_sound() ** 2)
-    values["viscosity"] = known(state.viscosity)
+    values["viscosity"] = value_or_none(state.viscosity)
     if LAWS[law].tabulated:
         values["table"] = isentrope(state, name, vapor_pressure)
     return values
@@ -65,7 +65,7 @@ def _suggestion(name: str) -> str:
 
     pure = CoolProp.get_global_param_string("FluidsList").split(",")
     oils = _incompressible_names()
-    if name.casefold().replace("-", " ").strip() in OILY:
+    if name.casefold().replace("-", " ").strip() in OIL_WORDS:
         return f'; oils are {", ".join(OILS)}, or give a "user" fluid'
     if name in oils:
         return f'; did you mean "INCOMP::{name}"?'
@@ -88,7 +88,7 @@ def _check_range(state: Any, name: str, temperature: float, pressure: float) -> 
     _check_temperature(name, temperature, state.Tmin(), state.Tmax())
     if pressure > state.pmax():
         raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, {state.pmax():g} Pa")
-    melting = known(lambda: state.melting_line(CoolProp.iT, CoolProp.iP, pressure))
+    melting = value_or_none(lambda: state.melting_line(CoolProp.iT, CoolProp.iP, pressure))
     if melting is not None and temperature < melting:
         where = f"{celsius(temperature)} and {pressure:g} Pa"
         raise FluidError("temperature", f"{name} is solid at {where}; it melts at {celsius(melting)}")
@@ -110,7 +110,7 @@ def _vapor_pressure(state: Any, temperature: float) -> float:
     return state.p()
 
 
-def _ask_incompressible(name: str, temperature: float, pressure: float) -> dict[str, Any]:
+def _incompressible_properties(name: str, temperature: float, pressure: float) -> dict[str, Any]:
     """Density, viscosity and vapour pressure if available; INCOMP fluids have no compressibility."""
     from CoolProp.CoolProp import PropsSI
 
@@ -122,15 +122,15 @@ def _ask_incompressible(name: str, temperature: float, pressure: float) -> dict[
         density = PropsSI("D", "T", temperature, "P", pressure, name)
     except ValueError as error:
         reason = str(error).split(" : PropsSI")[0]
-        raise FluidError(_blame(reason), f"{name}: {reason}") from None
-    viscosity = known(lambda: PropsSI("V", "T", temperature, "P", pressure, name))
-    vapor_pressure = known(lambda: PropsSI("P", "T", temperature, "Q", 0, name))
+        raise FluidError(_error_text(reason), f"{name}: {reason}") from None
+    viscosity = value_or_none(lambda: PropsSI("V", "T", temperature, "P", pressure, name))
+    vapor_pressure = value_or_none(lambda: PropsSI("P", "T", temperature, "Q", 0, name))
     values = dict(density=density, bulk_modulus=None, vapor_pressure=vapor_pressure or 0.0, table=None)
     # CoolProp returns exactly 1 Pa s, exp(0), for fluids without viscosity data, such as LiBr.
     return values | dict(viscosity=None if viscosity == 1.0 else viscosity)
 
 
-def _blame(reason: str) -> str:
+def _error_text(reason: str) -> str:
     if "composition" in reason or "fraction" in reason:
         return "name"
     return "pressure" if "ressure" in reason else "temperature"

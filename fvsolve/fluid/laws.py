@@ -13,14 +13,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fvsolve.errors import FluidError
-from fvsolve.fluid.air import AIR_KEYS, Air, mixed
+from fvsolve.fluid.air import AIR_KEYS, Air, air_of
 from fvsolve.fluid.oils import OILS
 from fvsolve.kernels import dtypes as rec
 
 LAWS: dict[str, type[Law]] = {}  # name -> law, from the simplest to the most general
 
 
-def named(fits: Callable[[type[Law]], bool]) -> str:
+def law_names(fits: Callable[[type[Law]], bool]) -> str:
     """Names of the laws for which `fits` is true, as text for a message."""
     *others, last = (f'"{name}"' for name, law in LAWS.items() if fits(law))
     return f"{', '.join(others)} or {last}" if others else last
@@ -98,7 +98,7 @@ class Law:
         return float(self.density(self.ambient))
 
     @property
-    def to_cavitate(self) -> str:
+    def cavitation_keys(self) -> str:
         """Keys that [fluid] needs before `cavitation = true`, as text for a message."""
         return 'law = "mixture" and '
 
@@ -137,7 +137,7 @@ class LinearLaw(Law, name="linear"):
         """Head [m] at pressures and heights."""
         return over_weight(pressure - self.ambient, self.rho * self.gravity) + z
 
-    def held(self, pressure: float, volume: float) -> float:
+    def mass_in(self, pressure: float, volume: float) -> float:
         """Mass [kg] in a volume."""
         return self.rho * volume * (1.0 + (pressure - self.fluid.pressure) / self.fluid.bulk_modulus)
 
@@ -153,7 +153,7 @@ class LinearLaw(Law, name="linear"):
         """Pressure [Pa] in the cells of a pipe: start pressure [Pa], profile and sum of both waves [kg/s] are given."""
         return start + waves / row["admittance"]
 
-    def held_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
+    def mass_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
         """Mass [kg] in a pipe at the start."""
         strain = (start - self.fluid.pressure) / (self.rho * row["speed"] ** 2)
         return float(np.sum(self.rho * row["area"] * row["dx"] * (1 + strain)))
@@ -168,22 +168,22 @@ class DenseLaw(Law):
 
         return density
 
-    def each(self, function, *arguments):
+    def for_each(self, function, *arguments):
         """Values of a compiled function at each element of its last argument."""
         *first, last = arguments
         values = [function(self.st, self.floats, *first, float(x)) for x in np.ravel(last)]
         return np.array(values).reshape(np.shape(last))[()]
 
     def density(self, pressure):
-        return self.each(self.kernels.density, pressure)
+        return self.for_each(self.kernels.density, pressure)
 
     def enthalpy(self, pressure):
         """Integral of dp / rho from the reference pressure [J/kg]."""
-        return self.each(self.kernels.enthalpy, pressure)
+        return self.for_each(self.kernels.enthalpy, pressure)
 
     def pressure_of_enthalpy(self, h):
         """Pressure [Pa] at which `enthalpy` is h."""
-        return self.each(self.kernels.pressure_of_enthalpy, h)
+        return self.for_each(self.kernels.pressure_of_enthalpy, h)
 
     def potential_of(self, pressure: float, z: float) -> float:
         return self.rho * (self.enthalpy(pressure) + self.gravity * z)
@@ -197,20 +197,20 @@ class DenseLaw(Law):
     def head(self, pressure, z):
         return over_weight(self.enthalpy(pressure) - self.enthalpy(self.ambient), self.gravity) + z
 
-    def held(self, pressure: float, volume: float) -> float:
+    def mass_in(self, pressure: float, volume: float) -> float:
         return self.density(pressure) * volume
 
     def compliance(self, speed: float) -> float:
         return 1.0 / (self.rho * speed**2) - 1.0 / self.fluid.bulk_modulus
 
     def area(self, row, pressure):
-        return self.each(self.kernels.wall_area, row, pressure)
+        return self.for_each(self.kernels.wall_area, row, pressure)
 
     def cell_pressure(self, row, start: np.ndarray, profile: np.ndarray, waves: np.ndarray) -> np.ndarray:
         masses = profile[row["center"] + np.arange(len(waves))] + waves / row["speed"]
-        return self.each(self.kernels.pressure_of_mass, row, masses)
+        return self.for_each(self.kernels.pressure_of_mass, row, masses)
 
-    def held_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
+    def mass_in_pipe(self, row, start: np.ndarray, profile: np.ndarray) -> float:
         return float(np.sum(profile[row["center"] + np.arange(len(start))])) * row["dx"]
 
 
@@ -251,7 +251,7 @@ class MixtureLaw(DenseLaw, name="mixture"):
 
     @classmethod
     def air(cls, given: dict[str, float]) -> Air:
-        return mixed(given)
+        return air_of(given)
 
     @classmethod
     def lower(cls, fluid, s, floats: list[float]) -> None:
@@ -269,7 +269,7 @@ class MixtureLaw(DenseLaw, name="mixture"):
         return float(self.density(self.ambient))
 
     @property
-    def to_cavitate(self) -> str:
+    def cavitation_keys(self) -> str:
         return ""
 
     @property
@@ -281,4 +281,4 @@ class MixtureLaw(DenseLaw, name="mixture"):
 
     def wave_speed(self, row, pressure: np.ndarray) -> float:
         """Harmonic mean of the local wave speeds along the pipe [m/s]."""
-        return len(pressure) / sum(1.0 / self.each(self.kernels.local_speed, row, pressure))
+        return len(pressure) / sum(1.0 / self.for_each(self.kernels.local_speed, row, pressure))

@@ -15,7 +15,7 @@ from typing import Any
 from fvsolve.errors import FluidError
 
 ZERO, ATMOSPHERE = 273.15, 1.01325  # [K], [bar]
-COLDEST, HOTTEST, HIGHEST = 273.15, 373.15, 1e8  # range of the sources [K], [Pa]
+MIN_TEMPERATURE, MAX_TEMPERATURE, MAX_PRESSURE = 273.15, 373.15, 1e8  # range of the sources [K], [Pa]
 
 
 @dataclass(frozen=True)
@@ -33,12 +33,12 @@ OILS = {  # ISO 3448 mid-point, viscosity index 100 by ASTM D2270, typical densi
     "ISO VG 68": Oil(68.0, 8.73, 881.0),
 }
 EXPANSION = 0.6278  # K1 of lubricating oils, ASTM D1250-80: thermal expansion at 15 degC is K1 / density [kg/m3/K]
-TAIT = (
+TAIT_COEFFICIENTS = (
     0.0732965,
     1965.02,
     -2.96813,
 )  # C, b0 [bar], b1 [bar/K]: rho = rho(1 bar) / (1 - C ln((b + p) / b)), b = b0 + b1 T
-HEAT = 1895.4, 2118.1  # cp at 25 and 80 degC [J/kg/K]
+HEAT_CAPACITY = 1895.4, 2118.1  # cp at 25 and 80 degC [J/kg/K]
 
 
 def oil_name(name: str) -> str | None:
@@ -52,19 +52,19 @@ def oil_name(name: str) -> str | None:
     return grade
 
 
-def ask_oil(name: str, temperature: float, pressure: float) -> dict[str, Any]:
+def oil_properties(name: str, temperature: float, pressure: float) -> dict[str, Any]:
     """Fields of `Fluid` for an oil at temperature [K] and pressure [Pa]; raises FluidError outside its range."""
-    if not COLDEST <= temperature <= HOTTEST:
+    if not MIN_TEMPERATURE <= temperature <= MAX_TEMPERATURE:
         text = f"{temperature - ZERO:.6g} degC"
         raise FluidError("temperature", f"{text} is outside the range of {name}, 0 degC to 100 degC")
-    if pressure > HIGHEST:
-        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, {HIGHEST:g} Pa")
+    if pressure > MAX_PRESSURE:
+        raise FluidError("pressure", f"{pressure:g} Pa is above the range of {name}, {MAX_PRESSURE:g} Pa")
     oil, p = OILS[name], pressure / 1e5
     expansion, rho = density_1atm(oil, temperature)
-    c, b = TAIT[0], TAIT[1] + TAIT[2] * temperature
+    c, b = TAIT_COEFFICIENTS[0], TAIT_COEFFICIENTS[1] + TAIT_COEFFICIENTS[2] * temperature
     rho /= 1.0 - c * math.log((b + p) / (b + ATMOSPHERE))
     isothermal = 1e5 * (b + p) / c * (1.0 - c * math.log((b + p) / b))
-    cp = HEAT[0] + (HEAT[1] - HEAT[0]) * (temperature - ZERO - 25.0) / 55.0
+    cp = HEAT_CAPACITY[0] + (HEAT_CAPACITY[1] - HEAT_CAPACITY[0]) * (temperature - ZERO - 25.0) / 55.0
     isentropic = 1.0 / (1.0 / isothermal - temperature * expansion**2 / (rho * cp))
     values = dict(density=rho, bulk_modulus=isentropic, viscosity=rho * walther(oil, temperature))
     return values | dict(vapor_pressure=0.0, table=None, source="docs/fluids.md, oils")

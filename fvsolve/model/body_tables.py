@@ -56,16 +56,16 @@ def fill_body(draft, name: str, body: Body, row) -> None:
     """Fill the row of a body, and add its states."""
     joint, t = body.joint, draft.case.numerics.start
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
-    row["inertia"], row["axis"] = body.moment().ravel(), joint.unit_axis
+    row["inertia"], row["axis"] = body.inertia_matrix().ravel(), joint.unit_axis
     row["at"], row["attitude"] = bodies.joint_position(draft.case.nodes, body), joint.attitude.rotation.ravel()
     row["damping"], row["stiffness"] = joint.damping or 0.0, joint.stiffness or 0.0
     pose = draft.case.poses[name]
     row["height"] = pose.at(body.centre_of_mass)[2]
     speed, spin = pose.velocity_at(body.centre_of_mass), pose.attitude.T @ pose.spin
-    row["energy"] = 0.5 * (body.mass * speed @ speed + spin @ body.moment() @ spin)
+    row["energy"] = 0.5 * (body.mass * speed @ speed + spin @ body.inertia_matrix() @ spin)
     row["y"] = row["rate"] = row["schedule"] = -1
-    if joint.driven is not None:
-        drive_joint(draft, name, joint.driven, row)
+    if joint.drive_schedule is not None:
+        drive_joint(draft, name, joint.drive_schedule, row)
         return
     coordinates, velocities = STATES[joint.kind]
     if not coordinates:
@@ -75,9 +75,9 @@ def fill_body(draft, name: str, body: Body, row) -> None:
     row["rate"] = draft.states([f"{name}.{key}" for key in velocities], list(velocities.values()))
     if joint.kind == "free":
         row["start"] = [*pose.at(body.centre_of_mass), *joint.attitude.parameters]
-        row["speed"] = [*joint.speed, *joint.turning]
+        row["speed"] = [*joint.centre_velocity, *joint.angular_velocity]
     elif joint.kind == "ball":
-        row["start"][0], row["speed"][:3] = 1.0, joint.turning
+        row["start"][0], row["speed"][:3] = 1.0, joint.angular_velocity
     else:
         row["start"][0], row["speed"][0] = bodies.joint_coordinate(joint, t), joint.rate or 0.0
 

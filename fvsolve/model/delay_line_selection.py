@@ -85,7 +85,7 @@ def reason_for_cells(case, name: str, link) -> str:
         return "scalars are carried in cells"
     if link.friction.model == "unsteady":
         return "unsteady friction depends on the flow history of every cell"
-    if link.yielding:
+    if link.creep_elements:
         return "its wall creeps in every cell"
     if any(getattr(case.places[end], "on", None) for end in link.ports.values()):
         return "the acceleration of its body acts on its cells"

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from fvsolve.case import Case
     from fvsolve.case.probe import Probe
     from fvsolve.model.state_names import StateNames
-    from fvsolve.parts.pipe.profile import Profile
+    from fvsolve.parts.pipe.elevation_profile import Profile
 
 
 @dataclass(frozen=True)
@@ -432,7 +432,7 @@ class Model(Displayable):
         initial, change = 0.0, 0.0
         for k, row in enumerate(self.tables.pipes):
             o, n = row["y"], int(row["cells"])
-            initial += self.case.law.held_in_pipe(row, self.profiles[k], self.tables.profile)
+            initial += self.case.law.mass_in_pipe(row, self.profiles[k], self.tables.profile)
             change += float(np.sum(y[o : o + 2 * n])) * row["dx"] / row["speed"]
             change += float(y[o]) if row["delay"] >= 0 else 0.0
             change += mass_in_creep(self.tables.floats, row, y)

@@ -15,7 +15,7 @@ from fvsolve.errors import Notice, listing
 from fvsolve.kernels import dtypes as rec
 from fvsolve.kernels.steady_friction import drag
 from fvsolve.parts.pipe.materials import materials
-from fvsolve.parts.pipe.wall import Wall, restraint_factor
+from fvsolve.parts.pipe.pipe_wall import Wall, restraint_factor
 from fvsolve.steppers.automatic import first_method
 from fvsolve.steppers.built_in_methods import AUTO
 from fvsolve.steppers.tableau import method_named
@@ -91,7 +91,7 @@ def wall_facts(link) -> dict[str, Any]:
     }
     if link.material is not None:
         stated = vars(link.wall) | {"roughness": link.friction.roughness} if isinstance(link.wall, Wall) else {}
-        unread = materials()[link.material].unread
+        unread = materials()[link.material].missing_keys
         facts["unread"] = [key for key in unread if key != "density" and stated.get(key) is None]
     if link.restraint is not None and isinstance(link.wall, Wall):
         facts["restraint_factor"] = restraint_factor(link.restraint, link.diameter, link.wall)

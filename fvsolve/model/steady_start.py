@@ -356,7 +356,7 @@ class SteadyStart:
                 lowering_of(type(node)).pressure_at_start(self, i, node, row) if held else self.pressure(i)
             )
             if row["kind"] in STORING:
-                row["mass"] = self.law.held(row["pressure"], row["volume"])
+                row["mass"] = self.law.mass_in(row["pressure"], row["volume"])
         self.nodes["demand"], self.nodes["inflow"] = self.demand, self.inflow
 
     def pipe_drop(self, row) -> float:

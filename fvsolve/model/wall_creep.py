@@ -7,7 +7,7 @@ import numpy as np
 
 def add_creep(draft, name: str, link, row) -> None:
     """Coefficients and states of a pipe's Kelvin-Voigt elements; faults where creep is not supported."""
-    if not link.yielding:
+    if not link.creep_elements:
         return
     place = f"links.{name}.wall.creep"
     if draft.case.scalars:
@@ -28,7 +28,7 @@ def gains(link, density: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
 
     G = c D K J / e is the volume that it takes up, relative to that of the elastic wall and the liquid together.
     """
-    growth, time = np.array(link.yielding).T
+    growth, time = np.array(link.creep_elements).T
     return growth * density * speed**2 / time, 1.0 / time
 
 

@@ -50,7 +50,7 @@ class LineReading:
     """Points on a line, with the cells and weights of each; points in holes of the mesh have no cells."""
 
     def __init__(self, line, basin, case) -> None:
-        self.basin, fields = line.basin, basin.part.own.fields
+        self.basin, fields = line.basin, basin.part.physics_type.fields
         share = np.linspace(0.0, 1.0, line.points)
         start, end = np.array(line.from_), np.array(line.to)
         points = start + share[:, None] * (end - start)

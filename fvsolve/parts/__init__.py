@@ -20,7 +20,7 @@ from fvsolve.parts.mass.part import Mass
 from fvsolve.parts.node import Node
 from fvsolve.parts.orifice.part import Orifice
 from fvsolve.parts.pipe.part import Pipe
-from fvsolve.parts.pipe.wall import Wall
+from fvsolve.parts.pipe.pipe_wall import Wall
 from fvsolve.parts.plugins import declare_installed
 from fvsolve.parts.reservoir.part import Reservoir
 from fvsolve.parts.rigid_column.part import RigidColumn

@@ -56,7 +56,11 @@ def unit_of(case, field: str) -> DrawnUnit:
     """Unit of a field, as in `[output]`; for fields of user-defined physics, as in their file."""
     if field in case.scalars:
         return DrawnUnit(field, case.scalars[field].unit)
-    own = {key: own_dimension for name in case.meshes for key, own_dimension in case.nodes[name].own.fields.items()}
+    own = {
+        key: own_dimension
+        for name in case.meshes
+        for key, own_dimension in case.nodes[name].physics_type.fields.items()
+    }
     dimension = (own | DIMENSIONS).get(field)
     if dimension is None:
         return DrawnUnit(field, "")

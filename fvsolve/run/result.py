@@ -341,7 +341,7 @@ class Result(Displayable):
             pipes = any(link.kind == "pipe" for link in self.case.links.values())
             basins = [self.case.nodes[name] for name in self.case.meshes]
             bodies = any(node.kind == "body" for node in self.case.nodes.values())
-            field = "pressure" if pipes or not basins else next(iter(basins[0].own.fields), "pressure")
+            field = "pressure" if pipes or not basins else next(iter(basins[0].physics_type.fields), "pressure")
             field = "speed" if bodies and not pipes and not basins else field
         out = Path(path) if path else self.directory / f"view-{field}{suffix}"
         frames = self._frames() if times else []

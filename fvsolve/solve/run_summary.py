@@ -113,7 +113,7 @@ def find_marks(run_data: RunData) -> list[Mark]:
         "beyond its stroke": "the piston is beyond an end of its stroke; an end-stop would stop it",
         "below vapor pressure": (
             "pressure falls below vapour pressure; the liquid column would separate; to model this, set "
-            f"{model.case.law.to_cavitate}cavitation = true in [fluid]"
+            f"{model.case.law.cavitation_keys}cavitation = true in [fluid]"
         ),
         "dry": "no water is left for the outflow; the missing water is added and booked as made_up",
     }

@@ -32,10 +32,10 @@ class SloshingCheck:
         for name, mesh in {**case.meshes, **case.lumped}.items():
             basin = case.nodes[name]
             modal = basin.on is not None and basin.sloshing == "modes"
-            free = basin.on is not None and basin.own.sloshes and any(free_joints(basin.on, case.nodes))
+            free = basin.on is not None and basin.physics_type.has_modes and any(free_joints(basin.on, case.nodes))
             if modal or (free and not basin.lumped):
-                place = np.array(basin.place) + basin.turn[:, :2] @ mesh.centroid
-                about = model.body_names.index(basin.on), place, basin.turn[:, 2]
+                place = np.array(basin.place) + basin.rotation[:, :2] @ mesh.centroid
+                about = model.body_names.index(basin.on), place, basin.rotation[:, 2]
                 self.tanks.append((name, modal, about, *(rises(model, name) if modal else ())))
         self.restart_data = np.zeros((len(self.tanks), 4))
 

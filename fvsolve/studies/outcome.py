@@ -142,7 +142,9 @@ def refuse_basins(case, study: str, allow_sloshing: bool = False) -> None:
     riding : accept sloshing basins that are fixed to bodies
     """
     names = [
-        name for name in case.meshes if not (allow_sloshing and case.nodes[name].on and case.nodes[name].own.sloshes)
+        name
+        for name in case.meshes
+        if not (allow_sloshing and case.nodes[name].on and case.nodes[name].physics_type.has_modes)
     ]
     if names:
         raise FvsolveError(f"{study} does not support basins yet; the case has {listing(names)}")

@@ -17,7 +17,7 @@ from fvsolve.case.raw import read_raw
 from fvsolve.case.text import inline
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
-from fvsolve.fluid.cache import coolprop
+from fvsolve.fluid.property_cache import coolprop_version
 from fvsolve.output.restart import programs
 from fvsolve.studies.parallel import run_tasks
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
@@ -204,7 +204,7 @@ class SweepRun:
         self.rows: dict[int, dict] = {}
         self.digests: dict[str, str] = {}  # name of a file -> hash of its content
         relevant = {key: value for key, value in raw.items() if key not in TEXT_KEYS}
-        versions_used = programs() | {"numba": "", "coolprop": coolprop()}
+        versions_used = programs() | {"numba": "", "coolprop": coolprop_version()}
         self.identity = digest_of(
             {**versions_used, "case": relevant, "base": base, "files": [*self.files((relevant, base))]}
         )

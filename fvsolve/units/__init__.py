@@ -11,16 +11,16 @@ import math
 import re
 from typing import Any
 
-from fvsolve.units.outside import ask_pint
-from fvsolve.units.spellings import DIMENSIONS, LIKELY, MEANT, UNITS, Dimension, Unit
+from fvsolve.units.pint_units import pint_unit
+from fvsolve.units.spellings import DIMENSIONS, LIKELY, NEAR_MISSES, UNITS, Dimension, Unit
 
 __all__ = [
     "DIMENSIONS", "UNITS", "Dimension", "Kinematic", "Unit", "convert", "find", "likely", "parse", "show", "span",
-    "vacuum", "wanted",
+    "vacuum", "expected",
 ]  # fmt: skip
 
 LONGEST = 100  # greatest length of a unit [characters]
-MOST = 1e100  # greatest magnitude of a quantity [SI]
+MAX_NUMBER = 1e100  # greatest magnitude of a quantity [SI]
 _NUMBER = re.compile(r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 
 
@@ -35,9 +35,11 @@ def parse(given: Any, dimension: str) -> Any:
     else:
         value, unit = _parse_number(given, dimension), None
     if not math.isfinite(value):
-        raise ValueError(f"{show(given)} is not finite; {wanted(dimension)}")
-    if abs(value) > MOST:
-        raise ValueError(f"{show(given)} is greater than {MOST:g} SI, where products overflow; {wanted(dimension)}")
+        raise ValueError(f"{show(given)} is not finite; {expected(dimension)}")
+    if abs(value) > MAX_NUMBER:
+        raise ValueError(
+            f"{show(given)} is greater than {MAX_NUMBER:g} SI, where products overflow; {expected(dimension)}"
+        )
     if (DIMENSIONS[dimension].base or dimension) == "pressure" and DIMENSIONS[dimension].gauge:
         return value, unit is not None and unit.gauge
     if unit is not None and unit.dimension == "kinematic viscosity" and dimension == "viscosity":
@@ -53,26 +55,26 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     """Unit of a spelling that measures `dimension`; ValueError with a suggestion otherwise."""
     if len(spelling) > LONGEST:  # pint would take minutes to read it
         raise ValueError(
-            f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {wanted(dimension)}"
+            f"{show(f'{number} {spelling}'.strip())}: unknown unit of {len(spelling)} letters; {expected(dimension)}"
         )
     base = DIMENSIONS[dimension].base or dimension
-    unit = UNITS.get(_plain(spelling))
+    unit = UNITS.get(_canonical(spelling))
     if unit is None:
-        folded = _plain(spelling).casefold().replace(" ", "")
+        folded = _canonical(spelling).casefold().replace(" ", "")
         for known in _spellings(dimension):
             if known.casefold().replace(" ", "") == folded:
                 raise ValueError(f"unknown unit {show(spelling)}; did you mean {show((number + ' ' + known).strip())}?")
-        unit = ask_pint(spelling) if _plain(spelling) not in MEANT else None
+        unit = pint_unit(spelling) if _canonical(spelling) not in NEAR_MISSES else None
     text = show(f"{number} {spelling}".strip())
-    suggested = MEANT.get(_plain(spelling), "")
+    suggested = NEAR_MISSES.get(_canonical(spelling), "")
     if unit is None:
         if not suggested or UNITS[suggested].dimension != base:
-            close = difflib.get_close_matches(_plain(spelling), _spellings(dimension), n=1)
+            close = difflib.get_close_matches(_canonical(spelling), _spellings(dimension), n=1)
             suggested = close[0] if close else ""
-        hint = f"did you mean {show((number + ' ' + suggested).strip())}?" if suggested else wanted(dimension)
+        hint = f"did you mean {show((number + ' ' + suggested).strip())}?" if suggested else expected(dimension)
         raise ValueError(f"{text}: unknown unit {show(spelling)}; {hint}")
     if unit.dimension != base and not (dimension == "viscosity" and unit.dimension == "kinematic viscosity"):
-        hint = wanted(dimension)
+        hint = expected(dimension)
         if suggested and UNITS[suggested].dimension == base:
             hint = f"expected {DIMENSIONS[dimension].words}; did you mean {show((number + ' ' + suggested).strip())}?"
         words = DIMENSIONS[unit.dimension].words if unit.dimension in DIMENSIONS else f"a {unit.dimension}"
@@ -80,7 +82,7 @@ def find(spelling: str, dimension: str, number: str = "") -> Unit:
     if dimension == "gauge_pressure" and unit.absolute:
         raise ValueError(f"{text} is an absolute pressure; expected a gauge pressure, for example {show('5 barg')}")
     if unit.gauge and not DIMENSIONS[dimension].gauge:
-        raise ValueError(f"{text} is a gauge pressure; {wanted(dimension)}")
+        raise ValueError(f"{text} is a gauge pressure; {expected(dimension)}")
     return unit
 
 
@@ -115,12 +117,12 @@ def likely(given: Any, dimension: str, least: float, greatest: float) -> str:
     match = _NUMBER.fullmatch(given) if isinstance(given, str) else None
     number, spelling = match.groups() if match else (f"{given:g}", DIMENSIONS[dimension].si)
     fit = [unit for unit, weight in LIKELY.get(DIMENSIONS[dimension].base or dimension, {}).items()
-           if unit != _plain(spelling) and least <= weight * UNITS[unit].si(float(number)) <= greatest]  # fmt: skip
+           if unit != _canonical(spelling) and least <= weight * UNITS[unit].si(float(number)) <= greatest]  # fmt: skip
     fit = [show(f"{number} {unit}") for unit in fit[: 2 if dimension == "viscosity" else 1]]
     return f"; did you mean {' or '.join(fit)}?" if fit else ""
 
 
-def wanted(dimension: str) -> str:
+def expected(dimension: str) -> str:
     """Text 'expected a length, for example "300 mm"'."""
     words, example = DIMENSIONS[dimension].words, DIMENSIONS[dimension].example
     return f"expected {words}, for example {example if dimension == 'number' else show(example)}"
@@ -137,7 +139,7 @@ def show(given: Any) -> str:
 def _parse_number(given: Any, dimension: str) -> float:
     if isinstance(given, bool) or not isinstance(given, (int, float)):
         kind = {bool: "true or false", dict: "a table", list: "a list"}.get(type(given), f"a {type(given).__name__}")
-        raise ValueError(f"{show(given)} is {kind}; {wanted(dimension)}")
+        raise ValueError(f"{show(given)} is {kind}; {expected(dimension)}")
     try:
         return float(given)
     except OverflowError:
@@ -147,7 +149,7 @@ def _parse_number(given: Any, dimension: str) -> float:
 def _parse_text(text: str, dimension: str) -> tuple[float, Unit | None]:
     match = _NUMBER.fullmatch(text.replace("\N{MINUS SIGN}", "-"))
     if match is None:
-        raise ValueError(f"{show(text)} is not a number with a unit; {wanted(dimension)}")
+        raise ValueError(f"{show(text)} is not a number with a unit; {expected(dimension)}")
     number, spelling = match.groups()
     if not spelling:
         if dimension != "number":
@@ -167,7 +169,7 @@ def _spellings(dimension: str) -> list[str]:
 
 
 @functools.lru_cache(maxsize=1024)
-def _plain(spelling: str) -> str:
+def _canonical(spelling: str) -> str:
     """Spelling as in the table: `m^3 / h`, `m³/h` and `m**3/h` are `m3/h`; `Pa.s` is `Pa s`."""
     text = spelling.strip().replace("**", "").replace("^", "")
     for old, new in (("²", "2"), ("³", "3"), ("µ", "u"), ("μ", "u"), ("°", "deg"), ("·", " "), ("*", " ")):

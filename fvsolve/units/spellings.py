@@ -231,7 +231,7 @@ def _table() -> dict[str, Unit]:
 UNITS: dict[str, Unit] = _table()
 
 # Near misses that are units of another dimension, or not units -> suggested unit.
-MEANT = {
+NEAR_MISSES = {
     "C": "degC", "F": "degF", "R": "degR", "deg C": "degC", "deg F": "degF", "degK": "K", "deg": "degC",
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "mins": "min", "minute": "min", "minutes": "min",
     "hour": "h", "hours": "h", "days": "d", "meter": "m", "metre": "m", "meters": "m", "metres": "m",

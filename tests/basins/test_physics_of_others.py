@@ -18,7 +18,7 @@ from fvsolve.basins.lower import rows_class
 from fvsolve.basins.lower_basin import BasinRows
 from fvsolve.errors import FvsolveError
 from fvsolve.parts import Basin
-from fvsolve.parts.basin.part import Physics, StartOfFields
+from fvsolve.parts.basin.part import BasinStart, Physics
 from fvsolve.parts.value import Quantity
 
 SOURCES = {
@@ -187,7 +187,7 @@ def test_every_physics_is_a_folder_that_lowers_itself():
     assert {one.__module__.split(".")[2] for one in Physics.kinds.values()} == folders
     for one in Physics.kinds.values():
         assert set(one.model_fields) <= set(Basin.model_fields)
-        assert set(one.starts.model_fields) <= set(StartOfFields.keys())
+        assert set(one.starts.model_fields) <= set(BasinStart.keys())
         assert issubclass(rows_class(one), BasinRows) and rows_class(one) is not BasinRows
 
 

@@ -153,7 +153,7 @@ def test_water_that_is_level_in_a_tank_that_leans_rests(method):
     probes = ["b.depth@0.1,0.2", "b.depth@1.9,0.9", "hull.joint_tx"]
     result = run(case_of(hull({"kind": "fixed", "attitude": lean}), basin, 1.0, {"method": method}, probes))
     model = build(load(case_of(hull({"kind": "fixed", "attitude": lean}), basin, 1.0, {"method": method}, probes)))
-    turn = model.case.poses["hull"].attitude @ model.case.nodes["b"].turn
+    turn = model.case.poses["hull"].attitude @ model.case.nodes["b"].rotation
     slope = -turn[2, :2]  # of gravity along the bed, over g: a level surface, to first order
     for place, name in (((0.1, 0.2), probes[0]), ((1.9, 0.9), probes[1])):
         truth = DEPTH + slope @ (np.array(place) - (0.5 * SIDE, 0.5))

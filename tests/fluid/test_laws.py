@@ -97,7 +97,7 @@ def test_what_a_pipe_holds_leads_back_to_its_pressure(name):
         m = profile + row["area"] * (p - REFERENCE) / row["speed"] ** 2
     found = one.cell_pressure(row, np.full(6, REFERENCE), profile, (m - profile) * row["speed"])
     assert found == approx(p, rel=1e-6 if one.linear else 1e-10)
-    assert one.held(REFERENCE, 2.0) == approx(2.0 * float(one.density(REFERENCE)), rel=1e-14)
+    assert one.mass_in(REFERENCE, 2.0) == approx(2.0 * float(one.density(REFERENCE)), rel=1e-14)
 
 
 @pytest.mark.parametrize("name", DENSE)

@@ -49,13 +49,13 @@ RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}
 
 def test_near_ambient_pressure_alone_its_flow_is_not_the_textbooks():
     """Beyond SMALL to rounding; within, less than 0.18 sqrt(SMALL) off the root, the greatest that the quintic is."""
-    from fvsolve.parts.air_valve.law import orifice_air
+    from fvsolve.parts.air_valve.law import orifice_flow
 
     for r in (0.2, 0.5283, 0.53, 0.9, 1.0 - 1.01 * SMALL):
         textbook = bores(r * AMBIENT, 0.1, 0.1, lambda x: 1.0) / (0.6 * area(0.1) * AMBIENT / math.sqrt(HEAT))
-        assert orifice_air(r) == pytest.approx(textbook, rel=2e-12)
+        assert orifice_flow(r) == pytest.approx(textbook, rel=2e-12)
     for x in np.linspace(0.0, SMALL, 50):
-        assert 0.0 <= math.sqrt(7 * x / 3.5) - orifice_air(1.0 - x) <= math.sqrt(2.0) * 0.18 * math.sqrt(SMALL) + SMALL
+        assert 0.0 <= math.sqrt(7 * x / 3.5) - orifice_flow(1.0 - x) <= math.sqrt(2.0) * 0.18 * math.sqrt(SMALL) + SMALL
 
 
 RETURN = {"time": [0.0, 2.0, 3.0], "value": [0.4e5, 0.4e5, 6e5]}

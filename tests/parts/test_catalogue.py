@@ -9,9 +9,9 @@ from reference.scenes import junction, lake, pipe, scene
 import fvsolve
 from fvsolve import load
 from fvsolve.errors import CaseError
-from fvsolve.parts.pipe.classes import ductile, rated
 from fvsolve.parts.pipe.materials import SOURCES, materials
-from fvsolve.parts.pipe.wall import Wall, restraint_factor
+from fvsolve.parts.pipe.pipe_wall import Wall, restraint_factor
+from fvsolve.parts.pipe.pressure_classes import class_size, ductile
 
 # SLR Pipeline, technical details: DN, DE, nominal wall of K9 and of the preferred C class [mm]
 SLR = [
@@ -36,14 +36,14 @@ def read(defaults=None, **more):
 @pytest.mark.parametrize(("size", "outer", "nine", "preferred", "number"), SLR)
 def test_walls_of_ductile_iron_are_those_that_a_maker_prints(size, outer, nine, preferred, number):
     for name, wall in (("K9", nine), (f"C{number}", preferred)):
-        found = rated(name, f"DN{size}", "ductile-iron")
+        found = class_size(name, f"DN{size}", "ductile-iron")
         assert 1e3 * found.thickness == approx(wall, abs=0.101)  # two tables of one decimal
         assert 1e3 * found.diameter == approx(outer - 2e3 * found.thickness)
 
 
 @pytest.mark.parametrize(("size", "bar"), BEARS.items())
 def test_k9_bears_what_a_maker_prints(size, bar):
-    assert round(1e-5 * rated("K9", f"DN{size}", "ductile-iron").pressure) == bar
+    assert round(1e-5 * class_size("K9", f"DN{size}", "ductile-iron").pressure) == bar
 
 
 def test_c_classes_are_the_pressure_that_their_least_wall_bears():
@@ -58,7 +58,7 @@ def test_c_classes_are_the_pressure_that_their_least_wall_bears():
     ("PE80", "PN 12.8", 11, 12.8),
 ])  # fmt: skip
 def test_polyethylene_by_its_ratio_and_by_its_pressure(material, name, ratio, bar):
-    found = rated(name, "DN110", material)
+    found = class_size(name, "DN110", material)
     assert found.thickness == approx(0.110 / ratio)
     assert found.diameter == approx(0.110 - 0.220 / ratio)
     assert found.pressure == approx(1e5 * bar)
@@ -103,8 +103,8 @@ def test_every_figure_names_the_page_it_was_read_on():
     for material in materials().values():
         for key, figure in material.figures.items():
             assert figure.least <= figure.used <= figure.greatest
-            assert figure.sources and all(SOURCES[one] in figure.said for one in figure.sources)
-            assert key not in material.unread
+            assert figure.sources and all(SOURCES[one] in figure.description for one in figure.sources)
+            assert key not in material.missing_keys
     assert materials()["PE100"].figures["youngs_modulus"].used == 1.3e9  # the greatest
 
 

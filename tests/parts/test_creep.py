@@ -251,7 +251,7 @@ def test_the_shipped_main_without_friction_is_the_transform_of_two_lines_in_seri
 
     def line_of(name, s):
         pipe, speed = case.links[name], case.wave_speed(name)
-        share = [(growth * case.properties.density * speed**2, time) for growth, time in pipe.yielding]
+        share = [(growth * case.properties.density * speed**2, time) for growth, time in pipe.creep_elements]
         root = np.sqrt(1.0 + sum(one / (1.0 + time * s) for one, time in share))
         return case.properties.density * speed / area(pipe.diameter) / root, np.tanh(s * pipe.length / speed * root)
 

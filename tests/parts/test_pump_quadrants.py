@@ -143,7 +143,9 @@ def test_head_and_torque_meet_at_both_ends_of_every_curve(given):
             heads = [law_curve.curve_head(floats, curve, n, one)[0] for one in (inside, out)]
             torques = [law.fluid_torque(floats, at, curve, n, one, 1.0) for one in (inside, out)]
             assert heads[0] == approx(heads[1], abs=1e-5) and torques[0] == approx(torques[1], abs=1e-4)
-            assert law_curve.leaves(floats, curve, n, out) and not law_curve.leaves(floats, curve, n, inside)
+            assert law_curve.is_off_curve(floats, curve, n, out) and not law_curve.is_off_curve(
+                floats, curve, n, inside
+            )
 
 
 def test_energy_is_never_made_while_it_runs_down_and_back():

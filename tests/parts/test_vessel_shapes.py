@@ -70,14 +70,14 @@ def model_of(case):
 def at_start(model) -> tuple[float, float]:
     """(volume of the gas [m3], its pressure [Pa]), as the tables have them."""
     numbers = model.tables.floats[model.tables.devices[0]["data"] :]
-    return float(numbers[law_vessel.GAS]), float(numbers[law_vessel.FIRST])
+    return float(numbers[law_vessel.GAS_VOLUME]), float(numbers[law_vessel.GAS_PRESSURE])
 
 
 @pytest.mark.parametrize("degrees", [0.0, 0.05, 1.0, 20.0, 45.0, 75.0, 89.99])
 def test_what_a_cylinder_holds_below_a_level_is_the_quadrature_of_its_sections(degrees):
     radius, length, slope = 1.1, 5.3, math.radians(degrees)
     top, whole = length * math.sin(slope) + 2.0 * radius * math.cos(slope), math.pi * radius**2 * length
-    kind = law_shape.LYING if degrees == 0.0 else law_shape.SLOPED
+    kind = law_shape.HORIZONTAL_CYLINDER if degrees == 0.0 else law_shape.INCLINED_CYLINDER
     shape = np.array([kind, top, radius, length, slope])
     bends = sorted((length * math.sin(slope), 2.0 * radius * math.cos(slope)))
     for z in np.linspace(0.01, 0.99, 7) * top:
@@ -258,7 +258,7 @@ def test_its_norm_is_what_its_energy_is_bent_by():
     found = sum(sum(factor * y[k] for k, factor in one.items()) ** 2 for one in
                 device.energy_rows(model, part, row, np.zeros(model.y_size), out))  # fmt: skip
     tables, node = model.tables, model.tables.nodes[row["node"]]
-    both = [law_vessel.energy_since(tables.settings[0], tables.floats, node, int(row["data"]), sign * y[node["y"]],
+    both = [law_vessel.stored_energy_change(tables.settings[0], tables.floats, node, int(row["data"]), sign * y[node["y"]],
                                     sign * y[row["y"]]) for sign in (1.0, -1.0)]  # fmt: skip
     assert found == pytest.approx(0.5 * sum(both), rel=1e-4)
 

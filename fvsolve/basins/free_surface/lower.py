@@ -111,7 +111,7 @@ class FreeSurfaceRows(BasinRows):
     @property
     def rubs(self) -> bool:
         """True if the bed has friction."""
-        return self.part.own.rubs(self.part)
+        return self.part.physics_type.has_friction(self.part)
 
     @property
     def damped(self) -> bool:

@@ -6,12 +6,12 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.basin.part import MOVES, MovingStart, Physics
+from fvsolve.parts.basin.part import VELOCITY_FIELDS, Physics, VelocityStart
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, nonnegative
 
 
-class SurfaceStart(MovingStart):
+class SurfaceStart(VelocityStart):
     """Start of water that is not at rest."""
 
     level: Annotated[
@@ -23,16 +23,16 @@ class FreeSurface(Physics, name="free-surface"):
     """h_t + div q = 0, q_t + div(q q / h + g h^2 / 2) = -g h grad(bed) - friction."""
 
     states: ClassVar[dict[str, str]] = {"depth": "m", "flow_x": "m2/s", "flow_y": "m2/s"}
-    fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **MOVES}
+    fields: ClassVar[dict[str, str]] = {"depth": "level", "surface": "level", "bed": "level", **VELOCITY_FIELDS}
     alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (("manning", "factor"),)
-    starts: ClassVar[type[MovingStart]] = SurfaceStart
+    starts: ClassVar[type[VelocityStart]] = SurfaceStart
     laws: ClassVar[tuple[str, ...]] = ("linear",)
     moves: ClassVar[bool] = True
-    rides: ClassVar[bool] = True
-    sloshes: ClassVar[bool] = True
-    docks: ClassVar[bool] = True
-    described: ClassVar[str] = "a free surface, whose water has one density"
-    steep: ClassVar[bool] = True
+    on_bodies: ClassVar[bool] = True
+    has_modes: ClassVar[bool] = True
+    links_on_bodies: ClassVar[bool] = True
+    description: ClassVar[str] = "a free surface, whose water has one density"
+    has_shocks: ClassVar[bool] = True
 
     level: Annotated[
         float,
@@ -58,7 +58,7 @@ class FreeSurface(Physics, name="free-surface"):
     ] = None  # fmt: skip
 
     @classmethod
-    def rubs(cls, basin) -> bool:
+    def has_friction(cls, basin) -> bool:
         return bool(basin.manning or basin.factor)
 
     @classmethod

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.basin.part import MOVES, MovingStart, Physics
+from fvsolve.parts.basin.part import VELOCITY_FIELDS, Physics, VelocityStart
 from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.value import Quantity, positive
 
 
-class LiquidStart(MovingStart):
+class LiquidStart(VelocityStart):
     """Start of a liquid that is not at rest."""
 
     pressure: Annotated[
@@ -21,13 +21,13 @@ class Liquid(Physics, name="liquid"):
     """r_t + div m = 0, m_t + div(m m / r) + grad p(r) = 0."""
 
     states: ClassVar[dict[str, str]] = {"density": "kg/m3", "flow_x": "kg/(m2 s)", "flow_y": "kg/(m2 s)"}
-    fields: ClassVar[dict[str, str]] = {"pressure": "pressure", **MOVES}
-    starts: ClassVar[type[MovingStart]] = LiquidStart
+    fields: ClassVar[dict[str, str]] = {"pressure": "pressure", **VELOCITY_FIELDS}
+    starts: ClassVar[type[VelocityStart]] = LiquidStart
     laws: ClassVar[tuple[str, ...]] = ("linear", "log", "table")
     moves: ClassVar[bool] = True
-    rides: ClassVar[bool] = True
+    on_bodies: ClassVar[bool] = True
     carries: ClassVar[bool] = False
-    echoes: ClassVar[bool] = True
+    allows_impedance: ClassVar[bool] = True
 
     pressure: Annotated[
         float,

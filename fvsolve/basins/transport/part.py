@@ -99,7 +99,7 @@ class Transport(Physics, name="transport"):
     ] = None
 
     @classmethod
-    def shapes(cls, basin, mesh) -> Iterator[tuple[tuple[str, ...], SpatialField, np.ndarray]]:
+    def formulas(cls, basin, mesh) -> Iterator[tuple[tuple[str, ...], SpatialField, np.ndarray]]:
         for key, formula in basin.velocity.given.items():
             if isinstance(formula, SpatialField):
                 yield ("velocity", key), formula, mesh.points if key == "stream" else mesh.middle

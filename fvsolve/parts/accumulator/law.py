@@ -14,26 +14,33 @@ from fvsolve.kernels.density import density, log_density, pressure_of_log
 from fvsolve.kernels.dtypes import LAW_LINEAR
 from fvsolve.kernels.linear_energy import height_pressure
 
-EXPONENT, GAS, ROOM, NECK, EMPTY, SHED = 0, 1, 2, 3, 4, 5  # indices into the numbers of an accumulator
-NUMBERS = 6
+EXPONENT, GAS_VOLUME, TOTAL_VOLUME, NECK_STIFFNESS, EMPTY_MASS, EMPTY_PRESSURE = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+)  # indices into the numbers of an accumulator
+NUMBER_COUNT = 6
 """Exponent n; gas volume in the profile [m3]; volume of gas, fluid and neck [m3]; stiffness of the neck [Pa/kg], 0
 without a neck; inflow since the start at which the gas just fills the vessel [kg], negative if fluid must flow out;
 pressure in that state minus that of the profile [Pa]."""
 
 
 @njit
-def gas_and_pressure(st, floats, node, at, y):
+def gas_state(st, floats, node, at, y):
     """(ln(V / V0) of the gas, p - p0 [Pa], dp/dm [Pa/kg]) after an inflow y [kg]."""
-    n, neck, above_empty = floats[at + EXPONENT], floats[at + NECK], y - floats[at + EMPTY]
+    n, neck, above_empty = floats[at + EXPONENT], floats[at + NECK_STIFFNESS], y - floats[at + EMPTY_MASS]
     if st["law"] != LAW_LINEAR:
-        return gas_and_pressure_dense(st, floats, node, at, y)
+        return gas_state_dense(st, floats, node, at, y)
     if neck > 0.0 and above_empty < 0.0:
-        squeezed = y if floats[at + EMPTY] > 0.0 else above_empty
-        base = 0.0 if floats[at + EMPTY] > 0.0 else floats[at + SHED]
-        return gas_at_most(floats, node, at), base + neck * squeezed, neck
-    p, gas, inflow = node["pressure"], floats[at + GAS], y
-    if neck > 0.0 and floats[at + EMPTY] > 0.0:  # the bladder fills its vessel at the start
-        p, inflow = p + floats[at + SHED], above_empty
+        squeezed = y if floats[at + EMPTY_MASS] > 0.0 else above_empty
+        base = 0.0 if floats[at + EMPTY_MASS] > 0.0 else floats[at + EMPTY_PRESSURE]
+        return full_bladder_gas(floats, node, at), base + neck * squeezed, neck
+    p, gas, inflow = node["pressure"], floats[at + GAS_VOLUME], y
+    if neck > 0.0 and floats[at + EMPTY_MASS] > 0.0:  # the bladder fills its vessel at the start
+        p, inflow = p + floats[at + EMPTY_PRESSURE], above_empty
     ratio = max(1e-9, 1.0 - inflow / (st["rho"] * gas))
     u = log1p(-inflow / (st["rho"] * gas)) if ratio > 1e-9 else log(ratio)
     change = p * expm1(-n * u)
@@ -41,25 +48,30 @@ def gas_and_pressure(st, floats, node, at, y):
 
 
 @njit
-def gas_at_most(floats, node, at):
+def full_bladder_gas(floats, node, at):
     """ln(V / V0) of a bladder that fills its vessel, by p V^n from the profile; 0 if it is full in the profile."""
-    if floats[at + EMPTY] > 0.0:
+    if floats[at + EMPTY_MASS] > 0.0:
         return 0.0
-    return -log1p(floats[at + SHED] / node["pressure"]) / floats[at + EXPONENT]
+    return -log1p(floats[at + EMPTY_PRESSURE] / node["pressure"]) / floats[at + EXPONENT]
 
 
 @njit
-def gas_and_pressure_dense(st, floats, node, at, y):
+def gas_state_dense(st, floats, node, at, y):
     """Values of `gas_state` under the laws log and table."""
-    n, gas, total, neck = floats[at + EXPONENT], floats[at + GAS], floats[at + ROOM], floats[at + NECK]
-    p0, mass, empty = node["pressure"], node["mass"] + y, floats[at + EMPTY]
+    n, gas, total, neck = (
+        floats[at + EXPONENT],
+        floats[at + GAS_VOLUME],
+        floats[at + TOTAL_VOLUME],
+        floats[at + NECK_STIFFNESS],
+    )
+    p0, mass, empty = node["pressure"], node["mass"] + y, floats[at + EMPTY_MASS]
     if neck > 0.0 and y < empty:
-        expansion = gas_at_most(floats, node, at)
+        expansion = full_bladder_gas(floats, node, at)
         p = pressure_of_log(st, floats, 0.0, log(mass / (st["rho"] * (total - gas * exp(expansion)))))
         if empty > 0.0 and y == 0.0:
             p = p0
         return expansion, p - p0, 1.0 / (log_density(st, floats, p)[1] * mass)
-    first = p0 + floats[at + SHED] if neck > 0.0 and empty > 0.0 else p0
+    first = p0 + floats[at + EMPTY_PRESSURE] if neck > 0.0 and empty > 0.0 else p0
     u = 0.0
     if first == p0:
         u = log(max(0.3, 1.0 - y / (density(st, floats, p0) * gas))) if y != 0.0 else 0.0
@@ -82,7 +94,7 @@ def set(t, y, out, tables, device):
     i, layout = device["node"], tables.layout[0]
     node = tables.nodes[i]
     st, floats = tables.settings[0], tables.floats
-    _, change, stiffness = gas_and_pressure(st, floats, node, device["data"], y[node["y"]])
+    _, change, stiffness = gas_state(st, floats, node, device["data"], y[node["y"]])
     out[layout["pressure"] + i] = change
     out[layout["stiffness"] + node["row"]] = stiffness
 
@@ -90,7 +102,7 @@ def set(t, y, out, tables, device):
 @njit
 def events(t, y, out, tables, device, g):
     """g: fluid left until the bladder or vessel is empty [kg], and its negative."""
-    left = y[tables.nodes[device["node"]]["y"]] - tables.floats[device["data"] + EMPTY]
+    left = y[tables.nodes[device["node"]]["y"]] - tables.floats[device["data"] + EMPTY_MASS]
     g[device["event"]], g[device["event"] + 1] = left, -left
 
 
@@ -100,10 +112,12 @@ def value(t, y, out, tables, device, quantity):
     node = tables.nodes[device["node"]]
     st, floats = tables.settings[0], tables.floats
     at, inflow = device["data"], y[node["y"]]
-    u, change, _ = gas_and_pressure(st, floats, node, at, inflow)
-    if floats[at + NECK] > 0.0 and inflow < floats[at + EMPTY]:  # the gas of a full bladder keeps its precharge
-        change = floats[at + SHED]
-    return node["pressure"] + change if quantity == 1 else floats[at + GAS] * exp(u)
+    u, change, _ = gas_state(st, floats, node, at, inflow)
+    if (
+        floats[at + NECK_STIFFNESS] > 0.0 and inflow < floats[at + EMPTY_MASS]
+    ):  # the gas of a full bladder keeps its precharge
+        change = floats[at + EMPTY_PRESSURE]
+    return node["pressure"] + change if quantity == 1 else floats[at + GAS_VOLUME] * exp(u)
 
 
 @njit
@@ -116,18 +130,18 @@ def gas_energy(p, gas, n, ambient, u):
 @njit
 def accumulator_energy(st, floats, node, at, y):
     """Stored energy after an inflow y [kg], minus that of the profile [J]."""
-    n, gas, empty, p0 = floats[at + EXPONENT], floats[at + GAS], floats[at + EMPTY], node["pressure"]
-    neck = floats[at + NECK] if st["law"] == LAW_LINEAR else 0.0
-    first = p0 + floats[at + SHED] if floats[at + NECK] > 0.0 and empty > 0.0 else p0
-    u, change, _ = gas_and_pressure(st, floats, node, at, y)
+    n, gas, empty, p0 = floats[at + EXPONENT], floats[at + GAS_VOLUME], floats[at + EMPTY_MASS], node["pressure"]
+    neck = floats[at + NECK_STIFFNESS] if st["law"] == LAW_LINEAR else 0.0
+    first = p0 + floats[at + EMPTY_PRESSURE] if floats[at + NECK_STIFFNESS] > 0.0 and empty > 0.0 else p0
+    u, change, _ = gas_state(st, floats, node, at, y)
     energy = gas_energy(first, gas, n, st["ambient"], u)
     if st["law"] != LAW_LINEAR:
-        total = floats[at + ROOM]
+        total = floats[at + TOTAL_VOLUME]
         energy += vessel_energy(st, floats, node, node["mass"] + y, total - gas * exp(u), p0 + change)
         return energy - vessel_energy(st, floats, node, node["mass"], total - gas, p0)
     inflow, p = min(y, empty), p0
     if empty <= 0.0:
-        inflow, p = min(y - empty, 0.0), p0 + floats[at + SHED]
+        inflow, p = min(y - empty, 0.0), p0 + floats[at + EMPTY_PRESSURE]
     if neck > 0.0:
         energy += inflow * (p - st["ambient"] + 0.5 * neck * inflow) / st["rho"]
     return energy + height_pressure(st, node) * y / st["rho"]

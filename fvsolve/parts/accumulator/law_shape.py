@@ -12,12 +12,12 @@ from fvsolve.jit import njit
 from fvsolve.kernels.linear_energy import level_moment
 from fvsolve.kernels.tank_levels import level_of_volume
 
-KIND, TOP, FIRST, SECOND, THIRD = 0, 1, 2, 3, 4
+KIND, FULL_LEVEL, FIRST_SIZE, SECOND_SIZE, THIRD_SIZE = 0, 1, 2, 3, 4
 """Numbers of a shape: its kind; the level at which it is full [m]; then an area [m2], or the radius [m], length [m] and
 slope [rad] of a cylinder, or the number of levels, areas and volumes that follow."""
-PRISM, LYING, SLOPED, TABLE = 0, 1, 2, 3
-NUMBERS = 5
-NARROW = 1e-6  # of the mean surface: least slope dV/dz in the search for a level
+PRISM, HORIZONTAL_CYLINDER, INCLINED_CYLINDER, AREA_TABLE = 0, 1, 2, 3
+NUMBER_COUNT = 5
+LEAST_SURFACE = 1e-6  # of the mean surface: least slope dV/dz in the search for a level
 
 
 @njit
@@ -32,7 +32,7 @@ def segment(d):
 
 
 @njit
-def segment_once(d):
+def segment_integral(d):
     """T(d): integral of S from 0 to d."""
     if d <= 0.0:
         return 0.0
@@ -43,7 +43,7 @@ def segment_once(d):
 
 
 @njit
-def segment_twice(d):
+def segment_double_integral(d):
     """U(d): integral of T from 0 to d."""
     if d <= 0.0:
         return 0.0
@@ -54,9 +54,9 @@ def segment_twice(d):
 
 
 @njit
-def depths(floats, at, z):
+def cylinder_depths(floats, at, z):
     """(d at the lower end, d at the upper end, tangent of the slope) of an inclined cylinder."""
-    radius, length, slope = floats[at + FIRST], floats[at + SECOND], floats[at + THIRD]
+    radius, length, slope = floats[at + FIRST_SIZE], floats[at + SECOND_SIZE], floats[at + THIRD_SIZE]
     tangent = sin(slope) / cos(slope)
     d = z / (radius * cos(slope))
     return d, d - length / radius * tangent, tangent
@@ -65,15 +65,15 @@ def depths(floats, at, z):
 @njit
 def volume_below(floats, at, z):
     """Volume below level z [m3]; z must lie within the vessel."""
-    kind, first = int(floats[at + KIND]), floats[at + FIRST]
+    kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return first * z
-    if kind == LYING:
-        return first * first * floats[at + SECOND] * segment(z / first)
-    if kind == SLOPED:
-        d, upper, tangent = depths(floats, at, z)
-        return first * first * first / tangent * (segment_once(d) - segment_once(upper))
-    rows, o, k = int(first), at + NUMBERS, 0
+    if kind == HORIZONTAL_CYLINDER:
+        return first * first * floats[at + SECOND_SIZE] * segment(z / first)
+    if kind == INCLINED_CYLINDER:
+        d, upper, tangent = cylinder_depths(floats, at, z)
+        return first * first * first / tangent * (segment_integral(d) - segment_integral(upper))
+    rows, o, k = int(first), at + NUMBER_COUNT, 0
     while k < rows - 2 and z >= floats[o + k + 1]:
         k += 1
     low, high = floats[o + rows + k], floats[o + rows + k + 1]
@@ -86,16 +86,16 @@ def volume_below(floats, at, z):
 @njit
 def surface_at(floats, at, z):
     """Area of the free surface at level z [m2]."""
-    kind, first = int(floats[at + KIND]), floats[at + FIRST]
+    kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return first
-    if kind == LYING:
+    if kind == HORIZONTAL_CYLINDER:
         d = z / first
-        return 2.0 * first * floats[at + SECOND] * sqrt(max(0.0, d * (2.0 - d)))
-    if kind == SLOPED:
-        d, upper, _ = depths(floats, at, z)
-        return first * first * (segment(d) - segment(upper)) / sin(floats[at + THIRD])
-    rows, o, k = int(first), at + NUMBERS, 0
+        return 2.0 * first * floats[at + SECOND_SIZE] * sqrt(max(0.0, d * (2.0 - d)))
+    if kind == INCLINED_CYLINDER:
+        d, upper, _ = cylinder_depths(floats, at, z)
+        return first * first * (segment(d) - segment(upper)) / sin(floats[at + THIRD_SIZE])
+    rows, o, k = int(first), at + NUMBER_COUNT, 0
     while k < rows - 2 and z >= floats[o + k + 1]:
         k += 1
     low, high = floats[o + rows + k], floats[o + rows + k + 1]
@@ -106,16 +106,18 @@ def surface_at(floats, at, z):
 @njit
 def moment_below(floats, at, z):
     """Integral of z dV from the bottom to level z [m4]."""
-    kind, first = int(floats[at + KIND]), floats[at + FIRST]
+    kind, first = int(floats[at + KIND]), floats[at + FIRST_SIZE]
     if kind == PRISM:
         return 0.5 * first * z * z
-    if kind == LYING:
-        return z * volume_below(floats, at, z) - first * first * first * floats[at + SECOND] * segment_once(z / first)
-    if kind == SLOPED:
-        d, upper, tangent = depths(floats, at, z)
-        difference = segment_twice(d) - segment_twice(upper)
-        return z * volume_below(floats, at, z) - first**4 * cos(floats[at + THIRD]) / tangent * difference
-    return level_moment(floats, at + NUMBERS, int(first), z)
+    if kind == HORIZONTAL_CYLINDER:
+        return z * volume_below(floats, at, z) - first * first * first * floats[at + SECOND_SIZE] * segment_integral(
+            z / first
+        )
+    if kind == INCLINED_CYLINDER:
+        d, upper, tangent = cylinder_depths(floats, at, z)
+        difference = segment_double_integral(d) - segment_double_integral(upper)
+        return z * volume_below(floats, at, z) - first**4 * cos(floats[at + THIRD_SIZE]) / tangent * difference
+    return level_moment(floats, at + NUMBER_COUNT, int(first), z)
 
 
 @njit
@@ -125,12 +127,12 @@ def level_at(floats, at, volume):
     if volume <= 0.0:
         return 0.0
     if kind == PRISM:
-        return volume / floats[at + FIRST]
-    if kind == TABLE:
-        return level_of_volume(floats, at + NUMBERS, int(floats[at + FIRST]), volume)
-    low, high = 0.0, floats[at + TOP]
-    total = pi * floats[at + FIRST] ** 2 * floats[at + SECOND]
-    z, least = high * min(volume / total, 1.0), NARROW * total / high
+        return volume / floats[at + FIRST_SIZE]
+    if kind == AREA_TABLE:
+        return level_of_volume(floats, at + NUMBER_COUNT, int(floats[at + FIRST_SIZE]), volume)
+    low, high = 0.0, floats[at + FULL_LEVEL]
+    total = pi * floats[at + FIRST_SIZE] ** 2 * floats[at + SECOND_SIZE]
+    z, least = high * min(volume / total, 1.0), LEAST_SURFACE * total / high
     for _ in range(100):
         excess = volume_below(floats, at, z) - volume
         if excess > 0.0:
@@ -140,7 +142,7 @@ def level_at(floats, at, volume):
         next_z = z - excess / max(surface_at(floats, at, z), least)
         if not low <= next_z <= high:
             next_z = 0.5 * (low + high)
-        if abs(next_z - z) <= 2e-16 * floats[at + TOP]:
+        if abs(next_z - z) <= 2e-16 * floats[at + FULL_LEVEL]:
             return next_z
         z = next_z
     return z

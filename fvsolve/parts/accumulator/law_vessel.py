@@ -15,39 +15,49 @@ from fvsolve.kernels.density import density, enthalpy, log_density, pressure_of_
 from fvsolve.kernels.dtypes import LAW_LINEAR
 from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.linear_energy import height_pressure
-from fvsolve.parts.accumulator.law import EMPTY, EXPONENT, GAS, ROOM, gas_energy
-from fvsolve.parts.accumulator.law import NUMBERS as SHAPED
-from fvsolve.parts.accumulator.law_shape import TOP, level_at, moment_below, surface_at
+from fvsolve.parts.accumulator.law import EMPTY_MASS, EXPONENT, GAS_VOLUME, TOTAL_VOLUME, gas_energy
+from fvsolve.parts.accumulator.law import NUMBER_COUNT as SHAPED
+from fvsolve.parts.accumulator.law_shape import FULL_LEVEL, level_at, moment_below, surface_at
 
-FIRST, LEVEL, BOTTOM, BRINGS, START, STOP, SHAPE = range(SHAPED, SHAPED + 7)
+GAS_PRESSURE, LEVEL, BOTTOM, COMPRESSOR_RATE, START_LEVEL, STOP_LEVEL, SHAPE = range(SHAPED, SHAPED + 7)
 """Gas pressure [Pa] and level [m] in the profile; height of the bottom above the node [m]; of the compressor, da/dt
 [1/s] and the levels at which it starts and stops [m]; the first number of the shape."""
-NARROW = 1e-3  # of the mean surface: lower bound in the stiffness, for a little fluid in a corner
+LEAST_SURFACE = 1e-3  # of the mean surface: lower bound in the stiffness, for a little fluid in a corner
 
 
 @njit
-def brought(y, device):
+def compressor_gas(y, device):
     """a: gas added by the compressor, relative to the gas at the start."""
     return y[device["y"]] if device["states"] > 0 else 0.0
 
 
 @njit
-def standing(st, floats, node, at, y, a):
+def vessel_state(st, floats, node, at, y, a):
     """(ln(V / V0) of the gas, its pressure minus that of the profile [Pa], volume [m3] and level [m] of the fluid)."""
-    gas, total, n, first = floats[at + GAS], floats[at + ROOM], floats[at + EXPONENT], floats[at + FIRST]
+    gas, total, n, first = (
+        floats[at + GAS_VOLUME],
+        floats[at + TOTAL_VOLUME],
+        floats[at + EXPONENT],
+        floats[at + GAS_PRESSURE],
+    )
     if st["law"] == LAW_LINEAR:
         ratio = max(1e-9, 1.0 - y / (st["rho"] * gas))
         u = log1p(-y / (st["rho"] * gas)) if ratio > 1e-9 else log(ratio)
         volume = (total - gas) + min(y / st["rho"], (1.0 - 1e-9) * gas)
     else:
-        u, volume = standing_dense(st, floats, node, at, y, a)
+        u, volume = vessel_state_dense(st, floats, node, at, y, a)
     return u, first * expm1(n * (log1p(a) - u)), volume, level_at(floats, at + SHAPE, volume)
 
 
 @njit
-def standing_dense(st, floats, node, at, y, a):
+def vessel_state_dense(st, floats, node, at, y, a):
     """(ln(V / V0) of the gas, volume of the fluid [m3]) with rho(q) V equal to the mass of the fluid, by Newton."""
-    gas, total, n, first = floats[at + GAS], floats[at + ROOM], floats[at + EXPONENT], floats[at + FIRST]
+    gas, total, n, first = (
+        floats[at + GAS_VOLUME],
+        floats[at + TOTAL_VOLUME],
+        floats[at + EXPONENT],
+        floats[at + GAS_PRESSURE],
+    )
     mass = node["mass"] + y
     if y == 0.0 and a == 0.0:
         return 0.0, total - gas
@@ -55,7 +65,7 @@ def standing_dense(st, floats, node, at, y, a):
     for _ in range(60):
         p, gas_volume = first * exp(n * (log1p(a) - u)), gas * exp(u)
         volume = total - gas_volume
-        rise, growth = lift_of(st, floats, at, mass, volume)
+        rise, growth = centroid_pressure_rise(st, floats, at, mass, volume)
         value, compressibility = log_density(st, floats, p + rise)
         rho = st["rho"] * exp(value)
         slope = rho * (compressibility * volume * (n * p + growth * gas_volume) + gas_volume)
@@ -67,50 +77,53 @@ def standing_dense(st, floats, node, at, y, a):
 
 
 @njit
-def lift_of(st, floats, at, mass, volume):
+def centroid_pressure_rise(st, floats, at, mass, volume):
     """(rho g (level - z) of a mass in a volume, z its centroid [Pa]; its derivative by the volume [Pa/m3])."""
     if volume <= 0.0 or mass <= 0.0:
         return 0.0, 0.0
     level = level_at(floats, at + SHAPE, volume)
     arm = level - moment_below(floats, at + SHAPE, level) / volume
     pressure_per_height = st["gravity"] * mass / volume
-    return pressure_per_height * arm, pressure_per_height * (1.0 / breadth(floats, at, level) - 2.0 * arm / volume)
+    return pressure_per_height * arm, pressure_per_height * (1.0 / surface_area(floats, at, level) - 2.0 * arm / volume)
 
 
 @njit
-def breadth(floats, at, level):
+def surface_area(floats, at, level):
     """Area of the free surface at a level [m2], at least `LEAST_SURFACE` of the mean area."""
-    return max(surface_at(floats, at + SHAPE, level), NARROW * floats[at + ROOM] / floats[at + SHAPE + TOP])
+    return max(
+        surface_at(floats, at + SHAPE, level),
+        LEAST_SURFACE * floats[at + TOTAL_VOLUME] / floats[at + SHAPE + FULL_LEVEL],
+    )
 
 
 @njit
 def pressure_and_stiffness(st, floats, node, at, y, a):
     """(pressure of the node minus that of the profile [Pa], dp/dm [Pa/kg])."""
-    n, gas = floats[at + EXPONENT], floats[at + GAS]
-    u, change, volume, level = standing(st, floats, node, at, y, a)
-    p, gas_stiffness = floats[at + FIRST] + change, n / (gas * exp(u))
-    weight = st["gravity"] / breadth(floats, at, level) if level > 0.0 else 0.0
+    n, gas = floats[at + EXPONENT], floats[at + GAS_VOLUME]
+    u, change, volume, level = vessel_state(st, floats, node, at, y, a)
+    p, gas_stiffness = floats[at + GAS_PRESSURE] + change, n / (gas * exp(u))
+    weight = st["gravity"] / surface_area(floats, at, level) if level > 0.0 else 0.0
     if st["law"] == LAW_LINEAR:
         return change + st["rho"] * st["gravity"] * (level - floats[at + LEVEL]), gas_stiffness * p / st["rho"] + weight
     if y == 0.0 and a == 0.0:
         change = 0.0
     else:
-        q, z = at_centroid(st, floats, node, at, y, p, volume, level)
-        change = place_pressure(st, floats, at, q, z) - node["pressure"]
+        q, z = centroid_state(st, floats, node, at, y, p, volume, level)
+        change = node_pressure(st, floats, at, q, z) - node["pressure"]
     value, compressibility = log_density(st, floats, p)
     stiffness = gas_stiffness * p + st["rho"] * exp(value) * weight
     return change, stiffness / (st["rho"] * exp(value) * (1.0 + max(0.0, volume) * compressibility * stiffness))
 
 
 @njit
-def at_centroid(st, floats, node, at, y, p, volume, level):
+def centroid_state(st, floats, node, at, y, p, volume, level):
     """(pressure of the fluid at its centroid [Pa], height of the centroid above the bottom [m])."""
     z = moment_below(floats, at + SHAPE, level) / volume if volume > 0.0 else 0.0
-    return p + lift_of(st, floats, at, node["mass"] + y, volume)[0], z
+    return p + centroid_pressure_rise(st, floats, at, node["mass"] + y, volume)[0], z
 
 
 @njit
-def place_pressure(st, floats, at, q, z):
+def node_pressure(st, floats, at, q, z):
     """Pressure of the node [Pa] for fluid of pressure q at its centroid z, laws log and table."""
     return pressure_of_enthalpy(st, floats, enthalpy(st, floats, q) + st["gravity"] * (floats[at + BOTTOM] + z))
 
@@ -120,47 +133,55 @@ def set(t, y, out, tables, device):
     """Write the pressure and stiffness of its node."""
     i, layout, at = device["node"], tables.layout[0], device["data"]
     node, st = tables.nodes[i], tables.settings[0]
-    a = brought(y, device)
+    a = compressor_gas(y, device)
     change, stiffness = pressure_and_stiffness(st, tables.floats, node, at, y[node["y"]], a)
     out[layout["pressure"] + i] = change
     out[layout["stiffness"] + node["row"]] = stiffness
 
 
 @njit
-def bringing(tables, device):
+def compressor_rate(tables, device):
     """da/dt while the compressor runs, otherwise 0 [1/s]."""
     runs = device["states"] > 0 and tables.armed[device["event"] + 2] > 0.0
-    return tables.floats[device["data"] + BRINGS] if runs else 0.0
+    return tables.floats[device["data"] + COMPRESSOR_RATE] if runs else 0.0
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
     """d/dt of the gas added by the compressor."""
     if dydt.size > 0 and device["states"] > 0:
-        dydt[device["y"]] = bringing(tables, device)
+        dydt[device["y"]] = compressor_rate(tables, device)
 
 
 @njit
 def events(t, y, out, tables, device, g):
     """g: fluid left until the vessel is empty [kg], and its negative; level left until the compressor switches [m]."""
     node, st, floats, at = tables.nodes[device["node"]], tables.settings[0], tables.floats, device["data"]
-    left, flag = y[node["y"]] - floats[at + EMPTY], device["event"]
+    left, flag = y[node["y"]] - floats[at + EMPTY_MASS], device["event"]
     g[flag], g[flag + 1] = left, -left
     if device["states"] > 0:
-        level = standing(st, floats, node, at, y[node["y"]], brought(y, device))[3]
-        event_pair(tables, g, flag + 2, floats[at + (STOP if tables.armed[flag + 2] > 0.0 else START)] - level)
+        level = vessel_state(st, floats, node, at, y[node["y"]], compressor_gas(y, device))[3]
+        event_pair(
+            tables, g, flag + 2, floats[at + (STOP_LEVEL if tables.armed[flag + 2] > 0.0 else START_LEVEL)] - level
+        )
 
 
 @njit
 def value(t, y, out, tables, device, quantity):
     """Gas volume [m3] (quantity 0), gas pressure [Pa] (1) or level [m] (2)."""
     node, st, floats, at = tables.nodes[device["node"]], tables.settings[0], tables.floats, device["data"]
-    u, change, _, level = standing(st, floats, node, at, y[node["y"]], brought(y, device))
-    return level if quantity == 2 else floats[at + FIRST] + change if quantity == 1 else floats[at + GAS] * exp(u)
+    u, change, _, level = vessel_state(st, floats, node, at, y[node["y"]], compressor_gas(y, device))
+    return (
+        level
+        if quantity == 2
+        else floats[at + GAS_PRESSURE] + change
+        if quantity == 1
+        else floats[at + GAS_VOLUME] * exp(u)
+    )
 
 
 @njit
-def added_energy(p, gas, n, ambient, a):
+def compressed_gas_energy(p, gas, n, ambient, a):
     """Energy above ambient that a times the gas adds at constant volume, from pressure p and volume `gas` [J]."""
     r = 1.0 + a
     if n == 1.0:
@@ -170,7 +191,7 @@ def added_energy(p, gas, n, ambient, a):
 
 
 @njit
-def vessel_gas_power(p, gas, n, ambient, a):
+def compression_energy_rate(p, gas, n, ambient, a):
     """d/da of that energy, p at a: work of compression from ambient along p V^n constant [J]."""
     if n == 1.0:
         return p * gas * log(p / ambient) / (1.0 + a)
@@ -178,14 +199,19 @@ def vessel_gas_power(p, gas, n, ambient, a):
 
 
 @njit
-def energy_since(st, floats, node, at, y, a):
+def stored_energy_change(st, floats, node, at, y, a):
     """Stored energy after an inflow y [kg] and added gas a, minus that of the profile [J]."""
-    n, gas, total, first = floats[at + EXPONENT], floats[at + GAS], floats[at + ROOM], floats[at + FIRST]
-    u, change, volume, level = standing(st, floats, node, at, y, a)
+    n, gas, total, first = (
+        floats[at + EXPONENT],
+        floats[at + GAS_VOLUME],
+        floats[at + TOTAL_VOLUME],
+        floats[at + GAS_PRESSURE],
+    )
+    u, change, volume, level = vessel_state(st, floats, node, at, y, a)
     start, start_volume = floats[at + LEVEL], total - gas
     energy = gas_energy(first, gas, n, st["ambient"], u)
     if a != 0.0:
-        energy += added_energy(first * exp(-n * u), gas * exp(u), n, st["ambient"], a)
+        energy += compressed_gas_energy(first * exp(-n * u), gas * exp(u), n, st["ambient"], a)
     moment = moment_below(floats, at + SHAPE, level) - moment_below(floats, at + SHAPE, start)
     if st["law"] == LAW_LINEAR:
         energy += st["gravity"] * (floats[at + BOTTOM] * y + st["rho"] * moment)
@@ -193,7 +219,7 @@ def energy_since(st, floats, node, at, y, a):
     for side in range(2):
         content, mass = (volume, node["mass"] + y) if side == 1 else (start_volume, node["mass"])
         p, height = (first + change, level) if side == 1 else (first, start)
-        q, z = at_centroid(st, floats, node, at, mass - node["mass"], p, content, height)
+        q, z = centroid_state(st, floats, node, at, mass - node["mass"], p, content, height)
         stored = vessel_energy(st, floats, node, mass, content, q) + mass * st["gravity"] * (floats[at + BOTTOM] + z)
         energy += stored if side == 1 else -stored
     return energy
@@ -203,17 +229,19 @@ def energy_since(st, floats, node, at, y, a):
 def stored(y, tables, device):
     """Stored energy, change since the profile [J]."""
     node = tables.nodes[device["node"]]
-    return energy_since(tables.settings[0], tables.floats, node, device["data"], y[node["y"]], brought(y, device))
+    return stored_energy_change(
+        tables.settings[0], tables.floats, node, device["data"], y[node["y"]], compressor_gas(y, device)
+    )
 
 
 @njit
 def power(t, y, dydt, out, tables, device):
     """(power of the compressor, rate of the stored energy, 0) [W]."""
-    supplied, rate = 0.0, bringing(tables, device)
+    supplied, rate = 0.0, compressor_rate(tables, device)
     if rate > 0.0:
         st, floats, at = tables.settings[0], tables.floats, device["data"]
-        node, a = tables.nodes[device["node"]], brought(y, device)
-        u, change, _, _ = standing(st, floats, node, at, y[node["y"]], a)
-        p, gas_volume = floats[at + FIRST] + change, floats[at + GAS] * exp(u)
-        supplied = rate * vessel_gas_power(p, gas_volume, floats[at + EXPONENT], st["ambient"], a)
+        node, a = tables.nodes[device["node"]], compressor_gas(y, device)
+        u, change, _, _ = vessel_state(st, floats, node, at, y[node["y"]], a)
+        p, gas_volume = floats[at + GAS_PRESSURE] + change, floats[at + GAS_VOLUME] * exp(u)
+        supplied = rate * compression_energy_rate(p, gas_volume, floats[at + EXPONENT], st["ambient"], a)
     return supplied, vessel_power(dydt, out, tables, device) + supplied, 0.0

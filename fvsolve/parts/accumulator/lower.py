@@ -8,8 +8,10 @@ from fvsolve.errors import Notice
 from fvsolve.model.device_lowering import Device
 from fvsolve.parts.accumulator import law
 
-ROUNDED = 1e-5  # share of the released mass added to the scale of errors in the neck, so that it exceeds rounding
-NECK = 0.01  # volume of the neck of a bladder accumulator over its volume
+NECK_ERROR_SHARE = (
+    1e-5  # share of the released mass added to the scale of errors in the neck, so that it exceeds rounding
+)
+NECK_SHARE = 0.01  # volume of the neck of a bladder accumulator over its volume
 
 
 class AccumulatorRows(Device, kind="accumulator"):
@@ -22,34 +24,34 @@ class AccumulatorRows(Device, kind="accumulator"):
     remedy = "give it a connection, whose loss damps the flow in and out"
 
     def of(self, part) -> Device:
-        return self if not part.shaped else ShapedRows() if part.compressor is None else CompressedRows()
+        return self if not part.has_shape else ShapedRows() if part.compressor is None else CompressorRows()
 
     def place(self, draft, name, node, row) -> None:
         super().place(draft, name, node, row)
         row["y"] = draft.states([f"{name}.mass"], 0.1 * draft.fluid.density * node.volume)
 
     def pressure_at_start(self, start, i, node, row) -> float | None:
-        if node.initial_pressure is None or not node.shaped:
+        if node.initial_pressure is None or not node.has_shape:
             return node.initial_pressure
         from fvsolve.parts.accumulator.lower_shape import VesselStart
 
-        return VesselStart(start, node).under(node.initial_pressure)
+        return VesselStart(start, node).node_pressure(node.initial_pressure)
 
     def numbers(self, draft, name, part) -> list[float]:
-        return [0.0] * law.NUMBERS
+        return [0.0] * law.NUMBER_COUNT
 
     def apply_event(self, run_data, row, t, y, scale) -> None:
         model = run_data.model
         floats, at = model.tables.floats[row["data"] :], model.tables.nodes[row["node"]]["y"]
         scale[at] = model.scale[at]
-        if floats[law.NECK] > 0.0 and run_data.armed[row["event"]] > 0.0:  # the neck takes up far less mass
-            scale[at] = -(1e5 / floats[law.NECK] + ROUNDED * abs(floats[law.EMPTY]))
+        if floats[law.NECK_STIFFNESS] > 0.0 and run_data.armed[row["event"]] > 0.0:  # the neck takes up far less mass
+            scale[at] = -(1e5 / floats[law.NECK_STIFFNESS] + NECK_ERROR_SHARE * abs(floats[law.EMPTY_MASS]))
 
     def begin(self, start, part, row) -> list[str]:
         draft, fluid = start.draft, start.draft.fluid
         node = draft.node_table[row["node"]]
         p, density = float(node["pressure"]), draft.case.law.density
-        neck = NECK * part.volume if part.precharge is not None else 0.0
+        neck = NECK_SHARE * part.volume if part.precharge is not None else 0.0
         charge_pressure = part.precharge if part.precharge is not None else p
         gas = part.gas_volume or part.volume * min(1.0, (charge_pressure / p) ** (1.0 / part.exponent))
         total = part.volume + neck
@@ -60,7 +62,7 @@ class AccumulatorRows(Device, kind="accumulator"):
         if draft.case.law.linear:
             empty = excess / stiffness if neck and excess > 0.0 else -fluid.density * (part.volume - gas)
         floats = draft.tables.floats
-        floats[row["data"] : row["data"] + law.NUMBERS] = [part.exponent, gas, total, stiffness, empty, excess]
+        floats[row["data"] : row["data"] + law.NUMBER_COUNT] = [part.exponent, gas, total, stiffness, empty, excess]
         node["mass"] = mass
         node["stiffness"] = stiffness if excess > 0.0 and neck else part.exponent * p / (fluid.density * gas)
         if neck and excess >= 0.0:
@@ -73,7 +75,7 @@ class AccumulatorRows(Device, kind="accumulator"):
     def change(self, model, row, y: float) -> float:
         """Pressure minus that of the profile [Pa] after an inflow y [kg]."""
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
-        return law.gas_and_pressure(st, floats, node, int(row["data"]), y)[1]
+        return law.gas_state(st, floats, node, int(row["data"]), y)[1]
 
     def energy(self, model, row, y: float) -> float:
         """Stored energy after an inflow y [kg], minus that of the profile [J]."""
@@ -90,8 +92,10 @@ class AccumulatorRows(Device, kind="accumulator"):
         def head(y: float) -> float:
             return energy_head(st, floats, node, float(node["pressure"] + self.change(model, row, y)))
 
-        low = float(floats[at + law.EMPTY]) if not floats[at + law.NECK] else -0.999 * float(node["mass"])
-        high = (1.0 - 1e-6) * model.case.properties.density * float(floats[at + law.GAS])
+        low = (
+            float(floats[at + law.EMPTY_MASS]) if not floats[at + law.NECK_STIFFNESS] else -0.999 * float(node["mass"])
+        )
+        high = (1.0 - 1e-6) * model.case.properties.density * float(floats[at + law.GAS_VOLUME])
         if head(low) < 0.0:
             for _ in range(200):
                 middle = 0.5 * (low + high)
@@ -111,12 +115,12 @@ class ShapedRows(AccumulatorRows, kind=""):
         return law_vessel
 
     def numbers(self, draft, name, part) -> list[float]:
-        from fvsolve.parts.accumulator.lower_shape import shape_of
+        from fvsolve.parts.accumulator.lower_shape import shape_numbers
 
         compressor = [0.0, 0.0, 0.0]
         if part.compressor is not None:
             compressor = [0.0, part.compressor.start, part.compressor.stop]
-        return [0.0] * law.NUMBERS + [0.0, 0.0, part.bottom or 0.0, *compressor] + shape_of(part)
+        return [0.0] * law.NUMBER_COUNT + [0.0, 0.0, part.bottom or 0.0, *compressor] + shape_numbers(part)
 
     def begin(self, start, part, row) -> list[str]:
         from fvsolve.parts.accumulator.lower_shape import VesselStart
@@ -137,8 +141,8 @@ class ShapedRows(AccumulatorRows, kind=""):
             draft.fault(f"nodes.{name}.{'level' if part.gas_volume is None else 'gas_volume'}", text)
             return []
         floats = draft.tables.floats
-        empty = -draft.fluid.density * at_start.held if start.law.linear else -mass
-        floats[at : at + law.NUMBERS] = [n, at_start.gas, part.volume, 0.0, empty, 0.0]
+        empty = -draft.fluid.density * at_start.fluid_volume if start.law.linear else -mass
+        floats[at : at + law.NUMBER_COUNT] = [n, at_start.gas, part.volume, 0.0, empty, 0.0]
         floats[at + self.law.FIRST], floats[at + self.law.LEVEL] = p, at_start.level
         if part.compressor is not None:
             floats[at + self.law.BRINGS] = part.compressor.flow * start.case.ambient_pressure / (p * at_start.gas)
@@ -156,7 +160,7 @@ class ShapedRows(AccumulatorRows, kind=""):
         return self.law.energy_since(st, floats, node, int(row["data"]), y, 0.0)
 
 
-class CompressedRows(ShapedRows, kind=""):
+class CompressorRows(ShapedRows, kind=""):
     """An air vessel whose compressor limits the level."""
 
     states = ("gas",)
@@ -170,7 +174,7 @@ class CompressedRows(ShapedRows, kind=""):
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
         u, change, _, _ = self.law.base_states(st, floats, node, at, float(y[mass]), a)
-        gas, p = floats[at + law.GAS] * math.exp(u), floats[at + self.law.FIRST] + change
+        gas, p = floats[at + law.GAS_VOLUME] * math.exp(u), floats[at + self.law.FIRST] + change
         root = math.sqrt(0.5 * part.exponent * p * gas)
         total = super().energy_rows(model, part, row, y, out)[0][mass]
         rest = math.sqrt(max(0.0, total**2 - (root / (rho * gas)) ** 2))

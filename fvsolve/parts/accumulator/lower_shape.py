@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.parts.accumulator import law_shape
 from fvsolve.parts.accumulator.shape import UPRIGHT, height_of, length_of
 
-FLAT = 1e-6  # axis rise over radius below which a cylinder counts as horizontal; likewise for upright
+SLOPE_TOLERANCE = 1e-6  # axis rise over radius below which a cylinder counts as horizontal; likewise for upright
 
 
 class VesselStart:
@@ -21,26 +21,26 @@ class VesselStart:
 
     def __init__(self, start, part) -> None:
         self.law, self.gravity, self.bottom = start.law, start.case.gravity, part.bottom or 0.0
-        shape = np.array(shape_of(part))
+        shape = np.array(shape_numbers(part))
         self.gas = part.gas_volume
         if self.gas is None:
             self.gas = part.volume - float(law_shape.volume_below(shape, 0, part.level))
-        self.held = part.volume - self.gas
-        self.level = float(law_shape.level_at(shape, 0, self.held))
+        self.fluid_volume = part.volume - self.gas
+        self.level = float(law_shape.level_at(shape, 0, self.fluid_volume))
         below = float(law_shape.moment_below(shape, 0, self.level))
-        self.centroid = below / self.held if self.held > 0.0 else 0.0
+        self.centroid = below / self.fluid_volume if self.fluid_volume > 0.0 else 0.0
 
     def gas_pressure(self, p: float) -> tuple[float, float]:
         """(pressure of the gas [Pa], mass of the fluid [kg]) for pressure p of the node."""
         if self.law.linear:
             rho = self.law.rho
-            return p - rho * self.gravity * (self.bottom + self.level), rho * self.held
+            return p - rho * self.gravity * (self.bottom + self.level), rho * self.fluid_volume
         potential = self.gravity * (self.bottom + self.centroid)
         q = float(self.law.pressure_of_enthalpy(self.law.enthalpy(p) - potential))
         rho = float(self.law.density(q))
-        return q - rho * self.gravity * (self.level - self.centroid), rho * self.held
+        return q - rho * self.gravity * (self.level - self.centroid), rho * self.fluid_volume
 
-    def under(self, gas: float) -> float:
+    def node_pressure(self, gas: float) -> float:
         """Pressure of the node [Pa] for a pressure of the gas."""
         if self.law.linear:
             return gas + self.law.rho * self.gravity * (self.bottom + self.level)
@@ -50,7 +50,7 @@ class VesselStart:
         return float(self.law.pressure_of_enthalpy(self.law.enthalpy(q) + self.gravity * (self.bottom + self.centroid)))
 
 
-def shape_of(part) -> list[float]:
+def shape_numbers(part) -> list[float]:
     """Numbers of the shape of a vessel, in the order of `law_shape`."""
     top = height_of(part)
     if part.diameter is None:
@@ -62,9 +62,13 @@ def shape_of(part) -> list[float]:
             0.5 * (a + b) * (high - low) for low, high, a, b in zip(level, level[1:], area, area[1:], strict=False)
         ]
         volume = [math.fsum(steps[:k]) for k in range(len(level))]
-        return [law_shape.TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
+        return [law_shape.AREA_TABLE, top, len(level), 0.0, 0.0, *map(float, (*level, *area, *volume))]
     radius, length, slope = 0.5 * part.diameter, length_of(part), UPRIGHT if part.slope is None else part.slope
-    if radius * math.cos(slope) <= FLAT * length * math.sin(slope):
+    if radius * math.cos(slope) <= SLOPE_TOLERANCE * length * math.sin(slope):
         return [law_shape.PRISM, top, math.pi * radius**2, 0.0, 0.0]
-    kind = law_shape.LYING if length * math.sin(slope) <= FLAT * radius * math.cos(slope) else law_shape.SLOPED
-    return [kind, top, radius, length, 0.0 if kind == law_shape.LYING else slope]
+    kind = (
+        law_shape.HORIZONTAL_CYLINDER
+        if length * math.sin(slope) <= SLOPE_TOLERANCE * radius * math.cos(slope)
+        else law_shape.INCLINED_CYLINDER
+    )
+    return [kind, top, radius, length, 0.0 if kind == law_shape.HORIZONTAL_CYLINDER else slope]

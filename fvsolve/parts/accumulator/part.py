@@ -6,7 +6,7 @@ import math
 from typing import Annotated, Any, ClassVar
 
 from fvsolve.parts.accumulator.shape import LEVELS, UPRIGHT, Compressor, height_of
-from fvsolve.parts.connection.part import Connection, Joined, joined
+from fvsolve.parts.connection.part import Connection, ConnectionTable, with_connection
 from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
@@ -15,11 +15,11 @@ from fvsolve.parts.tank.part import Surface
 from fvsolve.parts.value import Number, Quantity, Range, UsualRange, nonnegative, positive
 
 VOLUMES = UsualRange(1e-7, 1e5, "pilot accumulators to air cushions in rock")
-GAS = UsualRange(1e4, 2e8, "vacuum to test rigs")
+GAS_PRESSURES = UsualRange(1e4, 2e8, "vacuum to test rigs")
 EXPONENTS = UsualRange(1.0, 2.0, "isothermal to adiabatic real gases")
-FORMS = ("diameter", "area")  # keys that define a shape
-OF_SHAPE = ("level", "slope", "bottom", "compressor")  # keys that have no effect without a shape
-START = ("precharge", "gas_volume", "level")  # keys that determine the amount of gas
+SHAPE_KEYS = ("diameter", "area")  # keys that define a shape
+KEYS_WITH_SHAPE = ("level", "slope", "bottom", "compressor")  # keys that have no effect without a shape
+GAS_KEYS = ("precharge", "gas_volume", "level")  # keys that determine the amount of gas
 
 
 class Accumulator(Node, kind="accumulator"):
@@ -34,7 +34,7 @@ class Accumulator(Node, kind="accumulator"):
     """
 
     no_scalars: ClassVar[str] = "its contents carry no scalars yet"
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (START, FORMS)
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (GAS_KEYS, SHAPE_KEYS)
     quantities: ClassVar[dict[str, str]] = {**Node.quantities, "gas_pressure": "pressure", "gas_volume": "volume"}
     fixes_pressure: ClassVar[bool] = True
     synonyms: ClassVar[dict[str, str]] = {
@@ -48,7 +48,7 @@ class Accumulator(Node, kind="accumulator"):
         Quantity(
             "pressure",
             about="gas pressure at which the bladder fills volume [Pa]; gas_volume or level is needed if left out",
-            usual=GAS,
+            usual=GAS_PRESSURES,
         ),
     ] = None
     gas_volume: Annotated[
@@ -94,25 +94,25 @@ class Accumulator(Node, kind="accumulator"):
     initial_pressure: Annotated[
         float | None, Quantity("pressure", about="gas pressure at the start [Pa]; in equilibrium if left out")
     ] = None
-    connection: Annotated[Connection | None, Joined()] = None
+    connection: Annotated[Connection | None, ConnectionTable()] = None
 
     @classmethod
     def variant(cls, given: dict[str, Any]) -> type[Node]:
-        return Vessel if any(key in given for key in FORMS) else Accumulator
+        return Vessel if any(key in given for key in SHAPE_KEYS) else Accumulator
 
     @property
-    def shaped(self) -> bool:
+    def has_shape(self) -> bool:
         """True if a diameter or a table of areas is given, so that the level of the fluid is known."""
         return self.diameter is not None or self.area is not None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
-        faults += [(keys, f"no gas; {message}") for keys, message in at_least_one(given, START)]
-        shapes = [key for key in FORMS if key in given]
+        faults += [(keys, f"no gas; {message}") for keys, message in at_least_one(given, GAS_KEYS)]
+        shapes = [key for key in SHAPE_KEYS if key in given]
         if not shapes:
             text = "has no effect on a vessel without a shape; give diameter or area, or remove it"
-            faults += [((key,), text) for key in OF_SHAPE if key in given]
+            faults += [((key,), text) for key in KEYS_WITH_SHAPE if key in given]
         elif "precharge" in given:
             text = (
                 "is not valid with precharge (a bladder); give gas_volume or level in place of precharge, or remove it"
@@ -123,14 +123,14 @@ class Accumulator(Node, kind="accumulator"):
         return faults
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        return joined(name, self, Junction.model_construct(elevation=self.elevation))
+        return with_connection(name, self, Junction.model_construct(elevation=self.elevation))
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if (self.gas_volume or 0.0) > self.volume:
             yield ("gas_volume",), f"{self.gas_volume:g} m3 is greater than volume, {self.volume:g} m3"
         if self.initial_pressure is not None:
             yield from around.boiling_faults("nodes", name, "initial_pressure", [self.initial_pressure])
-        if not self.shaped:
+        if not self.has_shape:
             return
         if self.slope is not None and self.slope > UPRIGHT:
             text = f"{math.degrees(self.slope):g} deg is steeper than upright; expected 0 to 90 deg"

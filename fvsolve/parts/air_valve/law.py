@@ -20,50 +20,50 @@ from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import restriction_slope
 from fvsolve.kernels.valves import flow_at_drop
 
-VOLUME, AIR, HEAT, IN, OUT, SWITCH, SLOW, COMING = 0, 1, 2, 3, 4, 5, 6, 7
+VOLUME, AIR_MASS, RT, INLET_AREA, OUTLET_AREA, SWITCH_PRESSURE, THROTTLED_AREA, SWITCH_FLOW = 0, 1, 2, 3, 4, 5, 6, 7
 """Numbers: V0 [m3], mass of V0 of air at ambient pressure [kg], R T [J/kg], Cd A in and out [m2]; pressure
 above ambient from which the valve throttles [Pa], 0 for none; Cd A out while it throttles [m2]; flow of fluid from
 which it throttles [kg/s], 0 for none."""
 KAPPA = 1.4
-CHOKED = (2.0 / (KAPPA + 1.0)) ** (KAPPA / (KAPPA - 1.0))
-SMALL = 1e-3  # pressure drop over upstream pressure below which a polynomial replaces the square root
-NEAR = 0.02  # such a ratio below which a step may reverse the flow: the larger area then sets the rate limit
-RELUCTANCE = 10.0  # below ambient at which it opens, above ambient at which the flow may throttle it [Pa]
-LAX = 1e-9  # fluid in excess of V0 at which it shuts, over V0
-LINGER = 0.02  # shortest time constant in which the air left after shutting returns to ambient pressure [s]
+CRITICAL_RATIO = (2.0 / (KAPPA + 1.0)) ** (KAPPA / (KAPPA - 1.0))
+SMALL_DROP = 1e-3  # pressure drop over upstream pressure below which a polynomial replaces the square root
+REVERSAL_DROP = 0.02  # such a ratio below which a step may reverse the flow: the larger area then sets the rate limit
+PRESSURE_MARGIN = 10.0  # below ambient at which it opens, above ambient at which the flow may throttle it [Pa]
+OVERFILL = 1e-9  # fluid in excess of V0 at which it shuts, over V0
+EQUALISATION_TIME = 0.02  # shortest time constant in which the air left after shutting returns to ambient pressure [s]
 
 
 @njit
-def orifice_air(r):
+def orifice_flow(r):
     """Mass flow from p0 to r p0 over Cd A p0 / sqrt(R T) [-], isentropic, choked below CRITICAL_RATIO."""
-    x, power = 1.0 - max(r, CHOKED), (KAPPA - 1.0) / KAPPA
+    x, power = 1.0 - max(r, CRITICAL_RATIO), (KAPPA - 1.0) / KAPPA
     factor = -expm1(power * log1p(-x)) / x if x > 0.0 else power
-    root = flow_at_drop(1.0, sqrt(SMALL), x)
+    root = flow_at_drop(1.0, sqrt(SMALL_DROP), x)
     return root * sqrt(2.0 / power * factor) * (1.0 - x) ** (1.0 / KAPPA)
 
 
 @njit
 def air_state(st, floats, node, at, y_fluid, y_air):
     """(pressure of the air above ambient [Pa], its volume [m3], its mass [kg])."""
-    volume, start_mass = floats[at + VOLUME], floats[at + AIR]
+    volume, start_mass = floats[at + VOLUME], floats[at + AIR_MASS]
     filled = y_fluid / (node["density"] * volume)
     left = max(1e-3, 1.0 - filled)
     return st["ambient"] * (y_air / start_mass + filled) / left, volume * left, start_mass + y_air
 
 
 @njit
-def throttles(floats, at):
+def has_throttled_outlet(floats, at):
     """True if the valve has a small bore for air out."""
-    return floats[at + SWITCH] > 0.0 or floats[at + COMING] > 0.0
+    return floats[at + SWITCH_PRESSURE] > 0.0 or floats[at + SWITCH_FLOW] > 0.0
 
 
 @njit
-def way_out(tables, device):
+def outlet_area(tables, device):
     """Present Cd A for air out [m2]."""
     floats, at = tables.floats, device["data"]
-    if throttles(floats, at) and tables.armed[device["event"] + 2] > 0.0:
-        return floats[at + SLOW]
-    return floats[at + OUT]
+    if has_throttled_outlet(floats, at) and tables.armed[device["event"] + 2] > 0.0:
+        return floats[at + THROTTLED_AREA]
+    return floats[at + OUTLET_AREA]
 
 
 @njit
@@ -72,17 +72,17 @@ def air_inflow(st, floats, at, gauge, outlet):
 
     outlet : Cd A for air out [m2]
     """
-    p, root = st["ambient"] + gauge, sqrt(floats[at + HEAT])
+    p, root = st["ambient"] + gauge, sqrt(floats[at + RT])
     if gauge < 0.0:
-        full_flow = floats[at + IN] * st["ambient"] / root
+        full_flow = floats[at + INLET_AREA] * st["ambient"] / root
         r, sign = p / st["ambient"], 1.0
     else:
         full_flow = outlet * p / root
         r, sign = st["ambient"] / p, -1.0
-    x, largest = max(1.0 - r, SMALL), full_flow
-    if x < NEAR:
-        largest = max(floats[at + IN], outlet) * p / root
-    return sign * full_flow * orifice_air(r), 1.5 * largest * orifice_air(1.0 - x) / x
+    x, largest = max(1.0 - r, SMALL_DROP), full_flow
+    if x < REVERSAL_DROP:
+        largest = max(floats[at + INLET_AREA], outlet) * p / root
+    return sign * full_flow * orifice_flow(r), 1.5 * largest * orifice_flow(1.0 - x) / x
 
 
 @njit
@@ -107,25 +107,25 @@ def air_rate(y, tables, device):
     st, floats, at = tables.settings[0], tables.floats, device["data"]
     node = tables.nodes[device["node"]]
     gauge, volume, mass = air_state(st, floats, node, at, y[node["y"]], y[device["y"]])
-    flow, slope = air_inflow(st, floats, at, gauge, way_out(tables, device))
-    ambient_mass = st["ambient"] * volume / floats[at + HEAT]  # mass of the air at ambient pressure
+    flow, slope = air_inflow(st, floats, at, gauge, outlet_area(tables, device))
+    ambient_mass = st["ambient"] * volume / floats[at + RT]  # mass of the air at ambient pressure
     rate = slope / min(mass, ambient_mass)
-    if tables.armed[device["event"]] <= 0.0 and abs(flow) * LINGER >= abs(ambient_mass - mass):
-        flow, rate = (ambient_mass - mass) / LINGER, 1.0 / LINGER
-    return flow, rate, floats[at + HEAT] * log1p(gauge / st["ambient"])
+    if tables.armed[device["event"]] <= 0.0 and abs(flow) * EQUALISATION_TIME >= abs(ambient_mass - mass):
+        flow, rate = (ambient_mass - mass) / EQUALISATION_TIME, 1.0 / EQUALISATION_TIME
+    return flow, rate, floats[at + RT] * log1p(gauge / st["ambient"])
 
 
 @njit
 def move(t, y, dydt, out, tables, device):
     """d/dt of the air mass in the chamber, and its rate limit."""
     flow, rate, _ = air_rate(y, tables, device)
-    out[RATE] = max(out[RATE], rate, fluid_rate(out, tables, device))
+    out[RATE] = max(out[RATE], rate, fluid_rate_limit(out, tables, device))
     if dydt.size > 0:
         dydt[device["y"]] = flow
 
 
 @njit
-def fluid_rate(out, tables, device):
+def fluid_rate_limit(out, tables, device):
     """Rate of the fluid in the open chamber [1/s]: stiffness times the flow slopes of all that join the node."""
     layout, nodes, valves, own = tables.layout[0], tables.nodes, tables.valves, device["valve"]
     place = valves[own]["from_node"]
@@ -146,32 +146,32 @@ def events(t, y, out, tables, device, g):
     st, floats, at = tables.settings[0], tables.floats, device["event"]
     node, place = tables.nodes[device["node"]], tables.valves[device["valve"]]["from_node"]
     fluid = y[node["y"]]
-    overfill = LAX * node["density"] * floats[device["data"] + VOLUME]
+    overfill = OVERFILL * node["density"] * floats[device["data"] + VOLUME]
     margin = fluid - overfill
     if out[tables.layout[0]["valve"] + device["valve"]] <= 0.0:  # full as at shutting, but fluid flows out
         margin = min(margin, -overfill)
     if tables.armed[at] <= 0.0:
         p = tables.nodes[place]["pressure"] + out[tables.layout[0]["pressure"] + place] - st["ambient"]
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
-        margin = p - min(gauge, 0.0) + RELUCTANCE
+        margin = p - min(gauge, 0.0) + PRESSURE_MARGIN
     event_pair(tables, g, at, margin)
-    if throttles(floats, device["data"]):
+    if has_throttled_outlet(floats, device["data"]):
         gauge = air_state(st, floats, node, device["data"], fluid, y[device["y"]])[0]
         event_pair(
-            tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else until_throttled(out, tables, device, gauge)
+            tables, g, at + 2, -gauge if tables.armed[at + 2] > 0.0 else throttling_margin(out, tables, device, gauge)
         )
 
 
 @njit
-def until_throttled(out, tables, device, gauge):
+def throttling_margin(out, tables, device, gauge):
     """Margin until throttling begins: pressure [Pa], or fluid flow [kg/s] and air pressure above PRESSURE_MARGIN.
 
     At ambient pressure itself the wide bore is in use again, so a margin of zero there would switch both ways.
     """
     floats, at = tables.floats, device["data"]
-    if floats[at + SWITCH] > 0.0:
-        return floats[at + SWITCH] - gauge
-    return max(floats[at + COMING] - out[tables.layout[0]["valve"] + device["valve"]], RELUCTANCE - gauge)
+    if floats[at + SWITCH_PRESSURE] > 0.0:
+        return floats[at + SWITCH_PRESSURE] - gauge
+    return max(floats[at + SWITCH_FLOW] - out[tables.layout[0]["valve"] + device["valve"]], PRESSURE_MARGIN - gauge)
 
 
 @njit
@@ -187,7 +187,7 @@ def value(t, y, out, tables, device, quantity):
 def air_energy(st, floats, node, at, y_fluid, y_air):
     """m R T (ln(p / p_ambient) - 1) + p_ambient V of air, and height of fluid; 0 in the profile [J]."""
     gauge, volume, mass = air_state(st, floats, node, at, y_fluid, y_air)
-    energy = mass * floats[at + HEAT] * log1p(gauge / st["ambient"]) - gauge * volume
+    energy = mass * floats[at + RT] * log1p(gauge / st["ambient"]) - gauge * volume
     return energy + st["gravity"] * (node["elevation"] - st["datum"]) * y_fluid
 
 

@@ -22,7 +22,7 @@ class AirValveRows(Device, kind="air-valve"):
     remedy = "give it another volume"
 
     def of(self, part) -> Device:
-        return self if part.throttled_outlet is None else Throttling()
+        return self if part.throttled_outlet is None else ThrottledAirValveRows()
 
     def place(self, draft, name, node, row) -> None:
         super().place(draft, name, node, row)
@@ -45,7 +45,7 @@ class AirValveRows(Device, kind="air-valve"):
         return [part.volume, air_mass, rt, into, wide + always, part.switch or 0.0, small + always, 0.0]
 
     def scales(self, draft, name, part) -> list[float]:
-        return [self.numbers(draft, name, part)[law.AIR]]
+        return [self.numbers(draft, name, part)[law.AIR_MASS]]
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])
@@ -60,7 +60,7 @@ class AirValveRows(Device, kind="air-valve"):
         node["stiffness"] = start.case.ambient_pressure / (part.volume * node["density"])
         deficit = start.case.ambient_pressure - float(place["pressure"])
         name = list(start.case.places)[row["node"]].removesuffix(".inside")
-        if deficit <= law.RELUCTANCE:
+        if deficit <= law.PRESSURE_MARGIN:
             return []
         below = start.case.amount(deficit, "pressure", span=True)
         text = f"{name}: the air valve is open at the start, {below} below ambient"
@@ -72,11 +72,11 @@ class AirValveRows(Device, kind="air-valve"):
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes
         node, at = node[row["node"]], int(row["data"])
         _, volume, mass = law.air_state(st, floats, node, at, float(y[node["y"]]), float(y[row["y"]]))
-        root = math.sqrt(floats[at + law.HEAT] / (2.0 * mass))
+        root = math.sqrt(floats[at + law.RT] / (2.0 * mass))
         return [{int(row["y"]): root, int(node["y"]): root * mass / (volume * float(node["density"]))}]
 
 
-class Throttling(AirValveRows, kind=""):
+class ThrottledAirValveRows(AirValveRows, kind=""):
     """An air valve that releases air through a small bore from `switch` or `switch_velocity` on."""
 
     events = (*AirValveRows.events, "throttles", "stops throttling")
@@ -87,5 +87,5 @@ class Throttling(AirValveRows, kind=""):
             joins = (table["from_node"] == place) | (table["to_node"] == place)
             widest = max(widest, *table["area"][joins], 0.0)
         density = start.nodes[row["node"]]["density"]
-        start.draft.tables.floats[row["data"] + law.COMING] = (part.switch_velocity or 0.0) * density * widest
+        start.draft.tables.floats[row["data"] + law.SWITCH_FLOW] = (part.switch_velocity or 0.0) * density * widest
         return super().begin(start, part, row)

@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.connection.part import Connection, behind
+from fvsolve.parts.connection.part import Connection, behind_throat
 from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import constant
 from fvsolve.parts.value import Number, Quantity, UsualRange, between, positive
 
-BORE = between(0, 1, open=True)  # m; a plain 50 would be in mm
-BODY = 3.0  # diameter and length of the float chamber if its volume is not given, in inlet diameters
-LINES = ("pipe", "rigid-column")
-SWITCHES = ("switch", "switch_velocity")  # thresholds of throttling
-WIDE = 30.0  # diameter of the throat between fluid and air, in inlet diameters; its loss coefficient is 1
+BORE_RANGE = between(0, 1, open=True)  # m; a plain 50 would be in mm
+CHAMBER_SIZE = 3.0  # diameter and length of the float chamber if its volume is not given, in inlet diameters
+LINE_KINDS = ("pipe", "rigid-column")
+SWITCH_KEYS = ("switch", "switch_velocity")  # thresholds of throttling
+THROAT_SIZE = 30.0  # diameter of the throat between fluid and air, in inlet diameters; its loss coefficient is 1
 
 
 class AirValve(Node, kind="air-valve"):
@@ -30,13 +30,13 @@ class AirValve(Node, kind="air-valve"):
     """
 
     no_scalars: ClassVar[str] = "its contents carry no scalars yet"
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (SWITCHES,)
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (SWITCH_KEYS,)
     quantities: ClassVar[dict[str, str]] = {
         **Node.quantities, "air_volume": "volume", "air_mass": "mass", "air_pressure": "pressure",
     }  # fmt: skip
 
-    inlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air inflow [m]")]
-    outlet: Annotated[float, Quantity("length", BORE, "diameter of the bore for air outflow [m]")]
+    inlet: Annotated[float, Quantity("length", BORE_RANGE, "diameter of the bore for air inflow [m]")]
+    outlet: Annotated[float, Quantity("length", BORE_RANGE, "diameter of the bore for air outflow [m]")]
     switch: Annotated[
         float | None,
         Quantity(
@@ -56,10 +56,10 @@ class AirValve(Node, kind="air-valve"):
         ),
     ] = None
     throttled_outlet: Annotated[
-        float | None, Quantity("length", BORE, "diameter of the bore for throttled air outflow [m]")
+        float | None, Quantity("length", BORE_RANGE, "diameter of the bore for throttled air outflow [m]")
     ] = None
     automatic: Annotated[
-        float | None, Quantity("length", BORE, "diameter of the automatic bore, always open for air outflow [m]")
+        float | None, Quantity("length", BORE_RANGE, "diameter of the automatic bore, always open for air outflow [m]")
     ] = None
     discharge_coefficient: Annotated[
         float, Number(between(0, 1, open=True), "discharge coefficient Cd of all bores")
@@ -87,7 +87,7 @@ class AirValve(Node, kind="air-valve"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
-        switches = [key for key in SWITCHES if key in given]
+        switches = [key for key in SWITCH_KEYS if key in given]
         if switches and "throttled_outlet" not in given:
             faults.append(((switches[0],), "has no effect without throttled_outlet; give both, or remove it"))
         elif "throttled_outlet" in given and not switches:
@@ -111,8 +111,8 @@ class AirValve(Node, kind="air-valve"):
             )
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        size = Connection.model_construct(area=None, diameter=WIDE * self.inlet, loss_in=1.0, loss_out=1.0)
-        volume = self.volume if self.volume is not None else math.pi / 4.0 * (BODY * self.inlet) ** 3
+        size = Connection.model_construct(area=None, diameter=THROAT_SIZE * self.inlet, loss_in=1.0, loss_out=1.0)
+        volume = self.volume if self.volume is not None else math.pi / 4.0 * (CHAMBER_SIZE * self.inlet) ** 3
         chamber = self.model_copy(update={"volume": volume})
         place = Junction.model_construct(elevation=self.elevation, demand=constant(0.0))
-        return behind(name, chamber, place, size)
+        return behind_throat(name, chamber, place, size)

@@ -34,5 +34,5 @@ class PatchRows(Lowering, kind="patch"):
     def probe_flow(self, draft, name, row) -> None:
         """Fill the PROBE row of the flow into the basin."""
         row["index"], row["kind"], row["scale"] = draft.node_index[name], rec.PATCH_FLOW, 1.0 / draft.fluid.density
-        if not draft.case.nodes[draft.case.places[name].basin].own.joined:
+        if not draft.case.nodes[draft.case.places[name].basin].physics_type.joined:
             row["index"], row["kind"] = draft.patch_table["node"].tolist().index(row["index"]), rec.GIVEN_FLOW

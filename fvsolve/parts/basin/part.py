@@ -34,9 +34,9 @@ from fvsolve.parts.value import (
 from fvsolve.units import show
 
 SIDES = ("west", "east", "south", "north")
-OUTLINE = ("size", "cells", "grading", "holes")  # keys of rectangles
-SLOSHING = ("frozen", "modes", "cells")
-MOVES = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fields of a physics that has velocities
+RECTANGLE_KEYS = ("size", "cells", "grading", "holes")  # keys of rectangles
+SLOSHING_MODELS = ("frozen", "modes", "cells")
+VELOCITY_FIELDS = {"u": "velocity", "v": "velocity", "speed": "velocity"}  # fields of a physics that has velocities
 
 
 class Patch(Table):
@@ -133,18 +133,18 @@ class MeshFile(Table):
     unit: Annotated[str, Text("unit of the coordinates")] = "m"
 
 
-class MovingStart(Table):
+class VelocityStart(Table):
     """Initial velocities of a physics that has them."""
 
     u: Annotated[SpatialField, SpatialFieldKey("velocity", "velocity along x [m/s]")] = uniform(0.0)
     v: Annotated[SpatialField, SpatialFieldKey("velocity", "velocity along y [m/s]")] = uniform(0.0)
 
 
-class StartOfFields(Table):
+class BasinStart(Table):
     """Initial fields of a basin that is not at rest; the keys are those of its physics."""
 
 
-class Place(PlaceOnBody):
+class PatchNode(PlaceOnBody):
     """A patch as a node: pressure of the cells behind it, flow into them."""
 
     fixes_pressure: ClassVar[bool] = True
@@ -157,11 +157,11 @@ class Place(PlaceOnBody):
     pressure: float | None = None  # of a liquid at rest [Pa]
 
 
-class MovingWall(Place):
+class MovingWall(PatchNode):
     """A patch that is a moving wall: force on the water (inward), power into the water, travel."""
 
-    own: ClassVar[dict[str, str]] = {"force": "force", "power": "power", "travel": "position"}
-    quantities: ClassVar[dict[str, str]] = Place.quantities | own
+    wall_quantities: ClassVar[dict[str, str]] = {"force": "force", "power": "power", "travel": "position"}
+    quantities: ClassVar[dict[str, str]] = PatchNode.quantities | own
 
 
 class Physics(Table):
@@ -185,15 +185,15 @@ class Physics(Table):
     fields: ClassVar[dict[str, str]] = {}
     starts: ClassVar[type[Table]] = Table
     laws: ClassVar[tuple[str, ...]] = ()
-    described: ClassVar[str] = "basins"
+    description: ClassVar[str] = "basins"
     joined: ClassVar[bool] = True
     moves: ClassVar[bool] = False
-    rides: ClassVar[bool] = False
-    sloshes: ClassVar[bool] = False
-    docks: ClassVar[bool] = False
+    on_bodies: ClassVar[bool] = False
+    has_modes: ClassVar[bool] = False
+    links_on_bodies: ClassVar[bool] = False
     carries: ClassVar[bool] = True
-    echoes: ClassVar[bool] = False
-    steep: ClassVar[bool] = False
+    allows_impedance: ClassVar[bool] = False
+    has_shocks: ClassVar[bool] = False
 
     def __init_subclass__(cls, name: str, **rest: Any) -> None:
         super().__init_subclass__(**rest)
@@ -203,7 +203,7 @@ class Physics(Table):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **rest: Any) -> None:
-        both = (StartOfFields, optional(cls.starts)), (Basin, optional(cls))
+        both = (BasinStart, optional_keys(cls.starts)), (Basin, optional_keys(cls))
         for table, keys in both:
             for key in (key for key in keys if key in table.model_fields):
                 own, known = keys[key], table.model_fields[key]
@@ -215,10 +215,10 @@ class Physics(Table):
             if table.__pydantic_complete__:  # otherwise it is built when a case first has a basin
                 table.model_rebuild(force=True)
         Physics.kinds[cls.name] = cls
-        Basin.__doc__ = "\n".join([ABOUT, "", *(f"{name}: {kind.__doc__}" for name, kind in Physics.kinds.items())])
+        Basin.__doc__ = "\n".join([BASIN_DOC, "", *(f"{name}: {kind.__doc__}" for name, kind in Physics.kinds.items())])
 
     @classmethod
-    def rubs(cls, basin: Basin) -> bool:
+    def has_friction(cls, basin: Basin) -> bool:
         """True if friction of the bed or walls acts on the flow."""
         return False
 
@@ -234,7 +234,7 @@ class Physics(Table):
         return {"elevation": basin.elevation, "depth": None, "pressure": None}
 
     @classmethod
-    def shapes(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
+    def formulas(cls, basin: Basin, mesh: Any) -> Iterator[tuple[tuple[str, ...], Any, np.ndarray | None]]:
         """Formulas of its own keys: (keys, formula, points of evaluation, None for the means over all cells)."""
         for key in cls.model_fields:
             if isinstance(shape := getattr(basin, key), SpatialField):
@@ -252,7 +252,7 @@ class Physics(Table):
         return faults + [((), f"{key} is missing") for key in needed if key not in given]
 
     @classmethod
-    def goes(cls, law: str) -> bool:
+    def accepts_law(cls, law: str) -> bool:
         """True if it supports a density law."""
         return law in (cls.laws or (law,))
 
@@ -288,22 +288,22 @@ class Basin(PlaceOnBody, kind="basin"):
     ] = None
     patches: Annotated[Any, NamedTables(Patch, "named parts of the boundary: { outlet = { side, span } }")] = {}
     start: Annotated[
-        StartOfFields | None,
+        BasinStart | None,
         Nested(
-            StartOfFields, "initial level, or pressure above the pressure at rest, and velocities; at rest if left out"
+            BasinStart, "initial level, or pressure above the pressure at rest, and velocities; at rest if left out"
         ),
     ] = None
 
     attitude: Annotated[Attitude | None, Nested(Attitude, "attitude of its axes relative to those of its body")] = None
     sloshing: Annotated[
-        str, Choice("sloshing", SLOSHING, "model of the water on a body: frozen (rigid), linear modes, or cells")
+        str, Choice("sloshing", SLOSHING_MODELS, "model of the water on a body: frozen (rigid), linear modes, or cells")
     ] = "cells"
     scalars: Annotated[
         dict[str, Any], ScalarValues("scalar values at the start, formulas of x and y", SpatialFieldKey("number"))
     ] = {}
 
     @property
-    def own(self) -> type[Physics]:
+    def physics_type(self) -> type[Physics]:
         """Declaration of its physics."""
         return Physics.kinds[self.physics]
 
@@ -313,9 +313,11 @@ class Basin(PlaceOnBody, kind="basin"):
         known = isinstance(physics, str) and physics in Physics.kinds
         faults = Physics.kinds[physics].own_faults(given) if known else []
         if "mesh" in given:
-            faults += [((key,), "belongs to rectangles; this basin has a mesh") for key in OUTLINE if key in given]
+            faults += [
+                ((key,), "belongs to rectangles; this basin has a mesh") for key in RECTANGLE_KEYS if key in given
+            ]
         else:
-            faults += [((), f"{key} is missing") for key in OUTLINE[:2] if key not in given]
+            faults += [((), f"{key} is missing") for key in RECTANGLE_KEYS[:2] if key not in given]
         for name, patch in given["patches"].items() if isinstance(given.get("patches"), dict) else ():
             side = isinstance(patch, dict) and "side" in patch
             if side and "mesh" in given:
@@ -330,7 +332,7 @@ class Basin(PlaceOnBody, kind="basin"):
         return tuple(patches) if isinstance(patches, dict) else ()
 
     @property
-    def turn(self) -> np.ndarray:
+    def rotation(self) -> np.ndarray:
         """Rotation matrix from its axes to those of its body : float64[3, 3]."""
         return np.eye(3) if self.attitude is None else self.attitude.rotation
 
@@ -350,10 +352,10 @@ class Basin(PlaceOnBody, kind="basin"):
         return (*(entry for entry in stated if isinstance(entry, str)), *super().bodies(given))
 
 
-ABOUT = Basin.__doc__  # docstring of Basin before every physics adds a line
+BASIN_DOC = Basin.__doc__  # docstring of Basin before every physics adds a line
 
 
-def optional(table: type[Table]) -> dict[str, FieldInfo]:
+def optional_keys(table: type[Table]) -> dict[str, FieldInfo]:
     """Keys of a table, each made optional."""
     keys = {key: copy(info) for key, info in table.model_fields.items()}
     for info in keys.values():

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from fvsolve.parts.attitude_keys import Attitude, is_zero_vector, length_notices
-from fvsolve.parts.body.points import Inertia, PlacesByName
+from fvsolve.parts.body.body_keys import Inertia, NamedPoints
 from fvsolve.parts.node import Node
 from fvsolve.parts.schedule import Schedule, Scheduled
 from fvsolve.parts.table_model import Nested, Table
@@ -27,29 +27,29 @@ from fvsolve.parts.value import (
 )
 from fvsolve.units import show
 
-JOINTS = {  # kind -> keys it allows besides `on`, `at` and `attitude`
+JOINT_KEYS = {  # kind -> keys it allows besides `on`, `at` and `attitude`
     "revolute": ("axis", "angle", "rate", "damping", "stiffness"),
     "prismatic": ("axis", "travel", "rate", "damping", "stiffness"),
     "ball": ("rate", "damping"),
     "free": ("velocity", "rate"),
     "fixed": (),
 }
-OFTEN = {"hinge": "revolute", "pin": "revolute", "slider": "prismatic", "spherical": "ball", "weld": "fixed",
+JOINT_SYNONYMS = {"hinge": "revolute", "pin": "revolute", "slider": "prismatic", "spherical": "ball", "weld": "fixed",
          "floating": "free", "driven": "revolute or prismatic with a schedule as its angle or travel"}  # fmt: skip
-TURNING = ("angular_velocity", "rotational_damping", "torque")
-SLIDING = ("velocity", "damping", "stiffness")
-WIDE = {"angular_velocity": "rad/s, of a prismatic joint m/s", "damping": "N m s, of a prismatic joint N s/m",
+ANGULAR_DIMENSIONS = ("angular_velocity", "rotational_damping", "torque")
+LINEAR_DIMENSIONS = ("velocity", "damping", "stiffness")
+UNITS_BY_JOINT = {"angular_velocity": "rad/s, of a prismatic joint m/s", "damping": "N m s, of a prismatic joint N s/m",
         "stiffness": "N m, of a prismatic joint N/m"}  # fmt: skip
-ROTATION = {"x": "position", "y": "position", "z": "position", "roll": "angle", "pitch": "angle", "yaw": "angle",
+POSE_QUANTITIES = {"x": "position", "y": "position", "z": "position", "roll": "angle", "pitch": "angle", "yaw": "angle",
             "eta": "number", "eps_x": "number", "eps_y": "number", "eps_z": "number"}  # fmt: skip
 
 
-def along(name: str, dimension: str) -> dict[str, str]:
+def vector_quantities(name: str, dimension: str) -> dict[str, str]:
     """Quantities of the x, y and z components of a vector."""
     return {f"{name}{axis}": dimension for axis in "xyz"}
 
 
-class OfJoint(Value):
+class JointQuantity(Value):
     """A number whose unit depends on the kind of joint, or three such numbers along the axes of the body."""
 
     changes = PROFILE
@@ -64,7 +64,7 @@ class OfJoint(Value):
 
     @property
     def takes(self) -> str:
-        return WIDE[self.dimension]
+        return UNITS_BY_JOINT[self.dimension]
 
     def json(self) -> dict[str, Any]:
         number = Quantity(self.dimension).json()
@@ -77,7 +77,9 @@ class Joint(Table):
     The origin of the body lies at its joint. At angle or travel 0 the axes of the body are those of the joint.
     """
 
-    kind: Annotated[str, Choice("joint", tuple(JOINTS), "kind of joint (its degrees of freedom)", OFTEN)] = "free"
+    kind: Annotated[
+        str, Choice("joint", tuple(JOINT_KEYS), "kind of joint (its degrees of freedom)", JOINT_SYNONYMS)
+    ] = "free"
     on: Annotated[str | None, Text("carrier: BODY, BODY.POINT or FRAME.POINT; the world if left out")] = None
     at: Annotated[
         tuple[float, ...] | None,
@@ -95,7 +97,7 @@ class Joint(Table):
     ] = None
     rate: Annotated[
         Any,
-        OfJoint(
+        JointQuantity(
             "angular_velocity",
             "rate of angle or travel at the start; of a ball or free joint the angular velocity [x, y, z] in body axes"
             "; 0 if left out",
@@ -109,18 +111,20 @@ class Joint(Table):
             about="velocity of the centre of mass of a free body at the start [m/s]; 0 if left out",
         ),
     ] = None
-    damping: Annotated[Any, OfJoint("damping", "damping torque or force per rate of the joint; 0 if left out")] = None
+    damping: Annotated[
+        Any, JointQuantity("damping", "damping torque or force per rate of the joint; 0 if left out")
+    ] = None
     stiffness: Annotated[
-        Any, OfJoint("stiffness", "stiffness of a spring towards angle or travel 0; none if left out")
+        Any, JointQuantity("stiffness", "stiffness of a spring towards angle or travel 0; none if left out")
     ] = None
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults, kind = super().key_faults(given), given.get("kind", "free")
-        own = JOINTS.get(kind) if isinstance(kind, str) else None
+        own = JOINT_KEYS.get(kind) if isinstance(kind, str) else None
         if own is None:
             return faults
-        others = {key for keys in JOINTS.values() for key in keys} - {*own}
+        others = {key for keys in JOINT_KEYS.values() for key in keys} - {*own}
         allowed = f"its keys are {', '.join(('on', 'at', 'attitude', *own))}"
         faults += [
             ((key,), f"is not a key of joints of kind {show(kind)}; {allowed}") for key in given if key in others
@@ -142,7 +146,7 @@ class Joint(Table):
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
         """The table with rate, damping and stiffness read in the units of its kind of joint."""
         kind, result, faults = given.get("kind", "free"), dict(given), []
-        rate, damping, stiffness = SLIDING if kind == "prismatic" else TURNING
+        rate, damping, stiffness = LINEAR_DIMENSIONS if kind == "prismatic" else ANGULAR_DIMENSIONS
         triple = kind in ("ball", "free")
         values = {"rate": Rows(rate, length=3) if triple else Quantity(rate), "damping": Quantity(damping, nonnegative),
                   "stiffness": Quantity(stiffness, nonnegative)}  # fmt: skip
@@ -166,7 +170,7 @@ class Joint(Table):
         yield from length_notices("axis", self.axis)
 
     @property
-    def driven(self) -> Schedule | None:
+    def drive_schedule(self) -> Schedule | None:
         """Schedule that drives the joint, None without one."""
         given = self.coordinate
         return given if given is not None and not given.constant else None
@@ -183,12 +187,12 @@ class Joint(Table):
         return axis / (np.linalg.norm(axis) or 1.0)
 
     @property
-    def turning(self) -> np.ndarray:
+    def angular_velocity(self) -> np.ndarray:
         """Angular velocity of a ball joint or a free body at the start, in the axes of the body : float64[3]."""
         return np.array(self.rate or (0.0, 0.0, 0.0))
 
     @property
-    def speed(self) -> np.ndarray:
+    def centre_velocity(self) -> np.ndarray:
         """Velocity of the centre of mass of a free body at the start : float64[3]."""
         return np.array(self.velocity or (0.0, 0.0, 0.0))
 
@@ -203,10 +207,10 @@ class Body(Node, kind="body"):
 
     domain: ClassVar[str] = "spatial"
     quantities: ClassVar[dict[str, str]] = {
-        **ROTATION, **along("v", "velocity"), **along("w", "angular_velocity"), **along("a", "acceleration"),
+        **POSE_QUANTITIES, **vector_quantities("v", "velocity"), **vector_quantities("w", "angular_velocity"), **vector_quantities("a", "acceleration"),
         "angle": "angle", "travel": "position", "rate": "angular_velocity",
-        **along("joint_f", "force"), **along("joint_t", "torque"), "kinetic_energy": "energy",
-        **along("momentum_", "momentum"), **along("angular_momentum_", "angular_momentum"),
+        **vector_quantities("joint_f", "force"), **vector_quantities("joint_t", "torque"), "kinetic_energy": "energy",
+        **vector_quantities("momentum_", "momentum"), **vector_quantities("angular_momentum_", "angular_momentum"),
     }  # fmt: skip
 
     mass: Annotated[float, Quantity("mass", positive, "mass of the body and all that is fixed to it [kg]",
@@ -215,7 +219,7 @@ class Body(Node, kind="body"):
     centre_of_mass: Annotated[
         tuple[float, ...], Rows("position", length=3, about="centre of mass in the axes of the body [m]")
     ] = (0.0, 0.0, 0.0)
-    points: Annotated[dict[str, tuple[float, ...]], PlacesByName()] = {}
+    points: Annotated[dict[str, tuple[float, ...]], NamedPoints()] = {}
     joint: Annotated[Joint, Nested(Joint, "joint to another body or the world")] = Joint()
 
     @classmethod
@@ -224,13 +228,13 @@ class Body(Node, kind="body"):
         where = "has no effect: joint.at, angle or travel set the position of a body; remove it"
         return faults + [((key,), where) for key in ("elevation", "position") if key in given]
 
-    def moment(self) -> np.ndarray:
+    def inertia_matrix(self) -> np.ndarray:
         """Inertia matrix about the centre of mass in the axes of the body [kg m2] : float64[3, 3]."""
         given = np.array(self.inertia, dtype=float)
         return np.diag(given) if given.ndim == 1 else given
 
 
-SHARES = ("relative", "coriolis", "transversal", "centripetal")
+ACCELERATION_TERMS = ("relative", "coriolis", "transversal", "centripetal")
 
 
 class BodyPoint(Node, kind=""):
@@ -239,6 +243,6 @@ class BodyPoint(Node, kind=""):
     kind: ClassVar[str] = "point"
     domain: ClassVar[str] = "spatial"
     quantities: ClassVar[dict[str, str]] = {
-        **along("", "position"), **along("v", "velocity"), **along("a", "acceleration"),
-        **{f"a{axis}_{share}": "acceleration" for axis in "xyz" for share in SHARES},
+        **vector_quantities("", "position"), **vector_quantities("v", "velocity"), **vector_quantities("a", "acceleration"),
+        **{f"a{axis}_{share}": "acceleration" for axis in "xyz" for share in ACCELERATION_TERMS},
     }  # fmt: skip

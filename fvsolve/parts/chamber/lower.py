@@ -6,7 +6,7 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.model.lowering import Lowering
 
 
-def on_axis(case, cylinder) -> bool:
+def joins_masses(case, cylinder) -> bool:
     """True if a cylinder joins masses on one axis, not points of bodies."""
     ends = [cylinder.ports[port] for port in ("case", "rod")]
     return all(getattr(case.nodes.get(end), "domain", "") == "translational" for end in ends)
@@ -19,7 +19,7 @@ class ChamberRows(Lowering, kind="chamber"):
         moving, air = name in draft.owned, draft.fluid.air
         row["kind"], row["volume"] = rec.MOVING if moving else rec.CHAMBER, node.volume
         row["stiffness"] = draft.fluid.bulk_modulus / (draft.fluid.density * node.volume)
-        swept = moving and on_axis(draft.case, draft.case.links[name.rpartition(".")[0]])
+        swept = moving and joins_masses(draft.case, draft.case.links[name.rpartition(".")[0]])
         row["y"] = draft.states([f"{name}.{'excess' if swept else 'mass'}"], 1e5 / row["stiffness"])
         if moving or (air is not None and air.fraction > 0.0):  # air makes the stiffness depend on pressure
             row["row"] = draft.stiff()

@@ -9,7 +9,7 @@ from fvsolve.kernels.dtypes import JUNCTION
 from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
 
-RELUCTANCE = 1.0  # excess over the cracking pressure at which it opens, so that rounding does not [Pa]
+PRESSURE_MARGIN = 1.0  # excess over the cracking pressure at which it opens, so that rounding does not [Pa]
 
 
 @njit
@@ -20,7 +20,7 @@ def set(t, y, out, tables, device):
 
 
 @njit
-def leads_on(tables, device):
+def joins_junction(tables, device):
     """True if a junction lies at one of its ends: other parts may then stop the flow while the valve is open."""
     valve, nodes = tables.valves[device["valve"]], tables.nodes
     return nodes[valve["from_node"]]["kind"] == JUNCTION or nodes[valve["to_node"]]["kind"] == JUNCTION
@@ -31,10 +31,10 @@ def events(t, y, out, tables, device, g):
     """g: flow while open [kg/s], or drop beyond the opening pressure while shut [Pa]; and its negative."""
     k, at = device["valve"], device["event"]
     margin = out[tables.layout[0]["valve"] + k]
-    if margin == 0.0 and tables.armed[at] == 0.0 and leads_on(tables, device):
-        margin = head_drop(tables, out, k)[1] + RELUCTANCE
+    if margin == 0.0 and tables.armed[at] == 0.0 and joins_junction(tables, device):
+        margin = head_drop(tables, out, k)[1] + PRESSURE_MARGIN
     if tables.armed[at] > 0.0:
-        margin = head_drop(tables, out, k)[1] - tables.floats[device["data"]] - RELUCTANCE
+        margin = head_drop(tables, out, k)[1] - tables.floats[device["data"]] - PRESSURE_MARGIN
     event_pair(tables, g, at, margin)
 
 

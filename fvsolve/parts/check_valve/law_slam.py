@@ -7,26 +7,26 @@ it shuts and the deceleration from which that was read.
 
 from fvsolve.jit import njit
 from fvsolve.kernels.restrictions import head_drop
-from fvsolve.parts.check_valve.law import RELUCTANCE, leads_on
+from fvsolve.parts.check_valve.law import PRESSURE_MARGIN, joins_junction
 
-TURNED, SHUT, OPEN, BEYOND = 0, 1, 2, 3  # flags; the last: the deceleration exceeds the curve
-CRACKING, FULL, LAST = (
+REVERSED, SHUT, OPEN, BEYOND_CURVE = 0, 1, 2, 3  # flags; the last: the deceleration exceeds the curve
+CRACKING_PRESSURE, UNIT_FLOW, LAST_RATE = (
     0,
     1,
     2,
 )  # numbers: cracking pressure [Pa], mass flow at 1 m/s [kg/s], last rate of the curve [m/s2]
 UNKNOWN = -1
-AHEAD = 1e-6  # velocity from which a reversed flow counts as forward again [m/s]
-LEAST = 1e-300
+FORWARD_VELOCITY = 1e-6  # velocity from which a reversed flow counts as forward again [m/s]
+SMALLEST = 1e-300
 
 
 @njit
-def stands(y, tables, device):
+def valve_mode(y, tables, device):
     """REVERSED, SHUT or OPEN by its flags; without a flag, REVERSED if a slam velocity is stored, otherwise UNKNOWN."""
-    for mode in range(BEYOND):
+    for mode in range(BEYOND_CURVE):
         if tables.armed[device["event"] + mode] > 0.0:
             return mode
-    return TURNED if y[device["y"]] > 0.0 else UNKNOWN
+    return REVERSED if y[device["y"]] > 0.0 else UNKNOWN
 
 
 @njit
@@ -46,29 +46,37 @@ def move(t, y, dydt, out, tables, device):
 @njit
 def events(t, y, out, tables, device, g):
     """g: velocity margin until the flow reverses or the valve shuts [m/s], drop margin until it opens [Pa]."""
-    k, at, data, o, present = device["valve"], device["event"], device["data"], device["y"], stands(y, tables, device)
+    k, at, data, o, present = (
+        device["valve"],
+        device["event"],
+        device["data"],
+        device["y"],
+        valve_mode(y, tables, device),
+    )
     flow = out[tables.layout[0]["valve"] + k]
-    v = flow / tables.floats[data + FULL]
-    for mode in range(BEYOND):
+    v = flow / tables.floats[data + UNIT_FLOW]
+    for mode in range(BEYOND_CURVE):
         g[at + mode] = 1.0
     if present == SHUT:
-        follow(g, at, SHUT, OPEN, tables.floats[data + CRACKING] + RELUCTANCE - head_drop(tables, out, k)[1])
-    elif present == TURNED:
-        if v < AHEAD:
-            follow(g, at, TURNED, SHUT, v + y[o] if y[o] > 0.0 else 1.0)
-            g[at + OPEN] = AHEAD - v
+        set_mode_events(
+            g, at, SHUT, OPEN, tables.floats[data + CRACKING_PRESSURE] + PRESSURE_MARGIN - head_drop(tables, out, k)[1]
+        )
+    elif present == REVERSED:
+        if v < FORWARD_VELOCITY:
+            set_mode_events(g, at, REVERSED, SHUT, v + y[o] if y[o] > 0.0 else 1.0)
+            g[at + OPEN] = FORWARD_VELOCITY - v
         else:
-            follow(g, at, TURNED, OPEN, AHEAD - v)
+            set_mode_events(g, at, REVERSED, OPEN, FORWARD_VELOCITY - v)
     else:
-        margin = head_drop(tables, out, k)[1] + RELUCTANCE if flow == 0.0 and leads_on(tables, device) else v
-        follow(g, at, OPEN, TURNED if present == OPEN else SHUT, margin)
-    g[at + BEYOND] = tables.floats[data + LAST] - y[o + 1]
+        margin = head_drop(tables, out, k)[1] + PRESSURE_MARGIN if flow == 0.0 and joins_junction(tables, device) else v
+        set_mode_events(g, at, OPEN, REVERSED if present == OPEN else SHUT, margin)
+    g[at + BEYOND_CURVE] = tables.floats[data + LAST_RATE] - y[o + 1]
 
 
 @njit
-def follow(g, at, mode, later, margin):
+def set_mode_events(g, at, mode, later, margin):
     """Write the events of a mode that holds while `margin` is positive and is then followed by `later`."""
-    margin = -LEAST if margin == 0.0 else margin
+    margin = -SMALLEST if margin == 0.0 else margin
     g[at + mode], g[at + later] = -margin, margin
 
 

@@ -8,18 +8,18 @@ from fvsolve.errors import Notice
 from fvsolve.model.device_lowering import Device
 from fvsolve.parts.check_valve import law, law_slam
 from fvsolve.parts.disc.law import CHECK
-from fvsolve.parts.disc.lower import Lifting
+from fvsolve.parts.disc.lower import LiftedValve
 
-SHORT = 1e-6  # interval of the difference quotient for the deceleration of the flow [s]
+DIFFERENCE_TIME = 1e-6  # interval of the difference quotient for the deceleration of the flow [s]
 SMALL_FLOW = 1e-9  # share of the flow scale below which a reversed flow is rounding
 
 
-class CheckDisc(Lifting, kind=""):
+class CheckDisc(LiftedValve, kind=""):
     """A check valve whose disc moves with a delay."""
 
     mode = CHECK
 
-    def felt(self, start, k):
+    def lifting_pressure(self, start, k):
         before, behind = start.across(k)
         return (before - behind) * start.ratio.get(k, 1.0) - self.part(start, k).cracking_pressure
 
@@ -36,7 +36,7 @@ class CheckDisc(Lifting, kind=""):
 
         return newton
 
-    def tell(self, start, name, x):
+    def add_start_notices(self, start, name, x):
         """Warn that a disc that shares a rigid column with other valves does not control the column."""
         valve, nodes = start.valves[start.draft.valve_names.index(name)], start.nodes
         if any(
@@ -46,17 +46,17 @@ class CheckDisc(Lifting, kind=""):
                     "once it leaves its seat; make the column a pipe, or put a chamber between them")  # fmt: skip
             start.draft.warnings.append(Notice("range", f"links.{name}", text))
 
-    def next(self, x, back, now):
-        return "shut" if back and now != "shut" else super().next(x, back, now)
+    def next_mode(self, x, back, now):
+        return "shut" if back and now != "shut" else super().next_mode(x, back, now)
 
 
-class CheckSwing(CheckDisc, kind=""):
+class InertialCheckDisc(CheckDisc, kind=""):
     """A check valve whose disc has inertia."""
 
     states = ("opening", "speed")
 
 
-class CheckLag(CheckDisc, kind=""):
+class LaggedCheckDisc(CheckDisc, kind=""):
     """A check valve whose disc has no inertia."""
 
     states = ("opening",)
@@ -71,8 +71,14 @@ class CheckValveRows(Device, kind="check-valve"):
 
     def of(self, part) -> Device:
         if part.deceleration is not None:
-            return Slamming()
-        return self if not part.moves else CheckLag() if part.natural_frequency is None else CheckSwing()
+            return SlamCurveRows()
+        return (
+            self
+            if not part.has_dynamics
+            else LaggedCheckDisc()
+            if part.natural_frequency is None
+            else InertialCheckDisc()
+        )
 
     def numbers(self, draft, name, part) -> list[float]:
         return [part.cracking_pressure]
@@ -89,7 +95,7 @@ class CheckValveRows(Device, kind="check-valve"):
         return shuts
 
 
-class Slamming(CheckValveRows, kind=""):
+class SlamCurveRows(CheckValveRows, kind=""):
     """A check valve that shuts at the reverse velocity of its manufacturer's curve."""
 
     law = law_slam
@@ -98,18 +104,18 @@ class Slamming(CheckValveRows, kind=""):
     remedy = "give its curve a greater reverse_velocity"
 
     def numbers(self, draft, name, part) -> list[float]:
-        return [part.cracking_pressure, draft.fluid.density * part.bore, part.deceleration.rate[-1]]
+        return [part.cracking_pressure, draft.fluid.density * part.bore_area, part.deceleration.rate[-1]]
 
     def scales(self, draft, name, part) -> list[float]:
         return [1.0, 1.0]
 
     def apply_event(self, run_data, row, t, y, scale) -> None:
         o, at, curve = row["y"], row["event"], run_data.model.case.conduits[self.name(run_data, row)].deceleration
-        if run_data.armed[at + law_slam.TURNED] == 0.0:
+        if run_data.armed[at + law_slam.REVERSED] == 0.0:
             y[o] = y[o + 1] = 0.0
         elif y[o] == 0.0:
             y[o + 1] = self.deceleration(run_data, row, t, y)
-            y[o] = max(float(np.interp(y[o + 1], curve.rate, curve.reverse_velocity)), law_slam.LEAST)
+            y[o] = max(float(np.interp(y[o + 1], curve.rate, curve.reverse_velocity)), law_slam.SMALLEST)
 
     def name(self, run_data, row) -> str:
         return run_data.model.valve_names[row["valve"]]
@@ -119,6 +125,6 @@ class Slamming(CheckValveRows, kind=""):
         model, k = run_data.model, int(run_data.model.layout["valve"] + row["valve"])
         dydt, now, before = np.zeros(y.size), model.new_out(), model.new_out()
         model.functions.rhs(t, y, dydt, now, run_data.handle)
-        model.functions.rhs(t - SHORT, y - SHORT * dydt, np.zeros(y.size), before, run_data.handle)
-        full = model.tables.floats[row["data"] + law_slam.FULL]
-        return max(float(before[k] - now[k]) / (SHORT * full), 0.0)
+        model.functions.rhs(t - DIFFERENCE_TIME, y - DIFFERENCE_TIME * dydt, np.zeros(y.size), before, run_data.handle)
+        full = model.tables.floats[row["data"] + law_slam.UNIT_FLOW]
+        return max(float(before[k] - now[k]) / (DIFFERENCE_TIME * full), 0.0)

@@ -38,7 +38,7 @@ class SlamCurve:
         return {"rate": [*self.rate], "reverse_velocity": [*self.reverse_velocity]}
 
 
-class Slams(Value):
+class SlamCurveTable(Value):
     """A manufacturer's curve of slam velocities in a case file."""
 
     about = "curve of the manufacturer: reverse velocity at which the valve shuts, over deceleration of the flow"
@@ -95,10 +95,10 @@ class CheckValve(Disc, Sized, TwoPort, kind="check-valve"):
             DROPS,
         ),
     ] = None
-    deceleration: Annotated[Any, Slams()] = None
+    deceleration: Annotated[Any, SlamCurveTable()] = None
 
     @property
-    def bore(self) -> float:
+    def bore_area(self) -> float:
         """Area to which the velocities of `deceleration` refer [m2]."""
         return self.area if self.area is not None else math.pi / 4.0 * self.diameter**2
 

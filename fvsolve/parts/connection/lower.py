@@ -11,7 +11,7 @@ class ConnectionRows(Restriction, kind="connection"):
     """A throat with a loss coefficient for each direction."""
 
     def restriction(self, draft, name, link, row) -> None:
-        row["schedule"], row["back"] = draft.schedules.add(constant(1.0)), link.back
+        row["schedule"], row["back"] = draft.schedules.add(constant(1.0)), link.outflow_ratio
         super().restriction(draft, name, link, row)
 
     def inputs(self, model, name, part):

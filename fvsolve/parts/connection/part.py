@@ -35,7 +35,7 @@ class Connection(Table):
     loss_out: Annotated[float, Number(positive, "loss coefficient K for flow out of the vessel", changes=SHAPE)]
 
 
-class Joined(Value):
+class ConnectionTable(Value):
     """The table of a connection in a case file."""
 
     about = "throat with a loss for each flow direction; joined without loss if left out"
@@ -67,27 +67,27 @@ class Throat(TwoPort):
 
     def flow_area(self) -> float:
         """Area over the square root of the loss into the vessel [m2]."""
-        return self.throat / math.sqrt(self.size.loss_in)
+        return self.throat_area / math.sqrt(self.size.loss_in)
 
     @property
-    def throat(self) -> float:
+    def throat_area(self) -> float:
         """Area of the throat [m2]."""
         return self.size.area if self.size.area is not None else math.pi / 4.0 * self.size.diameter**2
 
     @property
-    def back(self) -> float:
+    def outflow_ratio(self) -> float:
         """Conductance out of the vessel over the conductance into it [-]."""
         return self.size.loss_in / self.size.loss_out
 
 
-def joined(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any], dict[str, Throat]]:
+def with_connection(name: str, vessel: Any, place: Any) -> tuple[dict[str, Any], dict[str, Throat]]:
     """(places, links) of a vessel: the vessel alone, or `place` at `name`, the throat and the vessel inside."""
     if vessel.connection is None:
         return {name: vessel}, {}
-    return behind(name, vessel.model_copy(update={"connection": None}), place, vessel.connection)
+    return behind_throat(name, vessel.model_copy(update={"connection": None}), place, vessel.connection)
 
 
-def behind(name: str, inside: Any, place: Any, size: Connection) -> tuple[dict[str, Any], dict[str, Throat]]:
+def behind_throat(name: str, inside: Any, place: Any, size: Connection) -> tuple[dict[str, Any], dict[str, Throat]]:
     """(places, links) of a vessel `inside` a throat from `place` at `name`."""
     ends = {"from": name, "to": f"{name}.inside"}
     throat = Throat.model_construct(**ends, size=size, diameter=size.diameter, area=size.area)

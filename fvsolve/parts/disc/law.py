@@ -18,11 +18,11 @@ from fvsolve.kernels.valve_seating import control_events, controls_column
 
 RELIEF, CHECK = 0, 1  # modes
 # indices into its numbers: lift, target and lifting pressure at the start, then the keys
-LIFT, TARGET, FELT, SPAN, TIME, SWING, DAMPING = 0, 1, 2, 3, 4, 5, 6
-AT_REST = 1e-10  # drive away from a stop, over the span, at which the disc leaves it; above rounding
-SETTLED = 0.5 * AT_REST  # share of the span by which it comes to rest earlier than it leaves
-EARLY = 1e-6  # time over 1 / w that its speed is extrapolated for the direction of motion
-SLAM = 1e-9  # time over T or 1 / w before the seat at which a closing disc counts as seated
+LIFT, TARGET, LIFTING_PRESSURE, SPAN, TIME_CONSTANT, ANGULAR_FREQUENCY, DAMPING = 0, 1, 2, 3, 4, 5, 6
+STOP_MARGIN = 1e-10  # drive away from a stop, over the span, at which the disc leaves it; above rounding
+SETTLE_MARGIN = 0.5 * STOP_MARGIN  # share of the span by which it comes to rest earlier than it leaves
+DIRECTION_TIME = 1e-6  # time over 1 / w that its speed is extrapolated for the direction of motion
+SLAM_TIME = 1e-9  # time over T or 1 / w before the seat at which a closing disc counts as seated
 
 
 @njit
@@ -43,14 +43,14 @@ def disc_drive(y, out, tables, device):
     """target - x at the present state."""
     k = device["valve"]
     before = out[tables.layout[0]["pressure"] + tables.valves[k]["from_node"]]
-    return disc_push(y, tables, device, before, head_drop(tables, out, k)[1])
+    return disc_drive_at(y, tables, device, before, head_drop(tables, out, k)[1])
 
 
 @njit
-def disc_push(y, tables, device, before, drop):
+def disc_drive_at(y, tables, device, before, drop):
     """target - x at an upstream pressure deviation p' and a drop across the disc."""
     floats, data = tables.floats, device["data"]
-    lifting = before if device["mode"] == RELIEF else drop - floats[data + FELT]
+    lifting = before if device["mode"] == RELIEF else drop - floats[data + LIFTING_PRESSURE]
     return (floats[data + TARGET] - floats[data + LIFT]) + lifting / floats[data + SPAN] - y[device["y"]]
 
 
@@ -63,15 +63,15 @@ def lead(t, y, tables, device, before, behind, drop, ahead):
     if device["states"] == 2:
         return y[device["y"] + 1], 0.0
     by_drop = device["mode"] == CHECK or ahead
-    slope = disc_slope(tables, device) if by_drop else 0.0
-    return disc_push(y, tables, device, before, drop) / floats[data + TIME], slope
+    slope = lift_rate_slope(tables, device) if by_drop else 0.0
+    return disc_drive_at(y, tables, device, before, drop) / floats[data + TIME_CONSTANT], slope
 
 
 @njit
-def disc_slope(tables, device):
+def lift_rate_slope(tables, device):
     """d(dx/dt) / d(lifting pressure) [1/Pa/s]; 0 for a disc with inertia."""
     floats, data = tables.floats, device["data"]
-    return 1.0 / (floats[data + TIME] * floats[data + SPAN]) if device["states"] == 1 else 0.0
+    return 1.0 / (floats[data + TIME_CONSTANT] * floats[data + SPAN]) if device["states"] == 1 else 0.0
 
 
 @njit
@@ -83,9 +83,9 @@ def move(t, y, dydt, out, tables, device):
     """
     floats, armed, at, o = tables.floats, tables.armed, device["event"], device["y"]
     drive, stopped = disc_drive(y, out, tables, device), armed[at] > 0.0 or armed[at + 2] > 0.0
-    time, swing = floats[device["data"] + TIME], floats[device["data"] + SWING]
+    time, swing = floats[device["data"] + TIME_CONSTANT], floats[device["data"] + ANGULAR_FREQUENCY]
     own = 1.0 / time if device["states"] == 1 else swing * max(1.0, 2.0 * floats[device["data"] + DAMPING])
-    out[RATE] = max(out[RATE], own if stopped else disc_loop(y, out, tables, device, own))
+    out[RATE] = max(out[RATE], own if stopped else disc_rate_limit(y, out, tables, device, own))
     if dydt.size == 0:
         return
     if device["states"] == 1:
@@ -100,7 +100,7 @@ def move(t, y, dydt, out, tables, device):
 
 
 @njit
-def disc_loop(y, out, tables, device, own):
+def disc_rate_limit(y, out, tables, device, own):
     """Rate limit including the nodes at its ends; where a column sets the flow, d dP / dx = -2 dP / x."""
     k, speed, nodes = device["valve"], own / tables.floats[device["data"] + SPAN], tables.nodes
     before, behind = tables.valves[k]["from_node"], tables.valves[k]["to_node"]
@@ -119,20 +119,20 @@ def events(t, y, out, tables, device, g):
     """g: distance to the stop, to the seat, and to the lift at which it stops controlling a column; each both ways."""
     armed, at, o = tables.armed, device["event"], device["y"]
     x, drive = disc_lift(y, tables, device), disc_drive(y, out, tables, device)
-    stop, seat = -drive - AT_REST, drive - AT_REST
+    stop, seat = -drive - STOP_MARGIN, drive - STOP_MARGIN
     if device["states"] == 1:
-        down = AT_REST if armed[at + 4] > 0.0 else -SETTLED  # the column delays it, unlike on the seat
-        onward, speed = (drive + down, drive + SETTLED), drive
+        down = STOP_MARGIN if armed[at + 4] > 0.0 else -SETTLE_MARGIN  # the column delays it, unlike on the seat
+        onward, speed = (drive + down, drive + SETTLE_MARGIN), drive
     else:
-        speed = y[o + 1] / tables.floats[device["data"] + SWING] + EARLY * drive
+        speed = y[o + 1] / tables.floats[device["data"] + ANGULAR_FREQUENCY] + DIRECTION_TIME * drive
         onward = speed, speed
     if armed[at] == 0.0:
         stop = max(1.0 - x, -onward[1])
     if armed[at + 2] == 0.0:
-        seat = max(x + SLAM * min(speed, 0.0), onward[0])
+        seat = max(x + SLAM_TIME * min(speed, 0.0), onward[0])
     event_pair(tables, g, at, stop)
     event_pair(tables, g, at + 2, seat)
-    control_events(out, tables, device, g, x, 1.0 if armed[at + 2] > 0.0 else 0.0, disc_slope(tables, device))
+    control_events(out, tables, device, g, x, 1.0 if armed[at + 2] > 0.0 else 0.0, lift_rate_slope(tables, device))
 
 
 @njit

@@ -10,18 +10,18 @@ from fvsolve.parts.disc import law
 from fvsolve.steady import Edge
 
 LIFTING, OPEN = "lifting", "open"  # modes of a valve; shut valves are in `start.shut`
-SEATED = 1e-12  # lift below the seat of a disc that has slammed, so that rounding does not open it
+SEAT_DEPTH = 1e-12  # lift below the seat of a disc that has slammed, so that rounding does not open it
 SMALL_LIFT = 1e-9  # lift that counts as rounding
 # control of a column (the last two) is not reported
-STOPS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "", "")
+STOP_EVENTS = ("is fully open", "leaves full opening", "is shut", "leaves its seat", "", "")
 
 
-class Lifting(Device, kind=""):
+class LiftedValve(Device, kind=""):
     """A valve that is shut, fully open, or lifted between; a disc with a delay has its lift as a state."""
 
     law, controlling_event = law, 4
     quantities = ("opening",)
-    events = STOPS
+    events = STOP_EVENTS
     remedy = "give it a greater overpressure"
 
     def numbers(self, draft, name, part) -> list[float]:
@@ -37,14 +37,14 @@ class Lifting(Device, kind=""):
         tables = run_data.model.tables
         stop, seat = (run_data.armed[row["event"] + k] > 0.0 for k in (0, 2))
         if self.states and seat and law.disc_lift(y, tables, row) > 0.0:  # the disc has slammed
-            y[row["y"]] = -tables.floats[row["data"] + law.LIFT] - SEATED
+            y[row["y"]] = -tables.floats[row["data"] + law.LIFT] - SEAT_DEPTH
         if row["states"] == 2 and (stop or seat):
             y[row["y"] + 1] = 0.0
 
     def part(self, start, k: int):
         return start.draft.devices[start.valves[k]["device"]][1]
 
-    def felt(self, start, k: int) -> float:
+    def lifting_pressure(self, start, k: int) -> float:
         """Lifting pressure beyond the opening pressure in the present steady solution [Pa]."""
         raise NotImplementedError
 
@@ -72,13 +72,13 @@ class Lifting(Device, kind=""):
         if start.rest:
             return False
         before = "shut" if k in start.shut else start.valve_modes[k]
-        x, flow = self.felt(start, k) / part.overpressure, float(start.valve_flows()[k])
-        after = self.next(x, flow < -SMALL_LIFT * start.flow_scale, before)
+        x, flow = self.lifting_pressure(start, k) / part.overpressure, float(start.valve_flows()[k])
+        after = self.next_mode(x, flow < -SMALL_LIFT * start.flow_scale, before)
         start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
         start.valve_modes[k] = LIFTING if after == "shut" else after
         return after != before
 
-    def next(self, x: float, back: bool, now: str) -> str:
+    def next_mode(self, x: float, back: bool, now: str) -> str:
         """Mode in the next steady solution."""
         if now == "shut":
             return LIFTING if x > SMALL_LIFT else now
@@ -91,22 +91,22 @@ class Lifting(Device, kind=""):
         valve, name = start.valves[k], start.draft.valve_names[k]
         lifts = k not in start.shut and start.valve_modes[k] == LIFTING
         x = 0.0 if k in start.shut else opening_of(start, k) if lifts else 1.0
-        self.put_lift(start, row, x, x if lifts else self.felt(start, k) / part.overpressure)
+        self.store_lift(start, row, x, x if lifts else self.lifting_pressure(start, k) / part.overpressure)
         valve["open"] = valve["conductance"] * x * x if self.states or x == 0.0 else valve["conductance"]
         if self.states and x > 0.0 and valve["transition"] == 0.0:
             valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
         start.draft.tables.floats[row["data"] + 2] = start.valve_law(k)[1]
-        self.tell(start, name, x)
-        target = self.felt(start, k) / part.overpressure
+        self.add_start_notices(start, name, x)
+        target = self.lifting_pressure(start, k) / part.overpressure
         return (
             [f"{name}: shut at the start, although its pressure would open it"]
             if start.rest and target > SMALL_LIFT
             else []
         )
 
-    def put_lift(self, start, row, x: float, target: float) -> None:
+    def store_lift(self, start, row, x: float, target: float) -> None:
         """Store the lift and the target at the start."""
         start.draft.tables.floats[row["data"] : row["data"] + 2] = x, target
 
-    def tell(self, start, name: str, x: float) -> None:
+    def add_start_notices(self, start, name: str, x: float) -> None:
         """Add notices about the start."""

@@ -41,7 +41,7 @@ class Disc(Table):
     ] = None
 
     @property
-    def moves(self) -> bool:
+    def has_dynamics(self) -> bool:
         """True if its lift is a state."""
         return self.time_constant is not None or self.natural_frequency is not None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fvsolve.model.mass_tables import PushLowering, join_ports
 
-FAR = 1e300  # distance to a stop that does not exist
+NO_STOP = 1e300  # distance to a stop that does not exist
 
 
 class EndStopRows(PushLowering, kind="end-stop"):
@@ -18,8 +18,8 @@ class EndStopRows(PushLowering, kind="end-stop"):
         (row,) = rows
         x, speed = join_ports(draft, row, ("from_mass", "to_mass"), (link.from_, link.to))
         row["stiffness"], row["damping"] = link.stiffness, link.damping
-        row["below"] = FAR if link.minimum is None else x - link.minimum
-        row["above"] = FAR if link.maximum is None else link.maximum - x
+        row["below"] = NO_STOP if link.minimum is None else x - link.minimum
+        row["above"] = NO_STOP if link.maximum is None else link.maximum - x
         for distance, sign in ((float(row["below"]), 1.0), (float(row["above"]), -1.0)):
             if distance <= 0.0:
                 row["force"] += sign * contact_force(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from fvsolve.parts.body.points import PlacesByName
+from fvsolve.parts.body.body_keys import NamedPoints
 from fvsolve.parts.node import Node
 from fvsolve.parts.value import Quantity
 
@@ -19,4 +19,4 @@ class Frame(Node, kind="frame"):
     quantities: ClassVar[dict[str, str]] = {"position": "position"}
 
     initial_position: Annotated[float, Quantity("position", about="position on the common axis [m]")] = 0.0
-    points: Annotated[dict[str, tuple[float, ...]], PlacesByName("fixed points for links, in world axes [m]")] = {}
+    points: Annotated[dict[str, tuple[float, ...]], NamedPoints("fixed points for links, in world axes [m]")] = {}

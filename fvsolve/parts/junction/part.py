@@ -8,7 +8,7 @@ from pydantic import Field
 
 from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.node import PlaceOnBody
-from fvsolve.parts.outlet.part import out_of
+from fvsolve.parts.outlet.part import outlet_to_ambient
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import Number, Quantity, between
 
@@ -49,7 +49,7 @@ class Junction(PlaceOnBody, kind="junction"):
         full = float(self.demand.value.max())
         law = {"flow": full, "exponent": self.demand_exponent, "opening": self.demand, "full": full, "most": 1.0}
         law |= {"least": self.minimum_pressure, "upper": self.required_pressure}
-        places, links = out_of(f"{name}.demand", name, **law)
+        places, links = outlet_to_ambient(f"{name}.demand", name, **law)
         return {name: self.model_copy(update={"demand": constant(0.0), "required_pressure": None}), **places}, links
 
     def faults(self, name: str, around: CaseContext) -> Faults:

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.link import Link
-from fvsolve.parts.outlet.part import out_of
+from fvsolve.parts.outlet.part import outlet_to_ambient
 from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.value import Number, Text, UsualRange, between, positive
 
@@ -40,7 +40,7 @@ class Leak(Link, kind="leak"):
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Link]]:
         law = {"flow": self.coefficient * 1e5**self.exponent, "exponent": self.exponent, "opening": self.opening}
-        return out_of(name, self.from_, **law)
+        return outlet_to_ambient(name, self.from_, **law)
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if getattr(around.nodes.get(self.from_), "kind", "") == "reservoir":

@@ -13,11 +13,11 @@ from fvsolve.jit import njit
 from fvsolve.kernels.event_pair import event_pair
 
 LEAST_DROP = 10.0  # drop above `least` below which the cubic applies [Pa]
-EVENTS = 4  # of an outlet: it shuts, opens, supplies all of its demand, or less
+EVENT_COUNT = 4  # of an outlet: it shuts, opens, supplies all of its demand, or less
 FREE, SHUT, PART, FULL = 0, 1, 2, 3  # rules; FREE: by the drop alone
-SLIGHT = 1e-3  # drop beyond `least` at which it opens or shuts, so that rounding does not [Pa]
-NEAR = 1e-9  # such a margin at full demand, over span
-NO_END = 1e300  # value of `most` without a limit
+EVENT_MARGIN = 1e-3  # drop beyond `least` at which it opens or shuts, so that rounding does not [Pa]
+FULL_MARGIN = 1e-9  # such a margin at full demand, over span
+NO_LIMIT = 1e300  # value of `most` without a limit
 
 
 @njit(forceinline=True)
@@ -30,11 +30,11 @@ def rule_of(tables, k):
 
 
 @njit(forceinline=True)
-def bent(floats, at, drop, rule):
+def drop_under_rule(floats, at, drop, rule):
     """(drop above `least` for the power law, most) under a rule."""
     above, most = drop - floats[at + 1], floats[at + 3]
     if rule == PART:
-        return above, NO_END
+        return above, NO_LIMIT
     return (0.0 if rule == SHUT else 2.0 * above if rule == FULL else above), most
 
 
@@ -42,7 +42,7 @@ def bent(floats, at, drop, rule):
 def emitter_flow(floats, at, g, drop, rule):
     """Mass flow [kg/s] at a drop [Pa]; g : conductance now, (flow at x = 1)^2 / span [kg2/s2/Pa]."""
     n, span = floats[at], floats[at + 2]
-    above, most = bent(floats, at, drop, rule)
+    above, most = drop_under_rule(floats, at, drop, rule)
     if above <= 0.0 or g <= 0.0:
         return 0.0
     full = sqrt(g * span)
@@ -56,7 +56,7 @@ def emitter_flow(floats, at, g, drop, rule):
 def emitter_slope(floats, at, g, drop, rule):
     """d flow / d drop [kg/s/Pa]."""
     n, span = floats[at], floats[at + 2]
-    above, most = bent(floats, at, drop, rule)
+    above, most = drop_under_rule(floats, at, drop, rule)
     if above <= 0.0 or g <= 0.0:
         return 0.0
     full = sqrt(g * span)
@@ -94,7 +94,7 @@ def emitter_drop(floats, at, g, flow, rule):
     n, span = floats[at], floats[at + 2]
     if flow <= 0.0 or g <= 0.0:
         return floats[at + 1]
-    most, least = NO_END if rule == PART else floats[at + 3], (LEAST_DROP / span) ** n
+    most, least = NO_LIMIT if rule == PART else floats[at + 3], (LEAST_DROP / span) ** n
     ratio = min(most, flow / sqrt(g * span))
     above = LEAST_DROP * cubic_root(n, ratio / least) if ratio < least else span * ratio ** (1.0 / n)
     return floats[at + 1] + (0.5 * above if rule == FULL else above)
@@ -122,9 +122,11 @@ def bends(tables, k, drop, g):
     valve, floats, armed = tables.valves[k], tables.floats, tables.armed
     at, event = valve["data"], valve["event"]
     above, span, most, missing = drop - floats[at + 1], floats[at + 2], floats[at + 3], 1.0
-    if most < NO_END:
-        missing = span * (most ** (1.0 / floats[at]) + (-NEAR if armed[event + 2] > 0.0 else NEAR)) - above
-    event_pair(tables, g, event, above - SLIGHT if armed[event] > 0.0 else above + SLIGHT)
+    if most < NO_LIMIT:
+        missing = (
+            span * (most ** (1.0 / floats[at]) + (-FULL_MARGIN if armed[event + 2] > 0.0 else FULL_MARGIN)) - above
+        )
+    event_pair(tables, g, event, above - EVENT_MARGIN if armed[event] > 0.0 else above + EVENT_MARGIN)
     event_pair(tables, g, event + 2, missing)
 
 

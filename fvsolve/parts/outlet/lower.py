@@ -31,7 +31,7 @@ class OutletRows(Restriction, kind="outlet"):
     """A link whose flow is a power of the drop."""
 
     law = law
-    events = ("",) * law.EVENTS
+    events = ("",) * law.EVENT_COUNT
 
     def restriction(self, draft, name, link, row) -> None:
         row["schedule"] = draft.schedules.add(link.opening, 1.0 / link.full)
@@ -65,7 +65,7 @@ class RelievingRows(Device, kind=""):
         raise NotImplementedError
 
     def numbers(self, draft, name, part) -> list[float]:
-        return [0.5, 0.0, SPAN, law.NO_END][: self.mode] + self.own_numbers(draft, name, part)
+        return [0.5, 0.0, SPAN, law.NO_LIMIT][: self.mode] + self.own_numbers(draft, name, part)
 
     def revise_state(self, start, part, row) -> bool:
         k = int(row["valve"])

@@ -40,7 +40,7 @@ class Outlet(TwoPort):
     full: float = 1.0
 
 
-def out_of(name: str, place: str, **law: Any) -> tuple[dict[str, Node], dict[str, Outlet]]:
+def outlet_to_ambient(name: str, place: str, **law: Any) -> tuple[dict[str, Node], dict[str, Outlet]]:
     """(places, links) of an outlet `name` at a place."""
     outlet = Outlet.model_construct(**{"from": place}, to=f"{name}.outside", **law)
     return {f"{name}.outside": Outside.model_construct(level_of=place)}, {name: outlet}

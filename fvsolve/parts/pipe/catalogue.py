@@ -9,13 +9,13 @@ from typing import Any
 
 from fvsolve.parts.conduit import pipe_size
 from fvsolve.parts.friction_model import DARCY, KEYS_OF_MODEL
-from fvsolve.parts.pipe.classes import SCHEDULE, NoSize, no_class, rated
 from fvsolve.parts.pipe.materials import Material, materials
+from fvsolve.parts.pipe.pressure_classes import SCHEDULE, UnknownSize, class_size, unknown_class
 from fvsolve.parts.value import ValueFault
 from fvsolve.units import parse, show
 
 STEELS = ("steel", "stainless-steel", "hydraulic-tube")
-OF_WALL = ("youngs_modulus", "poisson_ratio")
+WALL_KEYS = ("youngs_modulus", "poisson_ratio")
 
 
 def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
@@ -26,11 +26,11 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
         return given
     table, sources = {**given}, []
     if name is not None and material is None:  # reported where the key is read; nothing can be derived from it
-        if isinstance(table.get("class"), str) and (text := no_class(table["class"])) is not None:
+        if isinstance(table.get("class"), str) and (text := unknown_class(table["class"])) is not None:
             raise ValueFault([(("class",), text)])
-        return {key: value for key, value in stood_in(table).items() if key not in ("class", "nominal")}
+        return {key: value for key, value in with_substitutes(table).items() if key not in ("class", "nominal")}
     if not all(isinstance(table.get(key, ""), str) for key in ("class", "nominal")):
-        return stood_in(table)  # reported where the keys are read
+        return with_substitutes(table)  # reported where the keys are read
     if isinstance(table.get("class"), str):
         _add_class(table, sources, name if isinstance(name, str) else None)
     if isinstance(table.get("nominal"), str) and "diameter" not in table:
@@ -43,13 +43,13 @@ def from_catalogue(given: dict[str, Any]) -> dict[str, Any]:
     return table
 
 
-def stood_in(given: dict[str, Any]) -> dict[str, Any]:
+def with_substitutes(given: dict[str, Any]) -> dict[str, Any]:
     """Table with placeholder bore, wall and roughness where a wrong name gives none, so that other faults are found."""
     table = {**given}
     if not {"class", "nominal"}.isdisjoint(given):
         table["diameter"] = 1.0
     if isinstance(given.get("wall"), dict):
-        table["wall"] = {OF_WALL[0]: 1e11, "thickness": 0.01, **given["wall"]}
+        table["wall"] = {WALL_KEYS[0]: 1e11, "thickness": 0.01, **given["wall"]}
     friction = given.get("friction")
     if isinstance(friction, dict) and DARCY[0] in KEYS_OF_MODEL.get(str(friction.get("model")), ()):
         table["friction"] = friction if any(key in friction for key in DARCY) else {**friction, DARCY[0]: 1e-4}
@@ -66,9 +66,9 @@ def _add_class(table: dict[str, Any], sources: list[str], material: str | None) 
     if not isinstance(nominal, str):
         raise ValueFault([(("class",), f'{show(name)} needs a nominal size; give one, for example nominal = "DN300"')])
     try:
-        size = rated(name, nominal, material)
+        size = class_size(name, nominal, material)
     except ValueError as error:
-        raise ValueFault([(("nominal" if isinstance(error, NoSize) else "class",), str(error))]) from None
+        raise ValueFault([(("nominal" if isinstance(error, UnknownSize) else "class",), str(error))]) from None
     del table["class"], table["nominal"]
     _size(table, size.diameter, size.thickness)
     if size.pressure is not None:
@@ -111,10 +111,10 @@ def _add_wall(table: dict[str, Any], sources: list[str], material: Material) -> 
                 '{ thickness = "8 mm" }, or wave_speed')  # fmt: skip
         raise ValueFault([(("material",), text)])
     table["wall"] = {**wall}
-    for key in OF_WALL:
+    for key in WALL_KEYS:
         if key not in wall and (figure := material.figures.get(key)) is not None:
             table["wall"][key] = figure.used
-            sources.append(f"{material.name}: {figure.said}" if key == OF_WALL[0] else figure.said)
+            sources.append(f"{material.name}: {figure.description}" if key == WALL_KEYS[0] else figure.description)
 
 
 def _add_roughness(table: dict[str, Any], sources: list[str], material: Material) -> None:
@@ -126,4 +126,4 @@ def _add_roughness(table: dict[str, Any], sources: list[str], material: Material
     if isinstance(model, str) and DARCY[0] in KEYS_OF_MODEL.get(model, ()) and "roughness" in material.figures:
         figure = material.figures["roughness"]
         table["friction"] = {**friction, "roughness": figure.used}
-        sources.append(figure.said)
+        sources.append(figure.description)

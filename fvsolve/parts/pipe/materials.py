@@ -61,7 +61,7 @@ GRP                   rho  1800   1800   adpf
 KEYS = {"E": "youngs_modulus", "nu": "poisson_ratio", "k": "roughness", "rho": "density"}
 SI = {"youngs_modulus": 1e9, "poisson_ratio": 1.0, "roughness": 1e-3, "density": 1.0}
 UNITS = {"youngs_modulus": " GPa", "poisson_ratio": "", "roughness": " mm", "density": " kg/m3"}
-UNREAD = ("PVC-O", "PEX", "hydraulic-hose")  # pipe materials without a source for their figures
+WITHOUT_SOURCE = ("PVC-O", "PEX", "hydraulic-hose")  # pipe materials without a source for their figures
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Figure:
     least: float
     greatest: float
     sources: tuple[str, ...]
-    what: str = ""  # form of the material in the source
+    material_form: str = ""  # form of the material in the source
 
     @property
     def used(self) -> float:
@@ -84,11 +84,11 @@ class Figure:
         return low if low == high else f"{low}{between}{high}"
 
     @property
-    def said(self) -> str:
+    def description(self) -> str:
         """Text with the number, its range and its sources."""
         choice = "the greatest" if self.key == "youngs_modulus" else "the mean"
         span = "" if self.least == self.greatest else f", {choice} of {self.span(' to ')}"
-        form = f" ({self.what})" if self.what else ""
+        form = f" ({self.material_form})" if self.material_form else ""
         sources = "; ".join(SOURCES[key] for key in self.sources)
         return f"{self.key.replace('_', ' ')} {self.used / SI[self.key]:.4g}{UNITS[self.key]}{span}{form}: {sources}"
 
@@ -101,7 +101,7 @@ class Material:
     figures: dict[str, Figure] = field(default_factory=dict)
 
     @property
-    def unread(self) -> list[str]:
+    def missing_keys(self) -> list[str]:
         """Keys without a source."""
         return [key for key in KEYS.values() if key not in self.figures]
 

@@ -10,8 +10,17 @@ from pydantic import Field
 from fvsolve.parts.carried_scalar import ScalarValues
 from fvsolve.parts.conduit import LENGTH, Conduit
 from fvsolve.parts.context import CaseContext, Faults
-from fvsolve.parts.pipe.profile import Profile, ProfileValue
-from fvsolve.parts.pipe.wall import MODULI, Lining, OfCatalogue, Restraint, Wall, WallOrRigid, wall_faults, yielding
+from fvsolve.parts.pipe.elevation_profile import Profile, ProfileValue
+from fvsolve.parts.pipe.pipe_wall import (
+    MODULI,
+    Lining,
+    MaterialName,
+    Restraint,
+    Wall,
+    WallOrRigid,
+    creep_elements,
+    wall_faults,
+)
 from fvsolve.parts.table_model import Nested
 from fvsolve.parts.value import (
     BY_CELLS,
@@ -32,16 +41,16 @@ from fvsolve.parts.value import (
 
 MOST_CELLS = 10**8
 CATALOGUE = frozenset(("material", "class", "lining"))  # keys from which others are derived, besides nominal sizes
-SPANNED = 1e-6  # allowed difference of the span of chainage, over length
-MET = 1e-6  # allowed difference in elevation of profile and nodes [m]
-ENDS = {"from": "begins", "to": "ends"}
+LENGTH_TOLERANCE = 1e-6  # allowed difference of the span of chainage, over length
+ELEVATION_TOLERANCE = 1e-6  # allowed difference in elevation of profile and nodes [m]
+END_VERBS = {"from": "begins", "to": "ends"}
 LINES = ("finite-volume", "delay-line", "auto")  # numerical methods for waves in a pipe
 
 
 WAVES = UsualRange(
     30.0, 2000.0, "soft hoses to stiff pipes"
 )  # most are between 50 and 1500 m/s, Wylie and Streeter 1993
-SOFT = (  # (modulus [Pa], least wall over bore of such a pipe, text); the thinnest plastics are SDR 26
+SOFT_WALLS = (  # (modulus [Pa], least wall over bore of such a pipe, text); the thinnest plastics are SDR 26
     (2e8, 0.1, "softer than any plastic, as rubber is"),
     (4e8, 0.04, "soft as low-density polyethylene"),
 )
@@ -79,7 +88,7 @@ class Pipe(Conduit, kind="pipe"):
         float | None, Quantity("velocity", positive, "wave speed, instead of wall [m/s]", WAVES, BY_CELLS)
     ] = None
     wall: Annotated[Wall | Literal["rigid"] | None, WallOrRigid()] = None
-    material: Annotated[str | None, OfCatalogue()] = None
+    material: Annotated[str | None, MaterialName()] = None
     class_: Annotated[
         str | None,
         Text(
@@ -119,9 +128,9 @@ class Pipe(Conduit, kind="pipe"):
     scalars: Annotated[dict[str, Any], ScalarValues("scalar values in the pipe at the start", Number())] = {}
 
     @property
-    def yielding(self) -> tuple[tuple[float, float], ...]:
+    def creep_elements(self) -> tuple[tuple[float, float], ...]:
         """(final growth of the bore area with pressure [1/Pa], time [s]) of each creep element of the wall."""
-        return yielding(self)
+        return creep_elements(self)
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
@@ -133,14 +142,14 @@ class Pipe(Conduit, kind="pipe"):
         """Keys with names of catalogue and sizes replaced by numbers; Misfit for an unknown name."""
         faults, values = [], given
         if not CATALOGUE.isdisjoint(given):
-            from fvsolve.parts.pipe.catalogue import from_catalogue, stood_in
+            from fvsolve.parts.pipe.catalogue import from_catalogue, with_substitutes
 
             try:
                 values = from_catalogue(given)
             except ValueFault as error:
-                faults, values = error.faults, stood_in(given)
+                faults, values = error.faults, with_substitutes(given)
                 values = {key: value for key, value in values.items() if key not in ("nominal", "schedule", "class")}
-        for read in (super().resolve_keys, along_profile):
+        for read in (super().resolve_keys, add_profile_length):
             try:
                 values = read(values, setting)
             except ValueFault as error:
@@ -157,7 +166,7 @@ class Pipe(Conduit, kind="pipe"):
         """Faults of the profile with respect to length and nodes."""
         if self.profile is None:
             return
-        if abs(self.profile.length - self.length) > SPANNED * self.length:
+        if abs(self.profile.length - self.length) > LENGTH_TOLERANCE * self.length:
             text = f"chainage spans {self.profile.length:.10g} m, and length is {self.length:.10g} m; they must agree"
             yield ("profile",), f"{text}. Leave length out"
         for place, end, z in zip(("from", "to"), (self.from_, self.to), self.profile.elevation[[0, -1]], strict=True):
@@ -165,8 +174,10 @@ class Pipe(Conduit, kind="pipe"):
             if getattr(node, "on", None) is not None:
                 yield ("profile",), f"{end} is on body {node.on}, and pipes on bodies are straight; leave profile out"
             stated = getattr(node, "elevation", None)
-            if stated is not None and abs(stated - z) > MET:
-                text = f"{end} is at {stated:.10g} m, and the profile {ENDS[place]} at {z:.10g} m; expected the same"
+            if stated is not None and abs(stated - z) > ELEVATION_TOLERANCE:
+                text = (
+                    f"{end} is at {stated:.10g} m, and the profile {END_VERBS[place]} at {z:.10g} m; expected the same"
+                )
                 yield ("profile",), f"{text}, or no elevation of {end}, which then takes that of the profile"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
@@ -174,7 +185,7 @@ class Pipe(Conduit, kind="pipe"):
         wall = self.wall
         if not isinstance(wall, Wall) or wall.youngs_modulus < MODULI.least:
             return
-        for limit, thin, example in SOFT:
+        for limit, thin, example in SOFT_WALLS:
             if wall.youngs_modulus < limit and wall.thickness < thin * self.diameter:
                 text = (f"{wall.youngs_modulus:g} Pa is below {limit:g} Pa, {example}, for which a wall of "
                         f"{wall.thickness:g} m is too thin in a bore of {self.diameter:g} m; GPa meant?")  # fmt: skip
@@ -182,7 +193,7 @@ class Pipe(Conduit, kind="pipe"):
                 return
 
 
-def along_profile(given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
+def add_profile_length(given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
     """Add the length of the profile where none is given; Misfit with the faults of the profile."""
     if "profile" not in given:
         return given

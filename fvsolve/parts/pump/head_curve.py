@@ -38,14 +38,14 @@ class CurvePoints:
 
     flow: tuple[float, ...] = ()
     value: tuple[float, ...] = ()
-    word: str = "head"
+    quantity: str = "head"
     coefficients: tuple[float, ...] = ()
 
     def table(self) -> dict[str, list[float]]:
         """What the file would say."""
         if self.coefficients:
             return {"coefficients": list(self.coefficients)}
-        return {"flow": list(self.flow), self.word: list(self.value)}
+        return {"flow": list(self.flow), self.quantity: list(self.value)}
 
 
 def points(
@@ -103,7 +103,7 @@ class HeadCurve(Value):
 
     def check_polynomial(self, coefficients: tuple[float, ...]) -> None:
         """Misfit if the head never falls to zero, or rises before that flow."""
-        end = first_root(coefficients)
+        end = zero_head_flow(coefficients)
         if coefficients[0] <= 0.0 or end is None:
             raise ValueFault([(("coefficients",), "the head must start above 0 and fall to 0 at some flow; for example "
                                               "[60.0, 0.0, -900.0], 60 m less 900 m at 1 m3/s")])  # fmt: skip
@@ -118,7 +118,7 @@ class HeadCurve(Value):
         return {"anyOf": [keys_json(keys_of("head", "head")), keys_json(self.polynomial)]}
 
 
-def first_root(coefficients: tuple[float, ...]) -> float | None:
+def zero_head_flow(coefficients: tuple[float, ...]) -> float | None:
     """Least positive root of a polynomial of the flow; None without such a root."""
     roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients, "b")) if any(coefficients) else []
     real = [float(root.real) for root in roots if abs(root.imag) <= 1e-12 * abs(root) and root.real > 0.0]

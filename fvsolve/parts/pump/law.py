@@ -13,7 +13,7 @@ from fvsolve.kernels.dtypes import RATE
 from fvsolve.kernels.event_pair import event_pair
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.schedule_pieces import schedule_value
-from fvsolve.parts.check_valve.law import RELUCTANCE
+from fvsolve.parts.check_valve.law import PRESSURE_MARGIN
 from fvsolve.parts.pump.law_curve import (
     COUNT,
     JOIN,
@@ -25,8 +25,8 @@ from fvsolve.parts.pump.law_curve import (
     SUTER,
     curve_head,
     curve_step,
+    is_off_curve,
     joined_value,
-    leaves,
     piecewise,
     suter_value,
 )
@@ -36,10 +36,23 @@ from fvsolve.parts.pump.law_curve import (
 # speed [rad/s]; number of points of P, or rated torque of a Suter table; number of given torques; 1 if the shaft power
 # is known. Then pairs (schedule, value at the start) of given torques, then the points of P (flows, then powers) or WB.
 # With a joined table, these follow P: rated torque, correction of WB at the last flow, and WB.
-MODE, CHECK, TRIP, HELD, INERTIA, OFFSET, TORQUE, RATED, COUNT_OR_TORQUE, GIVEN, KNOWN, OWN_NUMBERS = range(12)
-HELD_SPEED, TRIPPING, TURNED = 0, 1, 2  # modes
-STEEPEST = 8.0  # bound of d(torque) / d(speed) of a Suter table, over the rated torque and n + v
-BAR, STILL = 1e5, 1e-9  # flow regarded as zero, over the flow at 1 bar
+(
+    MODE,
+    CHECK,
+    TRIP,
+    START_SPEED,
+    INERTIA,
+    OFFSET,
+    TORQUE,
+    RATED,
+    COUNT_OR_TORQUE,
+    TORQUE_COUNT,
+    HAS_SHAFT_POWER,
+    OWN_NUMBERS,
+) = range(12)
+HELD_SPEED, TRIPPING, TORQUE_DRIVEN = 0, 1, 2  # modes
+MAX_TORQUE_SLOPE = 8.0  # bound of d(torque) / d(speed) of a Suter table, over the rated torque and n + v
+BAR, FLOW_ROUNDING = 1e5, 1e-9  # flow regarded as zero, over the flow at 1 bar
 OUTSIDE = 1e-6  # tolerance of the range of the curve, over its flow scale
 
 
@@ -56,7 +69,7 @@ def pump_speed(t, y, tables, device):
     mode = floats[at + MODE]
     if mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device)):
         return schedule_value(tables, device["schedule"], t)
-    return floats[at + HELD] + y[device["y"]]
+    return floats[at + START_SPEED] + y[device["y"]]
 
 
 @njit
@@ -87,12 +100,12 @@ def pump_torque(out, tables, device):
 @njit
 def fluid_torque(floats, at, curve, n, q, dense):
     """Torque of the fluid [N m] at a relative speed, a flow [m3/s] and a density over that of the case."""
-    table = at + OWN_NUMBERS + 2 * int(floats[at + GIVEN])
+    table = at + OWN_NUMBERS + 2 * int(floats[at + TORQUE_COUNT])
     if floats[curve + LAW] == SUTER:
         rated = dense * floats[at + COUNT_OR_TORQUE]
         return rated * suter_value(floats, table, int(floats[curve + COUNT]), n, q / floats[curve + OWN + 1])[0]
     count = int(floats[at + COUNT_OR_TORQUE])
-    if leaves(floats, curve, n, q):
+    if is_off_curve(floats, curve, n, q):
         join, own = curve + int(floats[curve + JOIN]), table + 2 * count
         return dense * floats[own] * joined_value(floats, join, own + 1, n, q / floats[join + RATED_FLOW])[0]
     if n <= 0.0:
@@ -117,7 +130,7 @@ def move(t, y, dydt, out, tables, device):
     if dydt.size == 0:
         return
     push = -torque
-    if mode == TURNED:
+    if mode == TORQUE_DRIVEN:
         push = floats[at + OFFSET] - (torque - floats[at + TORQUE]) + given_torque(t, tables, device, True)
     dydt[device["y"]] = push / floats[at + INERTIA]
 
@@ -126,7 +139,7 @@ def move(t, y, dydt, out, tables, device):
 def given_torque(t, tables, device, change):
     """Sum of the given torques on the shaft, or its `change` since the start [N m]."""
     floats, total = tables.floats, 0.0
-    for k in range(int(floats[device["data"] + GIVEN])):
+    for k in range(int(floats[device["data"] + TORQUE_COUNT])):
         own = device["data"] + OWN_NUMBERS + 2 * k
         total += schedule_value(tables, int(floats[own]), t) - (floats[own + 1] if change else 0.0)
     return total
@@ -140,8 +153,8 @@ def shaft_rate(out, tables, device, torque):
     if floats[curve + LAW] == SUTER or floats[curve + JOIN] > 0.0:
         rated = floats[at + COUNT_OR_TORQUE]
         if floats[curve + JOIN] > 0.0:
-            rated = floats[at + OWN_NUMBERS + 2 * (int(floats[at + GIVEN]) + int(rated))]
-        return STEEPEST * abs(rated / floats[at + INERTIA]) * (abs(n) + abs(q / floats[curve + SCALE]))
+            rated = floats[at + OWN_NUMBERS + 2 * (int(floats[at + TORQUE_COUNT]) + int(rated))]
+        return MAX_TORQUE_SLOPE * abs(rated / floats[at + INERTIA]) * (abs(n) + abs(q / floats[curve + SCALE]))
     return 3.0 * abs(torque / (n * floats[at + INERTIA])) if n > 0.0 else 0.0
 
 
@@ -149,14 +162,14 @@ def shaft_rate(out, tables, device, torque):
 def power(t, y, dydt, out, tables, device):
     """Power given to the shaft, rate of its kinetic energy, and power taken from it by the fluid [W]."""
     floats, at = tables.floats, device["data"]
-    if floats[at + KNOWN] == 0.0:
+    if floats[at + HAS_SHAFT_POWER] == 0.0:
         return 0.0, 0.0, 0.0
     n = out[tables.layout[0]["drive"] + device["valve"]]
     omega, mode = n * floats[at + RATED], floats[at + MODE]
     taken = pump_torque(out, tables, device) * omega
     if mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device)):
         return taken, 0.0, taken
-    given = given_torque(t, tables, device, False) * omega if mode == TURNED else 0.0
+    given = given_torque(t, tables, device, False) * omega if mode == TORQUE_DRIVEN else 0.0
     return given, floats[at + INERTIA] * omega * dydt[device["y"]], taken
 
 
@@ -167,13 +180,13 @@ def stored(y, tables, device):
     if floats[at + MODE] == HELD_SPEED:
         return 0.0
     n = y[device["y"]]
-    return 0.5 * floats[at + INERTIA] * floats[at + RATED] * n * (2.0 * floats[at + HELD] + n)
+    return 0.5 * floats[at + INERTIA] * floats[at + RATED] * n * (2.0 * floats[at + START_SPEED] + n)
 
 
 @njit
-def unreversed(valve):
+def reversal_margin(valve):
     """Reverse flow below which the check valve stays open [kg/s]: next to a shut valve it stays open without flow."""
-    return STILL * sqrt(BAR * valve["conductance"])
+    return FLOW_ROUNDING * sqrt(BAR * valve["conductance"])
 
 
 @njit
@@ -184,11 +197,11 @@ def events(t, y, out, tables, device, g):
     g[at], g[at + 1] = 1.0, 1.0
     if floats[device["data"] + CHECK] == 0.0:
         return
-    left = out[layout["valve"] + k] + unreversed(valve)
+    left = out[layout["valve"] + k] + reversal_margin(valve)
     if tables.armed[at] > 0.0:
         rho, drop = head_drop(tables, out, k)
         most = curve_head(floats, valve["data"], out[layout["drive"] + k], 0.0)[0]
-        left = drop + rho * tables.settings[0]["gravity"] * most - RELUCTANCE
+        left = drop + rho * tables.settings[0]["gravity"] * most - PRESSURE_MARGIN
     event_pair(tables, g, at, left)
 
 

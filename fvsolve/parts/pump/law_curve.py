@@ -15,7 +15,7 @@ from math import atan2, pi, sqrt
 from fvsolve.jit import njit
 from fvsolve.kernels.valves import LEAST
 
-NEAR = 1e-9  # relative change of flow below which the tangent replaces the chord
+CHORD_CHANGE = 1e-9  # relative change of flow below which the tangent replaces the chord
 
 POWER, POINTS, POLYNOMIAL, SUTER = 0, 1, 2, 3  # laws of head curves
 # Numbers of a curve: law, count, first, last, a', b', scale of flows, offset of the joined table (0 without a table).
@@ -23,7 +23,7 @@ POWER, POINTS, POLYNOMIAL, SUTER = 0, 1, 2, 3  # laws of head curves
 LAW, COUNT, FIRST, LAST, TAIL_HEAD, TAIL, SCALE, JOIN, OWN = 0, 1, 2, 3, 4, 5, 6, 7, 8
 # Numbers of a joined table: rated head, rated flow, count of values, atan2(v, n) of the last flow, then the correction
 # of WH there, and WH. The numbers of WB have the last two as well.
-RATED_HEAD, RATED_FLOW, VALUES, EDGE, LACKS = 0, 1, 2, 3, 4
+RATED_HEAD, RATED_FLOW, VALUES, EDGE, CORRECTION = 0, 1, 2, 3, 4
 
 
 @njit
@@ -63,7 +63,7 @@ def suter_value(floats, at, count, speed, flow):
 
 
 @njit
-def leaves(floats, at, speed, flow):
+def is_off_curve(floats, at, speed, flow):
     """True if a pump with a joined table works outside its curve."""
     return floats[at + JOIN] > 0.0 and not (speed > 0.0 and 0.0 <= flow <= speed * floats[at + LAST])
 
@@ -82,10 +82,10 @@ def joined_value(floats, join, correction_at, speed, flow):
 @njit
 def curve_head(floats, at, speed, flow):
     """(head [m], its slope over flow [s/m2]) of the curve at `at` at a relative speed and a flow [m3/s]."""
-    if leaves(floats, at, speed, flow):
+    if is_off_curve(floats, at, speed, flow):
         join = at + int(floats[at + JOIN])
         head, rated = floats[join + RATED_HEAD], floats[join + RATED_FLOW]
-        value, slope = joined_value(floats, join, join + LACKS, speed, flow / rated)
+        value, slope = joined_value(floats, join, join + CORRECTION, speed, flow / rated)
         return head * value, head / rated * slope
     if floats[at + LAW] == SUTER:
         head, rated = floats[at + OWN], floats[at + OWN + 1]
@@ -138,7 +138,7 @@ def curve_step(floats, at, speed, rho, weight, g, m, drop):
     residual = drop + weight * head
     chord = -slope * weight / rho
     change = rho * curve_flow(floats, at, speed, -drop / weight, m / rho) - m
-    if abs(change) > NEAR * (abs(m) + rho * floats[at + SCALE]):
+    if abs(change) > CHORD_CHANGE * (abs(m) + rho * floats[at + SCALE]):
         chord = residual / change
     chord = max(chord, LEAST / sqrt(g))
     return residual / chord, 1.0 / chord

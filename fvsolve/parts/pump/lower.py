@@ -12,17 +12,17 @@ from fvsolve.model.inputs import SPEED, Input
 from fvsolve.parts.pump import law
 from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.lower_curve import curve_numbers, rated_point
+from fvsolve.parts.pump.lower_drive import ShaftLowering, numbers_of
 from fvsolve.parts.pump.lower_join import joined_table, specific_speed
-from fvsolve.parts.pump.lower_notes import at_odds, drawn_backwards, estimated, off_scale
+from fvsolve.parts.pump.lower_notes import estimated_inertia, rated_point_notes, reversed_pump, unusual_flow
 from fvsolve.parts.pump.lower_shaft import inertia, shaft_points
-from fvsolve.parts.pump.lower_turning import Turning, numbers_of
 from fvsolve.steady import Edge
 
 SMALL_FLOW = 1e-9  # reverse flow regarded as rounding, over the flow scale of the model
-FEW, MANY = 20.0, 320.0  # range of specific speeds that the published tables cover
+SMALL_SPECIFIC_SPEED, LARGE_SPECIFIC_SPEED = 20.0, 320.0  # range of specific speeds that the published tables cover
 
 
-class PumpRows(Turning, Device, kind="pump"):
+class PumpRows(ShaftLowering, Device, kind="pump"):
     """A restriction with a head curve; in the steady state no flow passes its check valve backward."""
 
     law = law
@@ -43,12 +43,12 @@ class PumpRows(Turning, Device, kind="pump"):
 
     def numbers(self, draft, name, part) -> list[float]:
         rated, weight = part.rated_speed or 1.0, draft.fluid.density * draft.case.gravity
-        numbers, own = self.turning(draft, name, part), shaft_points(part, weight)
+        numbers, own = self.drive_numbers(draft, name, part), shaft_points(part, weight)
         numbers |= {
             law.CHECK: part.check_valve, law.INERTIA: (inertia(part, weight) or np.inf) * rated, law.RATED: rated,
-            law.COUNT_OR_TORQUE: own[0], law.KNOWN: self.dissipates(part),
+            law.COUNT_OR_TORQUE: own[0], law.HAS_SHAFT_POWER: self.dissipates(part),
         }  # fmt: skip
-        return numbers_of(numbers, self.given(draft, name), own[1:])
+        return numbers_of(numbers, self.torque_schedules(draft, name), own[1:])
 
     def dissipates(self, part) -> bool:
         return not part.inertia is part.trip is part.efficiency is part.shaft_power is part.suter is None
@@ -71,7 +71,7 @@ class PumpRows(Turning, Device, kind="pump"):
                     "follows a parabola; give rated_speed to use a Suter table there")  # fmt: skip
             return Notice("range", f"links.{name}", text, "curve")
         speed = specific_speed(part, *rated)
-        source = table.words if FEW <= speed <= MANY else f"{table.words}, the nearest"
+        source = table.words if SMALL_SPECIFIC_SPEED <= speed <= LARGE_SPECIFIC_SPEED else f"{table.words}, the nearest"
         text = (f"{name}: it leaves its curve at {moment}; outside of it head and torque are those of the Suter "
                 f"table {source}, joined to it, by its specific speed of {speed:.4g} (rpm, m3/s, m); "
                 "for a pump of several stages or inlets give suter")  # fmt: skip
@@ -136,12 +136,12 @@ class PumpRows(Turning, Device, kind="pump"):
                 f"pump {name}: runs at {valve['drive']:.4g} of its rated speed, with a flow that is not on its curve"
             )
         draft.warnings += [
-            *drawn_backwards(start, name, part, valve), *off_scale(draft, name, part), *estimated(draft, name, part),
-            *at_odds(draft, name, part),
+            *reversed_pump(start, name, part, valve), *unusual_flow(draft, name, part), *estimated_inertia(draft, name, part),
+            *rated_point_notes(draft, name, part),
         ]  # fmt: skip
-        return moving + self.let_go(start, part, row, valve)
+        return moving + self.set_free_shaft(start, part, row, valve)
 
-    def asked(self, start, row, valve) -> float:
+    def fluid_torque(self, start, row, valve) -> float:
         floats, rho = start.draft.tables.floats, start.density_at(int(valve["from_node"]))
         speed, flow, dense = float(valve["drive"]), float(valve["flow"]) / rho, rho / start.draft.fluid.density
         return law.fluid_torque(floats, int(row["data"]), int(valve["data"]), speed, flow, dense)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.parts.pump import law_curve as curves
-from fvsolve.parts.pump.head_curve import CurvePoints, first_root
+from fvsolve.parts.pump.head_curve import CurvePoints, zero_head_flow
 from fvsolve.parts.pump.lower_join import joined_numbers
 
 LEAST_FLOW = 1e-5  # flow over the last flow, below which a curve that is flat at no flow is replaced by a line
@@ -49,7 +49,7 @@ def base_law(part, weight: float) -> tuple[int, int, float, float, list[float]]:
         return curves.POWER, 3, product / HIGHEST, product / LOWEST, [0.0, -product, -1.0]
     curve = part.curve
     if curve.coefficients:
-        last = first_root(curve.coefficients)
+        last = zero_head_flow(curve.coefficients)
         first = LEAST_FLOW * last if len(curve.coefficients) < 2 or curve.coefficients[1] == 0.0 else 0.0
         return curves.POLYNOMIAL, len(curve.coefficients), first, last, list(curve.coefficients)
     if (fit := power_law(curve)) is None:

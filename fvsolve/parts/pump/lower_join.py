@@ -9,7 +9,7 @@ import numpy as np
 from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.suter_tables import Quadrants, quadrants
 
-STILL = 1e-9  # angle regarded as zero [rad]
+ROUNDING = 1e-9  # angle regarded as zero [rad]
 
 
 def joined_numbers(part, flow: float, head: float, numbers: list[float]) -> list[float]:
@@ -19,11 +19,11 @@ def joined_numbers(part, flow: float, head: float, numbers: list[float]) -> list
     edge = math.atan2(numbers[curves.LAST], flow)
     own = np.array(numbers, dtype=float)
     shut_off, last = (curves.curve_head(own, 0, 1.0, q)[0] / head for q in (0.0, own[curves.LAST]))
-    correction, values = fitted(table.head, shut_off, last, edge)
-    return [head, flow, len(values), edge, correction, *steadied(values)]
+    correction, values = fit_to_curve(table.head, shut_off, last, edge)
+    return [head, flow, len(values), edge, correction, *monotone_head(values)]
 
 
-def fitted(values, shut_off: float, last: float, edge: float) -> tuple[float, np.ndarray]:
+def fit_to_curve(values, shut_off: float, last: float, edge: float) -> tuple[float, np.ndarray]:
     """Fit a table to a curve: (correction at the last flow, values corrected for no flow).
 
     shut_off, last : values of the curve at no flow and at the last flow, over the rated value. The correction for no
@@ -32,11 +32,11 @@ def fitted(values, shut_off: float, last: float, edge: float) -> tuple[float, np
     values = np.array(values)
     at = np.linspace(-math.pi, math.pi, len(values))
     correction = last * math.cos(edge) ** 2 - float(np.interp(edge, at, values))
-    reverse = (-0.5 * math.pi <= at) & (at < STILL)
+    reverse = (-0.5 * math.pi <= at) & (at < ROUNDING)
     return correction, values + reverse * (shut_off - np.interp(0.0, at, values)) * (1.0 + at / (0.5 * math.pi))
 
 
-def steadied(values: np.ndarray) -> np.ndarray:
+def monotone_head(values: np.ndarray) -> np.ndarray:
     """WH raised so that the head never falls as the flow through a turning pump reverses; else two flows have one head.
 
     Condition on W = WH between two values: d/d(angle) of W / cos^2 is below 0.
@@ -44,7 +44,7 @@ def steadied(values: np.ndarray) -> np.ndarray:
     values, at = values.copy(), np.linspace(-math.pi, math.pi, len(values))
     width = at[1] - at[0]
     for k in range(len(values) - 2, 0, -1):
-        if -0.5 * math.pi < at[k] < -STILL:
+        if -0.5 * math.pi < at[k] < -ROUNDING:
             tilt = 2.0 * width * math.tan(max(0.0, -at[k + 1])) - 0.5 * width**2
             values[k] = max(values[k], values[k + 1] * (1.0 - tilt))
     return values

@@ -12,22 +12,24 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.parts.pump.lower_curve import rated_point
 from fvsolve.parts.pump.lower_shaft import inertia, rated_power, usual_inertia
 
-NEAR = 1e-6  # difference of heads regarded as rounding [m]
-QUICKEST = 15.0  # velocity in adjacent pipes at the rated flow, above which a notice is given [m/s]
-SLOWEST = 0.01  # velocity below which a notice is given: 1/100 of usual mains; a wrong unit gives 1/1000
-FAR = 30.0  # allowed ratio to the usual inertia: flywheels give 10, a wrong unit gives 1000
+SPEED_TOLERANCE = 1e-6  # difference of heads regarded as rounding [m]
+MAX_VELOCITY = 15.0  # velocity in adjacent pipes at the rated flow, above which a notice is given [m/s]
+MIN_VELOCITY = 0.01  # velocity below which a notice is given: 1/100 of usual mains; a wrong unit gives 1/1000
+INERTIA_RATIO = 30.0  # allowed ratio to the usual inertia: flywheels give 10, a wrong unit gives 1000
 ROUNDING = 1e-9
 LEAST_SHARE = 0.02  # least efficiency at the rated flow
 UNITS = (("l/s", 1e-3), ("m3/h", 1.0 / 3600.0), ("l/min", 1e-3 / 60.0))
 
 
-def drawn_backwards(start, name: str, part, valve) -> list[Notice]:
+def reversed_pump(start, name: str, part, valve) -> list[Notice]:
     """Notice about a pump that runs at the start and delivers to a lower head, or to the lowest water level."""
     i, j = int(valve["from_node"]), int(valve["to_node"])
     heads = start.nodes["pressure"] / start.weight + start.nodes["elevation"]
     fixed = np.isin(start.nodes["kind"], (rec.FIXED, rec.TANK))
-    lowest = fixed[j] and not fixed[i] and heads[j] < heads[fixed].max() - NEAR and heads[j] == heads[fixed].min()
-    if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + NEAR or lowest):
+    lowest = (
+        fixed[j] and not fixed[i] and heads[j] < heads[fixed].max() - SPEED_TOLERANCE and heads[j] == heads[fixed].min()
+    )
+    if valve["drive"] <= 0.0 or start.rest or not (heads[i] > heads[j] + SPEED_TOLERANCE or lowest):
         return []
     target = (
         "the lowest water level" if lowest else f"{start.case.amount(heads[i] - heads[j], 'head', span=True)} lower"
@@ -36,7 +38,7 @@ def drawn_backwards(start, name: str, part, valve) -> list[Notice]:
     return [Notice("range", f"links.{name}", text, "from", float(heads[i] - heads[j]), 0.0)]
 
 
-def estimated(draft, name: str, part) -> list[Notice]:
+def estimated_inertia(draft, name: str, part) -> list[Notice]:
     """Notice about the estimated inertia of a pump that trips without given inertia."""
     if part.trip is None or part.inertia is not None:
         return []
@@ -46,14 +48,14 @@ def estimated(draft, name: str, part) -> list[Notice]:
     return [Notice("range", f"links.{name}", text, "inertia", value)]
 
 
-def at_odds(draft, name: str, part) -> list[Notice]:
+def rated_point_notes(draft, name: str, part) -> list[Notice]:
     """Notices about inertia and shaft power that are inconsistent with the rated point."""
     weight = draft.fluid.density * draft.case.gravity
     if weight == 0.0:
         return []
     notices, power = [], rated_power(part, weight)
     if part.inertia is not None:
-        notices += odd_inertia(draft.case, name, part.inertia, power, part.rated_speed)
+        notices += unusual_inertia(draft.case, name, part.inertia, power, part.rated_speed)
     flow, head = rated_point(part, weight)
     taken = weight * flow * head
     plausible = (1.0 - ROUNDING) * taken <= power <= taken / LEAST_SHARE
@@ -65,18 +67,18 @@ def at_odds(draft, name: str, part) -> list[Notice]:
     return notices
 
 
-def odd_inertia(case, name: str, given: float, power: float, speed: float) -> list[Notice]:
+def unusual_inertia(case, name: str, given: float, power: float, speed: float) -> list[Notice]:
     """Notice about an inertia [kg m2] far from the usual value at a power [W] and speed [rad/s]."""
     usual = usual_inertia(power, speed)
-    if usual / FAR <= given <= usual * FAR:
+    if usual / INERTIA_RATIO <= given <= usual * INERTIA_RATIO:
         return []
-    likely = units.likely(given, "inertia", usual / FAR, usual * FAR)
+    likely = units.likely(given, "inertia", usual / INERTIA_RATIO, usual * INERTIA_RATIO)
     rated = f"{case.amount(power, 'power')} at {speed * 30.0 / math.pi:.4g} rpm"
     text = f"{name}: an inertia of {given:.4g} kg m2, where {usual:.3g} kg m2 is usual for {rated}{likely}"
     return [Notice("range", f"links.{name}", text, "inertia", given, usual)]
 
 
-def off_scale(draft, name: str, part) -> list[Notice]:
+def unusual_flow(draft, name: str, part) -> list[Notice]:
     """Notice about a rated flow that is too fast or too slow in every adjacent pipe.
 
     Pumping stations have 1 to 4 m/s (Sanks, Pumping Station Design).
@@ -87,13 +89,15 @@ def off_scale(draft, name: str, part) -> list[Notice]:
         return []
     flow = rated_point(part, draft.fluid.density * draft.case.gravity)[0]
     most, least = (flow / (math.pi / 4.0 * bore**2) for bore in (min(bores), max(bores)))
-    if least <= QUICKEST and most >= SLOWEST:
+    if least <= MAX_VELOCITY and most >= MIN_VELOCITY:
         return []
-    if least > QUICKEST:
-        speed, limit, extreme = least, QUICKEST, "widest"
-        suggestion = next((f'"{flow:.4g} {unit}"' for unit, size in UNITS if speed * size <= QUICKEST), "another unit")
+    if least > MAX_VELOCITY:
+        speed, limit, extreme = least, MAX_VELOCITY, "widest"
+        suggestion = next(
+            (f'"{flow:.4g} {unit}"' for unit, size in UNITS if speed * size <= MAX_VELOCITY), "another unit"
+        )
     else:
-        speed, limit, extreme, suggestion = most, SLOWEST, "narrowest", "another unit"
+        speed, limit, extreme, suggestion = most, MIN_VELOCITY, "narrowest", "another unit"
     rated, velocity = draft.case.amount(flow, "flow"), draft.case.amount(speed, "velocity")
     text = f"{name}: its rated flow of {rated} is {velocity} in the {extreme} adjacent pipe; did you mean {suggestion}?"
     key = "suter" if part.suter is not None else "curve"

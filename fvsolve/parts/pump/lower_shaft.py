@@ -10,10 +10,10 @@ import numpy as np
 from fvsolve.parts.pump import law_curve as curves
 from fvsolve.parts.pump.head_curve import CurvePoints
 from fvsolve.parts.pump.lower_curve import base_law, curve_numbers, rated_point
-from fvsolve.parts.pump.lower_join import fitted, joined_table
+from fvsolve.parts.pump.lower_join import fit_to_curve, joined_table
 from fvsolve.parts.pump.part import EFFICIENCY
 
-EVEN = 65  # number of points of a power by a Suter table over the angle, and also over the flow
+SAMPLE_COUNT = 65  # number of points of a power by a Suter table over the angle, and also over the flow
 
 
 def shaft_points(part, weight: float) -> list[float]:
@@ -36,14 +36,14 @@ def shaft_points(part, weight: float) -> list[float]:
     else:
         flows, powers = shaft_power(part, weight, flow, rated)
     shut_off, end = np.interp([0.0, last], flows, powers) / rated
-    lack, values = fitted(table.torque, shut_off, end, math.atan2(last, flow))
+    lack, values = fit_to_curve(table.torque, shut_off, end, math.atan2(last, flow))
     return [len(flows), *flows, *powers, torque, lack, *values]
 
 
 def table_power(table, numbers, flow: float, head: float, last: float) -> tuple[np.ndarray, np.ndarray]:
     """(flows, powers over the rated power) of a curve by WB, nowhere below that of the rated efficiency."""
-    flows = flow * np.tan(np.linspace(0.0, math.atan2(last, flow), EVEN)[:-1])
-    flows = np.unique([*flows, *np.linspace(0.0, last, EVEN), *([flow] if last > flow else [])])
+    flows = flow * np.tan(np.linspace(0.0, math.atan2(last, flow), SAMPLE_COUNT)[:-1])
+    flows = np.unique([*flows, *np.linspace(0.0, last, SAMPLE_COUNT), *([flow] if last > flow else [])])
     lifts = np.array([curves.curve_head(numbers, 0, 1.0, float(q))[0] for q in flows]) / head
     at = np.linspace(-math.pi, math.pi, len(table.torque))
     by_table = (1.0 + (flows / flow) ** 2) * np.interp(np.arctan2(flows, flow), at, table.torque)

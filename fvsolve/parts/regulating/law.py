@@ -17,11 +17,11 @@ from fvsolve.kernels.valve_seating import control_events, controls_column
 
 REDUCING, SUSTAINING, FLOW_CONTROL = 0, 1, 2  # modes
 OPENING, ERROR, SET, BAND, TIME = 0, 1, 2, 3, 4  # numbers of a device: three at the start, then its keys
-AT_REST = 1e-10  # error over the band below which it stays at a stop, so that rounding does not move it
-SETTLED = 0.5 * AT_REST  # margin by which it reaches a stop earlier than it leaves it
+STOP_MARGIN = 1e-10  # error over the band below which it stays at a stop, so that rounding does not move it
+SETTLE_MARGIN = 0.5 * STOP_MARGIN  # margin by which it reaches a stop earlier than it leaves it
 ALMOST_SHUT = 1e-6  # opening below which its flow may be rounding
-RETURNS = 0.5  # fraction of the control lift below which it controls its column again
-RELUCTANCE = 1e-3  # drop below which it stays shut against reverse flow [Pa]
+RETURN_LIFT = 0.5  # fraction of the control lift below which it controls its column again
+PRESSURE_MARGIN = 1e-3  # drop below which it stays shut against reverse flow [Pa]
 
 
 @njit
@@ -104,19 +104,19 @@ def events(t, y, out, tables, device, g):
     if device["mode"] != FLOW_CONTROL:
         back = out[layout["valve"] + device["valve"]]
         if x <= ALMOST_SHUT or back == 0.0:
-            back = drop + RELUCTANCE
+            back = drop + PRESSURE_MARGIN
         if armed[at] > 0.0:
-            back = drop - RELUCTANCE
-    full, seat = -error - AT_REST, error - AT_REST
+            back = drop - PRESSURE_MARGIN
+    full, seat = -error - STOP_MARGIN, error - STOP_MARGIN
     if armed[at + 2] == 0.0:
-        full = max(full + SETTLED, 1.0 - x)
+        full = max(full + SETTLE_MARGIN, 1.0 - x)
     if armed[at + 4] == 0.0:  # a controlled column delays it, unlike on the seat
-        seat = max(error + (AT_REST if controls_column(tables, device["valve"]) else -SETTLED), x)
+        seat = max(error + (STOP_MARGIN if controls_column(tables, device["valve"]) else -SETTLE_MARGIN), x)
     event_pair(tables, g, at, back)
     event_pair(tables, g, at + 2, full)
     event_pair(tables, g, at + 4, seat)
     control_events(
-        out, tables, device, g, x, RETURNS if device["mode"] != FLOW_CONTROL else 0.0, 1.0 / stroke(tables, device)
+        out, tables, device, g, x, RETURN_LIFT if device["mode"] != FLOW_CONTROL else 0.0, 1.0 / stroke(tables, device)
     )
 
 

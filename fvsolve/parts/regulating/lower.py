@@ -17,7 +17,7 @@ SMALL_PRESSURE = 1e-3  # pressure regarded as rounding [Pa]
 OPEN, ACTIVE = "open", "active"  # as EPANET calls them; in `start.shut`, closed
 
 
-class Here(NamedTuple):
+class SteadyValve(NamedTuple):
     """A valve in a steady solution: potentials at its ends and set potential [Pa], flow, loss at full opening [Pa]."""
 
     start: object
@@ -50,11 +50,11 @@ class Regulator(Device, kind=""):
         row = draft.device_table[draft.device_names.index(name)]
         row["schedule"] = draft.schedules.add(schedule, scale)
         if self.end:
-            self.reach(draft, name, part)
+            self.check_set_pressure(draft, name, part)
         band = part.band if self.end else schedule.first * scale
         return [0.0, 0.0, 0.0, band, part.time_constant]
 
-    def reach(self, draft, name, part) -> None:
+    def check_set_pressure(self, draft, name, part) -> None:
         """Report a fault if no source can supply the set pressure."""
         nodes, case = draft.case.nodes.values(), draft.case
         if any(node.kind not in ("reservoir", "tank", "junction") for node in nodes) or "pump" in kinds_of(case):
@@ -78,7 +78,7 @@ class Regulator(Device, kind=""):
     def scales(self, draft, name, part) -> list[float]:
         return [0.1]
 
-    def given(self, start, k: int) -> float:
+    def set_value(self, start, k: int) -> float:
         """Set value at the start: pressure [Pa] or mass flow [kg/s]."""
         row = start.draft.device_table[start.valves[k]["device"]]
         return start.schedule_value(row["schedule"])
@@ -86,21 +86,21 @@ class Regulator(Device, kind=""):
     def target(self, start, k: int) -> float:
         """Set value at the start, a pressure as potential [Pa]."""
         if not self.end:
-            return self.given(start, k)
-        return start.law.potential_of(self.given(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
+            return self.set_value(start, k)
+        return start.law.potential_of(self.set_value(start, k), float(start.nodes["elevation"][self.sensed(start, k)]))
 
     def sensed(self, start, k: int) -> int:
         return int(start.valves[k][f"{self.end}_node"])
 
-    def free(self, start, k: int) -> bool:
+    def is_controllable(self, start, k: int) -> bool:
         """True if the flow through the valve can change the sensed quantity."""
         return not self.end or bool(np.isnan(start.fixed_potentials[self.sensed(start, k)]))
 
-    def stands(self, start, k: int) -> str:
-        return start.valve_modes.setdefault(k, ACTIVE if self.free(start, k) else OPEN)
+    def steady_mode(self, start, k: int) -> str:
+        return start.valve_modes.setdefault(k, ACTIVE if self.is_controllable(start, k) else OPEN)
 
     def edge(self, start, k):
-        if k in start.shut or self.stands(start, k) == OPEN:
+        if k in start.shut or self.steady_mode(start, k) == OPEN:
             return None
         i, j = (int(start.valves[k][end]) for end in ("from_node", "to_node"))
         goal = self.target(start, k)
@@ -115,30 +115,30 @@ class Regulator(Device, kind=""):
         flow = float(start.valve_flows()[k])
         p_from, p_to = start.across(k)
         loss = flow * abs(flow) / (float(start.valves[k]["conductance"]) * start.factor.get(k, 1.0))
-        here = Here(start, k, p_from, p_to, self.target(start, k), flow, loss)
-        before = "shut" if k in start.shut else self.stands(start, k)
-        after = self.next(here, before)
-        if after == ACTIVE and not self.free(start, k):
+        here = SteadyValve(start, k, p_from, p_to, self.target(start, k), flow, loss)
+        before = "shut" if k in start.shut else self.steady_mode(start, k)
+        after = self.next_mode(here, before)
+        if after == ACTIVE and not self.is_controllable(start, k):
             after = "shut"
         start.shut = start.shut | {k} if after == "shut" else start.shut - {k}
         start.valve_modes[k] = OPEN if after == OPEN else ACTIVE if after == ACTIVE else start.valve_modes[k]
         return after != before
 
-    def next(self, here: Here, now: str) -> str:
+    def next_mode(self, here: SteadyValve, now: str) -> str:
         """State of the valve in the next solution, by the rules of EPANET."""
         raise NotImplementedError
 
     def begin(self, start, part, row) -> list[str]:
         k = int(row["valve"])
         valve, floats, at = start.valves[k], start.draft.tables.floats, int(row["data"])
-        shut, active = k in start.shut, self.stands(start, k) == ACTIVE
+        shut, active = k in start.shut, self.steady_mode(start, k) == ACTIVE
         error = self.error(start, k)
         if active and not shut:
             if abs(error) > start.set_point_tolerance(self.end):
                 self.refuse(start, k)
             error = 0.0
         x = opening_of(start, k) if active and not shut else 1.0 if error > 0.0 or not shut else 0.0
-        floats[at], floats[at + 1], floats[at + 2] = x, error, self.given(start, k)
+        floats[at], floats[at + 1], floats[at + 2] = x, error, self.set_value(start, k)
         valve["open"] = 0.0 if shut else valve["conductance"] * x * x
         if valve["open"] > 0.0 and valve["transition"] == 0.0:
             valve["drop"] = abs(valve["flow"]) * valve["flow"] / valve["open"]
@@ -146,7 +146,7 @@ class Regulator(Device, kind=""):
 
     def error(self, start, k: int) -> float:
         """Control error at the start, positive to open, in the unit of the sensed quantity."""
-        given = self.given(start, k)
+        given = self.set_value(start, k)
         if not self.end:
             return given - float(start.valves[k]["flow"])
         pressure = float(start.nodes["pressure"][self.sensed(start, k)])
@@ -164,7 +164,7 @@ class PressureReducingRows(Regulator, kind="pressure-reducing"):
 
     mode, end, verb = law.REDUCING, "to", "reduce"
 
-    def next(self, here, now):
+    def next_mode(self, here, now):
         low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE
         if now == "shut" and here.p_to < low:
             return ACTIVE if here.p_from >= high else OPEN if here.p_from > here.p_to + SMALL_PRESSURE else now
@@ -180,7 +180,7 @@ class PressureSustainingRows(Regulator, kind="pressure-sustaining"):
 
     mode, end, verb = law.SUSTAINING, "from", "open"
 
-    def next(self, here, now):
+    def next_mode(self, here, now):
         low, high = here.target - SMALL_PRESSURE, here.target + SMALL_PRESSURE
         if now == "shut" and here.p_from > here.p_to + SMALL_PRESSURE:
             return OPEN if here.p_to > high else ACTIVE if here.p_from >= high else now
@@ -196,7 +196,7 @@ class FlowControlRows(Regulator, kind="flow-control"):
 
     mode, key = law.FLOW_CONTROL, "set_flow"
 
-    def next(self, here, now):
+    def next_mode(self, here, now):
         if now == ACTIVE:
             drop, small = here.p_from - here.p_to, SMALL_FLOW * here.start.flow_scale
             return OPEN if drop < here.loss - SMALL_PRESSURE or here.flow < here.target - small else now

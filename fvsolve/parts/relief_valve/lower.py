@@ -5,16 +5,16 @@ from __future__ import annotations
 from fvsolve.errors import Notice
 from fvsolve.model.device_lowering import Device
 from fvsolve.parts.disc.law import RELIEF
-from fvsolve.parts.disc.lower import Lifting
+from fvsolve.parts.disc.lower import LiftedValve
 from fvsolve.parts.relief_valve import law
 
 
-class ReliefDisc(Lifting, kind=""):
+class ReliefDisc(LiftedValve, kind=""):
     """A relief valve with disc dynamics."""
 
     mode = RELIEF
 
-    def felt(self, start, k):
+    def lifting_pressure(self, start, k):
         i, part = int(start.valves[k]["from_node"]), self.part(start, k)
         return start.law.pressure_of(start.answer.potential[i], float(start.nodes["elevation"][i])) - part.set_pressure
 
@@ -31,7 +31,7 @@ class ReliefDisc(Lifting, kind=""):
 
         return newton
 
-    def tell(self, start, name, x):
+    def add_start_notices(self, start, name, x):
         if x > 0.0:
             text = f"{name}: the relief valve is open at the start, lift {x:.3g} of 1"
             start.draft.warnings.append(Notice("start", f"links.{name}", text, "lift", float(x)))
@@ -56,10 +56,10 @@ class Relief(ReliefDisc, kind="relief-valve"):
     events = ("is shut", "opens", "is fully open", "leaves full opening")
 
     def of(self, part) -> Device:
-        return self if not part.moves else ReliefLag() if part.natural_frequency is None else ReliefSwing()
+        return self if not part.has_dynamics else ReliefLag() if part.natural_frequency is None else ReliefSwing()
 
     def numbers(self, draft, name, part) -> list[float]:
         return [0.0, part.overpressure, 0.0]
 
-    def put_lift(self, start, row, x, target):
+    def store_lift(self, start, row, x, target):
         start.draft.tables.floats[row["data"]] = target

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fvsolve.model.device_lowering import Device
-from fvsolve.parts.outlet.law import EVENTS
+from fvsolve.parts.outlet.law import EVENT_COUNT
 from fvsolve.parts.outlet.lower import RelievingRows
 from fvsolve.parts.rupture_disc import law, law_outside
 
@@ -33,5 +33,5 @@ class RuptureDiscRows(RelievingRows, kind="rupture-disc"):
 class DiscToAmbient(RuptureDiscRows, kind=""):
     """A rupture disc to ambient."""
 
-    law, mode = law_outside, EVENTS
-    events = ("",) * EVENTS + ("bursts",)
+    law, mode = law_outside, EVENT_COUNT
+    events = ("",) * EVENT_COUNT + ("bursts",)

@@ -10,15 +10,15 @@ every method integrates them to rounding. To ambient, `mode` numbers and flags o
 from fvsolve.jit import njit
 
 OPENING_TIME, HOLD, CLOSING_TIME, LOW, HIGH, TRIP, PLACE = 0, 1, 2, 3, 4, 5, 6  # numbers; PLACE: sensed node
-SHUT, OPENING, OPEN, CLOSING, BY_HIGH, READY, TRIPPED = 0, 1, 2, 3, 4, 5, 6  # flags
+SHUT, OPENING, OPEN, CLOSING, BY_HIGH, ARMED_LOW, TRIPPED = 0, 1, 2, 3, 4, 5, 6  # flags
 FLAGS = 7
 NEVER = 1e300  # setting left out [Pa], [s]
-RELUCTANCE = 10.0  # pressure beyond a setting that arms the low-pressure opening, or reopens a closing valve [Pa]
+PRESSURE_MARGIN = 10.0  # pressure beyond a setting that arms the low-pressure opening, or reopens a closing valve [Pa]
 LEAST = 1e-300
 
 
 @njit
-def stands(y, tables, device):
+def valve_stage(y, tables, device):
     """Stage of the valve: SHUT, OPENING, OPEN or CLOSING."""
     armed, at, o = tables.armed, device["event"] + device["mode"], device["y"]
     for stage in range(BY_HIGH):
@@ -41,23 +41,23 @@ def move(t, y, dydt, out, tables, device):
     """Write the rates of the opening and of the time spent open."""
     if dydt.size == 0:
         return
-    floats, at, o, stage = tables.floats, device["data"] + device["mode"], device["y"], stands(y, tables, device)
+    floats, at, o, stage = tables.floats, device["data"] + device["mode"], device["y"], valve_stage(y, tables, device)
     rise = 1.0 / floats[at + OPENING_TIME] if stage == OPENING else 0.0
     dydt[o] = -1.0 / floats[at + CLOSING_TIME] if stage == CLOSING else rise
     dydt[o + 1] = 1.0 if stage == OPEN else 0.0
 
 
 @njit
-def pilots(t, y, out, tables, device):
+def pilot_margins(t, y, out, tables, device):
     """Margins to opening by low pressure, by high pressure [Pa] and by trip [s]; and the sensed pressure [Pa]."""
     floats, armed, layout = tables.floats, tables.armed, tables.layout[0]
     at, flags = device["data"] + device["mode"], device["event"] + device["mode"]
     i = int(floats[at + PLACE])
     p = tables.nodes[i]["pressure"] + out[layout["pressure"] + i]
-    low = p - floats[at + LOW] if armed[flags + READY] > 0.0 else 1.0
+    low = p - floats[at + LOW] if armed[flags + ARMED_LOW] > 0.0 else 1.0
     high = floats[at + HIGH] - p
     if armed[flags + CLOSING] > 0.0:
-        high += RELUCTANCE
+        high += PRESSURE_MARGIN
     return low, high, 1.0 if armed[flags + TRIPPED] > 0.0 else floats[at + TRIP] - t, p
 
 
@@ -65,34 +65,34 @@ def pilots(t, y, out, tables, device):
 def events(t, y, out, tables, device, g):
     """g: margins to the next stage, and the flags of high pressure, arming and trip."""
     floats, armed, o = tables.floats, tables.armed, device["y"]
-    at, flags, stage = device["data"] + device["mode"], device["event"] + device["mode"], stands(y, tables, device)
-    low, high, trip, p = pilots(t, y, out, tables, device)
+    at, flags, stage = device["data"] + device["mode"], device["event"] + device["mode"], valve_stage(y, tables, device)
+    low, high, trip, p = pilot_margins(t, y, out, tables, device)
     opening_margin = min(low, high, trip)
-    by_high, ready = armed[flags + BY_HIGH] > 0.0, armed[flags + READY] > 0.0
+    by_high, ready = armed[flags + BY_HIGH] > 0.0, armed[flags + ARMED_LOW] > 0.0
     for flag in range(FLAGS):
         g[flags + flag] = 1.0
     g[flags + BY_HIGH] = -1.0 if by_high else 1.0
     if stage == OPENING:
-        follow(g, flags, stage, OPEN, 1.0 - y[o])
+        set_stage_event(g, flags, stage, OPEN, 1.0 - y[o])
     elif stage == OPEN:
         hold_left = -1.0 if by_high else floats[at + HOLD] - y[o + 1]
-        follow(g, flags, stage, CLOSING, max(hold_left, p - floats[at + HIGH]))
+        set_stage_event(g, flags, stage, CLOSING, max(hold_left, p - floats[at + HIGH]))
     else:
         g[flags + BY_HIGH] = -1.0 if by_high else high
         if opening_margin <= 0.0:
             g[flags + BY_HIGH] = 1.0 if low <= 0.0 or trip <= 0.0 else -1.0
         if stage == CLOSING and opening_margin > 0.0:
-            follow(g, flags, stage, SHUT, y[o])
+            set_stage_event(g, flags, stage, SHUT, y[o])
             g[flags + OPENING] = opening_margin
         else:
-            follow(g, flags, stage, OPENING, opening_margin)
+            set_stage_event(g, flags, stage, OPENING, opening_margin)
     if stage == SHUT:
-        g[flags + READY] = -1.0 if ready else floats[at + LOW] + RELUCTANCE - p
+        g[flags + ARMED_LOW] = -1.0 if ready else floats[at + LOW] + PRESSURE_MARGIN - p
     g[flags + TRIPPED] = floats[at + TRIP] - t
 
 
 @njit
-def follow(g, flags, stage, next_stage, margin):
+def set_stage_event(g, flags, stage, next_stage, margin):
     """Set g of the present stage, which lasts while the margin is positive, and of the next stage."""
     margin = -LEAST if margin == 0.0 else margin
     g[flags + stage], g[flags + next_stage] = -margin, margin

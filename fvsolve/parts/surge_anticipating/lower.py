@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fvsolve.errors import Notice
 from fvsolve.model.device_lowering import Device
-from fvsolve.parts.outlet.law import EVENTS
+from fvsolve.parts.outlet.law import EVENT_COUNT
 from fvsolve.parts.outlet.lower import RelievingRows
 from fvsolve.parts.surge_anticipating import law, law_outside
 
@@ -61,5 +61,5 @@ class SurgeAnticipatingRows(RelievingRows, kind="surge-anticipating"):
 class AnticipatingToAmbient(SurgeAnticipatingRows, kind=""):
     """A surge-anticipating valve to ambient."""
 
-    law, mode = law_outside, EVENTS
-    events = ("",) * EVENTS + SurgeAnticipatingRows.events
+    law, mode = law_outside, EVENT_COUNT
+    events = ("",) * EVENT_COUNT + SurgeAnticipatingRows.events

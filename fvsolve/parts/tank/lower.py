@@ -25,7 +25,7 @@ class TankRows(Lowering, kind="tank"):
             else:
                 draft.floats += [*level, *area, *volume]
             row["area"] = area.min()
-            contents = lambda z: shaped_volume(level, area, volume, z)  # noqa: E731
+            contents = lambda z: tank_volume(level, area, volume, z)  # noqa: E731
         else:
             row["area"] = node.area
             contents = lambda z: node.area * z  # noqa: E731
@@ -51,7 +51,7 @@ class TankRows(Lowering, kind="tank"):
         row["kind"], row["index"] = rec.LEVEL, draft.node_index[draft.inside(name)]
 
 
-def shaped_volume(level, area, volume, z: float) -> float:
+def tank_volume(level, area, volume, z: float) -> float:
     """Volume below level z [m3] of a tank whose areas are linear between levels and constant above the last."""
     if z >= level[-1]:
         return float(volume[-1] + (z - level[-1]) * area[-1])

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from fvsolve.parts.connection.part import Connection, Joined, joined
+from fvsolve.parts.connection.part import Connection, ConnectionTable, with_connection
 from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import PlaceOnBody
@@ -106,10 +106,10 @@ class Tank(PlaceOnBody, kind="tank"):
             "level", positive, "level above the bottom at which the tank spills [m]; never if left out", LEVELS, VALUE
         ),
     ] = None
-    connection: Annotated[Connection | None, Joined()] = None
+    connection: Annotated[Connection | None, ConnectionTable()] = None
 
     def inner(self, name: str) -> tuple[dict[str, Any], dict[str, Any]]:
-        return joined(name, self, Junction.model_construct(**self.position_keys, demand=constant(0.0)))
+        return with_connection(name, self, Junction.model_construct(**self.position_keys, demand=constant(0.0)))
 
     def faults(self, name: str, around: CaseContext) -> Faults:
         if self.height is not None and self.level > self.height:

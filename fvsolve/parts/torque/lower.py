@@ -10,14 +10,14 @@ from fvsolve.model.lowering import Lowering, lowering_of
 from fvsolve.model.mass_tables import PushLowering, join_ports
 from fvsolve.parts.force.lower import brace_of
 from fvsolve.parts.pump.law import OWN_NUMBERS
-from fvsolve.parts.pump.lower_turning import torques_on
+from fvsolve.parts.pump.lower_drive import torques_on
 
 
 class TorqueRows(Lowering, kind="torque"):
     """A torque on a shaft; its pump or turbine has the numbers."""
 
     def of(self, part):
-        return self if part.axis is None else ON_BODIES
+        return self if part.axis is None else BODY_TORQUES
 
     def inputs(self, model, name, part):
         turned = part.to.removesuffix(".shaft")
@@ -42,4 +42,4 @@ class BodyTorqueRows(PushLowering):
         return {"torque": Input(TORQUE, brace_of(model, name)["schedule"].item())}
 
 
-ON_BODIES = BodyTorqueRows()
+BODY_TORQUES = BodyTorqueRows()

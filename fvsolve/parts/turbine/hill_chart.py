@@ -8,11 +8,11 @@ from typing import Any, NamedTuple
 from fvsolve.parts.csv_rows import CsvError, read_rows, split_header
 from fvsolve.parts.table_model import keys_json, read_keys
 from fvsolve.parts.time_series import copy_name, find_file
-from fvsolve.parts.turbine.points import EFFICIENCY, FLOW, SPEED, TORQUE, faults_of_curve, faults_of_still
+from fvsolve.parts.turbine.chart_faults import EFFICIENCY, FLOW, SPEED, TORQUE, faults_of_curve, faults_of_shut
 from fvsolve.parts.value import NEEDED, Number, ReadContext, Rows, Value, ValueFault, between
 from fvsolve.units import show
 
-WITHIN = between(-1e4, 1e4)  # n11 and Q11 of any machine
+UNIT_RANGE = between(-1e4, 1e4)  # n11 and Q11 of any machine
 UNITS = {SPEED: "rpm m^(1/2)", FLOW: "m^(1/2)/s", TORQUE: "N/m3"}
 EXAMPLE = "{ opening = 0.5, unit_speed = [60, 75], unit_flow = [0.52, 0.48], efficiency = [0.88, 0.85] }"
 
@@ -27,15 +27,20 @@ class OpeningCurve(NamedTuple):
     speed: tuple[float, ...]
     flow: tuple[float, ...]
     value: tuple[float, ...]
-    word: str
+    quantity: str
 
     def table(self) -> dict[str, Any]:
         """The table as in a case file."""
-        return {"opening": self.opening, SPEED: list(self.speed), FLOW: list(self.flow), self.word: list(self.value)}
+        return {
+            "opening": self.opening,
+            SPEED: list(self.speed),
+            FLOW: list(self.flow),
+            self.quantity: list(self.value),
+        }
 
     def torques(self, weight: float) -> list[float]:
         """T11 at its points; weight = rho g [N/m3]."""
-        if self.word == TORQUE:
+        if self.quantity == TORQUE:
             return list(self.value)
         points = zip(self.speed, self.flow, self.value, strict=True)
         return [eta * weight * q * 30.0 / math.pi / n for n, q, eta in points]
@@ -48,12 +53,12 @@ class HillChart(NamedTuple):
     """
 
     curves: tuple[OpeningCurve, ...]
-    still: tuple[float, float] | None
-    said: Any
+    shut_point: tuple[float, float] | None
+    given: Any
 
     def table(self) -> Any:
         """The table as in a case file."""
-        return self.said
+        return self.given
 
 
 class HillChartValue(Value):
@@ -68,7 +73,7 @@ class HillChartValue(Value):
     )
     keys = {
         "opening": (Number(between(0, 1)), NEEDED),
-        SPEED: (Rows("number", WITHIN), NEEDED), FLOW: (Rows("number", WITHIN), NEEDED),
+        SPEED: (Rows("number", UNIT_RANGE), NEEDED), FLOW: (Rows("number", UNIT_RANGE), NEEDED),
         EFFICIENCY: (Rows("number", between(0, 1)), None), TORQUE: (Rows("number", between(-1e8, 1e8)), None),
     }  # fmt: skip
 
@@ -161,7 +166,7 @@ def chart_of(curves: dict, places: dict, faults: list, source: Any, file: str = 
             )
         seen.setdefault(curve.opening, k)
         keys, name = places[k], f"{file}opening {curve.opening:g}: "
-        texts = faults_of_still(curve) if curve.opening == 0.0 else faults_of_curve(curve)
+        texts = faults_of_shut(curve) if curve.opening == 0.0 else faults_of_curve(curve)
         faults += [((*keys, key) if not file and key else keys, (name if file else "") + text) for key, text in texts]
     open_curves = sorted((curve for curve in curves.values() if curve.opening > 0.0), key=lambda curve: curve.opening)
     if not open_curves and not faults:

@@ -12,14 +12,14 @@ from fvsolve.kernels.dtypes import JUNCTION, RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.valves import valve_conductance
 from fvsolve.parts.pump.law import (
-    GIVEN,
     HELD_SPEED,
     INERTIA,
     MODE,
     OFFSET,
     TORQUE,
+    TORQUE_COUNT,
+    TORQUE_DRIVEN,
     TRIPPING,
-    TURNED,
     given_torque,
     pump_speed,
     tripped,
@@ -27,7 +27,7 @@ from fvsolve.parts.pump.law import (
 from fvsolve.parts.pump.law import stored as stored
 from fvsolve.parts.turbine.law_chart import chart_at, chart_head, chart_step, chart_torque, is_outside
 
-SHUT = 1e-12  # square of an opening regarded as zero
+SHUT_SHARE = 1e-12  # square of an opening regarded as zero
 
 
 @njit
@@ -36,33 +36,33 @@ def set(t, y, out, tables, device):
     layout, k = tables.layout[0], device["valve"]
     out[layout["drive"] + k] = pump_speed(t, y, tables, device)
     g = valve_conductance(tables, k, t)
-    out[layout["conductance"] + k] = g if g >= SHUT * tables.valves[k]["conductance"] else 0.0
+    out[layout["conductance"] + k] = g if g >= SHUT_SHARE * tables.valves[k]["conductance"] else 0.0
 
 
 @njit
-def vanes(tables, k, g):
+def vane_opening(tables, k, g):
     """Opening of turbine k at its conductance."""
     return sqrt(g / tables.valves[k]["conductance"])
 
 
 @njit
-def point(out, tables, device):
+def operating_point(out, tables, device):
     """(opening, speed [rad/s], flow [m3/s], density over that of the case) of a turbine after the nodes are solved."""
     layout, k = tables.layout[0], device["valve"]
     rho, _ = head_drop(tables, out, k)
-    opening = vanes(tables, k, out[layout["conductance"] + k])
+    opening = vane_opening(tables, k, out[layout["conductance"] + k])
     return opening, out[layout["drive"] + k], out[layout["valve"] + k] / rho, rho / tables.settings[0]["rho"]
 
 
 @njit
-def torque_now(out, tables, device):
+def turbine_torque(out, tables, device):
     """Torque of the water on the shaft [N m]."""
-    opening, omega, q, density_ratio = point(out, tables, device)
+    opening, omega, q, density_ratio = operating_point(out, tables, device)
     return density_ratio * chart_torque(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
 
 
 @njit
-def holds(t, tables, device):
+def generator_holds_speed(t, tables, device):
     """True if the generator holds the speed."""
     mode = tables.floats[device["data"] + MODE]
     return mode == HELD_SPEED or (mode == TRIPPING and not tripped(t, tables, device))
@@ -74,15 +74,15 @@ def move(t, y, dydt, out, tables, device):
     floats, at = tables.floats, device["data"]
     if floats[at + MODE] == HELD_SPEED:
         return
-    if holds(t, tables, device):
+    if generator_holds_speed(t, tables, device):
         if dydt.size > 0:
             dydt[device["y"]] = 0.0
         return
     out[RATE] = max(out[RATE], shaft_rate(out, tables, device))
     if dydt.size == 0:
         return
-    torque = torque_now(out, tables, device)
-    if floats[at + MODE] == TURNED:
+    torque = turbine_torque(out, tables, device)
+    if floats[at + MODE] == TORQUE_DRIVEN:
         torque = floats[at + OFFSET] + (torque + floats[at + TORQUE]) + given_torque(t, tables, device, True)
     dydt[device["y"]] = torque / floats[at + INERTIA]
 
@@ -91,7 +91,7 @@ def move(t, y, dydt, out, tables, device):
 def shaft_rate(out, tables, device):
     """Rate at which the water brakes a free shaft [1/s]."""
     floats = tables.floats
-    opening, omega, q, density_ratio = point(out, tables, device)
+    opening, omega, q, density_ratio = operating_point(out, tables, device)
     if opening <= 0.0:
         return 0.0
     torque_slope = chart_at(floats, tables.valves[device["valve"]]["data"], opening, omega, q)[4]
@@ -103,10 +103,10 @@ def power(t, y, dydt, out, tables, device):
     """Power given to the shaft, rate of its kinetic energy, and minus the power taken from the water [W]."""
     floats, at = tables.floats, device["data"]
     omega = out[tables.layout[0]["drive"] + device["valve"]]
-    taken = -torque_now(out, tables, device) * omega
-    if holds(t, tables, device):
+    taken = -turbine_torque(out, tables, device) * omega
+    if generator_holds_speed(t, tables, device):
         return taken, 0.0, taken
-    given = given_torque(t, tables, device, False) * omega if floats[at + GIVEN] > 0.0 else 0.0
+    given = given_torque(t, tables, device, False) * omega if floats[at + TORQUE_COUNT] > 0.0 else 0.0
     return given, floats[at + INERTIA] * omega * dydt[device["y"]], taken
 
 
@@ -114,7 +114,7 @@ def power(t, y, dydt, out, tables, device):
 def value(t, y, out, tables, device, quantity):
     """Head [m], speed [rad/s], torque [N m], power at the shaft [W] or opening, by number."""
     st, k = tables.settings[0], device["valve"]
-    opening, omega, q, _ = point(out, tables, device)
+    opening, omega, q, _ = operating_point(out, tables, device)
     if quantity == 0:
         if opening > 0.0:
             return chart_head(tables.floats, tables.valves[k]["data"], opening, omega, q)[0]
@@ -124,14 +124,14 @@ def value(t, y, out, tables, device, quantity):
         return omega
     if quantity == 4:
         return opening
-    torque = torque_now(out, tables, device)
+    torque = turbine_torque(out, tables, device)
     return torque if quantity == 2 else torque * omega
 
 
 @njit
 def outside(out, tables, device):
     """PASSING if the operating angle is outside the chart, else 0."""
-    opening, omega, q, _ = point(out, tables, device)
+    opening, omega, q, _ = operating_point(out, tables, device)
     beyond = is_outside(tables.floats, tables.valves[device["valve"]]["data"], opening, omega, q)
     return TEMPORARY if beyond else 0
 
@@ -164,5 +164,5 @@ def slope(out, tables, k, g, drop):
 def turbine_step(tables, out, k, rho, g, m, drop):
     """`chart_step` of a turbine at its present speed, for fluid of density rho [kg/m3]."""
     weight, omega = rho * tables.settings[0]["gravity"], out[tables.layout[0]["drive"] + k]
-    opening, stiff = vanes(tables, k, g), stiffness(tables, k)
+    opening, stiff = vane_opening(tables, k, g), stiffness(tables, k)
     return chart_step(tables.floats, tables.valves[k]["data"], opening, omega, rho, weight, stiff, g, m, drop, m / rho)

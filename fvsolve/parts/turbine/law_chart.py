@@ -13,23 +13,23 @@ from fvsolve.jit import njit
 from fvsolve.kernels.valves import LEAST
 
 LEAST_ROOT = 0.1  # least root in the weight of the torque of a ray; given points have greater roots
-NEAR = 1e-9  # relative change of flow below which the tangent replaces the chord
+CHORD_CHANGE = 1e-9  # relative change of flow below which the tangent replaces the chord
 
 # Numbers of a chart: counts of curves and rays, speed [rad/s] and flow [m3/s] at 1 m, torque behind shut vanes over
 # omega |omega| [N m s2]; then arrays: openings, capacities, least and greatest given angles of all curves; angles of
 # all rays, their cosines and sines; roots, then T [N], of each curve on all rays.
-CURVES, RAYS, SPEED, FLOW, STILL, OWN = 0, 1, 2, 3, 4, 5
+CURVES, RAYS, SPEED, FLOW, SHUT_VANES, OWN = 0, 1, 2, 3, 4, 5
 
 
 @njit
-def shared(share_1, share_2, root_1, root_2, torque_1, torque_2):
+def torque_between_rays(share_1, share_2, root_1, root_2, torque_1, torque_2):
     """T at the sum of shares of two ray directions, linear along the line between their points at 1 m."""
     weight_1, weight_2 = share_1 * max(root_1, LEAST_ROOT), share_2 * max(root_2, LEAST_ROOT)
     return (weight_1 * torque_1 + weight_2 * torque_2) / (weight_1 + weight_2)
 
 
 @njit
-def between(floats, at, opening):
+def opening_share(floats, at, opening):
     """(curve at or below an opening, share of the next curve, opening over the least opening or 1 if it is above)."""
     count = int(floats[at + CURVES])
     if opening <= floats[at + OWN]:
@@ -42,7 +42,7 @@ def between(floats, at, opening):
 
 
 @njit
-def mixed(floats, first, stride, k, share):
+def interpolate_curves(floats, first, stride, k, share):
     """Value of curve k at `first + k stride`, interpolated to the next curve by `share`."""
     value = floats[first + k * stride]
     if share > 0.0:
@@ -53,8 +53,8 @@ def mixed(floats, first, stride, k, share):
 @njit
 def capacity(floats, at, opening):
     """Flow at u = 1 and a head of 1 m, over the `flow` of the chart."""
-    k, share, least = between(floats, at, opening)
-    return least * mixed(floats, at + OWN + int(floats[at + CURVES]), 1, k, share)
+    k, share, least = opening_share(floats, at, opening)
+    return least * interpolate_curves(floats, at + OWN + int(floats[at + CURVES]), 1, k, share)
 
 
 @njit
@@ -71,7 +71,7 @@ def ray_below(floats, first, count, angle):
 
 
 @njit
-def turned(n, u):
+def operating_angle(n, u):
     """Angle of (n, u), from -pi / 2 to 3 pi / 2."""
     angle = atan2(u, n)
     return angle + 2.0 * pi if angle < -0.5 * pi else angle
@@ -81,28 +81,34 @@ def turned(n, u):
 def chart_at(floats, at, opening, omega, flow):
     """(root of head, its slopes over omega and flow, torque [N m], its slope over omega) at an opening above 0."""
     curves, rays = int(floats[at + CURVES]), int(floats[at + RAYS])
-    k, share, least = between(floats, at, opening)
-    flow_scale = floats[at + FLOW] * least * mixed(floats, at + OWN + curves, 1, k, share)
+    k, share, least = opening_share(floats, at, opening)
+    flow_scale = floats[at + FLOW] * least * interpolate_curves(floats, at + OWN + curves, 1, k, share)
     n, u = omega / floats[at + SPEED], flow / flow_scale
     first = at + OWN + 4 * curves
-    i = ray_below(floats, first, rays, turned(n, u))
+    i = ray_below(floats, first, rays, operating_angle(n, u))
     a, b, c, d = floats[first + rays + i], floats[first + 2 * rays + i], 0.0, 0.0
     c, d = floats[first + rays + i + 1], floats[first + 2 * rays + i + 1]
     turn = a * d - b * c
     share_1, share_2 = (n * d - u * c) / turn, (a * u - b * n) / turn
     roots = first + 3 * rays + i
     torques = roots + curves * rays
-    root_1, root_2 = mixed(floats, roots, rays, k, share), mixed(floats, roots + 1, rays, k, share)
-    t_1, t_2 = mixed(floats, torques, rays, k, share), mixed(floats, torques + 1, rays, k, share)
+    root_1, root_2 = (
+        interpolate_curves(floats, roots, rays, k, share),
+        interpolate_curves(floats, roots + 1, rays, k, share),
+    )
+    t_1, t_2 = (
+        interpolate_curves(floats, torques, rays, k, share),
+        interpolate_curves(floats, torques + 1, rays, k, share),
+    )
     root = share_1 * root_1 + share_2 * root_2
     by_n, by_u = (root_1 * d - root_2 * b) / turn, (root_2 * a - root_1 * c) / turn
     torque, torque_slope = 0.0, 0.0
     if root > 0.0:
-        t = shared(share_1, share_2, root_1, root_2, t_1, t_2)
+        t = torque_between_rays(share_1, share_2, root_1, root_2, t_1, t_2)
         first, weight_2 = max(root_1, LEAST_ROOT), max(root_2, LEAST_ROOT)
         t_slope = (first * d * (t_1 - t) - weight_2 * b * (t_2 - t)) / (turn * (first * share_1 + weight_2 * share_2))
         torque, torque_slope = root * root * t, 2.0 * root * by_n * t + root * root * t_slope
-    speed, shut_torque = floats[at + SPEED], floats[at + STILL]
+    speed, shut_torque = floats[at + SPEED], floats[at + SHUT_VANES]
     torque = least * torque + (1.0 - least) * shut_torque * abs(omega) * omega
     torque_slope = least * torque_slope / speed + 2.0 * (1.0 - least) * shut_torque * abs(omega)
     return root, by_n / speed, by_u / flow_scale, torque, torque_slope
@@ -112,7 +118,7 @@ def chart_at(floats, at, opening, omega, flow):
 def chart_torque(floats, at, opening, omega, flow):
     """Torque on the shaft, positive forward [N m]; with shut vanes, the drag of the water."""
     if opening <= 0.0:
-        return floats[at + STILL] * abs(omega) * omega
+        return floats[at + SHUT_VANES] * abs(omega) * omega
     return chart_at(floats, at, opening, omega, flow)[3]
 
 
@@ -129,14 +135,18 @@ def is_outside(floats, at, opening, omega, flow):
     curves = int(floats[at + CURVES])
     if opening <= 0.0:
         return False
-    k, share, _ = between(floats, at, opening)
+    k, share, _ = opening_share(floats, at, opening)
     flow_scale = floats[at + FLOW] * capacity(floats, at, opening)
-    angle, own = turned(omega / floats[at + SPEED], flow / flow_scale), at + OWN + 2 * curves
-    return not mixed(floats, own, 1, k, share) <= angle <= mixed(floats, own + curves, 1, k, share)
+    angle, own = operating_angle(omega / floats[at + SPEED], flow / flow_scale), at + OWN + 2 * curves
+    return (
+        not interpolate_curves(floats, own, 1, k, share)
+        <= angle
+        <= interpolate_curves(floats, own + curves, 1, k, share)
+    )
 
 
 @njit
-def greatest(floats, at, opening, weight, drop):
+def flow_bound(floats, at, opening, weight, drop):
     """Flow above all flows at a pressure drop and a usual speed [m3/s]."""
     return floats[at + FLOW] * capacity(floats, at, opening) * (1.0 + sqrt(abs(drop) / weight))
 
@@ -147,7 +157,7 @@ def chart_flow(floats, at, opening, omega, weight, stiff, drop, start, flow):
 
     weight : rho g [N/m3]; stiff : decrease of the drop per flow, by the adjacent pipes [Pa s/m3]
     """
-    low, high, scale = -1e300, 1e300, greatest(floats, at, opening, weight, drop)
+    low, high, scale = -1e300, 1e300, flow_bound(floats, at, opening, weight, drop)
     for _ in range(200):
         head, slope = chart_head(floats, at, opening, omega, flow)
         residual = weight * head + stiff * (flow - start) - drop
@@ -183,7 +193,7 @@ def chart_step(floats, at, opening, omega, rho, weight, stiff, g, m, drop, first
     rest = drop - weight * head
     chord = slope * weight / rho
     new = chart_flow(floats, at, opening, omega, weight, stiff * rho, drop, q, first)
-    if abs(new - q) > NEAR * (abs(q) + floats[at + FLOW] * capacity(floats, at, opening)):
+    if abs(new - q) > CHORD_CHANGE * (abs(q) + floats[at + FLOW] * capacity(floats, at, opening)):
         chord = weight * (chart_head(floats, at, opening, omega, new)[0] - head) / (rho * (new - q))
     least = LEAST / sqrt(g)
     if abs(chord) < least:

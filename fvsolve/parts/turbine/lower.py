@@ -12,17 +12,17 @@ from fvsolve.kernels import dtypes as rec
 from fvsolve.model.device_lowering import Device
 from fvsolve.model.inputs import ANGULAR_SPEED, Input, opening_input
 from fvsolve.parts.pump.law import INERTIA, RATED
-from fvsolve.parts.pump.lower_notes import odd_inertia
-from fvsolve.parts.pump.lower_turning import Turning, numbers_of
+from fvsolve.parts.pump.lower_drive import ShaftLowering, numbers_of
+from fvsolve.parts.pump.lower_notes import unusual_inertia
 from fvsolve.parts.turbine import law
 from fvsolve.parts.turbine import law_chart as charts
 from fvsolve.parts.turbine.lower_chart import chart_numbers
 from fvsolve.steady import Edge
 
-SMALL = 1e-6  # pressure difference regarded as zero, over the pressure drops
+FLOW_TOLERANCE = 1e-6  # pressure difference regarded as zero, over the pressure drops
 
 
-class TurbineRows(Turning, Device, kind="turbine"):
+class TurbineRows(ShaftLowering, Device, kind="turbine"):
     """A restriction that follows its hill chart; its initial flow satisfies the chart at the node pressures."""
 
     law = law
@@ -40,8 +40,8 @@ class TurbineRows(Turning, Device, kind="turbine"):
         row["conductance"] = density * draft.floats[row["data"] + charts.FLOW] ** 2 / draft.case.gravity
 
     def numbers(self, draft, name, part) -> list[float]:
-        by_index = self.turning(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
-        return numbers_of(by_index, self.given(draft, name), [])
+        by_index = self.drive_numbers(draft, name, part) | {INERTIA: part.inertia or np.inf, RATED: 1.0}
+        return numbers_of(by_index, self.torque_schedules(draft, name), [])
 
     def energy_rows(self, model, part, row, y, out) -> list[dict[int, float]]:
         return [{int(row["y"]): math.sqrt(0.5 * part.inertia)}] if row["y"] >= 0 else []
@@ -61,7 +61,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
         i, j = int(row["from_node"]), int(row["to_node"])
         row["drive"] = omega = self.speed_at(start, k)
         vanes = float(start.schedule_value(row["schedule"]))
-        row["open"] = g = row["conductance"] * vanes * vanes if vanes * vanes >= law.SHUT else 0.0
+        row["open"] = g = row["conductance"] * vanes * vanes if vanes * vanes >= law.SHUT_SHARE else 0.0
         if g <= 0.0:
             return Edge(i, j, None, 0.0, shut=True)
         if start.rest:
@@ -72,7 +72,7 @@ class TurbineRows(Turning, Device, kind="turbine"):
 
         def newton(flow, present):
             present = float(present * ratio)
-            first = charts.greatest(floats, at, vanes, weight, present)  # finds the greatest of several flows
+            first = charts.flow_bound(floats, at, vanes, weight, present)  # finds the greatest of several flows
             a, s = charts.chart_step(floats, at, vanes, omega, rho, weight, 0.0, float(g), float(flow), present, first)
             return 1.0 / s, ratio, a / s
 
@@ -91,15 +91,18 @@ class TurbineRows(Turning, Device, kind="turbine"):
             at = floats, int(valve["data"]), vanes, float(valve["drive"])
             drop = rho * start.case.gravity * charts.chart_head(*at, float(valve["flow"]) / rho)[0]
             ratio = rho / draft.fluid.density
-            if abs(drop - valve["drop"] * ratio) > SMALL * (abs(drop) + abs(valve["drop"])) + 1e-3:
+            if abs(drop - valve["drop"] * ratio) > FLOW_TOLERANCE * (abs(drop) + abs(valve["drop"])) + 1e-3:
                 moving.append(f"turbine {name}: its flow at the start is not on its hill chart")
                 valve["open"] = 0.0
             elif draft.case.law.linear:
                 valve["drop"] = drop
-        draft.warnings += [*torn(start, name, part, valve), *heavy(start, name, part, valve)]
-        return moving + self.let_go(start, part, row, valve)
+        draft.warnings += [
+            *folded_curve_notice(start, name, part, valve),
+            *unusual_inertia_notice(start, name, part, valve),
+        ]
+        return moving + self.set_free_shaft(start, part, row, valve)
 
-    def asked(self, start, row, valve) -> float:
+    def fluid_torque(self, start, row, valve) -> float:
         rho = start.density_at(int(valve["from_node"]))
         vanes, omega = float(start.schedule_value(valve["schedule"])), float(valve["drive"])
         floats, density_ratio = start.draft.tables.floats, rho / start.draft.fluid.density
@@ -108,10 +111,10 @@ class TurbineRows(Turning, Device, kind="turbine"):
         )
 
 
-def torn(start, name: str, part, valve) -> list[Notice]:
+def folded_curve_notice(start, name: str, part, valve) -> list[Notice]:
     """Notice about a turbine with folded curves between two nodes that are not junctions."""
     ends = (start.nodes["kind"][int(valve[key])] for key in ("from_node", "to_node"))
-    if rec.JUNCTION in ends or not any(map(folds, part.hill_chart.curves)):
+    if rec.JUNCTION in ends or not any(map(has_fold, part.hill_chart.curves)):
         return []
     cause = f"{part.from_} and {part.to} both set their own pressures"
     text = (f"{name}: its hill chart is folded, with several flows at one head, and {cause}: the flow may jump "
@@ -119,7 +122,7 @@ def torn(start, name: str, part, valve) -> list[Notice]:
     return [Notice("range", f"links.{name}", text, "hill_chart")]
 
 
-def heavy(start, name: str, part, valve) -> list[Notice]:
+def unusual_inertia_notice(start, name: str, part, valve) -> list[Notice]:
     """Notice about an inertia far from the usual value at the greatest power of the chart at the initial head."""
     speed, ends = float(np.max(np.abs(part.speed.value))), [int(valve["from_node"]), int(valve["to_node"])]
     if part.inertia is None or speed == 0.0 or start.weight == 0.0:
@@ -128,10 +131,10 @@ def heavy(start, name: str, part, valve) -> list[Notice]:
     unit = max(n * torque for curve in part.hill_chart.curves
                for n, torque in zip(curve.speed, curve.torques(start.weight), strict=True))  # fmt: skip
     power = math.pi / 30.0 * unit * part.diameter**2 * max(high - low, 0.0) ** 1.5
-    return odd_inertia(start.case, name, part.inertia, power, speed) if power > 0.0 else []
+    return unusual_inertia(start.case, name, part.inertia, power, speed) if power > 0.0 else []
 
 
-def folds(curve) -> bool:
+def has_fold(curve) -> bool:
     """True if unit speed in forward rotation rises with the angle somewhere on a curve."""
     points = list(zip(curve.speed, curve.flow, strict=True))
     rising = points[0][0] * points[1][1] > points[0][1] * points[1][0]

@@ -12,9 +12,9 @@ import numpy as np
 
 from fvsolve.parts.turbine import law_chart as law
 
-MERGED = 1e-7  # angle below which two rays are merged [rad]
+ANGLE_TOLERANCE = 1e-7  # angle below which two rays are merged [rad]
 SPACING = math.pi / 24.0  # angle between rays outside the chart where a turning runner pumps in reverse [rad]
-PUMPED = 2.0  # shaft power over hydraulic power there
+PUMP_RATIO = 2.0  # shaft power over hydraulic power there
 STEEPEST = 10.0  # flow over speed up to which the shaft torque rises; the head vanishes beyond
 STANDING, BACKWARD = 0.5 * math.pi, math.pi  # angles of a runner at rest and in backward rotation without flow [rad]
 
@@ -26,12 +26,12 @@ def chart_numbers(part, weight: float) -> list[float]:
     flow = max(q for entry in chart.curves for q in entry.flow) * d * d
     torque_scale = weight * flow / speed
     curves = [nodes_of(entry, part, speed, flow, torque_scale, weight) for entry in chart.curves]
-    rays = merged(np.concatenate([angles for _, angles, *_ in curves]))
+    rays = merge_angles(np.concatenate([angles for _, angles, *_ in curves]))
     directions = np.column_stack([np.cos(rays), np.sin(rays)])
-    tables = [along(directions, rays, *entry[1:5]) for entry in curves]
+    tables = [curve_at_rays(directions, rays, *entry[1:5]) for entry in curves]
     shut_torque = 0.0
-    if chart.still is not None:
-        n11, t11 = chart.still
+    if chart.shut_point is not None:
+        n11, t11 = chart.shut_point
         shut_torque = t11 * d**3 / (n11 * math.pi / 30.0 / d) ** 2
     numbers = [len(curves), len(rays), speed, flow, shut_torque]
     numbers += [entry.opening for entry in chart.curves] + [entry[0] for entry in curves]
@@ -59,13 +59,13 @@ def nodes_of(curve, part, speed: float, flow: float, torque_scale: float, weight
     angle = angle - 2.0 * math.pi * math.floor((angle[0] + STANDING) / (2.0 * math.pi))
     distance = np.hypot(n, u)
     nodes = list(zip(angle, 1.0 / distance, torque, strict=True))
-    nodes = before(nodes[0], n[0], u[0], torque[0], torque_scale * capacity) + nodes
-    nodes += behind(nodes[-1], n[-1], u[-1], torque[-1], torque_scale * capacity)
+    nodes = nodes_before(nodes[0], n[0], u[0], torque[0], torque_scale * capacity) + nodes
+    nodes += nodes_behind(nodes[-1], n[-1], u[-1], torque[-1], torque_scale * capacity)
     angles, roots, torques = (np.array(column) for column in zip(*nodes, strict=True))
     return capacity, angles, np.column_stack([np.cos(angles), np.sin(angles)]), roots, torques, (angle[0], angle[-1])
 
 
-def before(first, n: float, u: float, torque: float, torque_scale: float) -> list:
+def nodes_before(first, n: float, u: float, torque: float, torque_scale: float) -> list:
     """Nodes below the first angle of a curve, down to reverse flow at standstill."""
     angle, root, _ = first
     nodes = []
@@ -73,21 +73,21 @@ def before(first, n: float, u: float, torque: float, torque_scale: float) -> lis
         braked = min(torque, 0.0) - max(torque, 0.0) * (1.0 / root - n) / n
         nodes = [(0.0, root, braked)]
         angle, torque = 0.0, braked
-    return pumping(angle, root, torque, torque_scale, -1.0)[::-1] + nodes
+    return pump_nodes(angle, root, torque, torque_scale, -1.0)[::-1] + nodes
 
 
-def behind(last, n: float, u: float, torque: float, torque_scale: float) -> list:
+def nodes_behind(last, n: float, u: float, torque: float, torque_scale: float) -> list:
     """Nodes above the last angle of a curve, up to reverse flow at standstill."""
     angle, root, _ = last
     nodes = []
     if angle < STANDING:
         nodes.append((STANDING, 1.0 / u, 2.0 * max(torque, 0.0)))
     if angle < BACKWARD:
-        return [*nodes, (BACKWARD, 0.0, 0.0), *pumping(0.0, 0.0, 0.0, torque_scale, 1.0)]
-    return pumping(angle - BACKWARD, root, torque, torque_scale, 1.0)
+        return [*nodes, (BACKWARD, 0.0, 0.0), *pump_nodes(0.0, 0.0, 0.0, torque_scale, 1.0)]
+    return pump_nodes(angle - BACKWARD, root, torque, torque_scale, 1.0)
 
 
-def pumping(angle: float, root: float, torque: float, torque_scale: float, direction: float) -> list:
+def pump_nodes(angle: float, root: float, torque: float, torque_scale: float, direction: float) -> list:
     """Nodes from a ray of a turning runner to reverse flow at standstill, where the root is -1.
 
     direction : -1 for forward rotation, 1 for backward. The shaft power is PUMPED times the hydraulic power, plus its
@@ -95,30 +95,34 @@ def pumping(angle: float, root: float, torque: float, torque_scale: float, direc
     """
     first_tilt = -angle if direction < 0.0 else angle
     count = max(2, math.ceil((STANDING - first_tilt) / SPACING))
-    excess = abs(torque) - PUMPED * torque_scale * math.tan(first_tilt)
+    excess = abs(torque) - PUMP_RATIO * torque_scale * math.tan(first_tilt)
     nodes = []
     for tilt in np.linspace(first_tilt, STANDING, count + 1)[1:]:
         ratio = min(math.tan(tilt), STEEPEST)
         nodes.append(
-            (tilt, straight(first_tilt, root, tilt), direction * (PUMPED * torque_scale * ratio + max(excess, 0.0)))
+            (
+                tilt,
+                root_on_line(first_tilt, root, tilt),
+                direction * (PUMP_RATIO * torque_scale * ratio + max(excess, 0.0)),
+            )
         )
     return [(-tilt if direction < 0.0 else BACKWARD + tilt, value, shaft_torque) for tilt, value, shaft_torque in nodes]
 
 
-def straight(first_tilt: float, root: float, tilt: float) -> float:
+def root_on_line(first_tilt: float, root: float, tilt: float) -> float:
     """Root at an angle below the speed axis, on the line from `root` at `first_tilt` to -1 at standstill."""
     share = math.cos(tilt) / math.cos(first_tilt)
     return share * root - (math.sin(tilt) - share * math.sin(first_tilt))
 
 
-def merged(angles: np.ndarray) -> np.ndarray:
+def merge_angles(angles: np.ndarray) -> np.ndarray:
     """Ascending angles from reverse flow at standstill once around, close angles merged."""
-    inner = np.sort(angles[(angles > -STANDING + MERGED) & (angles < 3.0 * STANDING - MERGED)])
-    distinct = inner[np.concatenate([[True], np.diff(inner) > MERGED])]
+    inner = np.sort(angles[(angles > -STANDING + ANGLE_TOLERANCE) & (angles < 3.0 * STANDING - ANGLE_TOLERANCE)])
+    distinct = inner[np.concatenate([[True], np.diff(inner) > ANGLE_TOLERANCE])]
     return np.concatenate([[-STANDING], distinct, [3.0 * STANDING]])
 
 
-def along(
+def curve_at_rays(
     ray_directions: np.ndarray, rays: np.ndarray, angles, directions, roots, torques
 ) -> tuple[np.ndarray, np.ndarray]:
     """(roots, torques over head) of a curve on all rays, on the straight lines between its own rays."""
@@ -129,5 +133,5 @@ def along(
     root = share_1 * roots[i] + share_2 * roots[i + 1]
     torque = (weights[0] * torques[i] + weights[1] * torques[i + 1]) / (weights[0] + weights[1])
     nearest = np.abs(rays[:, None] - angles).argmin(axis=1)
-    is_own = np.abs(rays - angles[nearest]) <= MERGED
+    is_own = np.abs(rays - angles[nearest]) <= ANGLE_TOLERANCE
     return np.where(is_own, roots[nearest], root), np.where(is_own, torques[nearest], torque)

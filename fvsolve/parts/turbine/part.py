@@ -14,7 +14,7 @@ from fvsolve.parts.schedule import Schedule, Scheduled, constant
 from fvsolve.parts.turbine.hill_chart import HillChart, HillChartValue, OpeningCurve
 from fvsolve.parts.value import VALUE, Quantity, UsualRange, anything, between, positive
 
-RUNNERS = UsualRange(0.05, 12.0, "pico turbines to great Kaplan runners")
+RUNNER_DIAMETERS = UsualRange(0.05, 12.0, "pico turbines to great Kaplan runners")
 ROUNDING = 1e-9  # tolerance, over the power of the water
 
 
@@ -31,7 +31,9 @@ class Turbine(TwoPort, kind="turbine"):
         "opening": "number",
     }  # fmt: skip
 
-    diameter: Annotated[float, Quantity("length", positive, "runner diameter D, as in the hill chart [m]", RUNNERS)]
+    diameter: Annotated[
+        float, Quantity("length", positive, "runner diameter D, as in the hill chart [m]", RUNNER_DIAMETERS)
+    ]
     hill_chart: Annotated[HillChart, HillChartValue()]
     speed: Annotated[
         Schedule, Scheduled("angular_velocity", anything, "speed held by the generator, positive forward [rad/s]")
@@ -64,11 +66,11 @@ class Turbine(TwoPort, kind="turbine"):
             return
         weight = around.fluid.density * around.gravity
         for curve in self.hill_chart.curves:
-            if (text := overdrawn(curve, weight)) is not None:
+            if (text := excess_power_point(curve, weight)) is not None:
                 yield ("hill_chart",), f"opening {curve.opening:g}: {text}"
 
 
-def overdrawn(curve: OpeningCurve, weight: float) -> str | None:
+def excess_power_point(curve: OpeningCurve, weight: float) -> str | None:
     """Text about the first point or line where the shaft power exceeds the hydraulic power; None without such."""
     points = list(zip(curve.speed, curve.flow, (t * pi / 30.0 for t in curve.torques(weight)), strict=True))
     for n, q, t in points:

@@ -54,7 +54,7 @@ class Characteristic:
         return {"opening": self.opening.tolist(), "flow_area": self.flow_area.tolist()}
 
 
-class Trim(Value):
+class CharacteristicValue(Value):
     """Characteristic of a valve: a name or a table."""
 
     about = "relative flow area over opening"
@@ -184,4 +184,4 @@ class Valve(Sized, TwoPort, kind="valve"):
     opening: Annotated[Schedule, Scheduled("number", between(0, 1), "stem position, 0 shut to 1 open")] = Field(
         default_factory=lambda: constant(1.0)
     )
-    characteristic: Annotated[Any, Trim()] = "linear"
+    characteristic: Annotated[Any, CharacteristicValue()] = "linear"

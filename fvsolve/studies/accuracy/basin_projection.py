@@ -29,7 +29,7 @@ def unit_of(case, variable: str) -> str | None:
     node = case.nodes.get(name)
     if not quantity or node is None or node.kind != "basin":
         return None
-    return node.own.states.get(quantity, "-")
+    return node.physics_type.states.get(quantity, "-")
 
 
 def project_to(fine, values, coarse) -> np.ndarray:

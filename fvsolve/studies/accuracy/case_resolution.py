@@ -129,7 +129,7 @@ def order_varies(case) -> bool:
     Free surfaces in the plane fall to second order, along one axis they do not.
     """
     fifth = scheme_order(case) > BASIN_ORDER
-    return fifth and any(basin.own.steep for basin in basins(case).values())
+    return fifth and any(basin.physics_type.has_shocks for basin in basins(case).values())
 
 
 def has_initial_jump(case, coarse: Mapping, fine: Mapping) -> bool:

@@ -42,7 +42,11 @@ def level_names(case) -> list[str]:
 
 def sloshing_basins(case) -> dict[str, Any]:
     """Basins with a free surface that are mounted on bodies."""
-    return {name: node for name, node in case.nodes.items() if node.kind == "basin" and node.on and node.own.sloshes}
+    return {
+        name: node
+        for name, node in case.nodes.items()
+        if node.kind == "basin" and node.on and node.physics_type.has_modes
+    }
 
 
 def finer_levels(case, doublings: int) -> list[str]:

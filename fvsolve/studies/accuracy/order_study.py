@@ -227,7 +227,7 @@ class OrderStudy:
         if self.plan.way == "time" or not breaks:
             return dict.fromkeys(NORMS, np.nan if self.plan.way != "time" and order_varies(self.case) else p)
         s = 0.0 if any(jumps for _, jumps in breaks) else 1.0
-        if s == 0.0 and any(basin.own.steep for basin in basins(self.case).values()):
+        if s == 0.0 and any(basin.physics_type.has_shocks for basin in basins(self.case).values()):
             return {"L1": 1.0, "L2": 0.5, "max": 0.0}  # bores remain steep
         return {"L1": (s + 1) * p / (p + 1), "L2": (s + 0.5) * p / (p + 1), "max": s * p / (p + 1)}
 

@@ -65,7 +65,7 @@ class Linear:
     @property
     def state_units(self) -> list[str]:
         """Units of x."""
-        names, basins = set(self.states), {basin.name: basin.part.own.states for basin in self.at.model.basins}
+        names, basins = set(self.states), {basin.name: basin.part.physics_type.states for basin in self.at.model.basins}
         return [
             basins[part].get(quantity.split("[")[0], "-") if part in basins
             else state_unit(name, f"{part}.opening" in names)

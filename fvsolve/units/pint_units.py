@@ -8,7 +8,9 @@ from collections.abc import Mapping
 
 from fvsolve.units.spellings import DIMENSIONS, Unit
 
-_ASKABLE = re.compile(r"\(?[^\W\d]+(?: ?(?:\*\*|\^)? ?-?\d)?\)?(?: ?[*/ ] ?\(?[^\W\d]+(?:(?:\*\*|\^)?-?\d)?\)?){0,5}")
+_SAFE_SPELLING = re.compile(
+    r"\(?[^\W\d]+(?: ?(?:\*\*|\^)? ?-?\d)?\)?(?: ?[*/ ] ?\(?[^\W\d]+(?:(?:\*\*|\^)?-?\d)?\)?){0,5}"
+)
 
 BASE = {
     "[length]": "m", "[mass]": "kg", "[time]": "s", "[current]": "A", "[temperature]": "K", "[substance]": "mol",
@@ -16,9 +18,9 @@ BASE = {
 }  # fmt: skip
 
 
-def ask_pint(spelling: str) -> Unit | None:
+def pint_unit(spelling: str) -> Unit | None:
     """Unit outside the table, by pint; None if pint does not know it."""
-    if not _ASKABLE.fullmatch(spelling):  # pint would compute 9**9**9
+    if not _SAFE_SPELLING.fullmatch(spelling):  # pint would compute 9**9**9
         return None
     import pint
 
@@ -41,10 +43,10 @@ def ask_pint(spelling: str) -> Unit | None:
 def base_units(dimensionality: Mapping[str, float]) -> str:
     """Base units of a quantity in alphabetical order, "kg·m²/s³"; the order of pint changes with its version."""
     powers = sorted((BASE.get(name, name), power) for name, power in dimensionality.items())
-    over = "·".join(unit + raised(power) for unit, power in powers if power > 0) or "1"
-    return "/".join([over, *(unit + raised(-power) for unit, power in powers if power < 0)])
+    over = "·".join(unit + superscript(power) for unit, power in powers if power > 0) or "1"
+    return "/".join([over, *(unit + superscript(-power) for unit, power in powers if power < 0)])
 
 
-def raised(power: float) -> str:
+def superscript(power: float) -> str:
     """Superscript text of a power; empty for 1."""
     return "" if power == 1 else f"{power:g}".translate(str.maketrans("0123456789.-", "⁰¹²³⁴⁵⁶⁷⁸⁹·⁻"))

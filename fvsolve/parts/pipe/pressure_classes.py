@@ -20,9 +20,12 @@ EN_545 = "EN 545:2010, brochure of Duktus"
 K_SOURCES = "ISO 2531, EN 545: Winsen DCI, Dimensions and pressure ratings; Aquaflo and SLR Pipeline, tables of K9"
 PE_SOURCES = "ISO 4427: PE100+ Association, SDR; Firat, PE pipe technical informations (MRS, C = 1.25 for water)"
 STRENGTH, SAFETY = 420.0, 3.0  # tensile strength of ductile iron [MPa], and safety factor of EN 545
-HIGHEST = 64.0  # greatest allowable pressure of K classes [bar]
-MRS, DESIGN = {"PE80": 8.0, "PE100": 10.0}, 1.25  # minimum required strength [MPa], and design coefficient C for water
-SERIES = (6.0, 41.0)  # least and greatest SDR
+MAX_PRESSURE = 64.0  # greatest allowable pressure of K classes [bar]
+MRS, DESIGN_COEFFICIENT = (
+    {"PE80": 8.0, "PE100": 10.0},
+    1.25,
+)  # minimum required strength [MPa], and design coefficient C for water
+SDR_RANGE = (6.0, 41.0)  # least and greatest SDR
 BAR = 1e5
 
 # DN, outer diameter and least walls of class 25, 30, 40, 50, 64, 100 [mm]; - is a size that is not in the brochure
@@ -46,7 +49,7 @@ DUCTILE = """
 PRESSURES = (25, 30, 40, 50, 64, 100)
 
 
-class Rated(NamedTuple):
+class ClassSize(NamedTuple):
     """Bore and wall [m], allowable pressure [Pa, gauge] where known, and source of a class at a nominal size."""
 
     diameter: float
@@ -55,7 +58,7 @@ class Rated(NamedTuple):
     source: str
 
 
-class NoSize(ValueError):
+class UnknownSize(ValueError):
     """Unknown nominal size of a class."""
 
 
@@ -74,7 +77,7 @@ IRON, PLASTIC = re.compile(r"(K|C|CLASS)(\d+)"), re.compile(r"(SDR|PN)(\d+(?:\.\
 SCHEDULE = re.compile(r"(?:schedule|sch\.?)\s*(\w+)", re.IGNORECASE)
 
 
-def rated(name: str, nominal: str, material: str | None) -> Rated:
+def class_size(name: str, nominal: str, material: str | None) -> ClassSize:
     """Size data of a class at a nominal size; ValueError for an unknown class or a size without data."""
     text = name.strip().upper().replace(" ", "")
     if match := IRON.fullmatch(text):
@@ -83,10 +86,10 @@ def rated(name: str, nominal: str, material: str | None) -> Rated:
         return _ductile(match[1][0], int(match[2]), name, _size(nominal))
     if match := PLASTIC.fullmatch(text):
         return _plastic(match[1], float(match[2]), name, _size(nominal), material)
-    raise ValueError(no_class(name))
+    raise ValueError(unknown_class(name))
 
 
-def no_class(name: str) -> str | None:
+def unknown_class(name: str) -> str | None:
     """Fault text of a name that is not a class of any material; None for a known class."""
     text = name.strip().upper().replace(" ", "")
     if IRON.fullmatch(text) or PLASTIC.fullmatch(text) or SCHEDULE.fullmatch(name.strip()):
@@ -98,11 +101,11 @@ def no_class(name: str) -> str | None:
 def _size(nominal: str) -> float:
     match = re.fullmatch(r"D[NE]?\s*(\d+(?:\.\d+)?)", nominal.strip(), re.IGNORECASE)
     if match is None:
-        raise NoSize(f'{show(nominal)} is not a nominal size of a class; expected for example "DN300"')
+        raise UnknownSize(f'{show(nominal)} is not a nominal size of a class; expected for example "DN300"')
     return float(match[1])
 
 
-def _ductile(series: str, number: int, name: str, size: float) -> Rated:
+def _ductile(series: str, number: int, name: str, size: float) -> ClassSize:
     if size not in ductile():
         nearest = sorted(ductile(), key=lambda dn: abs(dn - size))[:3]
         raise ValueError(
@@ -114,7 +117,7 @@ def _ductile(series: str, number: int, name: str, size: float) -> Rated:
             raise ValueError(f"unknown class {show(name)}; expected K7 to K14")
         wall = max(number * (0.5 + 0.001 * size), 6.0)
         least = wall - spare
-        allowable = min(20.0 * least * STRENGTH / ((outer - least) * SAFETY), HIGHEST)
+        allowable = min(20.0 * least * STRENGTH / ((outer - least) * SAFETY), MAX_PRESSURE)
         source = f"K{number} DN{size:g}: wall {wall:g} mm, K (0.5 + 0.001 DN), at least 6 mm; {K_SOURCES}"
     elif number not in walls:
         available = [f"C{pressure}" for pressure in walls]
@@ -122,19 +125,21 @@ def _ductile(series: str, number: int, name: str, size: float) -> Rated:
     else:
         wall, allowable = walls[number] + spare, float(number)
         source = f"C{number} DN{size:g}: wall at least {walls[number]:g} mm, nominal wall {spare:g} mm more; {EN_545}"
-    return Rated(1e-3 * (outer - 2.0 * wall), 1e-3 * wall, BAR * allowable, source)
+    return ClassSize(1e-3 * (outer - 2.0 * wall), 1e-3 * wall, BAR * allowable, source)
 
 
-def _plastic(series: str, number: float, name: str, size: float, material: str | None) -> Rated:
+def _plastic(series: str, number: float, name: str, size: float, material: str | None) -> ClassSize:
     strength = MRS.get(material or "")
     if series == "PN" and strength is None:
         raise ValueError(f"the wall of {name} is known only for {listing(list(MRS))}. Expected such a material, or "
                          "the SDR and allowable_pressure")  # fmt: skip
-    ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN * number)
-    if not SERIES[0] <= ratio <= SERIES[1]:
-        raise ValueError(f"{name} has SDR {ratio:g} (diameter over wall). Expected {SERIES[0]:g} to {SERIES[1]:g}")
+    ratio = number if series == "SDR" else 1.0 + 20.0 * strength / (DESIGN_COEFFICIENT * number)
+    if not SDR_RANGE[0] <= ratio <= SDR_RANGE[1]:
+        raise ValueError(
+            f"{name} has SDR {ratio:g} (diameter over wall). Expected {SDR_RANGE[0]:g} to {SDR_RANGE[1]:g}"
+        )
     wall = size / ratio
-    allowable = None if strength is None else BAR * 20.0 * strength / (DESIGN * (ratio - 1.0))
+    allowable = None if strength is None else BAR * 20.0 * strength / (DESIGN_COEFFICIENT * (ratio - 1.0))
     source = f"{name} of {size:g} mm outer diameter: wall d / SDR, SDR {ratio:.4g}"
     source += f"; {PE_SOURCES}" if strength else "; no source for its allowable pressure"
-    return Rated(1e-3 * (size - 2.0 * wall), 1e-3 * wall, allowable, source)
+    return ClassSize(1e-3 * (size - 2.0 * wall), 1e-3 * wall, allowable, source)

@@ -26,7 +26,7 @@ class Creep:
 
 
 @dataclass(frozen=True)
-class Positives(Value):
+class PositiveList(Value):
     """A list of numbers above 0, one for each element."""
 
     dimension: str
@@ -44,7 +44,7 @@ class Positives(Value):
         return {"type": "array", "items": {"type": ["number", "string"]}}
 
 
-LISTS = {"compliance": (Positives("compliance"), NEEDED), "time": (Positives("time"), NEEDED)}
+CREEP_KEYS = {"compliance": (PositiveList("compliance"), NEEDED), "time": (PositiveList("time"), NEEDED)}
 
 
 class Elements(Value):
@@ -59,14 +59,14 @@ class Elements(Value):
             return given
         if not isinstance(given, dict):
             raise ValueError(f"{show(given)} is not a table; expected {{ compliance = [1e-10], time = [0.05] }}")
-        creep = Creep(**read_keys(given, LISTS, setting))
+        creep = Creep(**read_keys(given, CREEP_KEYS, setting))
         if len(creep.compliance) != len(creep.time):
             sizes = f"{len(creep.compliance)} of compliance and {len(creep.time)} of time"
             raise ValueError(f"{sizes}; expected one compliance and one time for each element")
         return creep
 
     def below(self, key: str) -> Value | None:
-        return LISTS[key][0]
+        return CREEP_KEYS[key][0]
 
     def json(self) -> dict[str, Any]:
-        return keys_json(LISTS)
+        return keys_json(CREEP_KEYS)

@@ -10,10 +10,10 @@ import numpy as np
 from fvsolve.parts.value import Matrix, ReadContext, Rows, Value, ValueFault, nonnegative
 from fvsolve.units import show
 
-SLACK = 1e-6  # share of the largest moment: tolerance of the triangle inequality for numbers of six digits
+MOMENT_TOLERANCE = 1e-6  # share of the largest moment: tolerance of the triangle inequality for numbers of six digits
 
 
-class PlacesByName(Value):
+class NamedPoints(Value):
     """A table of points by name."""
 
     takes = "`{ NAME = [x, y, z] }`"
@@ -59,11 +59,11 @@ class Inertia(Value):
             )
         if any(isinstance(row, (list, tuple)) for row in given):
             inertia = Matrix("inertia").read(given, setting)
-            moments = principal(inertia)
+            moments = principal_moments(inertia)
         else:
             inertia = Rows("inertia", nonnegative, length=3).read(given, setting)
             moments = np.sort(inertia)
-        if moments[2] > moments[0] + moments[1] + SLACK * moments[2]:
+        if moments[2] > moments[0] + moments[1] + MOMENT_TOLERANCE * moments[2]:
             text = ", ".join(f"{moment:.4g}" for moment in moments)
             raise ValueError(f"moments of {text} kg m2 are not possible: the largest exceeds the sum of the other two")
         return inertia
@@ -75,12 +75,12 @@ class Inertia(Value):
         return {"anyOf": [Rows("inertia", length=3).json(), Matrix("inertia").json()]}
 
 
-def principal(rows: tuple) -> np.ndarray:
+def principal_moments(rows: tuple) -> np.ndarray:
     """Principal moments, ascending; ValueError if the matrix is not symmetric or a moment is negative."""
     matrix = np.array(rows)
-    if np.abs(matrix - matrix.T).max() > SLACK * np.abs(matrix).max():
+    if np.abs(matrix - matrix.T).max() > MOMENT_TOLERANCE * np.abs(matrix).max():
         raise ValueError(f"{show(rows)} is not symmetric; expected the moments, and minus the products of inertia")
     moments = np.linalg.eigvalsh(matrix)
-    if moments[0] < -SLACK * moments[2]:
+    if moments[0] < -MOMENT_TOLERANCE * moments[2]:
         raise ValueError(f"has a principal moment of {moments[0]:.4g} kg m2; expected all at least 0")
     return moments

@@ -6,10 +6,10 @@ from fvsolve.kernels.schedule_pieces import value_with_limit
 from fvsolve.parts import Schedule
 from fvsolve.parts.pump import law
 
-SNAP = 1e-12  # sum of the torques on a shaft regarded as rounding, over their magnitudes
+ROUNDING_SHARE = 1e-12  # sum of the torques on a shaft regarded as rounding, over their magnitudes
 
 
-class Turning:
+class ShaftLowering:
     """Base of restrictions with a shaft; `small` : scale of the speed state."""
 
     small = 1.0
@@ -20,14 +20,14 @@ class Turning:
     def scales(self, draft, name, part) -> list[float]:
         return [self.small for _ in self.states_of(draft, name, part)]
 
-    def turning(self, draft, name, part) -> dict[int, float]:
+    def drive_numbers(self, draft, name, part) -> dict[int, float]:
         """Numbers of the drive, without inertia and rated speed; also sets the speed schedule of the device row."""
         torques = torques_on(draft.case, name)
-        mode = law.TURNED if torques else law.HELD_SPEED if part.trip is None else law.TRIPPING
+        mode = law.TORQUE_DRIVEN if torques else law.HELD_SPEED if part.trip is None else law.TRIPPING
         draft.device_table["schedule"][draft.device_names.index(name)] = draft.schedules.add(part.speed)
-        return {law.MODE: mode, law.TRIP: self.trip(draft, name, part), law.GIVEN: len(torques)}
+        return {law.MODE: mode, law.TRIP: self.trip(draft, name, part), law.TORQUE_COUNT: len(torques)}
 
-    def given(self, draft, name) -> list[float]:
+    def torque_schedules(self, draft, name) -> list[float]:
         """Pairs (schedule, value at the start) of the given torques."""
         return [x for torque in torques_on(draft.case, name) for x in (draft.schedules.add(torque.torque), 0.0)]
 
@@ -48,28 +48,28 @@ class Turning:
         row = start.draft.device_table[start.valves[k]["device"]]
         return start.schedule_value(row["schedule"])
 
-    def asked(self, start, row, valve) -> float:
+    def fluid_torque(self, start, row, valve) -> float:
         """Torque of the fluid on the shaft at the start [N m]."""
         raise NotImplementedError
 
-    def let_go(self, start, part, row, valve) -> list[str]:
+    def set_free_shaft(self, start, part, row, valve) -> list[str]:
         """Store the initial speed of a free shaft and its unbalanced torque; return texts about its acceleration."""
         draft, floats, at = start.draft, start.draft.tables.floats, int(row["data"])
         name = draft.valve_names[row["valve"]]
         if floats[at + law.MODE] == law.TRIPPING:
             trip = float(part.trip)
             tables = draft.tables.schedules, draft.tables.pieces
-            floats[at + law.HELD] = value_with_limit(*tables, int(row["schedule"]), trip, trip)
-        if floats[at + law.MODE] != law.TURNED:
+            floats[at + law.START_SPEED] = value_with_limit(*tables, int(row["schedule"]), trip, trip)
+        if floats[at + law.MODE] != law.TORQUE_DRIVEN:
             return []
-        braking = self.asked(start, row, valve)
+        braking = self.fluid_torque(start, row, valve)
         first, total = at + law.OWN_NUMBERS, 0.0
-        for k in range(int(floats[at + law.GIVEN])):
+        for k in range(int(floats[at + law.TORQUE_COUNT])):
             value = start.schedule_value(floats[first + 2 * k])
             floats[first + 2 * k + 1], total = value, total + value
-        rest = total - braking if abs(total - braking) > SNAP * (abs(total) + abs(braking)) else 0.0
+        rest = total - braking if abs(total - braking) > ROUNDING_SHARE * (abs(total) + abs(braking)) else 0.0
         speed = float(valve["drive"])
-        floats[at + law.HELD], floats[at + law.TORQUE], floats[at + law.OFFSET] = speed, braking, rest
+        floats[at + law.START_SPEED], floats[at + law.TORQUE], floats[at + law.OFFSET] = speed, braking, rest
         rise = rest / part.inertia
         return [f"{part.kind} {name}: its shaft accelerates by {rise:.4g} rad/s2"] if rest != 0.0 else []
 

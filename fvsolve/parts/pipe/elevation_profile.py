@@ -12,7 +12,7 @@ from fvsolve.parts.time_series import copy_name, find_file
 from fvsolve.parts.value import ReadContext, Rows, Value, ValueFault, check_increasing
 from fvsolve.units import show
 
-FORMS = (("chainage", "elevation"), ("x", "y", "z"))
+COLUMN_SETS = (("chainage", "elevation"), ("x", "y", "z"))
 AXES = "x, y, z"
 
 
@@ -26,7 +26,7 @@ class Profile:
 
     chainage: np.ndarray
     elevation: np.ndarray
-    said: dict[str, Any]
+    given: dict[str, Any]
     plan: np.ndarray | None = None
 
     @property
@@ -43,7 +43,7 @@ class Profile:
         """Elevation at distances from the start [m]."""
         return np.interp(distance, self.distance, self.elevation)
 
-    def seen(self, distance: np.ndarray) -> np.ndarray:
+    def plan_at(self, distance: np.ndarray) -> np.ndarray:
         """x and y at distances from the start : float64[m, 2] [m]."""
         return np.column_stack([np.interp(distance, self.distance, axis) for axis in self.plan.T])
 
@@ -54,14 +54,14 @@ class Profile:
         cut = np.concatenate([[begin], d[inside], [end]])
         chainage, elevation = cut + self.chainage[0], self.at(cut)
         table = {"chainage": chainage.tolist(), "elevation": elevation.tolist()}
-        return Profile(chainage, elevation, table, None if self.plan is None else self.seen(cut))
+        return Profile(chainage, elevation, table, None if self.plan is None else self.plan_at(cut))
 
     def table(self) -> dict[str, Any]:
         """The table as in a case file."""
-        return self.said
+        return self.given
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Profile) and self.said == other.said
+        return isinstance(other, Profile) and self.given == other.given
 
     __hash__ = None
 
@@ -88,14 +88,14 @@ class ProfileValue(Value):
             profile = Profile(np.concatenate([[0.0], np.cumsum(steps)]), columns["z"], table, plan)
         else:
             profile = Profile(columns["chainage"], columns["elevation"], table)
-            steep(profile)
+            check_slope(profile)
         return profile
 
     def json(self) -> dict[str, Any]:
         return {"type": "object"}
 
 
-def steep(profile: Profile) -> None:
+def check_slope(profile: Profile) -> None:
     """Raise ValueError where a section rises more than its length."""
     lengths, rises = np.diff(profile.chainage), np.abs(np.diff(profile.elevation))
     if (rises > lengths * (1.0 + 1e-9)).any():
@@ -108,7 +108,7 @@ def steep(profile: Profile) -> None:
 
 def from_lists(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Columns [m] from lists of equal length, and the table of the case file."""
-    keys = form_of(list(given), "keys")
+    keys = columns_among(list(given), "keys")
     columns, faults = {}, [((key,), f"unknown key; expected {' and '.join(keys)}") for key in given if key not in keys]
     for key in keys:
         try:
@@ -139,7 +139,7 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
     try:
         path = find_file(given["file"], setting)
         rows = read_rows(path)
-        keys = form_of([name.casefold() for name in rows.names], f"columns of {path.name}")
+        keys = columns_among([name.casefold() for name in rows.names], f"columns of {path.name}")
         names = {name.casefold(): name for name in rows.names}
         columns = {key: rows.numbers(rows.column(names[key], 0), "length") for key in keys}
         if len(columns[keys[0]]) < 2:
@@ -152,9 +152,9 @@ def from_file(given: dict[str, Any], setting: ReadContext) -> tuple[dict[str, np
     return columns, {"file": copy_name(path, setting)}
 
 
-def form_of(names: list[str], source: str) -> tuple[str, ...]:
+def columns_among(names: list[str], source: str) -> tuple[str, ...]:
     """Names of the columns, chainage and elevation or x, y, z; ValueError where neither set is complete."""
-    for keys in FORMS:
+    for keys in COLUMN_SETS:
         if set(keys) <= set(names):
             return keys
     raise ValueError(f"{source} are {', '.join(names) or 'none'}; expected chainage and elevation, or {AXES}")

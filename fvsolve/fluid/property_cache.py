@@ -12,27 +12,29 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from fvsolve.fluid.coolprop import ask
-from fvsolve.fluid.table import FluidTable
+from fvsolve.fluid.coolprop import coolprop_properties
+from fvsolve.fluid.isentrope_table import FluidTable
 from fvsolve.jit import cache_folder
 
 FORMAT = 1  # version of file format and contents; increase it when either changes
 
 
-def cached(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
+def cached_properties(name: str, temperature: float, pressure: float, law: str) -> dict[str, Any]:
     """CoolProp properties, from disk if cached; a cache hit does not import CoolProp."""
-    key = json.dumps([FORMAT, coolprop(), name, temperature, pressure, law])
+    key = json.dumps([FORMAT, coolprop_version(), name, temperature, pressure, law])
     stem = re.sub(r"[^A-Za-z0-9.-]+", "-", name)[:40]
     path = cache_folder() / "fluids" / f"{stem}-{hashlib.sha256(key.encode()).hexdigest()[:24]}.json"
     properties = _read(path, key)
     if properties is None:
-        properties = ask(name, temperature, pressure, law) | {"source": f"CoolProp {coolprop()}"}
+        properties = coolprop_properties(name, temperature, pressure, law) | {
+            "source": f"CoolProp {coolprop_version()}"
+        }
         _write(path, key, properties)
     return properties
 
 
 @functools.cache
-def coolprop() -> str:
+def coolprop_version() -> str:
     """Version of CoolProp, without importing it."""
     from importlib.metadata import version
 

@@ -6,13 +6,13 @@ import math
 from itertools import pairwise
 
 LEAST = 1e-3  # least valid unit speed, unit flow and opening
-NEAR = 1e-6  # angle between points regarded as zero [rad]
+ANGLE_TOLERANCE = 1e-6  # angle between points regarded as zero [rad]
 SPEED, FLOW, EFFICIENCY, TORQUE = "unit_speed", "unit_flow", "efficiency", "unit_torque"
 
 
-def faults_of_still(curve) -> list[tuple[str, str]]:
+def faults_of_shut(curve) -> list[tuple[str, str]]:
     """Faults of the curve of opening 0, shut vanes."""
-    if not len(curve.speed) == len(curve.flow) == len(curve.value) == 1 or curve.word != TORQUE:
+    if not len(curve.speed) == len(curve.flow) == len(curve.value) == 1 or curve.quantity != TORQUE:
         return [("", f"vanes at opening 0 are shut; expected no curve, or a single point with a {TORQUE}")]
     faults = [(FLOW, f"{curve.flow[0]:g} is a flow through shut vanes; expected 0")] * (curve.flow[0] != 0.0)
     if not curve.speed[0] >= LEAST:
@@ -25,45 +25,50 @@ def faults_of_still(curve) -> list[tuple[str, str]]:
 def faults_of_curve(curve) -> list[tuple[str, str]]:
     """Faults of the points of an opening above 0."""
     if not len(curve.speed) == len(curve.flow) == len(curve.value):
-        counts = f"{len(curve.speed)} of {SPEED}, {len(curve.flow)} of {FLOW}, {len(curve.value)} of {curve.word}"
+        counts = f"{len(curve.speed)} of {SPEED}, {len(curve.flow)} of {FLOW}, {len(curve.value)} of {curve.quantity}"
         return [("", f"{counts}; expected equal numbers")]
     if len(curve.speed) < 2:
         return [("", "has one point; expected at least two")]
     points, faults = list(zip(curve.speed, curve.flow, strict=True)), []
     if curve.opening < LEAST:
         faults.append(("opening", f"{curve.opening:g} is almost shut; expected at least {LEAST:g}, or 0"))
-    if curve.word == EFFICIENCY and not all(n > 0.0 and q > 0.0 for n, q in points):
+    if curve.quantity == EFFICIENCY and not all(n > 0.0 and q > 0.0 for n, q in points):
         k = next(k for k, (n, q) in enumerate(points) if not (n > 0.0 and q > 0.0))
         faults.append(
-            (EFFICIENCY, f"gives no torque at point {k + 1}, {at(points[k])}; expected {TORQUE} for such points")
+            (
+                EFFICIENCY,
+                f"gives no torque at point {k + 1}, {point_text(points[k])}; expected {TORQUE} for such points",
+            )
         )
     if not any(q >= LEAST for _, q in points):
         faults.append((FLOW, f"is nowhere {LEAST:g} or more; flow that drives the turbine is positive"))
     if (dead := next((p for p in points if p[0] == 0.0 and p[1] <= 0.0), None)) is not None:
-        faults.append(("", f"{at(dead)} is not a valid point: no head drives reverse flow through a runner at rest"))
-    return faults or turns(points)
+        faults.append(
+            ("", f"{point_text(dead)} is not a valid point: no head drives reverse flow through a runner at rest")
+        )
+    return faults or angle_faults(points)
 
 
-def turns(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
+def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
     """Fault of points whose angle about the origin is not monotonic, or that cross reverse flow at rest."""
     way = 0.0
     for k, ((n, q), (m, r)) in enumerate(pairwise(points)):
         across = n * r - q * m
-        if abs(across) <= NEAR * math.hypot(n, q) * math.hypot(m, r):
-            return [("", f"points {k + 1} and {k + 2}, {at((n, q))} and {at((m, r))}, are in line with the origin; "
+        if abs(across) <= ANGLE_TOLERANCE * math.hypot(n, q) * math.hypot(m, r):
+            return [("", f"points {k + 1} and {k + 2}, {point_text((n, q))} and {point_text((m, r))}, are in line with the origin; "
                          f"expected different angles, atan2({FLOW}, {SPEED})")]  # fmt: skip
         if across * way < 0.0:
             rule = f"its angle, atan2({FLOW}, {SPEED}), must rise or fall throughout: give the points in their order"
-            return [("", f"turns back at point {k + 1}, {at((n, q))}; a curve may fold in {SPEED}, but {rule}")]
+            return [("", f"turns back at point {k + 1}, {point_text((n, q))}; a curve may fold in {SPEED}, but {rule}")]
         way = across
         if (n > 0.0) != (m > 0.0) and (q * abs(m) + r * abs(n)) <= 0.0:
-            return [("", f"passes from {at((n, q))} to {at((m, r))} across reverse flow through a runner at rest, "
+            return [("", f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at rest, "
                          "which no head drives")]  # fmt: skip
     if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:
         return [(SPEED, f"is below {LEAST:g} at the end of least angle; a turbine drives at forward speed")]
     return []
 
 
-def at(point: tuple[float, float]) -> str:
+def point_text(point: tuple[float, float]) -> str:
     """Text of a point."""
     return f"({point[0]:g}, {point[1]:g})"

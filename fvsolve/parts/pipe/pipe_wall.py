@@ -6,14 +6,14 @@ from collections.abc import Iterator
 from typing import Annotated, Any
 
 from fvsolve.errors import did_you_mean
-from fvsolve.parts.pipe.creep import Creep, Elements
+from fvsolve.parts.pipe.creep_keys import Creep, Elements
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import BY_CELLS, Number, Quantity, ReadContext, UsualRange, Value, between, positive
 from fvsolve.units import parse, show
 
 MODULI = UsualRange(1e5, 1.2e12, "soft rubber to diamond")
 THICKNESS = UsualRange(1e-6, 2.0, "foils to lined rock")
-THIN = 25.0  # least bore over wall of a thin wall, Wylie, Streeter and Suo 1993
+THIN_WALL = 25.0  # least bore over wall of a thin wall, Wylie, Streeter and Suo 1993
 RESTRAINTS = ("joints", "upstream", "anchored")
 POISSON = "poisson_ratio"
 
@@ -40,7 +40,7 @@ class Lining(Table):
     thickness: Annotated[float, Quantity("length", positive, "thickness of the lining [m]", THICKNESS, BY_CELLS)]
 
 
-class OfCatalogue(Value):
+class MaterialName(Value):
     """Name of a material of the catalogue."""
 
     about = "material of the wall: sets modulus, Poisson's ratio and roughness, where a source is known"
@@ -53,14 +53,14 @@ class OfCatalogue(Value):
         return list(materials())
 
     def read(self, given: Any, setting: ReadContext) -> str:
-        from fvsolve.parts.pipe.materials import UNREAD
+        from fvsolve.parts.pipe.materials import WITHOUT_SOURCE
 
         if isinstance(given, str) and given in self.names:
             return given
         if not isinstance(given, str):
             raise ValueError(f"{show(given)} is not text; expected one of {', '.join(self.names)}")
         wall = "give wall = { youngs_modulus, thickness }"
-        if given in UNREAD:
+        if given in WITHOUT_SOURCE:
             raise ValueError(f"the catalogue has no data of {given}; {wall}")
         raise ValueError(f"unknown material {show(given)}{did_you_mean(given, self.names)}; expected "
                          f"{', '.join(self.names)}; for any other material {wall}")  # fmt: skip
@@ -129,17 +129,17 @@ def restraint_factor(restraint: str | float | None, bore: float, wall: Wall) -> 
     nu = wall.poisson_ratio or 0.0
     thin = {"joints": 1.0, "upstream": 1.0 - 0.5 * nu, "anchored": 1.0 - nu * nu}[restraint]
     ratio = wall.thickness / bore
-    if ratio * THIN <= 1.0:
+    if ratio * THIN_WALL <= 1.0:
         return thin
     return thin / (1.0 + ratio) + 2.0 * ratio * (1.0 + nu)
 
 
-def wants_poisson(restraint: str | float | None, bore: float, wall: Wall) -> bool:
+def needs_poisson(restraint: str | float | None, bore: float, wall: Wall) -> bool:
     """True if the factor depends on Poisson's ratio."""
-    return restraint in ("upstream", "anchored") or (restraint == "joints" and wall.thickness * THIN > bore)
+    return restraint in ("upstream", "anchored") or (restraint == "joints" and wall.thickness * THIN_WALL > bore)
 
 
-def yielding(pipe: Any) -> tuple[tuple[float, float], ...]:
+def creep_elements(pipe: Any) -> tuple[tuple[float, float], ...]:
     """(final growth of the bore with pressure, dA / (A dp) [1/Pa], time tau [s]) of each creep element of the wall."""
     wall = pipe.wall
     if not isinstance(wall, Wall) or wall.creep is None:
@@ -150,7 +150,7 @@ def yielding(pipe: Any) -> tuple[tuple[float, float], ...]:
     )
 
 
-def softness(pipe: Any) -> float:
+def elastic_compliance(pipe: Any) -> float:
     """Elastic growth of the bore of a pipe with pressure, dA / (A dp) [1/Pa]; 0 for a stiff wall."""
     wall = pipe.wall
     if not isinstance(wall, Wall):
@@ -168,7 +168,7 @@ def wall_faults(pipe: Any) -> Iterator[tuple[tuple[Any, ...], str]]:
     wall = pipe.wall
     if not isinstance(wall, Wall):
         return
-    if wall.poisson_ratio is None and wants_poisson(pipe.restraint, pipe.diameter, wall):
+    if wall.poisson_ratio is None and needs_poisson(pipe.restraint, pipe.diameter, wall):
         reason = f"the catalogue has none of {pipe.material}" if pipe.material else "none is given"
         text = f"{show(pipe.restraint)} needs Poisson's ratio of the wall, and {reason}; give wall.poisson_ratio"
         yield ("restraint",), text

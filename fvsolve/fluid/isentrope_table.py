@@ -11,9 +11,9 @@ import numpy as np
 
 from fvsolve.errors import FluidError
 
-REACH = 1e8  # upper end of a table [Pa], or twice the reference pressure if that is higher
-AIM = 1e-9  # relative density error at which refinement stops
-WORST = 1e-6  # relative density error above which a table is refused
+TABLE_PRESSURE = 1e8  # upper end of a table [Pa], or twice the reference pressure if that is higher
+TARGET_ERROR = 1e-9  # relative density error at which refinement stops
+MAX_ERROR = 1e-6  # relative density error above which a table is refused
 INTERVALS = (32, 2048)  # least and greatest number of intervals
 
 
@@ -90,12 +90,12 @@ def isentrope(state: Any, name: str, vapor_pressure: float) -> FluidTable:
     intervals, max_intervals = INTERVALS
     try:
         table = _tabulate(state, span, intervals, temperature, entropy)
-        while table.error > AIM and intervals < max_intervals:
+        while table.error > TARGET_ERROR and intervals < max_intervals:
             intervals *= 2
             table = _tabulate(state, span, intervals, temperature, entropy)
     except ValueError as error:
         raise FluidError("law", f'no "table" of {name} from that state (CoolProp: {error}); use "log"') from None
-    if table.error > WORST or not _monotone(table):
+    if table.error > MAX_ERROR or not _monotone(table):
         text = f'"table" of {name} has an error of {table.error:.1g}, too near its critical point; use "log"'
         raise FluidError("law", text)
     return table
@@ -105,8 +105,8 @@ def _reach(state: Any, temperature: float, pressure: float) -> float:
     """Upper end of the table [Pa]: `TABLE_PRESSURE`, or twice the pressure, within the limits of CoolProp."""
     from CoolProp import CoolProp
 
-    limits = [max(REACH, 2.0 * pressure), state.pmax()]
-    melting = known(lambda: state.melting_line(CoolProp.iP, CoolProp.iT, temperature))
+    limits = [max(TABLE_PRESSURE, 2.0 * pressure), state.pmax()]
+    melting = value_or_none(lambda: state.melting_line(CoolProp.iP, CoolProp.iT, temperature))
     if melting is not None and melting > pressure:
         limits.append(melting)
     return min(limits)
@@ -148,7 +148,7 @@ def _monotone(table: FluidTable) -> bool:
     return bool(np.all(chord > 0.0) and np.all(slopes >= 0.0) and np.all(slopes <= 3.0))
 
 
-def known(read: Callable[[], float]) -> float | None:
+def value_or_none(read: Callable[[], float]) -> float | None:
     """Value of a function of CoolProp; None if CoolProp has no model for it."""
     try:
         value = read()
