@@ -108,7 +108,7 @@ def speed() -> None:
 def solved(case: dict) -> tuple[np.ndarray, float]:
     """Rows of probes of a run, and CPU time of its steps [s]."""
     import fvsolve
-    from fvsolve.output.memory import MemorySink
+    from fvsolve.output.memory_sink import MemorySink
     from fvsolve.solve.solve import initial_state, solve
 
     model = fvsolve.build(fvsolve.load(case))

@@ -15,7 +15,7 @@ from measure import agree, machine, parser
 import fvsolve
 from fvsolve.case import load
 from fvsolve.model.build import build
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 
 LAKE, FLOW, BEGIN, END = 6e6, 0.05, 1.0, 12.0

@@ -23,7 +23,7 @@ from planes_scenes import SIZE, scene, square
 
 from fvsolve.case import load
 from fvsolve.model import State, build
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.run import mpi_run
 from fvsolve.solve import initial_state
 from fvsolve.solve.run_loop import RunLoop

@@ -105,7 +105,7 @@ FAULTS = [
     ),
     Fault("studies/ports/positive_real.py", "order = n.degree - d.degree", "order = d.degree - n.degree"),
     Fault(
-        "output/lines.py",
+        "output/line_files.py",
         'self.along("u", fields), self.along("v", fields)',
         'self.along("u", fields), self.along("u", fields)',
     ),

@@ -65,7 +65,7 @@ class Case(Displayable):
     read: dict[tuple, tuple] = field(default_factory=dict, repr=False)  # place -> (raw value, value as read)
     equilibrium_nodes: dict[str, Node] = field(default_factory=dict, repr=False)  # bodies and masses in equilibrium
 
-    picture = "fvsolve.draw.objects:case_figure"
+    picture = "fvsolve.draw.object_pictures:case_figure"
 
     def summary_line(self) -> str:
         basins = f", {len(self.meshes)} basins" if self.meshes else ""

@@ -106,6 +106,6 @@ def value_of(text: str):
 
 def print_json(data) -> None:
     """Print one JSON object on standard output, with unrounded numbers."""
-    from fvsolve.output.summary import plain
+    from fvsolve.output.summary_file import plain
 
     print(json.dumps(plain(data), allow_nan=False))

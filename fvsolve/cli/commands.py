@@ -32,10 +32,10 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Solve cases and write their run directories."""
-    from fvsolve.draw.beside import Painter
+    from fvsolve.draw.plot_process import PlotProcess
 
     results = []
-    with Painter(beside=not no_pictures) as painter:  # its process starts before other modules are imported
+    with PlotProcess(second_process=not no_pictures) as painter:  # its process starts before other modules are imported
         from fvsolve.cli import printing
         from fvsolve.run import model_of, mpi_run
 
@@ -86,7 +86,7 @@ def _run(model, place: Path, force: bool, resume: bool, threads: int, painter, q
 
 def _judge(result, case) -> None:
     """Estimate the error of the peaks of a run and write it into the summary."""
-    from fvsolve.output.summary import write_summary
+    from fvsolve.output.summary_file import write_summary
     from fvsolve.studies.peak_error import peak_errors
 
     peak_errors(result, case, lambda text: print(f"{case.name} again: {text}", file=sys.stderr, flush=True))

@@ -102,8 +102,8 @@ def interrupt_message(words: str) -> Iterator[None]:
 def ledger(case, port, out, as_json: bool) -> None:
     """Run a case, write its energy ledger and picture, and print them with the passivity verdict at the port."""
     from fvsolve.cli.progress import run_progress
-    from fvsolve.draw.energy import energy_figure
-    from fvsolve.output.column import column, time_column
+    from fvsolve.draw.energy_picture import energy_figure
+    from fvsolve.output.unit_columns import column, time_column
     from fvsolve.studies.energy.energy_balance import energy as study
     from fvsolve.studies.energy.energy_balance import write_table
 
@@ -129,7 +129,7 @@ def ledger(case, port, out, as_json: bool) -> None:
 
 def _ledger(result, case, folder) -> None:
     from fvsolve.cli.terminal import console, line, table
-    from fvsolve.output.column import column
+    from fvsolve.output.unit_columns import column
 
     terminal, rows, joules = console(), [], column("energy", "energy", case)
 
@@ -191,7 +191,7 @@ def compare_pairs(case, schemes, methods, port, out, as_json: bool) -> None:
 
 def _in_unit(heading: Column, case) -> Column:
     """Convert a column of energies from J to the unit of `[output]`; returns any other column unchanged."""
-    from fvsolve.output.column import column
+    from fvsolve.output.unit_columns import column
 
     if not heading.head.endswith(" [J]"):
         return heading

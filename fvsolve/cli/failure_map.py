@@ -90,7 +90,7 @@ def _key(text: str | None) -> tuple[str, list] | None:
 
 
 def _write_files(result, folder: Path, head: str) -> list[Path]:
-    from fvsolve.draw.failure_map import failure_map_figure
+    from fvsolve.draw.failure_map_picture import failure_map_figure
 
     rows = [{"value": result.values[row["column"]]} | row for row in result.plain()["squares"]]
     table = ResultTable([Column(key) for key in rows[0]], rows).write(
@@ -105,7 +105,7 @@ def _write_files(result, folder: Path, head: str) -> list[Path]:
 
 def _show(result, files: list[Path], head: str) -> None:
     from fvsolve.cli import terminal
-    from fvsolve.draw.failure_map import column_labels
+    from fvsolve.draw.failure_map_picture import column_labels
     from fvsolve.studies.failure.run_verdict import VERDICT_TEXTS
 
     console = terminal.console()
@@ -155,7 +155,7 @@ def _by_courant(result) -> bool:
 
 
 def _limit(result, row) -> str:
-    from fvsolve.draw.failure_map import seconds
+    from fvsolve.draw.failure_map_picture import time_text
 
     limits = {square.limit for square in row}
     if len(limits) > 1:
@@ -167,4 +167,4 @@ def _limit(result, row) -> str:
         return "none"
     if limit == 0.0:
         return "any step"
-    return f"C {limit * result.wave_rate:.3g}" if _by_courant(result) else seconds(limit)
+    return f"C {limit * result.wave_rate:.3g}" if _by_courant(result) else time_text(limit)

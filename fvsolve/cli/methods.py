@@ -36,7 +36,7 @@ def table_output() -> Output:
 
 def method_output(name: str, out: Path | None) -> Output:
     """Tableau, stability function R(s) and properties of a method; writes a picture of its stability region."""
-    from fvsolve.draw.region import region_figure
+    from fvsolve.draw.region_picture import region_figure
 
     name = method_name(name)
     method = method_named(name)

@@ -44,7 +44,7 @@ def optimise(
 
 def _show(result, case) -> None:
     from fvsolve.cli import terminal
-    from fvsolve.output.column import column, time_column
+    from fvsolve.output.unit_columns import column, time_column
     from fvsolve.studies.sampling import key_quantity
 
     console, clock = terminal.console(), time_column(case)

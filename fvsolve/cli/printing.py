@@ -8,7 +8,7 @@ from fvsolve.cli.terminal import console as _console
 from fvsolve.cli.terminal import line as _line
 from fvsolve.cli.terminal import table as _table
 from fvsolve.errors import listing
-from fvsolve.output.directory import pictures_there
+from fvsolve.output.directory import existing_pictures
 from fvsolve.units import span
 
 ROWS = 20  # greatest number of rows of a table of probes; summary.json has all
@@ -83,7 +83,7 @@ def print_result(run) -> None:
 
 def time_column(summary: dict):
     """Column of times in the unit of a run."""
-    from fvsolve.output.column import UnitColumn
+    from fvsolve.output.unit_columns import UnitColumn
 
     return UnitColumn("t", "time", summary["time_unit"])
 
@@ -96,7 +96,7 @@ def time_formatter(summary: dict) -> Callable[[float], str]:
 
 def print_files(run) -> None:
     """Print the files in the run directory, and how to resume an interrupted run."""
-    names = sorted([*run.summary["files"], *pictures_there(run.directory)])
+    names = sorted([*run.summary["files"], *existing_pictures(run.directory)])
     _line(_console(), f"{run.directory}: {', '.join(names)}")
     if run.reason.startswith("interrupted"):
         _line(_console(), "to resume, use the same command with --resume")
@@ -150,7 +150,7 @@ def print_checks(case, facts: dict, every: bool = False) -> None:
 
 def _print_rows(console, case, word: str, parts: dict, keys: dict) -> None:
     """Print a table of basins or patches in the units of `[output]`, if there are any."""
-    from fvsolve.output.column import column
+    from fvsolve.output.unit_columns import column
 
     columns = [column(title, dimension, case) if dimension else None for title, dimension in keys.values()]
     heads = [title if part is None else part.header for (title, _), part in zip(keys.values(), columns, strict=True)]
@@ -171,7 +171,7 @@ def _wall_lines(case, pipes: dict) -> list[str]:
 
 
 def _wall_text(case, pipe: dict) -> str:
-    from fvsolve.output.column import column
+    from fvsolve.output.unit_columns import column
 
     texts = []
     if "allowable_pressure" in pipe:
@@ -204,7 +204,7 @@ def _print_states(console, case, word: str, parts: dict, keys: dict, every: bool
 
     odd : names of parts with notices, which are notable
     """
-    from fvsolve.output.column import column
+    from fvsolve.output.unit_columns import column
 
     if not parts:
         return
@@ -231,7 +231,7 @@ def _notable_rows(parts: dict, keys: dict, odd: set[str]) -> list[str]:
 
 def _fluid_text(case, fluid: dict) -> str:
     """Text on the fluid in the units of `[output]`; the bulk modulus has the unit of pressure differences."""
-    from fvsolve.output.column import column
+    from fvsolve.output.unit_columns import column
 
     texts = []
     for key, dimension in FLUID.items():
@@ -291,7 +291,7 @@ def print_differences(results: dict, summary: dict) -> None:
 
 
 def _print_extremes(console, run) -> None:
-    from fvsolve.output.column import UnitColumn
+    from fvsolve.output.unit_columns import UnitColumn
     from fvsolve.run.result import not_valid
 
     clock = UnitColumn("at", "time", run.summary["time_unit"])
@@ -345,7 +345,7 @@ def _error_text(peak: dict) -> str:
 
 def where_and_when(verdict: dict, summary: dict) -> str:
     """Place, chainage and time at which a quantity is nearest to its limit, in the units of a run's summary."""
-    from fvsolve.output.column import UnitColumn
+    from fvsolve.output.unit_columns import UnitColumn
 
     along = UnitColumn("chainage", "length", summary["envelope_units"]["distance"])
     chainage = (

@@ -22,7 +22,7 @@ def report(
     ] = False,
 ) -> None:
     """Write an offline HTML page of a run or a study: verdicts, long sections, histories, model, numerics."""
-    from fvsolve.report.report import write_report
+    from fvsolve.report.report_files import write_report
 
     for path in write_report(directory, out, xlsx):
         print(path)
@@ -75,7 +75,7 @@ def fatigue(
         raise FvsolveError(
             "expected --range, --allowable-range and --slope together (fatigue strength), and all values above 0"
         )
-    strength = counting.Strength(*given) if given else None
+    strength = counting.FatigueStrength(*given) if given else None
     names = [name.strip() for name in probes.split(",") if name.strip()]
     results = counting.cycles(open_run(directory), names or None, strength)
     if as_json:

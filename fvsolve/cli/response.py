@@ -11,7 +11,7 @@ import typer
 from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
 from fvsolve.cli.linearise import AtTime, BeforeJump, time_of
 from fvsolve.cli.study_options import Out, clear_files, folder_of, warn_replaced
-from fvsolve.output.column import column
+from fvsolve.output.unit_columns import column
 from fvsolve.studies.result_table import write_csv
 
 SYMBOLS = {"admittance": "Y", "impedance": "Z"}
@@ -74,7 +74,7 @@ def output_unit(case, result) -> tuple[float, str]:
 
 def draw(result, path: Path, size: float, unit: str) -> None:
     """Write PNG and SVG pictures of H in `unit`; `size` is the value of 1 SI unit in it."""
-    from fvsolve.draw.response import response_figure
+    from fvsolve.draw.response_picture import response_figure
 
     verdict = result.verdict
     dips, poles = [(dip.low, dip.high) for dip in verdict.dips], {abs(s.imag) for s in verdict.axis} - {0.0}

@@ -81,7 +81,7 @@ def calibrate(
 
 def difference_text(case, probe, value: float) -> str:
     """Text of a difference of a probe [SI], in the unit of the probe's record."""
-    from fvsolve.output.column import column
+    from fvsolve.output.unit_columns import column
 
     unit_column = column(probe.text, probe.dimension, case, probe.unit)
     return f"{unit_column.span_from_si(value):.6g} {unit_column.span_unit}"

@@ -105,7 +105,7 @@ def refuse_options(case: str | None, of_a_case: dict, of_a_grid: dict) -> None:
 
 def pictures(result, folder: Path) -> list[str]:
     """Draw the spectrum over the stability region for each row with a linear scheme; returns the file names."""
-    from fvsolve.draw.spectrum import spectrum_figure
+    from fvsolve.draw.spectrum_picture import spectrum_figure
     from fvsolve.steppers import analyse
 
     names = []

@@ -84,7 +84,7 @@ def write_charts(result, outcomes: list[str], folder: Path, heads: dict[str, str
 
     heads : key -> heading of the key with its unit
     """
-    from fvsolve.draw.sweep import outcome_figure
+    from fvsolve.draw.sweep_picture import outcome_figure
 
     available = result.outcomes
     names = [result.outcome(name) for name in outcomes] or [

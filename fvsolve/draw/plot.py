@@ -7,17 +7,17 @@ import textwrap
 import numpy as np
 
 from fvsolve.draw import style
-from fvsolve.draw.told import told
+from fvsolve.draw.curve_selection import select_curves
 
-PANELS = 6  # greatest number of panels
-LINES = 8  # greatest number of curves in a panel
-STILLS = 4  # greatest number of constant probes with names
-BROAD = 26  # letters of a line of a legend
-PIPES = 6  # greatest number of pipes drawn; the longest are chosen
-POINTS = 4000  # greatest number of rows drawn; of longer tables the extremes of bins are drawn
+MAX_PANELS = 6  # greatest number of panels
+MAX_LINES = 8  # greatest number of curves in a panel
+MAX_CONSTANTS = 4  # greatest number of constant probes with names
+LEGEND_WIDTH = 26  # letters of a line of a legend
+MAX_PIPES = 6  # greatest number of pipes drawn; the longest are chosen
+MAX_POINTS = 4000  # greatest number of rows drawn; of longer tables the extremes of bins are drawn
 
 
-@style.as_it_stands
+@style.without_markup
 def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, title=""):
     """Figure of probes over time, with a panel for each quantity and unit; constant probes are only named.
 
@@ -26,8 +26,8 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
     measured : probe -> (times, values), drawn dotted
     """
     probes = list(probes)
-    panels, still = told(values, probes, measured or {})
-    drawn = panels[:PANELS]
+    panels, still = select_curves(values, probes, measured or {})
+    drawn = panels[:MAX_PANELS]
     figure = style.figure(0.7 + 2.1 * max(len(drawn), 1) + (0.5 if len(drawn) == 1 else 0.0))
     rows = figure.subplots(max(len(drawn), 1), 1, sharex=True, squeeze=False)[:, 0]
     for axes, panel in zip(rows, drawn, strict=False):
@@ -41,13 +41,13 @@ def history_figure(t, values, probes, time_unit="s", marks=(), measured=None, ti
     return figure
 
 
-@style.as_it_stands
+@style.without_markup
 def envelope_figure(envelope, units, title=""):
     """Figure of least and maximum head along each of the longest pipes, with elevation and initial head.
 
     envelope : pipe -> quantity of envelope.csv -> float64[cells] in `units`
     """
-    longest = sorted(envelope, key=lambda pipe: -envelope[pipe]["distance"][-1])[:PIPES]
+    longest = sorted(envelope, key=lambda pipe: -envelope[pipe]["distance"][-1])[:MAX_PIPES]
     names = [pipe for pipe in envelope if pipe in longest]
     across = 1 if len(names) < 3 else 2
     down = -(-len(names) // across)
@@ -71,12 +71,12 @@ def envelope_figure(envelope, units, title=""):
     return figure
 
 
-def quantity(probe: str) -> str:
+def probe_quantity(probe: str) -> str:
     """Quantity of a probe: `pressure` of `main.pressure@0.5`."""
     return probe.partition("@")[0].rpartition(".")[2]
 
 
-def thinned(t, values, points=POINTS):
+def thin_series(t, values, points=MAX_POINTS):
     """Reduce a long series to the extremes of bins of rows, so that peaks remain and pictures stay small."""
     bins = points // 2
     if len(t) <= points:
@@ -89,17 +89,19 @@ def thinned(t, values, points=POINTS):
 
 
 def _panel(axes, t, values, probes, lines, measured, still) -> None:
-    style.dress(axes)
-    for i, curve in enumerate(lines[:LINES]):
+    style.style_axes(axes)
+    for i, curve in enumerate(lines[:MAX_LINES]):
         name, colour = probes[curve.column][0], style.COLOURS[i % len(style.COLOURS)]
-        axes.plot(*thinned(t, values[:, curve.column]), color=colour, linewidth=1.0, label=_lines(curve.label))
+        axes.plot(
+            *thin_series(t, values[:, curve.column]), color=colour, linewidth=1.0, label=_wrapped_label(curve.label)
+        )
         if name in measured:
             axes.plot(*measured[name], ":", color=colour, linewidth=1.4, label=f"{curve.label}, measured")
-    if len(lines) > LINES:
-        axes.plot([], [], " ", label=f"... {len(lines) - LINES} more in the table")
+    if len(lines) > MAX_LINES:
+        axes.plot([], [], " ", label=f"... {len(lines) - MAX_LINES} more in the table")
     if still:
-        named = [f"{name} {value:.6g} {unit}" for name, unit, value in still[:STILLS]]
-        named += [f"... {len(still) - STILLS} more"] if len(still) > STILLS else []
+        named = [f"{name} {value:.6g} {unit}" for name, unit, value in still[:MAX_CONSTANTS]]
+        named += [f"... {len(still) - MAX_CONSTANTS} more"] if len(still) > MAX_CONSTANTS else []
         axes.plot([], [], " ", label="\n".join(["constant:", *named]))
     low, high = axes.get_ylim()
     if high - low < 1e-9 * max(abs(low), abs(high)):  # constant curves: do not magnify round-off
@@ -110,9 +112,9 @@ def _panel(axes, t, values, probes, lines, measured, still) -> None:
     style.legend(axes)
 
 
-def _lines(label: str) -> str:
+def _wrapped_label(label: str) -> str:
     """Label broken into lines, so that the legend stays narrow."""
-    return textwrap.fill(label, BROAD, break_long_words=False)
+    return textwrap.fill(label, LEGEND_WIDTH, break_long_words=False)
 
 
 def _shade(axes, t, marks, first: bool) -> None:
@@ -138,7 +140,7 @@ def _shade(axes, t, marks, first: bool) -> None:
 
 
 def _profile(axes, arrays, hilly: bool) -> None:
-    style.dress(axes)
+    style.style_axes(axes)
     x, ground = arrays["distance"], arrays["elevation"]
     low, high = arrays["min_head"], arrays["max_head"]
     blue = style.COLOURS[0]

@@ -72,6 +72,6 @@ class DrawnScene:
         return np.asarray(points, float).reshape(-1, 3) * (plan, plan, self.height.factor)
 
     @property
-    def slant(self) -> float:
+    def height_ratio(self) -> float:
         """Factor on heights in their unit that gives equal scales of heights and lengths."""
         return self.length.factor / self.height.factor

@@ -9,15 +9,18 @@ from fvsolve.draw.symbols import WATER, strokes, symbol_of
 from fvsolve.errors import visible
 
 SIZE = (10.0, 6.0)  # [inch]
-DPI, SMALL = 150, 100  # resolution of a picture, and of an animation [dots per inch]
-COLOURS = "viridis"
-FOOT = 0.95  # height below the axes for the colour bar and the legend [inch]
-HEAD = 0.62  # height above the axes for the title [inch]
+DPI, ANIMATION_DPI = 150, 100  # resolution of a picture, and of an animation [dots per inch]
+COLOUR_MAP = "viridis"
+FOOT_HEIGHT = 0.95  # height below the axes for the colour bar and the legend [inch]
+HEAD_HEIGHT = 0.62  # height above the axes for the title [inch]
 MARGIN = 0.62  # margin of axes with ticks [inch]
-HALF = 8.0  # half width of a symbol [points]
-LEAST = 0.05  # half width of the colour range of a uniform field, as a fraction of its value
-EVEN, NONE = 1e-9, 1e-3  # relative range of a uniform field; ends of the range shown as zero, as a fraction of it
-ROWS = 4  # rows of the legend
+HALF_SYMBOL = 8.0  # half width of a symbol [points]
+EVEN_RANGE = 0.05  # half width of the colour range of a uniform field, as a fraction of its value
+EVEN_TOLERANCE, ZERO_TOLERANCE = (
+    1e-9,
+    1e-3,
+)  # relative range of a uniform field; ends of the range shown as zero, as a fraction of it
+LEGEND_ROWS = 4  # rows of the legend
 
 
 class PictureSheet:
@@ -26,24 +29,28 @@ class PictureSheet:
     def __init__(self, film: bool, ruled: bool = False, high: float = SIZE[1]) -> None:
         self.figure = style.figure(high, SIZE[0])
         self.figure.set_layout_engine("none")
-        self.figure.set_dpi(SMALL if film else DPI)
+        self.figure.set_dpi(ANIMATION_DPI if film else DPI)
         self.high = high
-        low, top = FOOT + (0.5 if ruled else 0.1), HEAD + 0.08
+        low, top = FOOT_HEIGHT + (0.5 if ruled else 0.1), HEAD_HEIGHT + 0.08
         wide = MARGIN if ruled else 0.1
         self.axes = self.figure.add_axes(
             (wide / SIZE[0], low / high, 1.0 - (wide + 0.25) / SIZE[0], 1.0 - (low + top) / high)
         )
-        self._texts = [
+        self._captions = [
             self.figure.text(0.18 / SIZE[0], 1.0 - 0.14 / high, "", fontsize=11, color=style.INK, va="top"),
             self.figure.text(0.18 / SIZE[0], 1.0 - 0.38 / high, "", fontsize=8.5, color=style.MUTED, va="top"),
         ]
-        for text in self._texts:
+        for text in self._captions:
             text.set_parse_math(False)
 
     def caption(self, title: str, below: str) -> None:
         """Set the title and the line below it."""
-        for text, content in zip(self._texts, (title, below), strict=True):
-            text.set_text(visible(content if len(content) <= style.LONGEST else content[: style.LONGEST - 3] + "..."))
+        for text, content in zip(self._captions, (title, below), strict=True):
+            text.set_text(
+                visible(
+                    content if len(content) <= style.MAX_TITLE_LENGTH else content[: style.MAX_TITLE_LENGTH - 3] + "..."
+                )
+            )
 
     def bar(self, limits: tuple[float, float], label: str) -> list[str]:
         """Draw the colour bar with the quantity and its unit; returns the texts of its ticks."""
@@ -52,7 +59,7 @@ class PictureSheet:
         from matplotlib.ticker import MaxNLocator
 
         place = self.figure.add_axes((0.3 / SIZE[0], 0.42 / self.high, 0.4, 0.14 / self.high))
-        bar = self.figure.colorbar(ScalarMappable(Normalize(*limits), COLOURS), cax=place, orientation="horizontal")
+        bar = self.figure.colorbar(ScalarMappable(Normalize(*limits), COLOUR_MAP), cax=place, orientation="horizontal")
         bar.outline.set_visible(False)
         bar.set_ticks(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(*limits))
         bar.ax.set_xlim(*limits)
@@ -71,10 +78,10 @@ class PictureSheet:
         place.set_axis_off()
         place.set_xlim(0.0, 1.0)
         place.set_ylim(0.0, 1.0)
-        across = max(3, -(-len(kinds) // ROWS))
+        across = max(3, -(-len(kinds) // LEGEND_ROWS))
         for k, (kind, part) in enumerate(kinds.items()):
             x, y = (k % across) / across + 0.03, 0.9 - (k // across) * 0.26
-            stamp(place, symbol_of(part.kinds, part.link), (x, y), half=6.0)
+            draw_symbol(place, symbol_of(part.kinds, part.link), (x, y), half=6.0)
             place.text(x + 0.03, y, kind.replace("-", " "), fontsize=8, color=style.INK, va="center", parse_math=False)
 
     def picture(self) -> np.ndarray:
@@ -83,7 +90,7 @@ class PictureSheet:
         return np.asarray(self.figure.canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def stamp(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF, shift=(0.0, 0.0)) -> None:
+def draw_symbol(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF_SYMBOL, shift=(0.0, 0.0)) -> None:
     """Draw a symbol at a point of the axes, rotated to a direction and moved by `shift` [points]."""
     from matplotlib.patches import Polygon
     from matplotlib.transforms import Affine2D, ScaledTranslation
@@ -99,12 +106,12 @@ def stamp(axes, symbol: str, at, along=(1.0, 0.0), half: float = HALF, shift=(0.
                                clip_on=False))  # fmt: skip
 
 
-def span(low: float, high: float) -> tuple[float, float]:
+def colour_range(low: float, high: float) -> tuple[float, float]:
     """Colour range of a field: its own range, or a band around the value of a uniform field."""
     most = max(abs(low), abs(high))
     if most == 0.0:
         return 0.0, 1.0
-    if high - low > EVEN * most:
-        return tuple(0.0 if abs(end) < NONE * (high - low) else end for end in (low, high))
-    middle, half = 0.5 * (low + high), LEAST * most or 0.5
+    if high - low > EVEN_TOLERANCE * most:
+        return tuple(0.0 if abs(end) < ZERO_TOLERANCE * (high - low) else end for end in (low, high))
+    middle, half = 0.5 * (low + high), EVEN_RANGE * most or 0.5
     return middle - half, middle + half

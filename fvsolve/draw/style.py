@@ -13,7 +13,7 @@ DOUBT = "#c2410c"  # marks: results are not to be trusted from there on
 COLOURS = ("#0b6aa8", "#d1622b", "#12876f", "#8a4fa3", "#b8860b", "#4aa3d8", "#a3324a", "#5a6b2f")
 WIDTH = 9.0  # of a picture [inch]
 DPI = 150
-LONGEST = 200  # greatest number of letters of a title
+MAX_TITLE_LENGTH = 200  # greatest number of letters of a title
 
 
 def figure(height: float, width: float = WIDTH):
@@ -26,7 +26,7 @@ def figure(height: float, width: float = WIDTH):
     return fig
 
 
-def as_it_stands(make: Callable) -> Callable:
+def without_markup(make: Callable) -> Callable:
     """Decorator of functions that make a figure: `$` in texts is no markup, except in powers on logarithmic axes."""
 
     @functools.wraps(make)
@@ -45,7 +45,7 @@ def as_it_stands(make: Callable) -> Callable:
     return draw
 
 
-def dress(axes) -> None:
+def style_axes(axes) -> None:
     """Style axes: left and bottom lines only, and a light grid behind the curves."""
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
@@ -87,6 +87,6 @@ def legend(axes) -> None:
 
 def title(fig, text: str) -> None:
     """Set the title of a figure."""
-    text = text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+    text = text if len(text) <= MAX_TITLE_LENGTH else text[: MAX_TITLE_LENGTH - 3] + "..."
     if text:
         fig.suptitle(visible(text), fontsize=10.5, color=INK, x=0.012, ha="left")

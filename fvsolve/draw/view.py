@@ -15,7 +15,7 @@ REMEDY = (
     "PyVista found no OpenGL to draw with off screen; on Debian or Ubuntu "
     "`apt install libegl1 libgl1-mesa-dri`, or `apt install libosmesa6`"
 )
-FILMS = "a .gif needs no extra package; .mp4 needs imageio with ffmpeg: pip install imageio imageio-ffmpeg"
+ANIMATION_FORMATS = "a .gif needs no extra package; .mp4 needs imageio with ffmpeg: pip install imageio imageio-ffmpeg"
 
 
 def view(scene: DrawnScene, out: Path) -> None:
@@ -30,23 +30,23 @@ def view(scene: DrawnScene, out: Path) -> None:
     if out.suffix == ".mp4" and animated:
         _need_imageio()
     if scene.pipes:
-        from fvsolve.draw.film import write
-        from fvsolve.draw.network import Network
+        from fvsolve.draw.animation import write_animation
+        from fvsolve.draw.network_picture import NetworkPicture
 
         try:
-            return write(Network(scene, animated), len(scene.frames), out)
+            return write_animation(NetworkPicture(scene, animated), len(scene.frames), out)
         except (OSError, ValueError) as error:
             raise FvsolveError(f"{out} could not be drawn: {error}") from None
-    return _beside(scene, out)
+    return _draw_in_process(scene, out)
 
 
-def _beside(scene: DrawnScene, out: Path) -> None:
+def _draw_in_process(scene: DrawnScene, out: Path) -> None:
     package = str(Path(__file__).resolve().parents[2])
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([package, *sys.path])}
     if sys.platform.startswith("linux") and not environment.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     request = pickle.dumps((scene, str(out)))
-    done = subprocess.run([sys.executable, "-m", "fvsolve.draw.stage"], env=environment, input=request,
+    done = subprocess.run([sys.executable, "-m", "fvsolve.draw.field_canvas"], env=environment, input=request,
                           capture_output=True)  # fmt: skip
     output = done.stderr.decode(errors="replace")
     if done.returncode < 0 or "OSMesa" in output or "EGL" in output:
@@ -61,4 +61,4 @@ def _need_imageio() -> None:
         import imageio  # noqa: F401
         import imageio_ffmpeg  # noqa: F401
     except ImportError:
-        raise FvsolveError(f"an .mp4 cannot be written: a package is missing; {FILMS}") from None
+        raise FvsolveError(f"an .mp4 cannot be written: a package is missing; {ANIMATION_FORMATS}") from None

@@ -60,7 +60,7 @@ class State(Displayable):
     y: np.ndarray
     memory: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
-    picture = "fvsolve.draw.objects:state_figure"
+    picture = "fvsolve.draw.object_pictures:state_figure"
 
     def __post_init__(self) -> None:
         self.t = as_time(self.t)
@@ -165,7 +165,7 @@ class Model(Displayable):
         default_factory=list, init=False
     )  # tables before the start is solved, reused by `vary`
 
-    picture = "fvsolve.draw.objects:model_figure"
+    picture = "fvsolve.draw.object_pictures:model_figure"
 
     def __post_init__(self) -> None:
         for array in (*self.tables, self.scale, self.start, *self.profiles.values(), *self.sharp.values()):

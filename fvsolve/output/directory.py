@@ -9,23 +9,23 @@ from pathlib import Path
 
 from fvsolve.case.resource_checks import LEAST_TEXT, byte_text, disk_size
 from fvsolve.errors import RunError
-from fvsolve.output.column import probe_columns, time_column
-from fvsolve.output.envelope import in_units, read_envelope, with_start, write_envelope
+from fvsolve.output.envelope import envelope_in_units, read_envelope, with_initial_heads, write_envelope
 from fvsolve.output.fields import FieldSeries
-from fvsolve.output.history import HistoryFile, read_table
-from fvsolve.output.lines import LineSeries, clear_lines
-from fvsolve.output.lock import let_go, locked
-from fvsolve.output.pieces import Shares
+from fvsolve.output.history_file import HistoryFile, read_table
+from fvsolve.output.line_files import LineSeries, clear_lines
+from fvsolve.output.lock import lock_folder, release
+from fvsolve.output.parallel_vtk import ParallelBasinWriter
 from fvsolve.output.restart import Restart, identity, read_restart, write_restart
-from fvsolve.output.routes import write_routes
-from fvsolve.output.summary import read_summary
+from fvsolve.output.route_table import write_routes
+from fvsolve.output.summary_file import read_summary
+from fvsolve.output.unit_columns import probe_columns, time_column
 
-OWN = ("restart.npz", "history.csv", "envelope.csv", "routes.csv", "fields.pvd", "case.toml")
-ENDED = "summary.json"
-PICTURES = ("history.png", "envelope.png")
+RUN_FILES = ("restart.npz", "history.csv", "envelope.csv", "routes.csv", "fields.pvd", "case.toml")
+SUMMARY_FILE = "summary.json"
+PICTURE_FILES = ("history.png", "envelope.png")
 # Files of `fvsolve report` and `plot`; those of an earlier run are deleted, since they show other numbers.
-REPORTS = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
-DRAWN = ("section-*.png", "view-*.png", "view-*.gif")  # the last two of `fvsolve view`
+REPORT_FILES = ("report.html", "report.xlsx", "section.png", "probes.png", "phase.png")
+PICTURE_PATTERNS = ("section-*.png", "view-*.png", "view-*.gif")  # the last two of `fvsolve view`
 
 
 class RunDirectory:
@@ -40,36 +40,36 @@ class RunDirectory:
         self.model = model
         if force and resume:
             raise RunError("--resume continues a run and --force starts it again; state only one of them")
-        _refuse_names(model.case)
-        self.who = identity(model.case)
+        _refuse_reserved_names(model.case)
+        self.identity = identity(model.case)
         self.history = HistoryFile(self.folder / "history.csv", time_column(model.case), probe_columns(model))
         drawn = model.case.output.fields > 0 and len(model.pipes) + len(model.basins) + len(model.body_names) > 0
         self.fields = FieldSeries(self.folder, model) if drawn else None
         self.lines = LineSeries(self.folder, model) if model.case.output.lines else None
         if self.folder.exists() and not self.folder.is_dir():
             raise RunError(f"{self.folder} is a file. Expected a directory; choose another one with --out DIR")
-        self.lock = locked(self.folder, "a run")
+        self.lock = lock_folder(self.folder, "a run")
         try:
             self.restart = self._checkpoint() if resume else None
             if self.restart is None and not force:
-                _refuse(self.folder)
+                _refuse_existing_run(self.folder)
             if self.restart is None:
-                _refuse_size(self.folder, model.case)
+                _refuse_full_disk(self.folder, model.case)
         except BaseException:
-            let_go(self.lock)
+            release(self.lock)
             raise
 
     @property
     def ended(self) -> bool:
         """True if the directory holds the finished run of the same case and versions, up to numerics.end."""
-        if self.restart is None or not (self.folder / ENDED).is_file():
+        if self.restart is None or not (self.folder / SUMMARY_FILE).is_file():
             return False
-        summary = read_summary(self.folder / ENDED)
-        return summary["ok"] and summary["versions"] == self.who and summary["t"] >= self.model.case.numerics.end
+        summary = read_summary(self.folder / SUMMARY_FILE)
+        return summary["ok"] and summary["versions"] == self.identity and summary["t"] >= self.model.case.numerics.end
 
     def begin(self, model, state) -> None:
         """Open the files: new empty ones, or those of the checkpoint, truncated to its time."""
-        for name in (ENDED, *PICTURES):
+        for name in (SUMMARY_FILE, *PICTURE_FILES):
             (self.folder / name).unlink(missing_ok=True)
         clear_reports(self.folder)
         if self.restart is None:
@@ -86,37 +86,37 @@ class RunDirectory:
 
     def rows(self, t, values) -> None:
         """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
-        with self.writing():
+        with self.report_write_errors():
             self.history.write(t, values)
 
     def field(self, t: float, frame: dict) -> None:
         """Write a frame of all pipes, basins and bodies at time `t` [s]."""
-        with self.writing():
+        with self.report_write_errors():
             if self.lines:
                 self.lines.write(self.fields.frames, frame)
             if self.fields:
                 self.fields.write(t, frame)
 
-    def among(self, comm, rows: dict) -> None:
+    def share_basin_rows(self, comm, rows: dict) -> None:
         """Make all ranks write frames of basins in parallel, each rank its rows; see `ParallelBasinWriter`."""
         if self.fields:
-            self.fields.pieces = Shares(comm, rows)
+            self.fields.pieces = ParallelBasinWriter(comm, rows)
 
     def checkpoint(self, state, extra: dict) -> None:
         """Replace restart.npz: state, solver arrays and the number of rows and frames written so far."""
-        with self.writing():
+        with self.report_write_errors():
             size = self.history.flush()
             frames = self.fields.frames if self.fields else 0
             restart = Restart(state.t, state.y, state.memory, extra, self.history.rows, size, frames)
-            write_restart(self.folder / "restart.npz", restart, self.who)
+            write_restart(self.folder / "restart.npz", restart, self.identity)
 
     def end(self, summary) -> None:
         """Close the history and write envelope.csv and routes.csv; the caller writes summary.json last."""
-        with self.writing():
+        with self.report_write_errors():
             self.history.close()
             if summary.envelope:
                 case = self.model.case
-                envelope = in_units(with_start(summary, self.model), case)
+                envelope = envelope_in_units(with_initial_heads(summary, self.model), case)
                 write_envelope(self.folder / "envelope.csv", envelope, case)
                 if case.routes:
                     write_routes(self.folder / "routes.csv", envelope, case)
@@ -124,13 +124,13 @@ class RunDirectory:
     def close(self) -> None:
         """Close open files and release the lock of the directory, also after a failed run."""
         try:
-            with self.writing():
+            with self.report_write_errors():
                 self.history.close()
         finally:
-            let_go(self.lock)
+            release(self.lock)
 
     @contextlib.contextmanager
-    def writing(self) -> Iterator[None]:
+    def report_write_errors(self) -> Iterator[None]:
         """Turn an OSError of the body into a RunError with the path."""
         try:
             yield
@@ -150,13 +150,13 @@ class RunDirectory:
 
     def files(self) -> list[str]:
         """Sorted names of the existing files of the run, with summary.json and without pictures."""
-        names = [*OWN, *self.model.case.copies]
+        names = [*RUN_FILES, *self.model.case.copies]
         existing = [name for name in dict.fromkeys(names) if (self.folder / name).is_file()]
-        return sorted([*existing, ENDED])
+        return sorted([*existing, SUMMARY_FILE])
 
     def _checkpoint(self) -> Restart | None:
         path = self.folder / "restart.npz"
-        restart = read_restart(path, self.who) if path.is_file() else None
+        restart = read_restart(path, self.identity) if path.is_file() else None
         if restart and restart.y.size != self.model.y_size:
             raise RunError(f"{path} holds {restart.y.size} states, but the case has {self.model.y_size}; start the run "
                            "again with --force")  # fmt: skip
@@ -165,7 +165,7 @@ class RunDirectory:
         return restart
 
     def _start(self) -> None:
-        clear(self.folder)
+        clear_run_files(self.folder)
         self.history.start()
         if self.fields:
             self.fields.start()
@@ -174,7 +174,7 @@ class RunDirectory:
 
     def _write_case(self) -> None:
         case = self.model.case
-        with self.writing():
+        with self.report_write_errors():
             (self.folder / "case.toml").write_text(case.resolved(), encoding="utf-8")
         for name, path in case.copies.items():
             copy = self.folder / name
@@ -187,7 +187,7 @@ def read_directory(folder: Path) -> tuple:
 
     `table` and `envelope` are functions: they read history.csv and envelope.csv when called.
     """
-    summary = read_summary(folder / ENDED)
+    summary = read_summary(folder / SUMMARY_FILE)
     return (
         summary,
         lambda: read_table(folder / "history.csv"),
@@ -196,9 +196,9 @@ def read_directory(folder: Path) -> tuple:
     )
 
 
-def clear(folder: Path) -> None:
+def clear_run_files(folder: Path) -> None:
     """Delete the files of an earlier run in `folder`; other files stay."""
-    for name in (ENDED, *OWN, *PICTURES):
+    for name in (SUMMARY_FILE, *RUN_FILES, *PICTURE_FILES):
         (folder / name).unlink(missing_ok=True)
     for path in (folder / "fields").glob("*.*vtu"):
         path.unlink()
@@ -207,31 +207,31 @@ def clear(folder: Path) -> None:
 
 def clear_reports(folder: Path) -> None:
     """Delete the report, the workbook and the pictures of earlier results in `folder`."""
-    drawn = [path for name in DRAWN for path in folder.glob(name)]
-    for path in [*(folder / name for name in REPORTS), *drawn]:
+    drawn = [path for name in PICTURE_PATTERNS for path in folder.glob(name)]
+    for path in [*(folder / name for name in REPORT_FILES), *drawn]:
         path.unlink(missing_ok=True)
 
 
-def _refuse_names(case) -> None:
+def _refuse_reserved_names(case) -> None:
     for name, path in case.copies.items():
-        if name in (ENDED, *OWN, *PICTURES, *REPORTS):
+        if name in (SUMMARY_FILE, *RUN_FILES, *PICTURE_FILES, *REPORT_FILES):
             raise RunError(f"{path} has the name of a file of the run directory ({name}); rename it")
 
 
-def _refuse_size(folder: Path, case) -> None:
+def _refuse_full_disk(folder: Path, case) -> None:
     least, free = disk_size(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
     if least > free:
         raise RunError(f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free. Expected a "
                        "longer [output] every, or another directory with --out DIR")  # fmt: skip
 
 
-def pictures_there(folder: Path) -> list[str]:
+def existing_pictures(folder: Path) -> list[str]:
     """Names of the existing pictures of a run directory."""
-    return [name for name in PICTURES if (folder / name).is_file()]
+    return [name for name in PICTURE_FILES if (folder / name).is_file()]
 
 
-def _refuse(folder: Path) -> None:
-    if (folder / ENDED).exists():
+def _refuse_existing_run(folder: Path) -> None:
+    if (folder / SUMMARY_FILE).exists():
         raise RunError(f"{folder} holds a run; replace it with --force, or keep it and choose another --out DIR")
     if (folder / "restart.npz").exists():
         raise RunError(

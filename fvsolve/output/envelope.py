@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.errors import RunError
-from fvsolve.output.column import UnitColumn, column, split_header
+from fvsolve.output.unit_columns import UnitColumn, column, split_header
 
-QUANTITIES = {
+ENVELOPE_QUANTITIES = {
     "distance": "length",
     "elevation": "head",
     "initial_head": "head",
@@ -25,10 +25,10 @@ QUANTITIES = {
 
 def envelope_columns(case) -> list[UnitColumn]:
     """Columns of envelope.csv after `pipe`, in the units of the case."""
-    return [column(name, dimension, case) for name, dimension in QUANTITIES.items()]
+    return [column(name, dimension, case) for name, dimension in ENVELOPE_QUANTITIES.items()]
 
 
-def with_start(summary, model) -> dict:
+def with_initial_heads(summary, model) -> dict:
     """Envelope of each pipe [SI] with the heads at the start, `initial_head` [m].
 
     Cells and the observed points between cells are sorted by their distance along the pipe.
@@ -45,7 +45,7 @@ def with_start(summary, model) -> dict:
     return envelopes
 
 
-def in_units(envelope: dict, case) -> dict:
+def envelope_in_units(envelope: dict, case) -> dict:
     """Convert an envelope from SI to the units of envelope.csv."""
     columns = envelope_columns(case)
     return {pipe: {col.name: np.asarray(col.from_si(np.asarray(arrays[col.name], float))) for col in columns}

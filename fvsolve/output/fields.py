@@ -14,20 +14,20 @@ import numpy as np
 
 from fvsolve.case.basins import patch_names
 from fvsolve.errors import RunError
-from fvsolve.output import layout
+from fvsolve.output import network_layout
 
-UNITS = {
+FIELD_UNITS = {
     "pressure": "Pa", "head": "m", "velocity": "m/s", "flow": "m3/s", "min_pressure": "Pa", "max_pressure": "Pa",
 }  # fmt: skip
-UNIT = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
-ARRAY = b"</DataArray>"
-FILE = re.compile('file="([^"]+)"')
+UNIT_XML = '<InformationKey name="UNITS_LABEL" location="vtkDataArray">{}</InformationKey>\n'
+ARRAY_END = b"</DataArray>"
+FILE_ATTRIBUTE = re.compile('file="([^"]+)"')
 
-HEAD = """<?xml version="1.0"?>
+PVD_HEAD = """<?xml version="1.0"?>
 <VTKFile type="Collection" version="0.1" byte_order="LittleEndian">
 <Collection>
 """
-TAIL = "</Collection>\n</VTKFile>\n"
+PVD_TAIL = "</Collection>\n</VTKFile>\n"
 
 
 class FieldSeries:
@@ -42,24 +42,28 @@ class FieldSeries:
         places = {basin.name: np.array(basin.part.position or (0.0, 0.0)) for basin in model.basins}
         self.places = places
         if model.pipes:
-            self.places = places = layout.positions(model.case, {pipe.name: pipe.length for pipe in model.pipes})
-            self.points, self.lines = geometry(model, places)
-            self.owner = ride(model, self.points)
+            self.places = places = network_layout.plan_positions(
+                model.case, {pipe.name: pipe.length for pipe in model.pipes}
+            )
+            self.points, self.lines = pipe_geometry(model, places)
+            self.owner = points_on_bodies(model, self.points)
         moving = {basin.name: np.zeros(2) for basin in model.basins if basin.part.on is not None}
         self.places = places = {**places, **moving}  # a basin on a body is drawn in world axes, as bodies are
         carried = {name: scalar.unit for name, scalar in model.case.scalars.items()}
         units = {basin.name: basin.units | (carried if basin.scalars else {}) for basin in model.basins}
-        self.basins = {basin.name: (*shape(basin, places[basin.name]), units[basin.name]) for basin in model.basins}
-        self.bodies = skeleton_of(model)
+        self.basins = {
+            basin.name: (*basin_geometry(basin, places[basin.name]), units[basin.name]) for basin in model.basins
+        }
+        self.bodies = body_lines_of(model)
         self.pipes = [pipe.name for pipe in model.pipes]
-        self.units = UNITS | carried
+        self.units = FIELD_UNITS | carried
         cells = [pipe.cells for pipe in model.pipes]
         self.pipe = np.repeat(np.arange(len(cells), dtype=np.int32), cells)
 
     def start(self) -> None:
         """Start an empty series."""
         (self.folder / "fields").mkdir(exist_ok=True)
-        (self.folder / "fields.pvd").write_bytes((HEAD + TAIL).encode())
+        (self.folder / "fields.pvd").write_bytes((PVD_HEAD + PVD_TAIL).encode())
 
     def continue_from(self, frames: int) -> None:
         """Keep the first `frames` frames of a series and delete those after its checkpoint."""
@@ -67,7 +71,7 @@ class FieldSeries:
         lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
         n = frames * (len(self.basins) + (1 if self.pipes else 0) + (1 if self.bodies else 0))
         entries = [f"{line}\n" for line in lines if line.startswith("<DataSet")][:n]
-        matches = [FILE.search(line) for line in entries]
+        matches = [FILE_ATTRIBUTE.search(line) for line in entries]
         if len(entries) < n or not all(match and (self.folder / match[1]).is_file() for match in matches):
             raise RunError(f"{index}: frames are missing; start the run again with --force")
         (self.folder / "fields").mkdir(exist_ok=True)
@@ -75,7 +79,7 @@ class FieldSeries:
             number = path.stem.rpartition("-")[2]
             if number.isdecimal() and int(number) >= frames:
                 path.unlink()
-        index.write_bytes((HEAD + "".join(entries) + TAIL).encode())
+        index.write_bytes((PVD_HEAD + "".join(entries) + PVD_TAIL).encode())
         self.frames = frames
 
     def write(self, t: float, frame: dict) -> None:
@@ -86,52 +90,52 @@ class FieldSeries:
             if self.pieces is not None and basin in self.pieces.rows:
                 file = f"fields/{basin}-{self.frames:06d}.pvtu"
                 self.pieces.write(self.folder / file, owner_basin, self.places[basin], frame[basin], units)
-                self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
+                self._add_to_collection(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
                 continue
             values = frame[basin]
             if owner_basin.part.on is not None:
                 values = values | owner_basin.vectors_at(values, frame["out"], self.model.layout)
-            blocks = {key: parted(value, cells) for key, value in values.items()}
+            blocks = {key: split_blocks(value, cells) for key, value in values.items()}
             if basin in frame["points"]:  # moving basins have points of their own at each time
                 points = np.append(self.places[basin], 0.0) + frame["points"][basin]
             write_frame(self.folder / file, points, cells, blocks, units)
-            self._list(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
+            self._add_to_collection(f'<DataSet timestep="{float(t)!r}" part="{part}" file="{file}"/>\n')
         if self.bodies:
             file, (points, speed) = f"fields/bodies-{self.frames:06d}.vtu", self.bodies.at(frame["out"])
-            blocks = {"body": [self.bodies.whose], "speed": [speed]}
+            blocks = {"body": [self.bodies.line_body], "speed": [speed]}
             write_frame(self.folder / file, points, [("line", self.bodies.lines)], blocks, {"speed": "m/s"})
-            self._list(f'<DataSet timestep="{float(t)!r}" part="{len(self.basins) + 1}" file="{file}"/>\n')
+            self._add_to_collection(f'<DataSet timestep="{float(t)!r}" part="{len(self.basins) + 1}" file="{file}"/>\n')
         if not self.pipes:
             self.frames += 1
             return
         data = {name: [np.concatenate([frame[pipe][name] for pipe in self.pipes])] for name in self.units}
         data["pipe"] = [self.pipe]
-        write_frame(self.folder / name, self.now(frame), [("line", self.lines)], data, self.units)
-        self._list(f'<DataSet timestep="{float(t)!r}" part="0" file="{name}"/>\n')
+        write_frame(self.folder / name, self.points_at(frame), [("line", self.lines)], data, self.units)
+        self._add_to_collection(f'<DataSet timestep="{float(t)!r}" part="0" file="{name}"/>\n')
         self.frames += 1
 
-    def now(self, frame: dict) -> np.ndarray:
+    def points_at(self, frame: dict) -> np.ndarray:
         """Points of pipes at the time of a frame, points on bodies moved with them : float64[n, 3] [m]."""
         if not (self.owner >= 0).any():
             return self.points
-        from fvsolve.output.skeleton import moved
+        from fvsolve.output.body_lines import world_points
 
-        return moved(self.model, frame["out"], self.owner, self.points)[0]
+        return world_points(self.model, frame["out"], self.owner, self.points)[0]
 
-    def _list(self, line: str) -> None:
+    def _add_to_collection(self, line: str) -> None:
         # A single write over the closing tags: the file stays valid if the process is killed before or after it.
         with open(self.folder / "fields.pvd", "r+b", buffering=0) as file:
-            file.seek(-len(TAIL), 2)
-            file.write((line + TAIL).encode())
+            file.seek(-len(PVD_TAIL), 2)
+            file.write((line + PVD_TAIL).encode())
 
 
-def skeleton_of(model):
+def body_lines_of(model):
     """Lines that show the bodies of a model; None if it has no bodies."""
     if not model.body_names:
         return None
-    from fvsolve.output.skeleton import Skeleton
+    from fvsolve.output.body_lines import BodyLines
 
-    return Skeleton(model)
+    return BodyLines(model)
 
 
 def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, list], units: dict[str, str]) -> None:
@@ -144,27 +148,27 @@ def write_frame(path: Path, points: np.ndarray, cells: list, data: dict[str, lis
     meshio.Mesh(points, cells, cell_data=data).write(path)
     text = path.read_bytes()
     for name in units:
-        end = text.index(ARRAY, text.index(f' Name="{name}"'.encode()))
-        text = text[:end] + unit_of(units, name).encode() + text[end:]
+        end = text.index(ARRAY_END, text.index(f' Name="{name}"'.encode()))
+        text = text[:end] + unit_xml(units, name).encode() + text[end:]
     path.write_bytes(text)
 
 
-def unit_of(units: dict[str, str], name: str) -> str:
+def unit_xml(units: dict[str, str], name: str) -> str:
     """XML of the unit of an array; "" if it has no unit."""
-    return UNIT.format(html.escape(units[name], quote=False)) if name in units else ""
+    return UNIT_XML.format(html.escape(units[name], quote=False)) if name in units else ""
 
 
-def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+def pipe_geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Points float64[n, 3] [m] and lines int[cells, 2] of all pipes.
 
     Pipes share the point of their common node; the point of a basin patch is its mean.
     plan : part -> float64[2] [m]
     """
-    places = {name: plan[layout.place(name)] for name in model.node_names}
+    places = {name: plan[network_layout.place(name)] for name in model.node_names}
     for basin in model.basins:
         for patch in patch_names(basin.mesh):
             places[f"{basin.name}.{patch}"] = plan[basin.name] + basin.mesh.middle[basin.mesh.patch(patch)].mean(axis=0)
-    bends = layout.bends(model.case.links)
+    bends = network_layout.link_bends(model.case.links)
     ends = list(dict.fromkeys(end for pipe in model.pipes for end in (pipe.from_, pipe.to)))
     index = {name: i for i, name in enumerate(ends)}
     points = [np.array([[*places[name], model.elevation[name]] for name in ends])]
@@ -173,7 +177,7 @@ def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray
         fractions = np.asarray(pipe.edges[1:-1]) / pipe.length
         start, end = places[pipe.from_], places[pipe.to]
         low, high = model.elevation[pipe.from_], model.elevation[pipe.to]
-        inner = layout.path(start, end, fractions, bends[pipe.name])
+        inner = network_layout.link_path(start, end, fractions, bends[pipe.name])
         z = low + fractions * (high - low)
         if pipe.profile is not None:
             z = pipe.profile.at(pipe.edges[1:-1])
@@ -185,7 +189,7 @@ def geometry(model, plan: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray
     return np.concatenate(points), np.concatenate(lines)
 
 
-def ride(model, points: np.ndarray) -> np.ndarray:
+def points_on_bodies(model, points: np.ndarray) -> np.ndarray:
     """Body of each point of `pipe_geometry` : int[n], -1 for the world.
 
     Points on a body are replaced by coordinates in the axes of the body, along a straight pipe.
@@ -211,10 +215,10 @@ def ride(model, points: np.ndarray) -> np.ndarray:
     return owner
 
 
-def shape(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
+def basin_geometry(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
     """Corners float64[p, 3] [m] of the cells of a basin at bed level, and blocks of cells of equal type, in order."""
     mesh = basin.mesh
-    points = placed(basin, origin, mesh.points)
+    points = drawn_points(basin, origin, mesh.points)
     three = mesh.cells[:, 3] < 0
     ends = np.flatnonzero(np.diff(three)) + 1
     blocks = np.split(np.arange(len(three)), ends)
@@ -222,13 +226,13 @@ def shape(basin, origin: np.ndarray) -> tuple[np.ndarray, list]:
     return points, [(named[three[b[0]]][0], mesh.cells[b, : named[three[b[0]]][1]]) for b in blocks]
 
 
-def placed(basin, origin: np.ndarray, points: np.ndarray) -> np.ndarray:
+def drawn_points(basin, origin: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points of a basin mesh, shifted by `origin`, at bed level : float64[p, 3] [m]."""
     x, y = np.ascontiguousarray(points.T)
     return np.column_stack([origin[0] + x, origin[1] + y, basin.ground(x, y)])
 
 
-def parted(values: np.ndarray, blocks: list) -> list[np.ndarray]:
+def split_blocks(values: np.ndarray, blocks: list) -> list[np.ndarray]:
     """Split values of cells into the blocks of cells."""
     return np.split(values, np.cumsum([len(cells) for _, cells in blocks])[:-1])
 
@@ -246,10 +250,10 @@ def read_series(path: Path) -> list[tuple[float, Path]]:
 
 def read_pipes(path: Path, quantity: str) -> np.ndarray:
     """Quantity of all pipe cells in a frame, in SI : float64[cells]; raises RunError if it cannot be read."""
-    return read_lines(path, quantity)[2]
+    return read_pipe_lines(path, quantity)[2]
 
 
-def read_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def read_pipe_lines(path: Path, quantity: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(points float64[p, 3] [m], lines int[c, 2], a quantity float64[c] in SI, number of the pipe int[c]) of a frame.
 
     Raises RunError if the file cannot be read.

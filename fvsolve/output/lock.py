@@ -12,10 +12,10 @@ from filelock import FileLock, Timeout
 
 from fvsolve.errors import RunError
 
-NAME = ".lock"
+LOCK_FILE = ".lock"
 
 
-def locked(folder: Path, writer: str) -> FileLock:
+def lock_folder(folder: Path, writer: str) -> FileLock:
     """Create a folder if needed and lock it; returns the lock.
 
     writer : the other user of the folder in the message, such as "a run"
@@ -23,7 +23,7 @@ def locked(folder: Path, writer: str) -> FileLock:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(folder / NAME, blocking=False, thread_local=False, fallback_to_soft=False)
+        lock = FileLock(folder / LOCK_FILE, blocking=False, thread_local=False, fallback_to_soft=False)
         lock.acquire()
     except Timeout:
         raise RunError(f"{folder} is in use: {writer} still writes there. Wait until it ends, stop it, or choose "
@@ -35,7 +35,7 @@ def locked(folder: Path, writer: str) -> FileLock:
     return lock
 
 
-def let_go(lock: FileLock) -> None:
+def release(lock: FileLock) -> None:
     """Release a lock if it is held and delete its file; waiting processes then lock a new file."""
     if lock.is_locked:
         with contextlib.suppress(OSError):  # Windows cannot delete an open file

@@ -15,7 +15,7 @@ import numpy as np
 from fvsolve.errors import RunError, listing
 
 # Keys of the resolved case that change the report of a run, not its numbers.
-SILENT = ("title", "expect", "compare")
+UNCHECKED_KEYS = ("title", "expect", "compare")
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Restart:
 
 def identity(case) -> dict[str, str]:
     """Hash of the case without its end time, and versions; a run can only continue if all are equal."""
-    table = {key: value for key, value in case.table().items() if key not in SILENT}
+    table = {key: value for key, value in case.table().items() if key not in UNCHECKED_KEYS}
     table["numerics"].pop("end")
     digest = hashlib.sha256(json.dumps(table, sort_keys=True, default=str).encode())
     for path in case.files:
@@ -43,16 +43,16 @@ def identity(case) -> dict[str, str]:
 
 def versions(case) -> dict[str, str]:
     """Versions on which the numbers of a run depend: programs, fluid data and target processor."""
-    return programs() | {"fluid": case.properties.source}
+    return program_versions() | {"fluid": case.properties.source}
 
 
-def programs() -> dict[str, str]:
+def program_versions() -> dict[str, str]:
     """Versions of the programs that compute: fvsolve, Python, numpy, numba, and the target processor."""
-    return dict(_programs())
+    return dict(_program_versions())
 
 
 @functools.cache
-def _programs() -> tuple[tuple[str, str], ...]:
+def _program_versions() -> tuple[tuple[str, str], ...]:
     """Versions of the programs; they cannot change within a process, so they are cached."""
     import fvsolve
     from fvsolve import jit
@@ -93,12 +93,12 @@ def read_restart(path: Path, who: dict[str, str]) -> Restart:
     damaged += ["identity"] if not isinstance(stored, dict) else []
     if damaged:
         raise RunError(f"{path}: damaged or edited data ({listing(damaged)}); start the run again with --force")
-    _check(path, stored, who)
+    _check_identity(path, stored, who)
     extra = {name.removeprefix("extra."): value for name, value in arrays.items()}
     return Restart(float(t), y, memory, extra, *counts.tolist())
 
 
-def _check(path: Path, stored: dict[str, str], expected: dict[str, str]) -> None:
+def _check_identity(path: Path, stored: dict[str, str], expected: dict[str, str]) -> None:
     if stored.get("case") != expected["case"]:
         raise RunError(
             f"{path} belongs to another case: keys other than numerics.end have changed (numerics.end also changes "

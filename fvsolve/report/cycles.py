@@ -13,15 +13,15 @@ from typing import Any
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.report.libraries import library
+from fvsolve.report.libraries import import_library
 from fvsolve.units import span
 
-OF = ("pressure", "gauge_pressure", "head")
-SMALL = 1e-3  # smallest range that is counted, as a fraction of the greatest range
+PRESSURE_QUANTITIES = ("pressure", "gauge_pressure", "head")
+SMALLEST_RANGE = 1e-3  # smallest range that is counted, as a fraction of the greatest range
 
 
 @dataclass(frozen=True)
-class Strength:
+class FatigueStrength:
     """Fatigue strength of a part: endured `cycles` at a pressure `range` [unit of the probe], and the Basquin slope."""
 
     range: float
@@ -33,26 +33,26 @@ class Strength:
         return self.cycles * (self.range / range) ** self.slope
 
 
-def counted(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]]:
+def count_cycles(values: np.ndarray, bins: int = 10) -> list[tuple[float, float]]:
     """(range, count) of the cycles of a series, greatest range first; each range is the upper end of its bin."""
-    cycles = list(library("rainflow").extract_cycles(values.tolist()))
+    cycles = list(import_library("rainflow").extract_cycles(values.tolist()))
     greatest = max((cycle[0] for cycle in cycles), default=0.0)
     if not greatest > 0.0:
         return []
     width, sums = greatest / bins, np.zeros(bins)
     for size, _, count, *_ in cycles:
-        if size >= SMALL * greatest:
+        if size >= SMALLEST_RANGE * greatest:
             sums[min(int(np.ceil(size / width * (1.0 - 1e-12))), bins) - 1] += count
     return [((k + 1) * width, float(sums[k])) for k in reversed(range(bins)) if sums[k] > 0.0]
 
 
-def cycles(result, probes: list[str] | None = None, strength: Strength | None = None) -> list[dict[str, Any]]:
+def cycles(result, probes: list[str] | None = None, strength: FatigueStrength | None = None) -> list[dict[str, Any]]:
     """Cycles of every probe of pressure or head, and with `strength` the fatigue damage of one run, `share`.
 
     A range counts with the upper end of its bin, so the damage is on the safe side. Raises FvsolveError for probes of
     other quantities and for values that are not finite.
     """
-    known = [name for name in result.probes if result.column(name).dimension in OF]
+    known = [name for name in result.probes if result.column(name).dimension in PRESSURE_QUANTITIES]
     unknown = [name for name in probes or () if name not in known]
     if unknown:
         raise FvsolveError(f"{listing(unknown)}: unknown probe of pressure or head{did_you_mean(unknown[0], known)}. "
@@ -61,7 +61,7 @@ def cycles(result, probes: list[str] | None = None, strength: Strength | None = 
     for name in probes or known:
         if not np.isfinite(result[name]).all():
             raise FvsolveError(f"{name} is not finite at all times, so its cycles cannot be counted")
-        counts = counted(np.asarray(result[name]))
+        counts = count_cycles(np.asarray(result[name]))
         row: dict[str, Any] = {"probe": name, "unit": span(result.units[name]), "cycles": counts}
         if strength is not None:
             row["share"] = float(sum(count / strength.allowed(size) for size, count in counts))

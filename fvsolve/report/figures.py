@@ -14,58 +14,80 @@ import numpy as np
 
 from fvsolve.draw.style import COLOURS, DOUBT, HAIR, INK, MUTED
 from fvsolve.errors import visible
+from fvsolve.report.head_animation import HeadAnimation
 from fvsolve.report.histories import HistoryPanel
-from fvsolve.report.motion import Motion
-from fvsolve.report.section import VAPOUR as VAPOUR_LINE
-from fvsolve.report.section import Section, window
+from fvsolve.report.long_section import VAPOUR_LINE as VAPOUR_LINE
+from fvsolve.report.long_section import Section, head_window
 
-GREATEST, LEAST, NOW, VAPOUR, CLASS = COLOURS[0], COLOURS[1], COLOURS[2], COLOURS[3], COLOURS[6]
-GROUND = "#ffffff"
-DASH, DOT, LONG = "9px,5px", "2px,3px", "14px,5px"
-LINES = {VAPOUR_LINE: {"colour": VAPOUR, "width": 1.4, "dash": DOT},
-         "class line": {"colour": CLASS, "width": 1.8, "dash": "9px,3px,2px,3px"}}  # fmt: skip
-LIMITS = {"maximum": {"colour": CLASS, "width": 1.3, "dash": LONG},
-          "minimum": {"colour": CLASS, "width": 1.3, "dash": "8px,3px,2px,3px,2px,3px"}}  # fmt: skip
+GREATEST_COLOUR, LEAST_COLOUR, NOW_COLOUR, VAPOUR_COLOUR, CLASS_COLOUR = (
+    COLOURS[0],
+    COLOURS[1],
+    COLOURS[2],
+    COLOURS[3],
+    COLOURS[6],
+)
+BACKGROUND = "#ffffff"
+DASH, DOT, LONG_DASH = "9px,5px", "2px,3px", "14px,5px"
+LINE_LOOKS = {VAPOUR_LINE: {"colour": VAPOUR_COLOUR, "width": 1.4, "dash": DOT},
+         "class line": {"colour": CLASS_COLOUR, "width": 1.8, "dash": "9px,3px,2px,3px"}}  # fmt: skip
+LIMIT_LOOKS = {"maximum": {"colour": CLASS_COLOUR, "width": 1.3, "dash": LONG_DASH},
+          "minimum": {"colour": CLASS_COLOUR, "width": 1.3, "dash": "8px,3px,2px,3px,2px,3px"}}  # fmt: skip
 # Lines remain distinguishable in grey print.
-DASHES = ("solid", DASH, DOT, "9px,3px,2px,3px", LONG, "14px,3px,2px,3px")
-DARK = {INK: "#dde3ea", MUTED: "#9aa7b5", HAIR: "#37424e", GROUND: "#12171d", DOUBT: "#ff8b5e"} | dict(
+DASHES = ("solid", DASH, DOT, "9px,3px,2px,3px", LONG_DASH, "14px,3px,2px,3px")
+DARK_COLOURS = {INK: "#dde3ea", MUTED: "#9aa7b5", HAIR: "#37424e", BACKGROUND: "#12171d", DOUBT: "#ff8b5e"} | dict(
     zip(COLOURS, ("#5db4ec", "#f08a4b", "#3cc3a4", "#c08ad8", "#e0b13c", "#8fd0f5", "#e8748c", "#a9bf6a"), strict=True)
 )  # colours for dark screens; printed pages use the light ones
-TALL, LOW = 920, 260  # heights of sections and histories [px]
-TOOLS = 22  # height of the tool bar above the names [px]
-LONGEST = 22  # greatest number of letters of a name over a chainage
+SECTION_HEIGHT, HISTORY_HEIGHT = 920, 260  # heights of sections and histories [px]
+TOOLBAR_HEIGHT = 22  # height of the tool bar above the names [px]
+MAX_NAME_LENGTH = 22  # greatest number of letters of a name over a chainage
 FONT = 'system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 
 
-def section_figure(section: Section, moving: Motion | None, unit: str, along: str, bins: int) -> dict[str, Any]:
+def section_figure(section: Section, moving: HeadAnimation | None, unit: str, along: str, bins: int) -> dict[str, Any]:
     """Figure of a long section: heads, pipe, vapour and class lines, cavity spans, devices, and the animated head.
 
     unit, along : units of head and chainage; bins : of a long line, the number of bins with their extremes
     """
-    k = section.picked(bins)
+    k = section.drawn_indices(bins)
     x, lines = (
-        numbers(section.chainage[k], "f4"),
-        {name: numbers(values[k], "f4") for name, values in section.along.items()},
+        packed_array(section.chainage[k], "f4"),
+        {name: packed_array(values[k], "f4") for name, values in section.along.items()},
     )
     data = [
-        _line("maximum head", x, lines["max_head"], GREATEST, width=2),
-        _line("minimum head", x, lines["min_head"], LEAST, width=2, fill="tonexty", fillcolor="rgba(11,106,168,0.08)"),
+        _line("maximum head", x, lines["max_head"], GREATEST_COLOUR, width=2),
+        _line(
+            "minimum head",
+            x,
+            lines["min_head"],
+            LEAST_COLOUR,
+            width=2,
+            fill="tonexty",
+            fillcolor="rgba(11,106,168,0.08)",
+        ),
         _line("initial head", x, lines["initial_head"], INK, width=1.2, dash=DASH),
         _line("pipe", x, lines["elevation"], MUTED, width=3.5),
     ]
     data += _limits(section, x, k)
-    if section.parted:
+    if section.cavity_spans:
         data.append({"type": "scatter", "mode": "markers", "name": "vapour pressure reached", "x": [None], "y": [None],
-                     "marker": {"symbol": "square", "size": 11, "color": VAPOUR, "opacity": 0.35}})  # fmt: skip
-    if section.beyond:
-        at, heads, names = zip(*section.beyond, strict=True)
+                     "marker": {"symbol": "square", "size": 11, "color": VAPOUR_COLOUR, "opacity": 0.35}})  # fmt: skip
+    if section.violations:
+        at, heads, names = zip(*section.violations, strict=True)
         data.append({"type": "scatter", "mode": "markers", "name": "limit passed", "x": at, "y": heads,
-                     "cliponaxis": False, "text": [as_it_stands(name) for name in names],
+                     "cliponaxis": False, "text": [escape_markup(name) for name in names],
                      "marker": {"symbol": "x-thin", "size": 10, "line": {"color": DOUBT, "width": 2.5}}})  # fmt: skip
-    shapes = [_span(a, b, VAPOUR, 0.18) for a, b in section.parted]
+    shapes = [_band(a, b, VAPOUR_COLOUR, 0.18) for a, b in section.cavity_spans]
     if moving is not None:
-        data.append(_line("head now", numbers(moving.chainage, "f4"), numbers(moving.heads[0], "f4"), NOW, width=2.6))
-    layout = _along([section], unit, along)
+        data.append(
+            _line(
+                "head now",
+                packed_array(moving.chainage, "f4"),
+                packed_array(moving.heads[0], "f4"),
+                NOW_COLOUR,
+                width=2.6,
+            )
+        )
+    layout = _section_layout([section], unit, along)
     layout["shapes"] = [*shapes, *layout["shapes"]]
     figure: dict[str, Any] = {"data": data, "layout": layout}
     if moving is not None:
@@ -74,22 +96,22 @@ def section_figure(section: Section, moving: Motion | None, unit: str, along: st
     return figure
 
 
-def study_section(several: list[tuple[str, Section]], unit: str, along: str) -> dict[str, Any]:
+def study_section_figure(several: list[tuple[str, Section]], unit: str, along: str) -> dict[str, Any]:
     """Figure of a section of several (name, section): pipe, vapour line and limits once, heads in a colour per run."""
     first = max((section for _, section in several), key=lambda section: len(section.devices))
-    k = first.picked()
-    x = numbers(first.chainage[k], "f4")
-    data = [_line("pipe", x, numbers(first.along["elevation"][k], "f4"), MUTED, width=3.5)]
+    k = first.drawn_indices()
+    x = packed_array(first.chainage[k], "f4")
+    data = [_line("pipe", x, packed_array(first.along["elevation"][k], "f4"), MUTED, width=3.5)]
     data += _limits(first, x, k)
     for n, (name, section) in enumerate(several):
-        colour, k = COLOURS[n % len(COLOURS)], section.picked()
-        x, group = numbers(section.chainage[k], "f4"), {"legendgroup": f"run {n}"}
-        high, low = (numbers(section.along[key][k], "f4") for key in ("max_head", "min_head"))
+        colour, k = COLOURS[n % len(COLOURS)], section.drawn_indices()
+        x, group = packed_array(section.chainage[k], "f4"), {"legendgroup": f"run {n}"}
+        high, low = (packed_array(section.along[key][k], "f4") for key in ("max_head", "min_head"))
         data.append(_line(name or "the case", x, high, colour, width=2, **group))
         data.append(_line("", x, low, colour, width=2, dash=DASH, showlegend=False, **group))
     return {
         "data": data,
-        "layout": _along([first, *(section for _, section in several if section is not first)], unit, along),
+        "layout": _section_layout([first, *(section for _, section in several if section is not first)], unit, along),
     }
 
 
@@ -100,34 +122,38 @@ def history_figure(panel: HistoryPanel, time_unit: str, doubt: float | None) -> 
         place = names.index(line.name)
         colour = COLOURS[place % len(COLOURS)]
         trace = _line(
-            line.name, numbers(line.t), numbers(line.values), colour, dash=DASHES[place // len(COLOURS) % len(DASHES)]
+            line.name,
+            packed_array(line.t),
+            packed_array(line.values),
+            colour,
+            dash=DASHES[place // len(COLOURS) % len(DASHES)],
         )
         if line.measured:
             trace |= {"mode": "markers", "name": f"{trace['name']}, measured", "marker": {"size": 4, "color": colour}}
         data.append(trace | ({} if line.seen else {"visible": "legendonly"}))
-    layout = _layout(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", f"time [{time_unit}]", LOW)
+    layout = _layout(f"{panel.quantity.replace('_', ' ')} [{panel.unit}]", f"time [{time_unit}]", HISTORY_HEIGHT)
     ends = [line.t[[0, -1]] for line in panel.lines if len(line.t)]
     if ends:
         layout["xaxis"]["range"] = [float(min(a for a, _ in ends)), float(max(b for _, b in ends))]
     if doubt is not None and ends:
-        layout["shapes"] = [_span(doubt, layout["xaxis"]["range"][1], DOUBT, 0.08)]
-    layout |= {"yaxis": layout["yaxis"] | _still(panel)}
+        layout["shapes"] = [_band(doubt, layout["xaxis"]["range"][1], DOUBT, 0.08)]
+    layout |= {"yaxis": layout["yaxis"] | _range_at_rest(panel)}
     return {"data": data, "layout": layout}
 
 
-def as_it_stands(text: str) -> str:
+def escape_markup(text: str) -> str:
     """Escape a text for plotly.js: no markup, and `$` does not begin a formula."""
     return html.escape(visible(str(text)), quote=False).replace("$", "&#36;")
 
 
-def numbers(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict[str, str]:
+def packed_array(values: Sequence[float] | np.ndarray, kind: str = "f8") -> dict[str, str]:
     """Array as plotly.js reads it, in base64; kind : "f8" (exact) or "f4" (seven digits)."""
     packed = np.ascontiguousarray(values, f"<{kind}").tobytes()
     return {"dtype": kind, "bdata": base64.b64encode(packed).decode()}
 
 
 def _line(name: str, x, y, colour: str, width: float = 1.5, dash: str = "solid", **more: Any) -> dict[str, Any]:
-    return {"type": "scatter", "mode": "lines", "name": as_it_stands(name), "x": x, "y": y,
+    return {"type": "scatter", "mode": "lines", "name": escape_markup(name), "x": x, "y": y,
             "line": {"color": colour, "width": width, "dash": dash}, **more}  # fmt: skip
 
 
@@ -136,70 +162,72 @@ def _layout(y: str, x: str, height: int) -> dict[str, Any]:
             "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power", "minexponent": 6,
             "separatethousands": True}  # fmt: skip
     return {
-        "height": height, "margin": {"l": 62, "r": 14, "t": TOOLS + 6, "b": 50},
-        "paper_bgcolor": GROUND, "plot_bgcolor": GROUND,
+        "height": height, "margin": {"l": 62, "r": 14, "t": TOOLBAR_HEIGHT + 6, "b": 50},
+        "paper_bgcolor": BACKGROUND, "plot_bgcolor": BACKGROUND,
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
         "font": {"family": FONT, "size": 12, "color": INK}, "separators": ".\u202f", "hovermode": "x unified",
-        "hoverlabel": {"namelength": -1, "font": {"size": 11, "color": INK}, "bgcolor": GROUND, "bordercolor": HAIR},
+        "hoverlabel": {"namelength": -1, "font": {"size": 11, "color": INK}, "bgcolor": BACKGROUND, "bordercolor": HAIR},
         "dragmode": "zoom", "showlegend": False,
-        "xaxis": axis | {"title": {"text": as_it_stands(x), "standoff": 8}},
-        "yaxis": axis | {"title": {"text": as_it_stands(y), "standoff": 8}},
+        "xaxis": axis | {"title": {"text": escape_markup(x), "standoff": 8}},
+        "yaxis": axis | {"title": {"text": escape_markup(y), "standoff": 8}},
     }  # fmt: skip
 
 
-def _span(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:
+def _band(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:
     return {"type": "rect", "xref": "x", "yref": "paper", "x0": a, "x1": b, "y0": 0, "y1": 1, "fillcolor": colour,
             "opacity": opacity, "line": {"width": 0}, "layer": "below"}  # fmt: skip
 
 
-def _post(x: float) -> dict[str, Any]:
+def _vertical_line(x: float) -> dict[str, Any]:
     return {"type": "line", "xref": "x", "yref": "paper", "x0": x, "x1": x, "y0": 0, "y1": 1.015,
             "line": {"color": HAIR, "width": 1}, "layer": "below"}  # fmt: skip
 
 
 def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
     """Traces of the vapour line and of limits; upper and lower limits have different dashes."""
-    return [_line(name, x, numbers(line[k], "f4"), **(LINES.get(name) or LIMITS[name.rpartition(", ")[2]]))
+    return [_line(name, x, packed_array(line[k], "f4"), **(LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]))
             for name, line in section.lines.items()]  # fmt: skip
 
 
-def _along(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
+def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str, Any]:
     """Layout of a figure of sections, with the chainage and devices of the first."""
-    first, seen = sections[0], window(sections, unit)
-    layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", TALL), _names(first)
-    layout["margin"]["t"] = TOOLS + 26 + 6 * max((len(name["hovertext"][:LONGEST]) for name in names), default=0)
-    layout["shapes"] = [_post(device.chainage) for device in first.devices]
-    layout["annotations"] = [*names, *_beyond(seen.above, 1), *_beyond(seen.below, 0)]
+    first, seen = sections[0], head_window(sections, unit)
+    layout, names = _layout(f"head [{unit}]", f"chainage [{along}]", SECTION_HEIGHT), _place_names(first)
+    layout["margin"]["t"] = (
+        TOOLBAR_HEIGHT + 26 + 6 * max((len(name["hovertext"][:MAX_NAME_LENGTH]) for name in names), default=0)
+    )
+    layout["shapes"] = [_vertical_line(device.chainage) for device in first.devices]
+    layout["annotations"] = [*names, *_limit_arrow(seen.above, 1), *_limit_arrow(seen.below, 0)]
     layout["xaxis"]["range"] = list(first.ends)
     layout["yaxis"]["range"] = [seen.low, seen.high]
     return layout
 
 
-def _beyond(limits: list[str], edge: int) -> list[dict[str, Any]]:
+def _limit_arrow(limits: list[str], edge: int) -> list[dict[str, Any]]:
     """Arrow to the upper (1) or lower (0) edge with the limits outside the axis; a double click shows them."""
-    text, away = "<br>".join(map(as_it_stands, limits)), 7 * len(limits) + 6  # pixels from the edge
+    text, away = "<br>".join(map(escape_markup, limits)), 7 * len(limits) + 6  # pixels from the edge
     arrow = {"xref": "paper", "yref": "paper", "x": 0.97, "y": edge, "ax": 0, "ay": away if edge else -away,
-             "showarrow": True, "arrowhead": 2, "arrowwidth": 1.2, "arrowcolor": CLASS, "xanchor": "right",
-             "yanchor": "middle", "borderpad": 4, "bgcolor": GROUND, "text": text,
-             "font": {"size": 11, "color": CLASS}}  # fmt: skip
+             "showarrow": True, "arrowhead": 2, "arrowwidth": 1.2, "arrowcolor": CLASS_COLOUR, "xanchor": "right",
+             "yanchor": "middle", "borderpad": 4, "bgcolor": BACKGROUND, "text": text,
+             "font": {"size": 11, "color": CLASS_COLOUR}}  # fmt: skip
     return [arrow] if limits else []
 
 
-def _names(section: Section) -> list[dict[str, Any]]:
+def _place_names(section: Section) -> list[dict[str, Any]]:
     """Names of devices and nodes above the chainages of a section."""
     late = section.ends[0] + 0.9 * (section.ends[1] - section.ends[0])
     return [{"x": x, "y": 1.02, "xref": "x", "yref": "paper", "showarrow": False, "textangle": -45,
              "xanchor": "right" if x > late else "left", "yanchor": "bottom",
-             "text": as_it_stands(_cut(names)), "hovertext": as_it_stands(names),
+             "text": escape_markup(_shortened(names)), "hovertext": escape_markup(names),
              "font": {"size": 11, "color": INK if stands else MUTED}}
             for x, names, stands in section.labels()]  # fmt: skip
 
 
-def _cut(text: str) -> str:
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}\u2026"
+def _shortened(text: str) -> str:
+    return text if len(text) <= MAX_NAME_LENGTH else f"{text[: MAX_NAME_LENGTH - 1]}\u2026"
 
 
-def _still(panel: HistoryPanel) -> dict[str, Any]:
+def _range_at_rest(panel: HistoryPanel) -> dict[str, Any]:
     """Axis range for constant series, so that round-off is not magnified; {} for series that vary."""
     values = np.concatenate([line.values for line in panel.lines if line.seen] or [np.zeros(0)])
     values = values[np.isfinite(values)]

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fvsolve.draw.plot import quantity, thinned
+from fvsolve.draw.plot import probe_quantity, thin_series
 
-LINES = 8  # lines of a panel that are visible at first; a click on a name shows the others
-MOST = 48  # greatest number of probes of a report; history.csv has all
-NUMBERS = 40_000  # greatest number of values of all series of a report together
+SHOWN_LINES = 8  # lines of a panel that are visible at first; a click on a name shows the others
+MAX_PROBES = 48  # greatest number of probes of a report; history.csv has all
+MAX_NUMBERS = 40_000  # greatest number of values of all series of a report together
 
 
 class Series(NamedTuple):
@@ -31,36 +31,36 @@ class HistoryPanel(NamedTuple):
     lines: list[Series]
 
 
-def panels(result) -> list[HistoryPanel]:
+def history_panels(result) -> list[HistoryPanel]:
     """Panels of histories in the order of the probes; in a large panel the lines with the widest range are visible."""
     groups: dict[tuple[str, str], list[str]] = {}
-    for name in chosen(result):
-        groups.setdefault((quantity(name), result.units[name]), []).append(name)
+    for name in chosen_probes(result):
+        groups.setdefault((probe_quantity(name), result.units[name]), []).append(name)
     measured = result.history_drawn().get("measured", {})
-    points = max(NUMBERS // max(2 * (len(chosen(result)) + len(measured)), 1), 64)
+    points = max(MAX_NUMBERS // max(2 * (len(chosen_probes(result)) + len(measured)), 1), 64)
     result_panels = []
     for (kind, unit), names in groups.items():
-        seen = names if len(names) <= LINES else _liveliest(result, names)
-        lines = [Series(name, *thinned(result.t, result[name], points), name in seen) for name in names]
-        lines += [Series(name, *thinned(*measured[name], points), name in seen, True) for name in names
+        seen = names if len(names) <= SHOWN_LINES else _most_varying(result, names)
+        lines = [Series(name, *thin_series(result.t, result[name], points), name in seen) for name in names]
+        lines += [Series(name, *thin_series(*measured[name], points), name in seen, True) for name in names
                   if name in measured]  # fmt: skip
         result_panels.append(HistoryPanel(kind, unit, lines))
     return result_panels
 
 
-def chosen(result) -> list[str]:
+def chosen_probes(result) -> list[str]:
     """Names of the probes of the report: all, or of many those with the widest range in each panel."""
-    if len(result.probes) <= MOST:
+    if len(result.probes) <= MAX_PROBES:
         return result.probes
     groups: dict[tuple[str, str], list[str]] = {}
     for name in result.probes:
-        groups.setdefault((quantity(name), result.units[name]), []).append(name)
-    share = max(MOST // len(groups), 1)
-    selected = {name for names in groups.values() for name in _liveliest(result, names, share)}
+        groups.setdefault((probe_quantity(name), result.units[name]), []).append(name)
+    share = max(MAX_PROBES // len(groups), 1)
+    selected = {name for names in groups.values() for name in _most_varying(result, names, share)}
     return [name for name in result.probes if name in selected]
 
 
-def _liveliest(result, names: list[str], count: int = LINES) -> set[str]:
+def _most_varying(result, names: list[str], count: int = SHOWN_LINES) -> set[str]:
     extremes = result.extremes
     swing = {name: (extremes[name].maximum or 0.0) - (extremes[name].minimum or 0.0) for name in names}
     return set(sorted(names, key=lambda name: -swing[name])[:count])

@@ -8,7 +8,7 @@ from typing import Any
 from fvsolve.errors import FvsolveError
 
 
-def library(name: str) -> Any:
+def import_library(name: str) -> Any:
     """Import a module of the extra `report`; raises FvsolveError with the install command if it is missing."""
     try:
         return import_module(name)
@@ -18,17 +18,17 @@ def library(name: str) -> Any:
 
 def template(text: str) -> Any:
     """Jinja template that escapes all values, so that they never become markup."""
-    jinja = library("jinja2")
+    jinja = import_library("jinja2")
     return jinja.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja.StrictUndefined,
                              ).from_string(text)  # fmt: skip
 
 
-def charts() -> str:
+def plotly_source() -> str:
     """Source of plotly.js from the Plotly wheel, so that the page needs no network."""
-    return library("plotly.offline").get_plotlyjs()
+    return import_library("plotly.offline").get_plotlyjs()
 
 
-def workbook(path: str) -> Any:
+def empty_workbook(path: str) -> Any:
     """New workbook at `path` that stores text as text, never as a formula, link or number."""
     plain = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
-    return library("xlsxwriter").Workbook(path, {**plain, "nan_inf_to_errors": True})
+    return import_library("xlsxwriter").Workbook(path, {**plain, "nan_inf_to_errors": True})

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from fvsolve.output.column import column
-from fvsolve.report.tables import ReportTable, worded
+from fvsolve.output.unit_columns import column
+from fvsolve.report.tables import ReportTable, value_text
 
-UNITS = {"mass": "kg", "energy": "J"}  # units of ledgers; ledgers of scalars have the unit of the scalar
-TERMS = ("initial", "inflow", "outflow", "spilled", "made_up", "final")
+LEDGER_UNITS = {"mass": "kg", "energy": "J"}  # units of ledgers; ledgers of scalars have the unit of the scalar
+LEDGER_TERMS = ("initial", "inflow", "outflow", "spilled", "made_up", "final")
 
 
 def settings(result) -> ReportTable:
@@ -14,14 +14,14 @@ def settings(result) -> ReportTable:
     summary, numerics = result.summary, result.case.numerics
     steps = {"courant": "Courant number", "step": "given, s", "rtol": "by error, rtol"}
     given = [
-        f"{words} {worded(getattr(numerics, key))}" for key, words in steps.items() if getattr(numerics, key, None)
+        f"{words} {value_text(getattr(numerics, key))}" for key, words in steps.items() if getattr(numerics, key, None)
     ]
     time = column("", "time", result.case)
-    span = [worded(float(time.from_si(item))) for item in (numerics.start, summary["t"])]
+    span = [value_text(float(time.from_si(item))) for item in (numerics.start, summary["t"])]
     rows = [["time", f"{span[0]} to {span[1]} {time.unit}"]]
     if summary["cells"]:
-        rows += [["scheme", _scheme(numerics)], ["cells", summary["cells"]]]
-    rows += [["method", "; ".join(_method(item, result.case) for item in summary["methods"])],
+        rows += [["scheme", _scheme_text(numerics)], ["cells", summary["cells"]]]
+    rows += [["method", "; ".join(_method_text(item, result.case) for item in summary["methods"])],
              ["step", "; ".join(given) or "by default"],
              ["steps", summary["steps"]], ["repeated steps", summary["rejections"]],
              ["evaluations of rates", summary["rhs"]], ["seconds of stepping", summary["seconds"]]]  # fmt: skip
@@ -29,7 +29,7 @@ def settings(result) -> ReportTable:
         rows.append(
             ["errors of peaks (\u00b1)", "; ".join([summary["resolution"]["words"], *summary["resolution"]["reasons"]])]
         )
-    return ReportTable("Method", ("", ""), [[key, worded(value)] for key, value in rows])
+    return ReportTable("Method", ("", ""), [[key, value_text(value)] for key, value in rows])
 
 
 def ledgers(result) -> ReportTable | None:
@@ -37,8 +37,8 @@ def ledgers(result) -> ReportTable | None:
     balances = {name: row for name, row in result.summary["ledgers"].items() if "remainder" in row}
     if not balances:
         return None
-    terms = [term for term in TERMS if any(isinstance(row.get(term), float) for row in balances.values())]
-    rows = [[name, UNITS.get(name, ""), *(row.get(term) for term in terms), f"{row['remainder']:.2e}",
+    terms = [term for term in LEDGER_TERMS if any(isinstance(row.get(term), float) for row in balances.values())]
+    rows = [[name, LEDGER_UNITS.get(name, ""), *(row.get(term) for term in terms), f"{row['remainder']:.2e}",
              f"{row['relative']:.1e}" if "relative" in row else None] for name, row in balances.items()]  # fmt: skip
     heads = ("ledger", "unit", *(term.replace("_", " ") for term in terms), "remainder", "of the largest term")
     return ReportTable("Ledgers", heads, rows)
@@ -72,13 +72,13 @@ def comparisons(result) -> ReportTable | None:
     rows = [[row.probe, row.file, row.unit, row.rms, row.greatest_difference, row.measured_peak, row.computed_peak]
             for row in result.comparisons]  # fmt: skip
     heads = ("probe", "measured", "unit", "rms", "greatest difference", "peak measured", "computed")
-    return ReportTable("Against measurements", heads, rows, loose=frozenset({3, 4, 5, 6})) if rows else None
+    return ReportTable("Against measurements", heads, rows, mixed_units=frozenset({3, 4, 5, 6})) if rows else None
 
 
-def _scheme(numerics) -> str:
+def _scheme_text(numerics) -> str:
     limiter = getattr(numerics, "limiter", None)
     return f"{numerics.scheme}, limiter {limiter}" if limiter and numerics.scheme == "muscl" else numerics.scheme
 
 
-def _method(row: dict, case) -> str:
+def _method_text(row: dict, case) -> str:
     return row["method"] if not row["time"] else f"{row['method']} from {case.amount(row['time'], 'time', 6)} on"

@@ -7,68 +7,68 @@ from pathlib import Path
 from typing import Any
 
 from fvsolve.errors import visible
-from fvsolve.report import described, numerics, trust, worst
-from fvsolve.report.figures import DARK, history_figure, section_figure
-from fvsolve.report.heads import in_units
-from fvsolve.report.histories import chosen, panels
-from fvsolve.report.legs import SectionWay
-from fvsolve.report.libraries import charts, template
-from fvsolve.report.motion import motions
-from fvsolve.report.section import BINS, Section, section
-from fvsolve.report.tables import ReportTable, worded
+from fvsolve.report import model_tables, numerics, reliability, worst_places
+from fvsolve.report.envelope_units import envelope_column
+from fvsolve.report.figures import DARK_COLOURS, history_figure, section_figure
+from fvsolve.report.head_animation import head_animations
+from fvsolve.report.histories import chosen_probes, history_panels
+from fvsolve.report.libraries import plotly_source, template
+from fvsolve.report.long_section import MAX_BINS, Section, section_of
+from fvsolve.report.section_pipes import SectionPath
+from fvsolve.report.tables import ReportTable, value_text
 from fvsolve.run.result import not_valid
 
-HERE = Path(__file__).parent
-SHARED = 900  # greatest number of bins of all sections together
-PAPER_TITLE = 100  # greatest number of letters of the title on each printed page
-WARNINGS = 40  # greatest number on the page; summary.json has all
+TEMPLATE_FOLDER = Path(__file__).parent
+MAX_SHARED_BINS = 900  # greatest number of bins of all sections together
+MAX_PAPER_TITLE = 100  # greatest number of letters of the title on each printed page
+MAX_WARNINGS = 40  # greatest number on the page; summary.json has all
 
 
-def page(result, ways: list[SectionWay]) -> str:
+def page(result, ways: list[SectionPath]) -> str:
     """HTML report of a run."""
-    sections = [section(result, way) for way in ways]
+    sections = [section_of(result, way) for way in ways]
     figures: dict[str, Any] = {}
-    probes = worst.of_probes(result)
+    probes = worst_places.extremes_of_probes(result)
     filled = {
         "invalid": not_valid(result.summary),
         "title": visible(result.summary["title"] or result.summary["case"]), "run": result.summary,
         "description": visible(result.case.description), "source": visible(result.case.source),
-        "ended": result.summary.get("ended", ""), "words": trust.words(result),
-        "limits": trust.verdicts(result), "worst": worst.of_all(result, ways) or probes,
+        "ended": result.summary.get("ended", ""), "words": reliability.top_sentences(result),
+        "limits": reliability.verdict_table(result), "worst": worst_places.extremes_of_pipes(result, ways) or probes,
         "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
-        "probes_left_out": len(result.probes) - len(chosen(result)),
-        "places": _there([*trust.worst(result), *worst.by_pipe(result), probes if result.envelope else None]),
-        "model": _there(described.model(result)),
-        "numbers": _there([numerics.settings(result), numerics.ledgers(result), trust.claims(result),
+        "probes_left_out": len(result.probes) - len(chosen_probes(result)),
+        "places": _nonempty([*reliability.worst_tables(result), *worst_places.ranked_pipes(result), probes if result.envelope else None]),
+        "model": _nonempty(model_tables.all_tables(result)),
+        "numbers": _nonempty([numerics.settings(result), numerics.ledgers(result), reliability.claim_table(result),
                            numerics.comparisons(result)]),
-        "told": _cut([notice.text for notice in result.warnings if notice.ok]),
-        "happened": _there([numerics.cavities(result), numerics.events(result)]),
+        "told": _warning_texts([notice.text for notice in result.warnings if notice.ok]),
+        "happened": _nonempty([numerics.cavities(result), numerics.events(result)]),
         "versions": numerics.versions(result),
     }  # fmt: skip
-    return rendered("page", filled, figures)
+    return render_page("page", filled, figures)
 
 
-def rendered(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> str:
+def render_page(name: str, filled: dict[str, Any], figures: dict[str, Any]) -> str:
     """Render a template with its data, style, script, figures and the charting library embedded.
 
     name : "page" or "study"; filled : values of the template; figures : id -> data for plotly.js
     """
     files = {"table": "table.html.j2", "page": f"{name}.html.j2", "css": "page.css", "js": "page.js"}
-    texts = {key: (HERE / file).read_text(encoding="utf-8") for key, file in files.items()}
+    texts = {key: (TEMPLATE_FOLDER / file).read_text(encoding="utf-8") for key, file in files.items()}
     return template(texts["table"] + texts["page"]).render(
         filled,
         css=texts["css"],
         script=texts["js"],
-        library=charts(),
-        figures=embedded(figures),
-        dark=json.dumps(DARK),
-        paper=quoted(filled["title"]),
+        library=plotly_source(),
+        figures=script_json(figures),
+        dark=json.dumps(DARK_COLOURS),
+        paper=css_string(filled["title"]),
     )
 
 
-def quoted(text: str) -> str:
+def css_string(text: str) -> str:
     """Text as a CSS string; all but ASCII letters and digits are escaped, so that nothing can end it early."""
-    text = text if len(text) <= PAPER_TITLE else f"{text[: PAPER_TITLE - 1]}\u2026"
+    text = text if len(text) <= MAX_PAPER_TITLE else f"{text[: MAX_PAPER_TITLE - 1]}\u2026"
     return (
         '"'
         + "".join(letter if letter.isascii() and letter.isalnum() else f"\\{ord(letter):x} " for letter in text)
@@ -76,7 +76,7 @@ def quoted(text: str) -> str:
     )
 
 
-def embedded(data: Any) -> str:
+def script_json(data: Any) -> str:
     """JSON for a <script> element of the page, escaped so that no text can end it; NaN and infinity become null."""
     try:
         text = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
@@ -90,16 +90,16 @@ def embedded(data: Any) -> str:
 
 def _sections(result, sections: list[Section], figures: dict[str, Any]) -> list[dict[str, Any]]:
     """Template data of each section; adds its figure to `figures`."""
-    moving = motions(result, [item.way for item in sections])
-    height, along = in_units(result, "max_head").unit, in_units(result, "distance").unit
-    entries, bins = [], min(BINS, SHARED // max(len(sections), 1))
+    moving = head_animations(result, [item.way for item in sections])
+    height, along = envelope_column(result, "max_head").unit, envelope_column(result, "distance").unit
+    entries, bins = [], min(MAX_BINS, MAX_SHARED_BINS // max(len(sections), 1))
     for k, item in enumerate(sections):
         line = moving[k] if moving else None
         figures[f"section-{k}"] = section_figure(item, line, height, along, bins)
         entries.append({"id": f"section-{k}", "name": visible(item.way.name),
-                     "length": f"{worded(in_units(result, 'distance').from_si(item.way.length))} {along}",
+                     "length": f"{value_text(envelope_column(result, 'distance').from_si(item.way.length))} {along}",
                      "frames": 0 if line is None else len(line.times), "pipes": len(item.way.legs),
-                     "parted": bool(item.parted)})  # fmt: skip
+                     "parted": bool(item.cavity_spans)})  # fmt: skip
     return entries
 
 
@@ -108,17 +108,17 @@ def _histories(result, figures: dict[str, Any]) -> list[dict[str, Any]]:
     drawn = result.history_drawn()
     doubt = min((time for time, _ in drawn.get("marks", ())), default=None)
     entries = []
-    for k, panel in enumerate(panels(result)):
+    for k, panel in enumerate(history_panels(result)):
         figures[f"history-{k}"] = history_figure(panel, drawn["time_unit"], doubt)
         hidden = sum(not line.seen for line in panel.lines)
         entries.append({"id": f"history-{k}", "name": panel.quantity.replace("_", " "), "hidden": hidden})
     return entries
 
 
-def _there(tables: list[ReportTable | None]) -> list[ReportTable]:
+def _nonempty(tables: list[ReportTable | None]) -> list[ReportTable]:
     return [table for table in tables if table is not None and table.rows]
 
 
-def _cut(texts: list[str]) -> list[str]:
-    more = len(texts) - WARNINGS
-    return [visible(text) for text in texts[:WARNINGS]] + ([f"{more} more in summary.json"] if more > 0 else [])
+def _warning_texts(texts: list[str]) -> list[str]:
+    more = len(texts) - MAX_WARNINGS
+    return [visible(text) for text in texts[:MAX_WARNINGS]] + ([f"{more} more in summary.json"] if more > 0 else [])

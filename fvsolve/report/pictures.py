@@ -7,12 +7,12 @@ from pathlib import Path
 
 from fvsolve.display import save_if_path
 from fvsolve.draw.plot import history_figure
-from fvsolve.draw.section import phase_figure, section_figure
+from fvsolve.draw.section_picture import phase_figure, section_figure
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.report.heads import in_units
-from fvsolve.report.legs import SectionWay, ways
-from fvsolve.report.report import opened
-from fvsolve.report.section import section, window
+from fvsolve.report.envelope_units import envelope_column
+from fvsolve.report.long_section import head_window, section_of
+from fvsolve.report.report_files import open_checked_run
+from fvsolve.report.section_pipes import SectionPath, section_paths
 from fvsolve.run.result import not_valid
 from fvsolve.units import show
 
@@ -27,11 +27,11 @@ def write_pictures(
     phases : pairs of probes "X:Y", drawn in phase.png
     Raises RunError if the directory holds no finished run, FvsolveError with all unknown names.
     """
-    result, folder = opened(Path(directory)), Path(out) if out is not None else Path(directory)
+    result, folder = open_checked_run(Path(directory)), Path(out) if out is not None else Path(directory)
     faults: list[str] = []
-    picked = chosen(result, probes, faults)
-    pairs = [_pair(result, text, faults) for text in phases]
-    sections = _sections(ways(result), route, bool(picked or phases), faults)
+    picked = parse_probes(result, probes, faults)
+    pairs = [_phase_pair(result, text, faults) for text in phases]
+    sections = _chosen_sections(section_paths(result), route, bool(picked or phases), faults)
     if faults:
         raise FvsolveError("\n".join(faults))
     title, drawn = result.summary["title"], {}
@@ -54,7 +54,7 @@ def write_pictures(
     return [folder / name for name in drawn]
 
 
-def chosen(result, text: str, faults: list[str]) -> list[str]:
+def parse_probes(result, text: str, faults: list[str]) -> list[str]:
     """Split `a.head,tank.depth@1,2` into names of probes, which may contain commas; adds a fault for unknown names."""
     names, pieces = [], [piece.strip() for piece in text.split(",")] if text else []
     while pieces:
@@ -64,24 +64,24 @@ def chosen(result, text: str, faults: list[str]) -> list[str]:
         if ends:
             names.append(name)
         else:
-            faults.append(_none(result, name))
+            faults.append(_unknown_probe(result, name))
     return list(dict.fromkeys(names))
 
 
-def _pair(result, text: str, faults: list[str]) -> list[str]:
+def _phase_pair(result, text: str, faults: list[str]) -> list[str]:
     names = [name.strip() for name in text.split(":")]
     if len(names) != 2:
         faults.append(f"--phase {show(text)}: expected two probes, X:Y")
-    faults += [_none(result, name) for name in names if len(names) == 2 and name not in result.units]
+    faults += [_unknown_probe(result, name) for name in names if len(names) == 2 and name not in result.units]
     return names
 
 
-def _none(result, name: str) -> str:
+def _unknown_probe(result, name: str) -> str:
     hint = did_you_mean(name, result.units) or f"; the run has {listing(result.units) or 'none'}"
     return f"{show(name)}: unknown probe{hint}"
 
 
-def _sections(sections: list[SectionWay], route: str, others: bool, faults: list[str]) -> list[SectionWay]:
+def _chosen_sections(sections: list[SectionPath], route: str, others: bool, faults: list[str]) -> list[SectionPath]:
     """Sections to draw; adds a fault for an unknown route. others : True if probes or phase planes are drawn."""
     if not route:
         return [] if others else sections
@@ -93,11 +93,11 @@ def _sections(sections: list[SectionWay], route: str, others: bool, faults: list
     return named
 
 
-def _section_figure(result, way: SectionWay):
-    sec = section(result, way)
-    k, title = sec.picked(), "\n".join(filter(None, [result.summary["title"], way.name]))
+def _section_figure(result, way: SectionPath):
+    sec = section_of(result, way)
+    k, title = sec.drawn_indices(), "\n".join(filter(None, [result.summary["title"], way.name]))
     return section_figure(
         sec.chainage[k], {name: values[k] for name, values in sec.along.items()}, result.summary["envelope_units"],
-        {name: line[k] for name, line in sec.lines.items()}, window([sec], in_units(result, "max_head").unit),
-        sec.parted, sec.beyond, [device.chainage for device in sec.devices], sec.labels(), title,
+        {name: line[k] for name, line in sec.lines.items()}, head_window([sec], envelope_column(result, "max_head").unit),
+        sec.cavity_spans, sec.violations, [device.chainage for device in sec.devices], sec.labels(), title,
     )  # fmt: skip

@@ -11,10 +11,10 @@ from fvsolve.errors import visible
 
 DIGITS = 5  # significant digits of the greatest number of a column
 DECIMALS = 6  # greatest number of decimals, unless the least number of the column needs more
-MOST = 7  # greatest number of digits after the first if all numbers of a column have the same decimals
-ROWS = 60  # greatest number of rows of a table on the page, unless the table states `most`
-ERROR = "\u00b1"  # header of columns of errors, shown with two digits
-NARROW, FIGURE, POINT = (
+MAX_SHARED_DIGITS = 7  # greatest number of digits after the first if all numbers of a column have the same decimals
+MAX_ROWS = 60  # greatest number of rows of a table on the page, unless the table states `most`
+ERROR_HEADER = "\u00b1"  # header of columns of errors, shown with two digits
+NARROW_SPACE, FIGURE_SPACE, POINT_SPACE = (
     "\u202f",
     "\u2007",
     "\u2008",
@@ -43,8 +43,8 @@ class ReportTable:
     rows: Sequence[Sequence[Any]]
     units: Sequence[str] = ()
     bad: frozenset[int] = frozenset()
-    loose: frozenset[int] = frozenset()
-    most: int = ROWS
+    mixed_units: frozenset[int] = frozenset()
+    most: int = MAX_ROWS
     more: str = ""
     links: Sequence[str] = ()
 
@@ -69,10 +69,10 @@ class ReportTable:
     def words(self) -> list[list[str]]:
         """Texts of the rows that the page shows."""
         shown = self.rows[: self.most]
-        rough = [k for k, head in enumerate(self.headers) if head == ERROR]
+        rough = [k for k, head in enumerate(self.headers) if head == ERROR_HEADER]
         shown = [[float(f"{value:.2g}") if k in rough and is_number(value) else value for k, value in enumerate(row)]
                  for row in shown]  # fmt: skip
-        columns = [aligned([row[k] for row in shown], k in self.loose) for k in range(len(self.headers))]
+        columns = [aligned_texts([row[k] for row in shown], k in self.mixed_units) for k in range(len(self.headers))]
         return [list(row) for row in zip(*columns, strict=True)]
 
     @property
@@ -86,10 +86,10 @@ def is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def aligned(values: Sequence[Any], loose: bool = False) -> list[str]:
+def aligned_texts(values: Sequence[Any], loose: bool = False) -> list[str]:
     """Texts of a column, padded so that decimal points align; loose : True if the rows have different units."""
-    places = None if loose else decimals([value for value in values if is_number(value)])
-    words = [worded(value, places) for value in values]
+    places = None if loose else decimal_places([value for value in values if is_number(value)])
+    words = [value_text(value, places) for value in values]
     behind = [text.partition(".")[1:] for text, value in zip(words, values, strict=True) if is_number(value)]
     widest = max((len(rest) for point, rest in behind if point), default=-1)
     if widest < 0:
@@ -100,10 +100,10 @@ def aligned(values: Sequence[Any], loose: bool = False) -> list[str]:
 
 def _padded(text: str, widest: int) -> str:
     _, point, rest = text.partition(".")
-    return text + ("" if point else POINT) + FIGURE * (widest - len(rest))
+    return text + ("" if point else POINT_SPACE) + FIGURE_SPACE * (widest - len(rest))
 
 
-def decimals(numbers: Sequence[float]) -> int | None:
+def decimal_places(numbers: Sequence[float]) -> int | None:
     """Number of decimals of a column; None if its numbers differ too much in size for a common number."""
     sizes = [abs(size) for size in numbers if math.isfinite(size) and size != 0.0]
     if not sizes:
@@ -112,7 +112,7 @@ def decimals(numbers: Sequence[float]) -> int | None:
     places = min(max(DIGITS - 1 - top, 0), DECIMALS)
     least = 0 if all(float(size).is_integer() for size in sizes) else 1 - math.floor(math.log10(min(sizes)))
     places = max(places, least)
-    if top > 9 or top + places > MOST:
+    if top > 9 or top + places > MAX_SHARED_DIGITS:
         return None
     texts = [f"{size:.{places}f}" for size in sizes]
     while places and all(text.endswith("0") for text in texts):
@@ -120,7 +120,7 @@ def decimals(numbers: Sequence[float]) -> int | None:
     return places
 
 
-def worded(value: Any, places: int | None = None) -> str:
+def value_text(value: Any, places: int | None = None) -> str:
     """Text of a value; a number has `places` decimals, or by default DIGITS significant digits."""
     if value is None or is_number(value) and not math.isfinite(value):
         return "\u2013"
@@ -131,7 +131,7 @@ def worded(value: Any, places: int | None = None) -> str:
     text = _digits(value) if places is None else f"{value:,.{places}f}"
     text = text if text.strip("-0.,") else text.lstrip("-")  # no minus sign before zero
     text = text if abs(value) >= 1e4 else text.replace(",", "")
-    return text.replace(",", NARROW).replace("-", "\u2212")
+    return text.replace(",", NARROW_SPACE).replace("-", "\u2212")
 
 
 def _digits(value: float) -> str:

@@ -8,12 +8,12 @@ import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from fvsolve.draw.beside import Painter, Picture
+from fvsolve.draw.plot_process import Picture, PlotProcess
 from fvsolve.errors import CaseError, RunError
-from fvsolve.output.directory import ENDED, RunDirectory, pictures_there, read_directory
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.directory import SUMMARY_FILE, RunDirectory, existing_pictures, read_directory
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.output.restart import identity
-from fvsolve.output.summary import described, write_summary
+from fvsolve.output.summary_file import summary_data, write_summary
 from fvsolve.run import mpi_run
 from fvsolve.run.case_claims import claims
 from fvsolve.run.result import Result
@@ -53,7 +53,7 @@ def run(
     with contextlib.closing(sink_of(model, out, force, resume, threads)) as sink:
         result = solved(model, sink, progress, threads, begun)
         if pictures:
-            draw(result, Painter(beside=False))
+            draw(result, PlotProcess(second_process=False))
         return result
 
 
@@ -63,7 +63,7 @@ def open_run(directory: str | Path) -> Result:
     from fvsolve.run.summary_fields import check
 
     contents = read_directory(Path(directory))
-    check(contents[0], Path(directory) / ENDED)
+    check(contents[0], Path(directory) / SUMMARY_FILE)
     return Result(*contents)
 
 
@@ -112,9 +112,9 @@ def solved(model, sink, progress=None, threads: int = 1, begun: float | None = N
     return open_run(sink.folder)
 
 
-def draw(result: Result, painter: Painter) -> None:
+def draw(result: Result, painter: PlotProcess) -> None:
     """Write missing pictures of a run directory; warns of pictures that fail."""
-    missing = None if result.directory is None else pictures_there(result.directory)
+    missing = None if result.directory is None else existing_pictures(result.directory)
     pictures, failed = [], {}
     for name, function, drawn in (("history.png", "history_figure", result.history_drawn),
                                   ("envelope.png", "envelope_figure", result.envelope_drawn)):  # fmt: skip
@@ -142,7 +142,7 @@ def _solve(model, sink, progress, threads, comm):
     state = initial_state(model) if restart is None else State(restart.t, restart.y, restart.memory)
     sink.begin(model, state)
     if comm is not None and sink.folder is not None:
-        sink.among(comm, mpi_run.rows_of(model, comm.size))
+        sink.share_basin_rows(comm, mpi_run.rows_of(model, comm.size))
     try:
         return solve(model, state, sink, progress, threads, comm)
     except MemoryMismatch as error:
@@ -150,7 +150,7 @@ def _solve(model, sink, progress, threads, comm):
 
 
 def _result(model, summary, sink, begun: float) -> Result:
-    facts = described(summary, model)
+    facts = summary_data(summary, model)
     result = Result(facts, sink.table, sink.envelope, sink.folder)
     result.case = model.case
     facts |= claims(model, summary, result)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fvsolve.case.extent import OF_PRESSURE
-from fvsolve.output.column import UnitColumn, column, probe_columns
+from fvsolve.output.unit_columns import UnitColumn, column, probe_columns
 from fvsolve.run.comparison import comparison, interpolated
 from fvsolve.run.part_extremes import in_quantity, part_extremes
 from fvsolve.run.result import FAILS, HOLDS, OPEN

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fvsolve.output.column import UnitColumn
+from fvsolve.output.unit_columns import UnitColumn
 
 RESULT_KEYS = (
     "rms",

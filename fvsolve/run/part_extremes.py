@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fvsolve.case.extent import OF_PRESSURE
-from fvsolve.output.envelope import with_start
+from fvsolve.output.envelope import with_initial_heads
 
 ENVELOPE_KEYS = ("distance", "elevation", "min_pressure", "t_min", "max_pressure", "t_max")
 
@@ -33,7 +33,7 @@ def part_extremes(model, summary, extent) -> list[PartExtremes]:
     """Extremes of every part of an extent."""
     is_pressure = extent.quantity in OF_PRESSURE
     pipes = {pipe.name: pipe for pipe in model.pipes}
-    envelope = with_start(summary, model) if is_pressure else {}
+    envelope = with_initial_heads(summary, model) if is_pressure else {}
     quantity = "pressure" if is_pressure else extent.quantity
     rows: dict[str, list] = {}  # watched probes along pipes
     for probe in model.watched:

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from fvsolve.case.basins import patch_names
-from fvsolve.draw.aspect import LIKELY
+from fvsolve.draw.projection import PLAUSIBLE_SCALE
 from fvsolve.draw.scene import DrawnPart, DrawnScene, DrawnUnit
 from fvsolve.errors import FvsolveError, did_you_mean, listing
-from fvsolve.output import layout
-from fvsolve.output.column import column
-from fvsolve.output.fields import UNITS, read_lines
+from fvsolve.output import network_layout
+from fvsolve.output.fields import FIELD_UNITS, read_pipe_lines
+from fvsolve.output.unit_columns import column
 
 DIMENSIONS = {
     "pressure": "pressure", "min_pressure": "pressure", "max_pressure": "pressure", "head": "head",
@@ -39,15 +39,15 @@ def scene_of(case, title: str, field: str, frames: list[tuple[float, list[Path]]
         lengths = {name: link.length for name, link in case.links.items() if hasattr(link, "length")}
         scene.plan = "schematic" if scene.plan != "given" and not lengths else scene.plan
     elif pipes and not case.meshes and not bodies:
-        known = [*UNITS, *case.scalars]
+        known = [*FIELD_UNITS, *case.scalars]
         if field not in known:
             raise FvsolveError(f"unknown field {field!r}{did_you_mean(field, known)}; fields are {listing(known)}")
-        scene.pipes = [read_lines(files[0], field) for _, files in frames]
+        scene.pipes = [read_pipe_lines(files[0], field) for _, files in frames]
         if scene.plan == "given" and not _to_scale(scene, lengths):
             scene.plan = "own scale"
     scene.bodies = list(case.poses) if bodies else []
     if not bodies:
-        plan = layout.positions(case, lengths) if pipes or not frames else _about_basins(case)
+        plan = network_layout.plan_positions(case, lengths) if pipes or not frames else _about_basins(case)
         scene.parts, scene.anchors = parts_of(case, plan), _anchors(case, plan)
     return scene
 
@@ -95,12 +95,14 @@ def parts_of(case, plan: dict[str, np.ndarray]) -> list[DrawnPart]:
                                    joint=node.kind == "junction", held=fixed))  # fmt: skip
     nodes = {part.name: part for part in parts}
     for name, link in links.items():
-        ends = [nodes[layout.place(port)].at for port in link.ports.values() if layout.place(port) in nodes]
+        ends = [
+            nodes[network_layout.place(port)].at for port in link.ports.values() if network_layout.place(port) in nodes
+        ]
         if not (ends or name in plan):
             continue
         at = np.array([*plan[name], np.mean([end[2] for end in ends]) if ends else 0.0]) if name in plan else None
         at = np.mean(ends, axis=0) if at is None else at
-        between = tuple(_key(port, case) for port in link.ports.values() if layout.place(port) != name)
+        between = tuple(_key(port, case) for port in link.ports.values() if network_layout.place(port) != name)
         parts.append(DrawnPart(f"links.{name}", name, _kinds(link), tuple(map(float, at)), between, True,
                                own_place=name in plan))  # fmt: skip
     return parts
@@ -110,7 +112,7 @@ def _key(port: str, case) -> str:
     """Part, or patch, of a port."""
     if port in case.nodes:
         return f"nodes.{port}"
-    owner = layout.place(port)
+    owner = network_layout.place(port)
     return f"links.{owner}" if owner in case.links else port if owner in case.meshes else f"nodes.{owner}"
 
 
@@ -124,7 +126,7 @@ def _to_scale(scene: DrawnScene, lengths: dict[str, float]) -> bool:
     points, lines, _, owner = scene.pipes[0]
     drawn = np.bincount(owner, np.linalg.norm(points[lines[:, 1]] - points[lines[:, 0]], axis=1), len(lengths))
     share = float(np.median(drawn / np.array(list(lengths.values()))))
-    return LIKELY[0] <= share <= LIKELY[1]
+    return PLAUSIBLE_SCALE[0] <= share <= PLAUSIBLE_SCALE[1]
 
 
 def _anchors(case, plan: dict[str, np.ndarray]) -> dict[str, tuple[float, float, float]]:
@@ -148,7 +150,7 @@ def _about_basins(case) -> dict[str, np.ndarray]:
         for link in case.links.values():
             ports = list(link.ports.values())
             for port, opposite in (ports, ports[::-1]) if len(ports) == 2 else ():
-                if opposite in case.nodes and opposite not in plan and layout.place(port) in plan:
+                if opposite in case.nodes and opposite not in plan and network_layout.place(port) in plan:
                     owner, _, patch = port.partition(".")
                     out, start = _outward(case, owner, patch) if patch else (np.array([1.0, 0.0]), np.zeros(2))
                     plan[opposite] = plan[owner] + start + 0.12 * size * out

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fvsolve import jit, store
-from fvsolve.draw.beside import processors
+from fvsolve.draw.plot_process import processor_count
 from fvsolve.errors import FvsolveError, RunError
 from fvsolve.run.process_pool import ProcessPool
 
@@ -50,10 +50,12 @@ def warm(
         + [("attempt", kind) for kind in STEPS if whole]
         + [("algebra", kind) for kind in LINEAR if whole]
     )
-    _all(tasks, jobs or processors(), lambda done, task: progress(done, len(tasks) + len(cases), task))
+    _all(tasks, jobs or processor_count(), lambda done, task: progress(done, len(tasks) + len(cases), task))
     case_tasks = [("case", str(path)) for path in cases]
     _all(
-        case_tasks, jobs or processors(), lambda done, task: progress(len(tasks) + done, len(tasks) + len(cases), task)
+        case_tasks,
+        jobs or processor_count(),
+        lambda done, task: progress(len(tasks) + done, len(tasks) + len(cases), task),
     )
     after = code_files(folder)
     return CacheState(
@@ -128,7 +130,7 @@ def algebra(kind: str) -> None:
 
 def case(path: str) -> None:
     """Code that a case needs: its start, checks, first steps and energies."""
-    from fvsolve.output.memory import MemorySink
+    from fvsolve.output.memory_sink import MemorySink
     from fvsolve.run import model_of
     from fvsolve.solve import initial_state, solve
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from fvsolve.display import Displayable, save_if_path
 from fvsolve.errors import FvsolveError, Notice, RunError, did_you_mean, listing
-from fvsolve.output.column import UnitColumn
 from fvsolve.output.fields import read_series
+from fvsolve.output.unit_columns import UnitColumn
 from fvsolve.units import show
 from fvsolve.validation import COUNT_FROM_ZERO, NUMBER, PATH, TEXT, validated
 
@@ -208,9 +208,9 @@ class Result(Displayable):
     @cached_property
     def routes(self) -> dict:
         """Route -> chainage, pipe, distance, elevation, least and maximum pressure and head, times, along it."""
-        from fvsolve.output.routes import along_routes
+        from fvsolve.output.route_table import route_envelopes
 
-        return along_routes(self.envelope, self.case)
+        return route_envelopes(self.envelope, self.case)
 
     @property
     def probes(self) -> list[str]:

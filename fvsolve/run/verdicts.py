@@ -11,7 +11,7 @@ from fvsolve.case import schedule_ends
 from fvsolve.case.design_limits import VACUUM
 from fvsolve.case.extent import OF_PRESSURE
 from fvsolve.case.pipe_routes import Leg, is_cut, legs, pipe_leg
-from fvsolve.output.column import UnitColumn, column
+from fvsolve.output.unit_columns import UnitColumn, column
 from fvsolve.run.part_extremes import PartExtremes, in_quantity, part_extremes, pressure_of
 from fvsolve.run.result import FAILS, HOLDS, OPEN
 

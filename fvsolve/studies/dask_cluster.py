@@ -9,7 +9,7 @@ import uuid
 from typing import Any
 
 from fvsolve.errors import FvsolveError, RunError, listing
-from fvsolve.output.restart import programs
+from fvsolve.output.restart import program_versions
 from fvsolve.run.process_pool import compute
 
 TIMEOUT = 10.0  # timeout for a scheduler, and for its first worker [s]
@@ -117,7 +117,7 @@ def check_versions(client: Any, address: str) -> None:
     faults = [
         f"{end} has {item}" for end, text in ends.items() for item in differing_versions(here, version_numbers(text))
     ]
-    faults = faults or [f"worker {name} has {item}" for name, text in client.run(programs, on_error="return").items()
+    faults = faults or [f"worker {name} has {item}" for name, text in client.run(program_versions, on_error="return").items()
                         for item in program_differences(text)]  # fmt: skip
     if faults:
         raise FvsolveError(f"the Dask cluster at {address} has other versions, so its results could differ: "
@@ -129,7 +129,7 @@ def program_differences(reported: Any) -> list[str]:
     if not isinstance(reported, dict):
         return [f"no fvsolve ({reported})"]
     own = {
-        name: version for name, version in programs().items() if name != "target"
+        name: version for name, version in program_versions().items() if name != "target"
     }  # processors of workers may differ
     return differing_versions(own, reported)
 

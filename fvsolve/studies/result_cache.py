@@ -12,9 +12,9 @@ from typing import Any
 
 from fvsolve import jit
 from fvsolve.errors import RunError
-from fvsolve.output.lock import let_go, locked
+from fvsolve.output.lock import lock_folder, release
 from fvsolve.output.restart import identity
-from fvsolve.output.summary import plain
+from fvsolve.output.summary_file import plain
 from fvsolve.steppers.tableau import BUILT_IN, METHODS
 from fvsolve.validation import PATH, Kind
 
@@ -32,7 +32,7 @@ class ResultCache:
         self.results: dict[str, dict] = {}
         self.reused_keys: set[str] = set()  # requested keys with results from earlier studies
         self.new_keys: set[str] = set()  # keys with results of this study
-        self.lock = None if folder is None else locked(Path(folder), "a study")
+        self.lock = None if folder is None else lock_folder(Path(folder), "a study")
         self.file = None
         if self.path is not None and self.path.is_file():
             self._read()
@@ -58,7 +58,7 @@ class ResultCache:
         if self.file is not None:
             self.file.close()
         if self.lock is not None:
-            let_go(self.lock)
+            release(self.lock)
 
     @property
     def reused(self) -> int:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
 
-from fvsolve.output.summary import plain
+from fvsolve.output.summary_file import plain
 
 
 class PlainData:

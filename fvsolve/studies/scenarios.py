@@ -12,7 +12,7 @@ from typing import Any
 from fvsolve.case import Case, load
 from fvsolve.errors import FvsolveError, RunError
 from fvsolve.output.directory import clear_reports
-from fvsolve.output.summary import plain, write_summary
+from fvsolve.output.summary_file import plain, write_summary
 from fvsolve.run import run
 from fvsolve.studies.case_pickle import PickledCase
 from fvsolve.studies.parallel import run_tasks

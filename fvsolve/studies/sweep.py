@@ -18,7 +18,7 @@ from fvsolve.case.text import inline
 from fvsolve.display import Displayable
 from fvsolve.errors import FvsolveError, RunError, did_you_mean, listing
 from fvsolve.fluid.property_cache import coolprop_version
-from fvsolve.output.restart import programs
+from fvsolve.output.restart import program_versions
 from fvsolve.studies.parallel import run_tasks
 from fvsolve.studies.result_cache import ResultCache, digest_of, write_errors
 from fvsolve.studies.result_table import Column, ResultTable
@@ -49,7 +49,7 @@ class Sweep(Displayable):
     rows: list[dict[str, Any]]
     reused: int
 
-    picture = "fvsolve.draw.objects:sweep_figure"
+    picture = "fvsolve.draw.object_pictures:sweep_figure"
 
     def summary_line(self) -> str:
         failed = sum(not row["ok"] for row in self.rows)
@@ -204,7 +204,7 @@ class SweepRun:
         self.rows: dict[int, dict] = {}
         self.digests: dict[str, str] = {}  # name of a file -> hash of its content
         relevant = {key: value for key, value in raw.items() if key not in TEXT_KEYS}
-        versions_used = programs() | {"numba": "", "coolprop": coolprop_version()}
+        versions_used = program_versions() | {"numba": "", "coolprop": coolprop_version()}
         self.identity = digest_of(
             {**versions_used, "case": relevant, "base": base, "files": [*self.files((relevant, base))]}
         )

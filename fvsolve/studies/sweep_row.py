@@ -9,7 +9,7 @@ from typing import Any
 from fvsolve.case import Case, load
 from fvsolve.case.raw import split_key
 from fvsolve.errors import CaseError
-from fvsolve.output.summary import plain
+from fvsolve.output.summary_file import plain
 from fvsolve.studies.case_pickle import PickledCase
 from fvsolve.studies.outcome import has_diverged, refusal_text
 
@@ -32,7 +32,7 @@ class RowMaker:
 
     def __call__(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Row of a run; a refused case gives a row with its reason."""
-        from fvsolve.output.memory import MemorySink
+        from fvsolve.output.memory_sink import MemorySink
         from fvsolve.run import model_of
         from fvsolve.solve import initial_state, solve
 

@@ -18,14 +18,14 @@ from scipy.spatial import Delaunay
 import fvsolve
 from fvsolve.basins.basin_probes import observe_dense_flows, observe_flows
 from fvsolve.basins.liquid.liquid_probes import observe_liquid
-from fvsolve.draw import frames as of_view
+from fvsolve.draw import frame_meshes as of_view
 from fvsolve.draw.scene import DrawnScene
-from fvsolve.draw.sheet import PictureSheet, span
+from fvsolve.draw.sheet import PictureSheet, colour_range
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.mesh import read, rectangle
 from fvsolve.mesh.mesh_points import MeshPoints
 from fvsolve.model import RunData
-from fvsolve.output.fields import parted, shape, write_frame
+from fvsolve.output.fields import basin_geometry, split_blocks, write_frame
 from fvsolve.run.plot_scene import lengths_of, unit_of
 
 PLANE = {"scheme": "muscl", "limiter": "van-leer", "method": "ssp-rk2", "courant": 0.9}
@@ -290,13 +290,13 @@ def test_a_line_that_lies_in_no_basin_is_refused():
 
 
 def test_a_line_across_a_hole_has_nothing_there(tmp_path):
-    from fvsolve.output.lines import LineReading
+    from fvsolve.output.line_files import LineSampler
 
     case = fvsolve.load(liquid([], size=[4.0, 4.0], cells=[16, 16], holes=[[1.0, 1.0, 2.0, 2.5]]) | {
         "output": {"every": 1e-4, "lines": {"cut": {"basin": "block", "from": [0, 2], "to": [4, 2], "points": 9}}}
     })  # fmt: skip
     model = fvsolve.build(case)
-    line = LineReading(case.output.lines["cut"], model.basins[0], case)
+    line = LineSampler(case.output.lines["cut"], model.basins[0], case)
     rows = line.text(model.fields(model.start, model.new_out())["block"]).splitlines()
     found = [float(row.split(",")[3]) for row in rows[1:]]  # the hole has its ends, 1 m and 2 m, as its outline
     assert found == approx([5e5, 5e5, 5e5, np.nan, *[5e5] * 5], rel=1e-12, nan_ok=True)
@@ -314,8 +314,8 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     model = fvsolve.build(fvsolve.load(case))
     basin = model.basins[0]
     fields = model.fields(random_state(model, 1e-3), model.new_out())["block"]
-    points, cells = shape(basin, np.zeros(2))
-    data = {name: parted(values, cells) for name, values in fields.items()}
+    points, cells = basin_geometry(basin, np.zeros(2))
+    data = {name: split_blocks(values, cells) for name, values in fields.items()}
     write_frame(tmp_path / "block.vtu", points, cells, data, basin.units)
     found, drawn = meshio.read(tmp_path / "block.vtu"), pyvista.read(tmp_path / "block.vtu")
     kinds = {block.type for block in found.cells}
@@ -329,7 +329,7 @@ def test_a_frame_of_triangles_and_quads_opens_with_pyvista_and_meshio_and_knows_
     case["output"]["units"] = {"pressure": "barg", "length": "ft"}
     asked = fvsolve.load(case)
     scene = DrawnScene("", unit_of(asked, "pressure"), *lengths_of(asked), [])
-    shown = of_view.read(tmp_path / "block.vtu", scene)
+    shown = of_view.read_frame(tmp_path / "block.vtu", scene)
     assert shown["pressure"] == approx(1e-5 * (fields["pressure"] - asked.ambient_pressure), abs=1e-9)
     assert (scene.quantity.unit, scene.length.unit) == ("barg", "ft")
     assert np.asarray(shown.points)[:, :2] == approx(points[:, :2] / 0.3048, rel=1e-6)
@@ -358,7 +358,7 @@ def test_pipes_end_at_the_patches_of_a_basin_where_it_is_drawn(tmp_path):
      (-1e-8, 1.0), (5e8, 5.00001e8), (0.99999, 100.0)],
 )  # fmt: skip
 def test_the_labels_of_a_bar_of_colours_differ(low, high):
-    ends = span(low, high)
+    ends = colour_range(low, high)
     sheet = PictureSheet(film=True)
     labels = sheet.bar(ends, "pressure [bar]")
     assert len(set(labels)) == len(labels) >= 3 and ends[0] < ends[1]

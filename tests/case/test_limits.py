@@ -9,8 +9,8 @@ import pytest
 from reference.scenes import AMBIENT, GRAVITY, RHO, area, junction, lake, pipe, reservoir, scene, step, valve
 
 import fvsolve
-from fvsolve.report.legs import ways
-from fvsolve.report.section import section
+from fvsolve.report.long_section import section_of
+from fvsolve.report.section_pipes import section_paths
 
 LENGTH, DIAMETER, SPEED = 1000.0, 0.3, 1000.0
 SHUT, VELOCITY, HEAD = 0.1, 0.5, 100.0
@@ -65,10 +65,10 @@ def test_a_picture_has_it_where_it_stands_whatever_the_unit_and_however_the_pipe
         case["nodes"] |= more
         case["output"]["units"] = {"length": "ft"}
         result = fvsolve.run(case)
-        one = section(result, ways(result)[0])
+        one = section_of(result, section_paths(result)[0])
         (top,) = result.verdicts
         assert top.chainage == pytest.approx(5025.0) and one.ends == pytest.approx((5000 / 0.3048, 6000 / 0.3048))
-        assert min(abs(at - 5025.0 / 0.3048) for at, _, name in one.beyond) < 1e-6
+        assert min(abs(at - 5025.0 / 0.3048) for at, _, name in one.violations) < 1e-6
         assert {device.place: device.chainage for device in one.devices}["gate"] == pytest.approx(6000 / 0.3048)
         found.append(top)
     assert found[0].value == found[1].value

@@ -12,12 +12,12 @@ from reference.scenes import AMBIENT, GRAVITY, RHO, SHARP, area, junction, lake,
 
 import fvsolve
 from fvsolve.errors import FvsolveError
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.report.cycles import cycles
 from fvsolve.report.figures import section_figure
-from fvsolve.report.legs import ways
-from fvsolve.report.report import write_report
-from fvsolve.report.section import section, window
+from fvsolve.report.long_section import head_window, section_of
+from fvsolve.report.report_files import write_report
+from fvsolve.report.section_pipes import section_paths
 from fvsolve.run import model_of
 from fvsolve.run.part_extremes import part_extremes
 from fvsolve.run.verdicts import nearest, verdict
@@ -76,10 +76,10 @@ def test_it_holds_where_none_opens(quantity: str) -> None:
 
 def test_the_vapour_line_is_drawn_where_cavities_are_followed(tmp_path) -> None:
     result = fvsolve.run(parting({}), out=tmp_path / "run", pictures=False)
-    one = section(result, ways(result)[0])
+    one = section_of(result, section_paths(result)[0])
     assert one.lines["vapour line"] == pytest.approx(one.along["elevation"] + BELOW, abs=1e-3)
     assert "vapour line" in [line["name"] for line in section_figure(one, None, "m", "m", 50)["data"]]
-    assert one.parted and not window([one], "m").below
+    assert one.cavity_spans and not head_window([one], "m").below
     book = write_report(result.directory, tmp_path / "page.html", xlsx=True)[1]
     with zipfile.ZipFile(book) as parts:
         sheets = [parts.read(name).decode() for name in parts.namelist() if "worksheets/sheet" in name]

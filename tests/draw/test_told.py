@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from fvsolve.draw.told import told
+from fvsolve.draw.curve_selection import select_curves
 
 T = np.linspace(0.0, 1.0, 200)
 WAVE, OTHER = np.sin(7.0 * T), np.cos(5.0 * T)
 
 
 def labels(columns: dict, measured=()) -> tuple[dict, list]:
-    panels, still = told(np.column_stack(list(columns.values())), [(name, "x") for name in columns], measured)
+    panels, still = select_curves(np.column_stack(list(columns.values())), [(name, "x") for name in columns], measured)
     return {panel.quantity: [line.label for line in panel.lines] for panel in panels}, still
 
 

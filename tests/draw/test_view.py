@@ -11,10 +11,10 @@ from pytest import approx
 from reference.scenes import lake, pipe, scene, valve
 
 import fvsolve
-from fvsolve.draw import water
-from fvsolve.draw.aspect import Aspect, aspect_of, rounded
-from fvsolve.draw.names import beside
-from fvsolve.draw.network import Network
+from fvsolve.draw import water_surface
+from fvsolve.draw.label_placement import place_labels
+from fvsolve.draw.network_picture import NetworkPicture
+from fvsolve.draw.projection import Projection, choose_projection, round_scale
 from fvsolve.draw.symbols import OTHER_LINK, OTHER_NODE, SYMBOLS, strokes, symbol_of
 from fvsolve.parts.link import Link
 from fvsolve.parts.node import Node
@@ -36,13 +36,13 @@ def town(**units) -> dict:
     return made
 
 
-def drawn(case, out, field="pressure") -> tuple[Network, set[str]]:
+def drawn(case, out, field="pressure") -> tuple[NetworkPicture, set[str]]:
     """A network's sheet and all that stands written on it."""
     from matplotlib.text import Text
 
     run = fvsolve.run(case, out=out)
     frames = run._frames()[-1:]
-    network = Network(scene_of(run.case, "a $town$", field, [(frames[0][0], [frames[0][1]])], 0), film=True)
+    network = NetworkPicture(scene_of(run.case, "a $town$", field, [(frames[0][0], [frames[0][1]])], 0), film=True)
     network.show(0)
     return network, {text.get_text() for text in network.sheet.figure.findobj(Text)}
 
@@ -89,7 +89,7 @@ def test_numbers_are_told_in_the_units_of_the_output_and_margins_as_differences(
 
 def test_names_cover_neither_each_other_nor_symbols_and_what_finds_no_room_is_left_out():
     at = [(10.0 * k, 50.0) for k in range(1, 10)]
-    found = beside(at, [(30.0, 8.0)] * 9, [4.0] * 9, [(x - 2, y - 2, x + 2, y + 2) for x, y in at], np.zeros((0, 2)),
+    found = place_labels(at, [(30.0, 8.0)] * 9, [4.0] * 9, [(x - 2, y - 2, x + 2, y + 2) for x, y in at], np.zeros((0, 2)),
                    (0, 0, 100, 100))  # fmt: skip
     boxes = [(x, y, x + 30.0, y + 8.0) for x, y in filter(None, found)]
     assert 2 <= len(boxes) < 9 and found[0] is not None
@@ -100,11 +100,11 @@ def test_names_cover_neither_each_other_nor_symbols_and_what_finds_no_room_is_le
 
 def test_a_line_is_followed_in_profile_a_level_plan_from_above_and_all_else_aslant_to_scale():
     line = np.array([(0.0, 0, 3), (30, 40, 9), (60, 80, 1)])
-    assert np.ptp(aspect_of(line).on_sheet(line), axis=0) == approx([100.0, 8.0])
-    assert aspect_of(np.array([(0.0, 0, 3), (30, 0, 3), (30, 40, 3)])).kind == "plan"
-    one = aspect_of(np.array([(0.0, 0, 0), (100, 0, 0), (0, 100, 4)]))
-    assert (one.kind, one.rise, rounded(0.0999)) == ("aslant", 10.0, 0.05)
-    across = Aspect("aslant", 3.0)
+    assert np.ptp(choose_projection(line).on_sheet(line), axis=0) == approx([100.0, 8.0])
+    assert choose_projection(np.array([(0.0, 0, 3), (30, 0, 3), (30, 40, 3)])).kind == "plan"
+    one = choose_projection(np.array([(0.0, 0, 0), (100, 0, 0), (0, 100, 4)]))
+    assert (one.kind, one.rise, round_scale(0.0999)) == ("aslant", 10.0, 0.05)
+    across = Projection("aslant", 3.0)
     ends = across.on_sheet([(0, 0, 0), (5, 0, 0), (0, 5, 0), (0, 0, 2)])
     east, north, up = np.linalg.norm(ends[1:] - ends[0], axis=1) / (5.0, 5.0, 6.0)
     assert east**2 + north**2 + up**2 == approx(2.0)  # an orthographic picture of three axes (Gauss)
@@ -137,8 +137,8 @@ def bowl():
 
 def test_the_shore_is_where_the_surface_meets_the_bed_to_a_part_of_a_cell(bowl):
     mesh, radius, cell = bowl
-    found = water.water(mesh, 1.0, ("depth",))
-    shore = np.vstack(water.loops(found))
+    found = water_surface.water_mesh(mesh, 1.0, ("depth",))
+    shore = np.vstack(water_surface.boundary_loops(found))
     off = np.hypot(shore[:, 0], shore[:, 1]) - radius
     assert len(shore) > 60 and np.abs(off).max() < 0.15 * cell
     assert np.asarray(found.points)[:, 2] == approx(np.full(found.n_points, 0.1 * radius), abs=1e-6)
@@ -149,7 +149,7 @@ def test_the_shore_of_a_basin_that_rides_is_as_good_in_its_own_axes(bowl):
     turn, place = np.array([[0.8, 0.0, 0.6], [0.0, 1.0, 0.0], [-0.6, 0.0, 0.8]]), (3.0, 4.0, 5.0)
     mesh.points = mesh.points @ turn.T + place
     mesh.cell_data["normal"] = np.tile(turn[:, 2], (mesh.n_cells, 1))
-    shore = (np.vstack(water.loops(water.water(mesh, 1.0, ()))) - place) @ turn
+    shore = (np.vstack(water_surface.boundary_loops(water_surface.water_mesh(mesh, 1.0, ()))) - place) @ turn
     assert np.abs(np.hypot(shore[:, 0], shore[:, 1]) - radius).max() < 0.15 * cell
     assert shore[:, 2] == approx(np.full(len(shore), 0.1 * radius), abs=1e-3)
 
@@ -158,11 +158,11 @@ def test_what_is_cut_out_of_a_basin_and_what_rises_from_its_bed_are_houses(bowl)
     mesh, _, _ = bowl
     middle = mesh.cell_centers().points
     inside = (np.abs(middle[:, 0] - 2.0) < 0.5) & (np.abs(middle[:, 1]) < 0.5)
-    walls, roof = water.houses(mesh.extract_cells(~inside), 2.0)
+    walls, roof = water_surface.buildings(mesh.extract_cells(~inside), 2.0)
     assert roof.area == approx(1.0, rel=0.1) and (walls.bounds[5], roof.bounds[4]) == (2.0, 2.0)
-    assert not water.houses(mesh, 2.0) and not water.blocks(mesh).any()
+    assert not water_surface.buildings(mesh, 2.0) and not water_surface.raised_cells(mesh).any()
     at = np.asarray(mesh.points)
     at[(np.abs(at[:, 0] - 2.0) < 0.45) & (np.abs(at[:, 1]) < 0.45), 2] += 3.0
     mesh.points = at
-    rises = water.blocks(mesh)
+    rises = water_surface.raised_cells(mesh)
     assert inside[rises].sum() >= 16 and rises.sum() <= 40

@@ -17,7 +17,7 @@ from reference.scenes import scene
 from reference.trees import body
 
 import fvsolve
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 from invariance import equivalent_mechanisms as equivalent
 from invariance.moving import METHODS, SCENES, machine, piston, stepped

@@ -7,7 +7,7 @@ import pytest
 from model.test_delay_lines import vessel
 
 import fvsolve
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 from fvsolve.step_limits.delay_line_growth import ANGLES, interpolation_factor, reflection_factor
 from fvsolve.steppers.tableau import method_named

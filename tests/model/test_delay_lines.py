@@ -29,7 +29,7 @@ from fvsolve import studies
 from fvsolve.case.text import write
 from fvsolve.errors import CaseError, FvsolveError
 from fvsolve.model import delay_history
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 
 METHODS = {

@@ -14,10 +14,10 @@ from reference.fork import PROBES, branched
 from reference.scenes import AMBIENT
 
 import fvsolve
-from fvsolve.output import layout
-from fvsolve.output.column import UnitColumn
+from fvsolve.output import network_layout
 from fvsolve.output.fields import FieldSeries, read_series
-from fvsolve.output.history import HistoryFile, read_headers, read_table
+from fvsolve.output.history_file import HistoryFile, read_headers, read_table
+from fvsolve.output.unit_columns import UnitColumn
 
 UNITS = {"pressure": "barg", "flow": "l/s", "time": "ms"}
 
@@ -230,7 +230,7 @@ def network(links: dict[str, tuple[str, str]], **positions) -> SimpleNamespace:
 
 
 def test_stated_positions_are_used():
-    places = layout.positions(network({"x": ("a", "b")}, a=(1.0, 2.0), b=(3.0, 4.0)), {"x": 9.0})
+    places = network_layout.plan_positions(network({"x": ("a", "b")}, a=(1.0, 2.0), b=(3.0, 4.0)), {"x": 9.0})
     assert places["a"].tolist() == [1.0, 2.0] and places["b"].tolist() == [3.0, 4.0]
 
 
@@ -244,22 +244,22 @@ def test_where_a_pipe_is_cut_its_place_is_that_along_the_pipe():
         "links": {"main": {"type": "pipe", "from": "a", "to": "b", "length": 400.0, "diameter": 0.1,
                            "wave_speed": 1000.0, "friction": {"model": "none"}, "cells": 40}},
     }  # fmt: skip
-    places = layout.positions(fvsolve.load(case), {"main-1": 100.0, "main-2": 300.0})
+    places = network_layout.plan_positions(fvsolve.load(case), {"main-1": 100.0, "main-2": 300.0})
     assert places["tap"].tolist() == [100.0, 100.0] and places["b"].tolist() == [100.0, 400.0]
 
 
 def test_a_chain_is_laid_out_straight_and_to_scale():
     chain = network({"x": ("a", "b"), "y": ("b", "c"), "z": ("c", "d")})
-    places = layout.positions(chain, {"x": 100.0, "y": 50.0, "z": 200.0})
+    places = network_layout.plan_positions(chain, {"x": 100.0, "y": 50.0, "z": 200.0})
     plan = np.array([places[name] for name in "abcd"])
     assert plan == pytest.approx(np.array([[0, 0], [100, 0], [150, 0], [350, 0]]), abs=1e-3)
 
 
-@pytest.mark.parametrize("count", [30, layout.DENSE + 50])
+@pytest.mark.parametrize("count", [30, network_layout.MAX_DENSE_NODES + 50])
 def test_a_network_is_laid_out_alike_every_time_with_no_two_nodes_in_one_place(count):
     links = {f"p{i}": (f"n{i}", f"n{(i * 7) // 10}") for i in range(1, count)}
     lengths = {name: 50.0 + 10.0 * (i % 7) for i, name in enumerate(links)}
-    one, two = (layout.positions(network(links), lengths) for _ in range(2))
+    one, two = (network_layout.plan_positions(network(links), lengths) for _ in range(2))
     plan = np.array(list(one.values()))
     assert np.array_equal(plan, np.array(list(two.values())))
     apart = np.linalg.norm(plan[:, None] - plan[None], axis=2) + 1e9 * np.eye(count)
@@ -267,5 +267,5 @@ def test_a_network_is_laid_out_alike_every_time_with_no_two_nodes_in_one_place(c
 
 
 def test_parallel_links_bend_apart():
-    bends = layout.bends(network({"x": ("a", "b"), "y": ("b", "a"), "z": ("b", "c")}).links)
+    bends = network_layout.link_bends(network({"x": ("a", "b"), "y": ("b", "a"), "z": ("b", "c")}).links)
     assert bends["z"] == 0.0 and bends["x"] == bends["y"] != 0.0  # seen from their own starts

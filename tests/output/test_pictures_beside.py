@@ -11,17 +11,17 @@ import pytest
 from reference.fork import branched
 
 import fvsolve
-from fvsolve.draw.beside import processors
+from fvsolve.draw.plot_process import processor_count
 
 BEGIN = """
 import sys
 from pathlib import Path
-from fvsolve.draw.beside import Painter, Picture
+from fvsolve.draw.plot_process import Painter, Picture
 t = [0.0, 1.0]
 arguments = {"t": t, "values": __import__("numpy").array([t, t]).T, "probes": [("a.level", "m"), ("b.level", "m")]}
 wanted = [Picture(Path(name), "history_figure", arguments) for name in ("one.png", "two.png")]
 """
-alone = pytest.mark.skipif(processors() < 2, reason="one processor draws in one process")
+alone = pytest.mark.skipif(processor_count() < 2, reason="one processor draws in one process")
 
 
 def python(code: str, folder: Path) -> str:

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 import fvsolve
 from fvsolve.model.jacobian_pattern import jacobian_pattern
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 from fvsolve.studies.energy.energy_balance import energy
 

@@ -9,8 +9,8 @@ from reference.scenes import junction, lake, pipe, ramp, scene, valve
 
 import fvsolve
 from fvsolve.draw.style import COLOURS
-from fvsolve.report.figures import DARK, as_it_stands
-from fvsolve.report.report import write_report
+from fvsolve.report.figures import DARK_COLOURS, escape_markup
+from fvsolve.report.report_files import write_report
 
 TITLE = "</script><b>A & B</b> costs $5 and $6"
 HIGH = "far <b>above</b> & $5"  # a limit that no head comes near
@@ -72,7 +72,7 @@ def test_nothing_is_fetched_nothing_complains_and_the_head_line_plays(report, ch
     page.evaluate("Plotly.relayout('history-0', {'xaxis.range[0]': 0.4, 'xaxis.range[1]': 1.2})")
     until(page, "document.querySelector('#history-1').layout.xaxis.range[1] == 1.2")
     name = "a <b>bold</b> & $x$ &lt; </script>"
-    page.evaluate("name => Plotly.relayout('history-1', {'xaxis.title.text': name})", as_it_stands(name))
+    page.evaluate("name => Plotly.relayout('history-1', {'xaxis.title.text': name})", escape_markup(name))
     assert page.locator("#history-1 .xtitle").all_text_contents() == [name]
     assert said == [] and asked == [report.as_uri()]
 
@@ -158,7 +158,7 @@ def colours(page) -> dict[str, str]:
     found = page.evaluate(asked)
     values = {name: sum(numbers(text)) / 3 for name, text in found.items()}
     said = {name: "dark" if value < 128 else "light" for name, value in values.items()}
-    return said | {"legend": "dark" if found["legend"] == DARK[COLOURS[0]] else "light"}
+    return said | {"legend": "dark" if found["legend"] == DARK_COLOURS[COLOURS[0]] else "light"}
 
 
 def numbers(colour: str) -> list[int]:

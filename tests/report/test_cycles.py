@@ -11,16 +11,16 @@ from reference.scenes import reservoir, scene, valve
 import fvsolve
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
-from fvsolve.report.cycles import Strength, counted, cycles
+from fvsolve.report.cycles import FatigueStrength, count_cycles, cycles
 
 ASTM = np.array([-2, 1, -3, 5, -1, 3, -4, 4, -2], float)  # ASTM E1049-85, figure 6
 RANGES = {3.0: 0.5, 4.0: 1.5, 6.0: 0.5, 8.0: 1.0, 9.0: 0.5}  # and its table
 
 
 def test_the_standards_example_is_counted_as_its_table_has_it() -> None:
-    assert dict(counted(ASTM, bins=9)) == RANGES
-    assert dict(counted(np.repeat(ASTM, 3), bins=9)) == RANGES
-    assert counted(np.full(10, 3.0)) == [] and counted(np.zeros(1)) == []
+    assert dict(count_cycles(ASTM, bins=9)) == RANGES
+    assert dict(count_cycles(np.repeat(ASTM, 3), bins=9)) == RANGES
+    assert count_cycles(np.full(10, 3.0)) == [] and count_cycles(np.zeros(1)) == []
 
 
 def swung() -> dict:
@@ -32,7 +32,7 @@ def swung() -> dict:
 
 
 def test_a_swing_uses_its_share() -> None:
-    found = {one["probe"]: one for one in cycles(fvsolve.run(swung()), None, Strength(4e5, 1e6, 3.0))}
+    found = {one["probe"]: one for one in cycles(fvsolve.run(swung()), None, FatigueStrength(4e5, 1e6, 3.0))}
     assert set(found) == {"swung.pressure", "still.pressure"}
     (size, count), *small = found["swung.pressure"]["cycles"]
     assert size == pytest.approx(2e5, rel=1e-3) and count == pytest.approx(20.0, abs=0.6)

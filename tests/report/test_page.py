@@ -14,10 +14,10 @@ from reference.folders import DOCS
 from reference.scenes import junction, lake, pipe, ramp, scene, tank, valve
 
 import fvsolve
-from fvsolve.report.figures import as_it_stands
-from fvsolve.report.legs import ways
-from fvsolve.report.page import embedded, page
-from fvsolve.report.report import write_report
+from fvsolve.report.figures import escape_markup
+from fvsolve.report.page import page, script_json
+from fvsolve.report.report_files import write_report
+from fvsolve.report.section_pipes import section_paths
 from fvsolve.run.result import Result
 from fvsolve.run.summary_fields import ROWS
 
@@ -87,14 +87,14 @@ def closure(tmp_path_factory):
 
 
 def read(result) -> Read:
-    return Read(page(result, ways(result)))
+    return Read(page(result, section_paths(result)))
 
 
 def test_the_peak_of_a_million_rows_is_in_the_page_to_the_last_bit(closure):
     rng = np.random.default_rng(17)
     table = np.column_stack([np.linspace(0.0, 3.0, 10**6), rng.normal(size=(10**6, len(closure.probes)))])
     table[271_828, 1], table[314_159, 1] = np.pi * 1e3, -np.e * 1e3
-    found = page(changed(closure, table), ways(closure))
+    found = page(changed(closure, table), section_paths(closure))
     traces = [one for id, figure in Read(found).figures.items() if id.startswith("history") for one in figure["data"]]
     assert len(found) < 6e6 and len(traces) == len(closure.probes)
     for k, name in enumerate(closure.probes, 1):
@@ -108,7 +108,7 @@ def test_a_report_of_many_long_sections_probes_and_frames_stays_below_six_megaby
     case["links"]["main"]["cells"] = 4000
     case["output"] |= {"every": 1e-5, "probes": [f"main.head@{k / 200}" for k in range(200)]}
     found = fvsolve.run(case, out=tmp_path / "run", pictures=False)
-    (way,) = ways(found)
+    (way,) = section_paths(found)
     text = page(found, [way] * 40)
     assert 5e6 < len(text.encode()) < 6e6 and "152 probes that swing less are not drawn" in text
 
@@ -125,7 +125,7 @@ def test_words_of_a_case_are_data_and_never_markup(closure):
     assert not [tag for tag, _ in found.tags if tag in ("b", "img", "iframe", "object", "link")]
     shown = re.sub(r"\s+", " ", WICKED.replace("\u2028", "\\u2028"))
     assert found.text.count(shown) >= 5  # title, heading, description, source, verdict, warning
-    assert as_it_stands("<b>a</b> & $x$") == "&lt;b&gt;a&lt;/b&gt; &amp; &#36;x&#36;"
+    assert escape_markup("<b>a</b> & $x$") == "&lt;b&gt;a&lt;/b&gt; &amp; &#36;x&#36;"
 
 
 def test_the_page_names_no_host(closure):
@@ -208,7 +208,7 @@ def test_verdicts_stand_first_those_that_fail_before_others(closure):
 
 
 def test_what_is_no_number_is_none_in_the_page():
-    assert embedded({"a": [1.0, float("nan")], "b": "<"}) == '{"a":[1.0,null],"b":"\\u003c"}'
+    assert script_json({"a": [1.0, float("nan")], "b": "<"}) == '{"a":[1.0,null],"b":"\\u003c"}'
 
 
 def test_without_stored_fields_the_page_says_why_nothing_moves(tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from reference.scenes import junction, lake, pipe, ramp, scene, valve
 
 import fvsolve
-from fvsolve.report.pictures import chosen, write_pictures
+from fvsolve.report.pictures import parse_probes, write_pictures
 
 
 @pytest.fixture(scope="module")
@@ -44,4 +44,4 @@ def test_names_of_probes_may_have_commas():
         units = dict.fromkeys(["pool.depth@10,2.5", "a.head", "pool.depth@10"], "m")
 
     faults = []
-    assert chosen(Run, "pool.depth@10,2.5,a.head, pool.depth@10", faults) == [*Run.units] and not faults
+    assert parse_probes(Run, "pool.depth@10,2.5,a.head, pool.depth@10", faults) == [*Run.units] and not faults

@@ -7,11 +7,11 @@ import pytest
 from reference.scenes import GRAVITY, RHO, junction, lake, pipe, scene, step, valve
 
 import fvsolve
-from fvsolve.draw.section import LIMITS, LINES
+from fvsolve.draw.section_picture import LIMIT_LOOKS, LINE_LOOKS
 from fvsolve.report.figures import section_figure
-from fvsolve.report.legs import ways
-from fvsolve.report.motion import motions
-from fvsolve.report.section import section, window
+from fvsolve.report.head_animation import head_animations
+from fvsolve.report.long_section import head_window, section_of
+from fvsolve.report.section_pipes import section_paths
 
 CHAINAGE, ELEVATION = [0.0, 130.0, 300.0, 500.0], [0.0, 42.0, 5.0, 20.0]
 SHUT = 0.3
@@ -39,10 +39,10 @@ def main(tmp_path_factory):
 
 
 def test_a_route_is_the_section_and_its_chainage_runs_through_what_stands_between_its_pipes(main):
-    (way,) = ways(main)
+    (way,) = section_paths(main)
     assert (way.name, way.begin, way.end) == ("line", 2000.0, 2800.0)
     assert way.places == [("lake", 2000.0), ("a", 2500.0), ("b", 2500.0), ("gate", 2800.0)]
-    one = section(main, way)
+    one = section_of(main, way)
     assert (np.diff(one.chainage) >= 0.0).all() and set(2000.0 + np.array(CHAINAGE)) <= set(one.chainage)
     line = np.interp(one.chainage, [*(2000.0 + np.array(CHAINAGE)), 2800.0], [*ELEVATION, 30.0])
     assert one.along["elevation"] == pytest.approx(line)
@@ -50,7 +50,7 @@ def test_a_route_is_the_section_and_its_chainage_runs_through_what_stands_betwee
 
 
 def test_without_a_route_a_section_runs_through_a_link_between_junctions(main, tmp_path):
-    (way,) = ways(fvsolve.run(over_a_hill(), out=tmp_path / "run", pictures=False))
+    (way,) = section_paths(fvsolve.run(over_a_hill(), out=tmp_path / "run", pictures=False))
     assert (way.name, way.begin, way.end) == ("hill \u2013 last", 0.0, 800.0)
     assert [(leg.pipe, leg.backwards) for leg in way.legs] == [("hill", False), ("last", True)]
 
@@ -60,26 +60,26 @@ def test_a_pipe_that_is_cut_has_a_section_where_no_route_has_all_of_it(tmp_path)
     for routes, named in (({}, ["hill", "last"]), ({"line": {"pipes": ["hill", "last"]}}, ["line"])):
         case = over_a_hill(routes=routes)
         case["nodes"]["tap"] = tap
-        found = ways(fvsolve.run(case, out=tmp_path / named[0], pictures=False))
+        found = section_paths(fvsolve.run(case, out=tmp_path / named[0], pictures=False))
         assert [way.name for way in found] == named
 
 
 def test_limits_are_lines_and_what_passes_one_is_marked_where_it_is_worst(main):
-    one = section(main, ways(main)[0])
+    one = section_of(main, section_paths(main)[0])
     bar = 1e6 / (RHO * GRAVITY)
     assert one.lines["class, maximum"] == pytest.approx(one.along["elevation"] + bar, rel=1e-9)
     surge = one.lines["surge, maximum"]
     assert np.isnan(surge[one.pipe == "hill"]).all()
     assert surge[one.pipe == "last"] == pytest.approx(one.along["elevation"][one.pipe == "last"] + 400.0)
     verdict = next(found for found in main.verdicts if found.name == "class")
-    assert not verdict.ok and (verdict.chainage, verdict.name) in [(at, name) for at, _, name in one.beyond]
-    for at, head, name in one.beyond:
+    assert not verdict.ok and (verdict.chainage, verdict.name) in [(at, name) for at, _, name in one.violations]
+    for at, head, name in one.violations:
         assert name == "class" and head > np.interp(at, one.chainage, one.lines["class, maximum"])
 
 
 def test_the_axis_follows_heads_profile_and_vapour_line_and_names_limits_far_from_them(main):
     """Limits within half the range of heads are shown; others are named with an arrow and flatten nothing."""
-    one = section(main, ways(main)[0])
+    one = section_of(main, section_paths(main)[0])
     heads = np.concatenate([one.along[name] for name in ("initial_head", "min_head", "max_head")])
     followed = np.concatenate([heads, one.along["elevation"], one.lines["vapour line"]])
     top, bottom, reach = followed.max(), followed.min(), 0.5 * np.ptp(heads)
@@ -95,22 +95,22 @@ def test_the_axis_follows_heads_profile_and_vapour_line_and_names_limits_far_fro
         ("far", 1, True), ("deep", 0, False)]  # fmt: skip
     assert f"{top + 1.1 * reach:.4g} m" in arrows[0]["text"]
     calm = replace(planted, lines={"vapour line": one.lines["vapour line"], "far, maximum": flat["far, maximum"]})
-    assert window([calm], "m").high < top + 0.13 * (top - bottom)
+    assert head_window([calm], "m").high < top + 0.13 * (top - bottom)
 
 
 def test_upper_and_lower_limits_and_the_class_have_dashes_of_their_own(main):
-    one = section(main, ways(main)[0])
+    one = section_of(main, section_paths(main)[0])
     names = ("vapour line", "class line", "a, maximum", "a, minimum")
     planted = replace(one, lines=dict.fromkeys(names, one.along["elevation"]))
     figure = section_figure(planted, None, "m", "m", 150)
     dashes = {line["name"]: line["line"]["dash"] for line in figure["data"] if "line" in line}
     assert len({dashes[name] for name in (*names, "initial head", "pipe")}) == 6
-    drawn = [look["linestyle"] for look in (*LINES.values(), *LIMITS.values())]
+    drawn = [look["linestyle"] for look in (*LINE_LOOKS.values(), *LIMIT_LOOKS.values())]
     assert len(drawn) == len(set(drawn)) == 4
 
 
 def test_the_moving_line_has_the_cells_of_a_frame_and_not_the_points_of_the_profile(main):
-    (line,) = motions(main, ways(main))
+    (line,) = head_animations(main, section_paths(main))
     assert line.chainage == pytest.approx(2012.5 + 25.0 * np.arange(32)) and line.heads.shape == (6, 32)
-    one = section(main, ways(main)[0])
+    one = section_of(main, section_paths(main)[0])
     assert line.heads[0] == pytest.approx(np.interp(line.chainage, one.chainage, one.along["initial_head"]), abs=0.01)

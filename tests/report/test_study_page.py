@@ -13,7 +13,7 @@ from studies.test_design import STUDY, throttled
 
 import fvsolve
 from fvsolve.case.text import write
-from fvsolve.report.report import write_report
+from fvsolve.report.report_files import write_report
 from fvsolve.studies import scenarios
 
 

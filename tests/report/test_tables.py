@@ -8,11 +8,11 @@ import pytest
 from reference.scenes import junction, lake, pipe, scene
 
 import fvsolve
-from fvsolve.report.described import walls
-from fvsolve.report.legs import ways
-from fvsolve.report.report import write_report
-from fvsolve.report.section import section
-from fvsolve.report.tables import ReportTable, aligned, worded
+from fvsolve.report.long_section import section_of
+from fvsolve.report.model_tables import walls
+from fvsolve.report.report_files import write_report
+from fvsolve.report.section_pipes import section_paths
+from fvsolve.report.tables import ReportTable, aligned_texts, value_text
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def fork(tmp_path_factory):
 
 
 def test_sections_are_the_longest_ways_and_run_down_the_head(fork):
-    found = ways(fork)
+    found = section_paths(fork)
     assert [[leg.pipe for leg in way.legs] for way in found] == [["first", "second", "third"], ["branch", "beside"]]
     longest = found[0]
     assert [(leg.begin, leg.backwards) for leg in longest.legs] == [(0.0, False), (400.0, True), (700.0, False)]
@@ -38,20 +38,20 @@ def test_sections_are_the_longest_ways_and_run_down_the_head(fork):
 
 
 def test_a_section_is_one_line_along_its_chainage(fork):
-    one = section(fork, ways(fork)[0])
+    one = section_of(fork, section_paths(fork)[0])
     assert one.chainage == pytest.approx(25.0 + 50.0 * np.arange(24))  # all cells are 50 m long
     points = [0.0, 400.0, 700.0, 1200.0], [0.0, 10.0, 20.0, 5.0]
     assert one.along["elevation"] == pytest.approx(np.interp(one.chainage, *points))
-    assert (np.diff(one.along["initial_head"]) < 0).all() and one.parted == []
+    assert (np.diff(one.along["initial_head"]) < 0).all() and one.cavity_spans == []
     assert [device.parts for device in one.devices] == [("high (reservoir)",), (), (), ("low (reservoir)",)]
 
 
 def test_numbers_of_a_column_are_aligned_on_their_points():
-    plain = [text.replace("\u2007", "0").replace("\u2008", ".") for text in aligned([1.5, 22.25, 333.0, None])]
+    plain = [text.replace("\u2007", "0").replace("\u2008", ".") for text in aligned_texts([1.5, 22.25, 333.0, None])]
     assert plain[:3] == ["1.50", "22.25", "333.00"]
-    assert len({len(text.partition(".")[2]) for text in aligned([0.001, 12.0, 5.5])}) == 1
-    assert worded(12345.678) == "12\u202f346" and worded(-0.0) == "0" and worded(1e-12) == "1e\u221212"
-    assert worded(float("nan")) == worded(None) == "\u2013" and worded(True) == "yes"
+    assert len({len(text.partition(".")[2]) for text in aligned_texts([0.001, 12.0, 5.5])}) == 1
+    assert value_text(12345.678) == "12\u202f346" and value_text(-0.0) == "0" and value_text(1e-12) == "1e\u221212"
+    assert value_text(float("nan")) == value_text(None) == "\u2013" and value_text(True) == "yes"
     assert ReportTable("", ("name", "length"), [["a", 1.0], ["b", None]]).numeric == [False, True]
 
 

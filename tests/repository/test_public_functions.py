@@ -13,7 +13,7 @@ from reference.scenes import still
 
 import fvsolve
 from fvsolve import FvsolveError, State, advance, initial_state, integrate, steppers, studies
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.studies import LineImpedance, Transfer, sweep
 
 

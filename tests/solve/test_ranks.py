@@ -15,7 +15,7 @@ import pytest
 from solve.test_threads import SCENES, liquid, water
 
 import fvsolve
-from fvsolve.draw.frames import read
+from fvsolve.draw.frame_meshes import read_frame
 from fvsolve.draw.scene import DrawnScene, DrawnUnit
 from fvsolve.output.fields import read_series
 
@@ -95,7 +95,7 @@ def test_frames_that_ranks_write_are_those_of_one_process_to_who_reads_them(tmp_
                      for k in range(2)]  # fmt: skip
     runs = [tmp_path / name / "fields" / f"sheet-000001.{kind}" for name, kind in (("one", "vtu"), ("a dye", "pvtu"))]
     asked = DrawnScene("", DrawnUnit("dye", ""), *[DrawnUnit("length", "m")] * 2, [])
-    one, two = (read(path, asked) for path in runs)
+    one, two = (read_frame(path, asked) for path in runs)
     assert two.n_cells == one.n_cells == 132 and two.n_points == one.n_points and asked.quantity.unit == "mg/l"
     assert np.array_equal(two.cell_centers().points, one.cell_centers().points)
     assert np.array_equal(two["dye"], one["dye"])

@@ -16,7 +16,7 @@ from basins.test_basin import alone, basin
 from reference.fork import branched
 
 import fvsolve
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 
 KILLS = 2
@@ -24,7 +24,7 @@ OFTEN = """
 import sys
 from importlib import import_module
 import fvsolve
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve.solve import Run
 import_module("fvsolve.solve.solve").CHECKPOINT_SECONDS = 0.02
 print(fvsolve.run(sys.argv[1], out=sys.argv[2], resume=True).reason)

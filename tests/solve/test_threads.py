@@ -14,7 +14,7 @@ from reference.scenes import reservoir, scene
 import fvsolve
 from fvsolve.errors import FvsolveError
 from fvsolve.kernels import band_exchange
-from fvsolve.output.memory import MemorySink
+from fvsolve.output.memory_sink import MemorySink
 from fvsolve.solve import initial_state
 from fvsolve.solve.partition import divisible_rows, single_thread_reason
 from fvsolve.solve.run_loop import RunLoop

@@ -10,7 +10,7 @@ from reference.scenes import area, junction, lake, pipe, ramp, reservoir, scene,
 
 import fvsolve
 from fvsolve.case.text import write
-from fvsolve.report.report import write_report
+from fvsolve.report.report_files import write_report
 from fvsolve.studies import scenarios
 from fvsolve.studies.peak_error import peak_errors
 from fvsolve.studies.sizing import size

@@ -9,7 +9,7 @@ from reference.scenes import NO_FRICTION, junction, pipe, reservoir, scene, valv
 
 from fvsolve.case.text import write
 from fvsolve.errors import FvsolveError
-from fvsolve.output.summary import plain
+from fvsolve.output.summary_file import plain
 from fvsolve.steppers.tableau import tableau
 from fvsolve.studies import chart, failure_map, order, stability
 

@@ -138,7 +138,7 @@ def test_a_scheduler_without_workers_is_named(monkeypatch):
 def test_another_version_is_named_with_both_numbers(cluster, monkeypatch):
     from fvsolve.studies import dask_cluster as room
 
-    own = room.programs()
+    own = room.program_versions()
     assert room.program_differences(own) == [] and room.program_differences({**own, "sources": "other"}) == [
         f"sources other (here {own['sources']})"
     ]

@@ -21,15 +21,15 @@ ERROR_LABELS = ("mean error over the run [range]", "error at the end [range]")
 
 def write_chart(chart: Chart, folder: Path, title: str = "", dpi: float | None = None) -> list[Path]:
     """Write the table and both pictures of a chart; returns their paths."""
-    from fvsolve.draw.chart import save
+    from fvsolve.draw.work_precision_picture import save_picture
 
     paths = [folder / f"chart.{ending}" for ending in ("csv", "png", "svg")]
     for path in paths:
         path.unlink(missing_ok=True)  # avoids an old picture next to a new table
     write_chart_csv(chart, paths[0])
     picture = chart_picture(chart, title)
-    save(picture, paths[1], dpi)
-    save(picture, paths[2])
+    save_picture(picture, paths[1], dpi)
+    save_picture(picture, paths[2])
     return paths
 
 
@@ -49,7 +49,7 @@ def write_chart_csv(chart: Chart, path: Path) -> None:
 
 def chart_picture(chart: Chart, title: str = ""):
     """matplotlib Figure of a chart: errors over the trajectory and at the end, by CPU time and by work."""
-    from fvsolve.draw.chart import Curve, chart_figure
+    from fvsolve.draw.work_precision_picture import Curve, chart_figure
 
     curves = []
     for name, points in chart.curves().items():

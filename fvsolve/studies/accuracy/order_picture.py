@@ -13,7 +13,7 @@ CELLS = "cell size [m]"  # measure that is printed in the units of the case; ste
 
 def order_picture(study):
     """matplotlib Figure of errors against cell size or step: a panel for each variable, a line for each norm."""
-    from fvsolve.draw.order import order_figure
+    from fvsolve.draw.convergence_picture import order_figure
 
     length_factor, length = study.shown.get("length", (1.0, "m")) if study.plan.measure == CELLS else (1.0, "")
     measure = CELLS.replace("[m]", f"[{length}]") if length else study.plan.measure
@@ -54,7 +54,7 @@ def variable_dimension(variable: str) -> str:
 
 def error_scale(case, variable: str) -> tuple[float, str]:
     """Size of 1 SI unit and unit, for differences of a variable or for "length", in the units of `[output]`."""
-    from fvsolve.output.column import column
+    from fvsolve.output.unit_columns import column
 
     result = column("", variable if variable == "length" else variable_dimension(variable), case)
     return result.span_from_si(1.0), result.span_unit

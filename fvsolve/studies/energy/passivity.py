@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fvsolve.errors import FvsolveError, did_you_mean
-from fvsolve.output.summary import plain
+from fvsolve.output.summary_file import plain
 from fvsolve.schemes import SCHEMES
 from fvsolve.steppers.automatic import AUTO, EXPLICIT, IMPLICIT, TIGHT_BELOW, TIGHT_IMPLICIT
 from fvsolve.studies.outcome import name_list

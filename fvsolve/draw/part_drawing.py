@@ -1,0 +1,136 @@
+"""Symbols and names of parts on a sheet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fvsolve.draw import label_placement as naming
+from fvsolve.draw import style
+from fvsolve.draw.projection import Projection
+from fvsolve.draw.scene import DrawnScene
+from fvsolve.draw.sheet import draw_symbol
+from fvsolve.draw.symbols import symbol_of
+from fvsolve.errors import visible
+
+SYMBOL_SPACING = 4.8  # least distance of symbols, in half widths of a symbol
+SMALL_SYMBOL_COUNT, MAX_NAMED_PIPES = (
+    40,
+    14,
+)  # number of parts above which symbols are small; greatest number of pipes with names
+MAX_PARTS_WITH_JOINTS = 400  # greatest number of parts with symbols and names for plain junctions
+HALO_WIDTH = 2.2  # width of the white border of a name [points]
+EDGE_MARGIN = 5.0  # free margin of the sheet [pixels]
+
+
+def draw_parts(stage, scene: DrawnScene, segments: np.ndarray) -> tuple[int, int]:
+    """Draw symbols and names of the parts of a scene; returns the number of names drawn and of all names.
+
+    stage : picture with `sheet`, `axes`, `aspect`, `half` (half width of a symbol [points]), `texts` that no name may
+            cover, `cover` (float64[k, 2], points that names should not cover) and `labels` (other names with points)
+    segments : float64[c, 2, 2]  pipes on the sheet
+    """
+    if not (scene.parts or scene.pipes or stage.labels):
+        return 0, 0
+    axes, half, aspect = stage.axes, stage.half, stage.aspect
+    point = stage.sheet.figure.dpi / 72.0  # [pixels]
+    at = symbol_positions(scene, aspect, axes, SYMBOL_SPACING * half * point)
+    blocks, ties = [], []
+    for part in [part for part in scene.parts if not (part.joint and len(scene.parts) > MAX_PARTS_WITH_JOINTS)]:
+        ends = [at[name] for name in part.between if name in at]
+        ties += [(at[part.key], end) for end in ends]
+        along = ends[-1] - ends[0] if len(ends) > 1 else np.array([1.0, 0.0])
+        place = axes.transData.inverted().transform(at[part.key])
+        size = half * (0.5 if part.joint and len(scene.parts) > SMALL_SYMBOL_COUNT else 1.0)
+        draw_symbol(axes, symbol_of(part.kinds, part.link), place, along, size)
+        reach = (0.4 if part.joint else 1.0) * size * point
+        blocks.append([*(at[part.key] - reach), *(at[part.key] + reach)])
+    back = axes.transData.inverted().transform
+    for a, b in ties:
+        axes.plot(*back(np.array([a, b])).T, color=style.INK, linewidth=1.1, zorder=5)
+    return _write_names(stage, scene, segments, at, np.array(blocks).reshape(-1, 4), np.reshape(ties, (-1, 2, 2)))
+
+
+def symbol_positions(scene: DrawnScene, aspect: Projection, axes, apart: float) -> dict[str, np.ndarray]:
+    """Positions of symbols [pixels]; parts not fixed by a pipe are moved if a link to them is shorter than `apart`."""
+    nodes = [part for part in scene.parts if not part.link]
+    seen = axes.transData.transform(aspect.on_sheet(scene.shown([item.at for item in scene.parts])))
+    at = {part.key: place for part, place in zip(scene.parts, seen, strict=True)}
+    at |= dict(zip(scene.anchors, axes.transData.transform(aspect.on_sheet(
+        scene.shown(list(scene.anchors.values())))), strict=True))  # fmt: skip
+    held = {part.key for part in nodes if part.held} | set(scene.anchors)
+    middle = seen.mean(axis=0) if len(seen) else np.zeros(2)
+    for part in scene.parts:
+        ends = [name for name in part.between if name in at]
+        if len(ends) == 2 and ends[0] != ends[1]:
+            first, last = ends if ends[1] not in held else ends[::-1]
+            way = at[last] - at[first]
+            if np.linalg.norm(way) < apart and last not in held:
+                far = way if np.linalg.norm(way) > 1.0 else at[first] - middle
+                far = far if np.linalg.norm(far) > 1.0 else np.array([1.0, 0.0])
+                if aspect.kind == "profile":  # its height is not changed
+                    at[last] = np.array([at[first][0] + np.copysign(apart, far[0]), at[last][1]])
+                else:
+                    at[last] = at[first] + apart * far / np.linalg.norm(far)
+                held.add(last)
+        if ends and not part.own_place:
+            at[part.key] = np.mean([at[name] for name in ends], axis=0)
+            if len(ends) == 1:
+                at[part.key] = at[part.key] + (0.0, 0.7 * apart)
+    return at
+
+
+@dataclass
+class DrawnName:
+    """Name to draw next to a point `at` [pixels], at a distance `gap` [points]."""
+
+    text: str
+    at: np.ndarray
+    gap: float
+    look: dict[str, Any]
+
+
+def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[int, int]:
+    """Write the names that have free space; returns the number of names written and of all names."""
+    from matplotlib.patheffects import withStroke
+
+    axes, figure = stage.axes, stage.sheet.figure
+    pixels = axes.transData.transform(segments.reshape(-1, 2)).reshape(-1, 2, 2)
+    labels, renderer = _names_to_draw(scene, at, pixels, stage.half), figure.canvas.get_renderer()
+    look = {"color": style.INK, "fontsize": 8}
+    labels += [DrawnName(name, axes.transData.transform(place), 6.0, look) for name, place in stage.labels]
+    halo = [withStroke(linewidth=HALO_WIDTH, foreground="white")]
+    always = {"zorder": 7, "parse_math": False, "va": "bottom", "path_effects": halo}
+    texts = [axes.text(0.0, 0.0, visible(item.text), **always, **item.look) for item in labels]
+    sizes = [text.get_window_extent(renderer).size for text in texts]
+    ticks = [text.get_window_extent(renderer).extents for text in stage.texts]
+    point = figure.dpi / 72.0
+    places = naming.place_labels(
+        [item.at for item in labels], sizes, [point * item.gap for item in labels],
+        np.vstack([blocks, np.reshape(ticks, (-1, 4))]),
+        np.vstack([naming.points_along(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]),
+        (EDGE_MARGIN + axes.bbox.x0 * axes.axison, axes.bbox.y0 - EDGE_MARGIN, figure.bbox.x1 - EDGE_MARGIN, axes.bbox.y1 + EDGE_MARGIN),
+    )  # fmt: skip
+    for text, corner in zip(texts, places, strict=True):
+        if corner is None:
+            text.remove()
+        else:
+            text.set_position(axes.transData.inverted().transform(corner))
+    without = sum(item.joint for item in scene.parts) if len(scene.parts) > MAX_PARTS_WITH_JOINTS else 0
+    return sum(item is not None for item in places), len(labels) + without
+
+
+def _names_to_draw(scene: DrawnScene, at, pixels, half: float) -> list[DrawnName]:
+    """Names to draw, by priority: parts, pipes if they are few, plain junctions."""
+    plain, small = {"color": style.INK, "fontsize": 8}, {"color": style.INK, "fontsize": 7.5}
+    parts = [DrawnName(item.name, at[item.key], half + 3.0, plain) for item in scene.parts if not item.joint]
+    joints = [DrawnName(item.name, at[item.key], 5.0, small) for item in scene.parts if item.joint]
+    joints = joints if len(scene.parts) <= MAX_PARTS_WITH_JOINTS else []
+    if len(scene.names) > MAX_NAMED_PIPES or not scene.pipes or not scene.names:
+        return parts + joints
+    look = {"color": style.MUTED, "fontsize": 7.5, "fontstyle": "italic"}
+    middles = {name: pixels[scene.pipes[0][3] == k].reshape(-1, 2) for k, name in enumerate(scene.names)}
+    pipes = [DrawnName(name, item[len(item) // 2], 4.0, look) for name, item in middles.items() if len(item)]
+    return parts + pipes + joints

@@ -1,0 +1,133 @@
+"""Pictures drawn in a second process, which imports matplotlib while the first computes.
+
+    python -m fvsolve.draw.plot_process
+
+reads pictures from standard input, one pickle each, and answers each with a pickle: the error text, or "".
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fvsolve.display import save
+
+PACKAGE = Path(__file__).resolve().parents[1]
+
+
+class Picture(NamedTuple):
+    """Request for a picture: its path, the name of a function of `fvsolve.draw.plot`, and the arguments by name."""
+
+    path: Path
+    function: str
+    arguments: Mapping[str, Any]
+
+
+def draw_picture(picture: Picture) -> str:
+    """Write a picture atomically; returns the error text, or "" on success."""
+    temporary = picture.path.with_name(f"fresh-{picture.path.name}")
+    try:
+        figure = getattr(import_module("fvsolve.draw.plot"), picture.function)(**picture.arguments)
+        save(figure, temporary)
+        os.replace(temporary, picture.path)
+    except Exception as error:  # a missing picture must not fail the run, whose numbers are complete
+        return f"{type(error).__name__}: {error}"
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+    return ""
+
+
+class PlotProcess:
+    """Draws pictures in a second process if `beside` and if that saves time, else in this process.
+
+    The second process starts at once. Context manager: on exit it ends the process; no incomplete picture is left.
+    """
+
+    def __init__(self, second_process: bool) -> None:
+        self.process = None
+        if not second_process or "matplotlib.figure" in sys.modules or processor_count() < 2 or not sys.executable:
+            return
+        path = os.pathsep.join([str(PACKAGE.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+        # A process group of its own: Ctrl-C must interrupt only the run, which then reports on pictures.
+        options = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x200}
+        with contextlib.suppress(OSError):  # the system allows no second process
+            self.process = subprocess.Popen(
+                [sys.executable, "-P", "-m", "fvsolve.draw.plot_process"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                env=os.environ | {"PYTHONPATH": path}, **options,
+            )  # fmt: skip
+
+    def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
+        """Write pictures; returns path -> error text for those that could not be drawn."""
+        pictures = list(pictures)
+        try:
+            faults = {picture.path: self._draw_by_process(picture) for picture in pictures}
+        except BaseException:
+            self.end()
+            for picture in pictures:
+                with contextlib.suppress(OSError):
+                    picture.path.with_name(f"fresh-{picture.path.name}").unlink()
+            raise
+        return {path: fault for path, fault in faults.items() if fault}
+
+    def _draw_by_process(self, picture: Picture) -> str:
+        if self.process is None:
+            return draw_picture(picture)
+        try:
+            pickle.dump(picture, self.process.stdin, pickle.HIGHEST_PROTOCOL)
+            self.process.stdin.flush()
+            return pickle.load(self.process.stdout)
+        except (OSError, EOFError, pickle.UnpicklingError):
+            self.end()
+            return draw_picture(picture)
+
+    def end(self) -> None:
+        """End the second process, if any."""
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+            with contextlib.suppress(OSError):  # unwritten requests are discarded
+                self.process.stdin.close()
+            self.process.stdout.close()
+            self.process = None
+
+    def __enter__(self) -> PlotProcess:
+        return self
+
+    def __exit__(self, *_: Any) -> None:
+        self.end()
+
+
+def processor_count() -> int:
+    """Number of processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def draw_requests() -> None:
+    """Draw requested pictures until standard input ends."""
+    from fvsolve.draw import style
+
+    requests, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # output of libraries must not mix with the answers
+    axes = style.figure(1.0).subplots()  # imports what all pictures need before the first request
+    axes.plot([0.0, 1.0], label="x")
+    axes.legend()
+    axes.figure.canvas.draw()
+    while True:
+        try:
+            picture = pickle.load(requests)
+        except EOFError:
+            return
+        pickle.dump(draw_picture(picture), answers)
+        answers.flush()
+
+
+if __name__ == "__main__":
+    draw_requests()

@@ -1,0 +1,60 @@
+"""Sink of a run without a directory: rows are stored in memory."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fvsolve.output.envelope import envelope_in_units, with_initial_heads
+from fvsolve.output.unit_columns import probe_columns, time_column, to_column_units
+
+
+class MemorySink:
+    """Stores the probe rows and the envelope of a run; ignores fields and checkpoints."""
+
+    folder = None
+    restart = None
+    ended = False
+
+    def __init__(self, model):
+        self.model = model
+        self.time = time_column(model.case)
+        self.columns = probe_columns(model)
+        self._blocks: list[np.ndarray] = []
+        self._summary = None
+
+    def begin(self, model, state) -> None:
+        """Do nothing: there is no file to open."""
+
+    def rows(self, t, values) -> None:
+        """Append probe rows: `t : float64[k]` [s], `values : float64[k, probes]` in SI."""
+        block = np.empty((len(t), 1 + len(self.columns)))
+        block[:, 0], block[:, 1:] = self.time.from_si(np.asarray(t)), to_column_units(self.columns, np.asarray(values))
+        self._blocks.append(block)
+
+    def field(self, t: float, frame: dict) -> None:
+        """Do nothing: fields are not stored."""
+
+    def checkpoint(self, state, extra: dict) -> None:
+        """Do nothing: checkpoints are not stored."""
+
+    def end(self, summary) -> None:
+        """Store the summary, from which `envelope` is made."""
+        self._summary = summary
+
+    def close(self) -> None:
+        """Do nothing: there is no file to close."""
+
+    def table(self) -> np.ndarray:
+        """Time and probes in the units of the columns : float64[rows, 1 + probes]."""
+        return np.concatenate([np.empty((0, 1 + len(self.columns))), *self._blocks])
+
+    @property
+    def last(self) -> np.ndarray:
+        """Last row of the table."""
+        return self._blocks[-1][-1]
+
+    def envelope(self) -> dict:
+        """Envelope: pipe -> quantity -> float64[cells] in the units of envelope.csv; {} before the end of the run."""
+        if not self._summary:
+            return {}
+        return envelope_in_units(with_initial_heads(self._summary, self.model), self.model.case)

@@ -1,0 +1,110 @@
+"""summary.json: results of a run for people and programs."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+
+from fvsolve.errors import RunError, listing
+from fvsolve.output.envelope import envelope_columns
+from fvsolve.output.unit_columns import probe_columns, time_column
+
+# Keys without which summary.json is rejected.
+REQUIRED_KEYS = (
+    "title", "case", "reason", "ok", "t", "invalid_from", "marks",
+    "probes", "time_unit", "envelope_units", "ambient_pressure",
+    "extremes", "ledgers", "expectations", "comparisons", "verdicts", "versions", "warnings", "files",
+)  # fmt: skip
+
+
+def summary_data(summary, model) -> dict:
+    """Summary of a solver as plain data in SI; only the extremes are in the units of the probes."""
+    return {
+        "title": model.case.title,
+        "case": model.case.name,
+        "reason": summary.reason,
+        "ok": bool(summary.ok),
+        "t": float(summary.t),
+        "invalid_from": plain(float(summary.invalid_from)),
+        "marks": [
+            {"what": mark.what, "place": mark.place, "time": float(mark.time), "text": mark.text}
+            for mark in summary.marks
+        ],
+        "cavities": [asdict(cavity) for cavity in summary.cavities],
+        "events": [{"time": float(item.time), "name": item.name, "what": item.what} for item in summary.events],
+        "probes": {item.name: {"dimension": item.dimension, "unit": item.unit} for item in probe_columns(model)},
+        "time_unit": time_column(model.case).unit,
+        "envelope_units": {item.name: item.unit for item in envelope_columns(model.case)},
+        "ambient_pressure": model.case.ambient_pressure,
+        "fluid": model.case.properties.plain(),
+        "extremes": _extremes(summary, model),
+        "ledgers": plain(summary.ledgers),
+        **summary.counts,
+        "methods": summary.methods,
+        "cells": int(summary.cells),
+        "threads": int(summary.threads),
+        "seconds": float(summary.seconds),
+        "seconds_setup": float(summary.seconds_setup),
+        "cost": plain(summary.cost),
+        "warnings": [item.plain() for item in (*model.warnings, *summary.warnings)],
+    }
+
+
+def plain(value):
+    """Convert a value to plain Python data for JSON.
+
+    Numpy numbers and arrays become Python numbers and lists, dataclasses dicts, complex numbers [re, im], NaN and
+    infinity None, and other objects their text.
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(value.plain() if hasattr(value, "plain") else vars(value))
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, complex):
+        return [plain(value.real), plain(value.imag)]
+    return value if isinstance(value, (str, int, bool, type(None))) else str(value)
+
+
+def write_summary(path: Path, summary: dict) -> None:
+    """Write summary.json atomically: a directory that contains it holds a finished run."""
+    fresh = path.with_suffix(".json.tmp")
+    fresh.write_text(json.dumps(plain(summary), indent=1) + "\n", encoding="utf-8")
+    os.replace(fresh, path)
+
+
+def read_summary(path: Path) -> dict:
+    """Read summary.json; raises RunError if it is missing, damaged or lacks a required key."""
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+        missing = [key for key in REQUIRED_KEYS if key not in summary] if isinstance(summary, dict) else ["a table"]
+        if missing:
+            raise ValueError(f"{listing(missing)} missing, so it is not the summary of a run; run again with --force")
+        return summary
+    except FileNotFoundError:
+        raise RunError(f"{path.parent} does not hold a finished run (no {path.name})") from None
+    except (OSError, ValueError) as error:
+        raise RunError(f"{path} cannot be read: {error}") from None
+
+
+def _extremes(summary, model) -> dict:
+    """Extremes in units of the probes; None if reached after the time from which a diverged run is invalid."""
+    extremes = {}
+    for col in probe_columns(model):
+        least, t_min, greatest, t_max = (*summary.extremes[col.name],)
+        sides = {"minimum": (least, t_min), "maximum": (greatest, t_max)}
+        row: dict = {"unit": col.unit}
+        for side, (value, t) in sides.items():
+            valid = not t >= summary.invalid_from
+            row |= {side: plain(float(col.from_si(value))) if valid else None,
+                    f"t_{side[:3]}": plain(float(t)) if valid else None}  # fmt: skip
+        extremes[col.name] = row
+    return extremes

@@ -1,0 +1,207 @@
+"""Data of a long section: elevation, heads, limits and devices along the chainage, in the units of [output]."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from fvsolve.case.extent import OF_PRESSURE
+from fvsolve.output.route_table import joined_envelopes
+from fvsolve.report.envelope_units import envelope_column, head_of
+from fvsolve.report.section_limits import limit_lines
+from fvsolve.report.section_pipes import SectionPath
+from fvsolve.run.result import FAILS
+from fvsolve.run.verdicts import NEAR, Chainages
+
+SECTION_QUANTITIES = ("elevation", "initial_head", "min_head", "max_head", "min_pressure", "max_pressure",
+         "t_min", "t_max")  # fmt: skip
+HEAD_QUANTITIES = ("initial_head", "min_head", "max_head")
+VAPOUR_LINE = "vapour line"
+LABEL_DISTANCE = 0.035  # least distance of names, as a fraction of the length; closer names would overlap
+LIMIT_REACH = (
+    0.5  # limits farther away than this fraction of the range of heads are only named at the edge of the picture
+)
+EDGE_MARGIN, NAME_MARGIN = (
+    0.05,
+    0.07,
+)  # fractions of the head axis: free at each end, and for each limit that is named there
+MAX_BINS = 150  # greatest number of bins of a long line; the extremes of head and elevation of each bin are drawn
+
+
+class SectionDevice(NamedTuple):
+    """Node of a section with the devices at it."""
+
+    chainage: float
+    place: str
+    parts: tuple[str, ...]  # "pump (pump)"
+
+
+@dataclass(frozen=True)
+class Section:
+    """Long section: a path through the network with the results along it.
+
+    chainage : float64[n]; pipe : str[n]  pipe of each point
+    along : quantity -> float64[n]
+    lines : name -> float64[n]  heads of vapour pressure, pressure class and limits, NaN where there is none
+    ends : chainages of both ends
+    parted : spans of chainage where the vapour pressure was reached
+    beyond : (chainage, head, name of the limit) of places where a limit is violated
+    """
+
+    way: SectionPath
+    chainage: np.ndarray
+    pipe: np.ndarray
+    along: dict[str, np.ndarray]
+    lines: dict[str, np.ndarray]
+    ends: tuple[float, float]
+    cavity_spans: list[tuple[float, float]]
+    violations: list[tuple[float, float, str]]
+    devices: list[SectionDevice]
+
+    def drawn_indices(self, bins: int = MAX_BINS) -> np.ndarray:
+        """Indices of the points to draw: all, or for a long section the extremes of each bin."""
+        n = len(self.chainage)
+        if n <= 4 * bins:
+            return np.arange(n)
+        edges = np.linspace(0, n, bins + 1).astype(int)
+        most = [
+            ("max_head", np.argmax),
+            ("min_head", np.argmin),
+            ("elevation", np.argmax),
+            ("elevation", np.argmin),
+        ]
+        lines = [(self.along[name], end) for name, end in most]
+        rows = [a + end(line[a:b]) for line, end in lines for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return np.unique([0, *rows, n - 1])
+
+    def labels(self) -> list[tuple[float, str, bool]]:
+        """(chainage, names, True if a device is there) of labels that do not overlap.
+
+        Devices and ends have priority over plain junctions; devices close to each other share a label.
+        """
+        length = self.ends[1] - self.ends[0]
+        order = sorted(self.devices, key=lambda device: (not device.parts, device.chainage not in self.ends))
+        shown: list[tuple[float, list[str], bool]] = []
+        for device in order:
+            names = [part.rpartition(" (")[0] for part in device.parts] or [device.place]
+            near = [label for label in shown if abs(device.chainage - label[0]) < LABEL_DISTANCE * length]
+            if not near:
+                shown.append((device.chainage, names, bool(device.parts)))
+            elif device.parts:
+                near[0][1].extend(name for name in names if name not in near[0][1])
+        return [(chainage, ", ".join(names), stands) for chainage, names, stands in shown]
+
+
+class HeadWindow(NamedTuple):
+    """Ends of the head axis, and texts of the limits above and below it."""
+
+    low: float
+    high: float
+    above: list[str]
+    below: list[str]
+
+
+def head_window(sections: Sequence[Section], unit: str) -> HeadWindow:
+    """Head axis of a picture of sections: heads, profile, vapour line and limits close to them.
+
+    Limits far away are only named, so that they do not compress the heads.
+    """
+    heads = value_range([section.along[name] for section in sections for name in HEAD_QUANTITIES]) or (0.0, 1.0)
+    shown = [section.along["elevation"] for section in sections]
+    shown += [limit for section in sections for name, limit in section.lines.items() if name == VAPOUR_LINE]
+    followed = value_range([*map(np.array, heads), *shown]) or heads
+    reach, (low, high), above, below = LIMIT_REACH * (heads[1] - heads[0]), followed, [], []
+    for name in dict.fromkeys(name for section in sections for name in section.lines if name != VAPOUR_LINE):
+        limit = value_range([section.lines[name] for section in sections if name in section.lines])
+        if limit and limit[0] > followed[1] + reach:
+            above.append(f"{name}: from {limit[0]:.4g} {unit}")
+        elif limit and limit[1] < followed[0] - reach:
+            below.append(f"{name}: from {limit[1]:.4g} {unit}")
+        elif limit:
+            low = min(low, max(limit[0], followed[0] - reach))
+            high = max(high, min(limit[1], followed[1] + reach))
+    span = high - low or 1.0
+    return HeadWindow(
+        low - (EDGE_MARGIN + NAME_MARGIN * len(below)) * span,
+        high + (EDGE_MARGIN + NAME_MARGIN * len(above)) * span,
+        above,
+        below,
+    )
+
+
+def value_range(lines: list[np.ndarray]) -> tuple[float, float] | None:
+    """Least and greatest of all finite values; None if there is none."""
+    values = np.concatenate([np.ravel(line) for line in lines] or [np.empty(0)])
+    values = values[np.isfinite(values)]
+    return (float(values.min()), float(values.max())) if values.size else None
+
+
+def section_of(result, way: SectionPath) -> Section:
+    """Long section of a run along a path."""
+    distances = envelope_column(result, "distance")
+    strung_up = joined_envelopes(result.envelope, way.legs, distances)
+    chainage, pipe = distances.to_si(strung_up["chainage"]), strung_up["pipe"]
+    along = {name: strung_up[name] for name in SECTION_QUANTITIES}
+    lines, boils = {}, result.summary["fluid"]["vapor_pressure"]
+    if boils is not None:  # a law with cavities has no head at the vapour pressure itself, where vapour fills all
+        left = 1.0 + NEAR * result.case.law.cavitates
+        lines[VAPOUR_LINE] = head_of(result, boils * left, along["elevation"])
+    lines |= limit_lines(result, pipe, along["elevation"])
+    parted = _cavity_spans(result, along["min_pressure"], chainage, way)
+    beyond = _violations(result, way, chainage, along)
+    to_unit = distances.from_si
+    return Section(
+        way, strung_up["chainage"], pipe, along, lines, (float(to_unit(way.begin)), float(to_unit(way.end))),
+        [(float(to_unit(a)), float(to_unit(b))) for a, b in parted],
+        [(float(to_unit(at)), head, name) for at, head, name in beyond],
+        [device._replace(chainage=float(to_unit(device.chainage))) for device in _devices(result, way)],
+    )  # fmt: skip
+
+
+def cavity_pressure(result) -> float | None:
+    """Pressure [Pa] below which a pipe has a cavity: vapour pressure, or twice it for laws with cavities; or None."""
+    return None if result.summary["fluid"]["vapor_pressure"] is None else result.case.law.cavity_pressure
+
+
+def _cavity_spans(result, least: np.ndarray, chainage: np.ndarray, way: SectionPath) -> list[tuple[float, float]]:
+    """Spans of chainage [m] around points where the pressure fell to the vapour pressure."""
+    limit = cavity_pressure(result)
+    if limit is None:
+        return []
+    low = envelope_column(result, "min_pressure").to_si(least) <= limit * (1.0 + 1e-9)
+    middles = np.concatenate([[way.begin], 0.5 * (chainage[1:] + chainage[:-1]), [way.end]])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], low.astype(int), [0]])))
+    return [(float(middles[a]), float(middles[b])) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _violations(result, way: SectionPath, chainage: np.ndarray, along: dict) -> list[tuple[float, float, str]]:
+    """(chainage [m], head, name of the limit) of places of a path where a limit on pressure or head is violated."""
+    violations, chainages = [], Chainages(result.case)
+    for verdict in result.summary["verdicts"]:
+        limit = result.case.limits.get(verdict["name"])
+        on = limit.extent.on if limit is not None else ()
+        for worst in verdict["worst"] if verdict["quantity"] in OF_PRESSURE else []:
+            leg = next((leg for leg in way.legs if leg.pipe == worst["place"]), None)
+            if leg is None or worst["state"] != FAILS:
+                continue
+            at = float(leg.chainage(chainages.leg(leg.pipe, on).distance(worst["chainage"])))
+            if leg.begin <= at <= leg.end:
+                line = along["min_head" if worst["bound"] == "minimum" else "max_head"]
+                violations.append((at, float(line[np.argmin(np.abs(chainage - at))]), verdict["name"]))
+    return violations
+
+
+def _devices(result, way: SectionPath) -> list[SectionDevice]:
+    """Nodes of a path with their devices, chainages in m: nodes other than junctions, and links other than pipes."""
+    case, devices = result.case, []
+    for place, chainage in way.places:
+        owner = place.partition(".")[0]
+        kind = case.nodes[place].kind if place in case.nodes else case.nodes[owner].kind if owner in case.nodes else ""
+        parts = [] if kind in ("junction", "") else [f"{place} ({kind})"]
+        parts += [f"{name} ({link.kind})" for name, link in case.links.items()
+                  if link.kind != "pipe" and place in link.ports.values()]  # fmt: skip
+        devices.append(SectionDevice(chainage, place, tuple(parts)))
+    return devices

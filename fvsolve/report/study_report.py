@@ -1,0 +1,171 @@
+"""HTML report of a study: verdicts of each protection in each event, and figures that overlay the runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fvsolve.case.text import inline
+from fvsolve.draw.plot import probe_quantity, thin_series
+from fvsolve.errors import visible
+from fvsolve.output.unit_columns import column
+from fvsolve.report import model_tables, numerics
+from fvsolve.report.envelope_units import envelope_column
+from fvsolve.report.figures import history_figure, study_section_figure
+from fvsolve.report.histories import HistoryPanel, Series
+from fvsolve.report.long_section import section_of
+from fvsolve.report.page import MAX_WARNINGS, render_page
+from fvsolve.report.reliability import Sentence, open_reason
+from fvsolve.report.section_pipes import section_paths
+from fvsolve.report.tables import ERROR_HEADER, ReportTable, in_unit
+from fvsolve.run.result import FAILS, HOLDS, IN_WORDS, OPEN, not_valid
+from fvsolve.units import span
+
+SERIES_POINTS = 400  # greatest number of points of a series
+MAX_PROBES, MAX_SECTIONS = 6, 2  # greatest numbers of probes and sections of an event, from its first run
+MAX_FAILED_ROWS = 200  # greatest number of rows of limits that fail or are open
+CAPTION = "Maximum (solid) and minimum (dashed) head over all accepted steps, by protection."
+
+
+def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) -> str:
+    """HTML report of a study; study : data of study.json, runs : (row, `Result`) of each, row["page"] its report."""
+    figures: dict[str, Any] = {}
+    first = runs[0][1]
+    events = [{"id": f"event-{k}", "name": visible(name or "All runs"), "figures": event_figures(name, k, runs, figures)}
+              for k, name in enumerate(dict.fromkeys(row["event"] for row, _ in runs))]  # fmt: skip
+    filled = {
+        "title": visible(study["title"] or study["study"]), "said": study, "case": visible(first.summary["case"]),
+        "ended": max(result.summary.get("ended", "") for _, result in runs),
+        "version": first.summary["versions"]["fvsolve"], "description": visible(first.case.description),
+        "words": study_sentences(study, runs), "matrix": [run_matrix(runs)], "events": events,
+        "failing": failing_limits(runs), "changes": change_tables(study), "first": run_name(runs[0][0]),
+        "model": [table for table in model_tables.all_tables(first) if table],
+        "told": warning_texts(runs), "versions": numerics.versions(first),
+    }  # fmt: skip
+    return render_page("study", filled, figures)
+
+
+def run_name(row: dict[str, Any]) -> str:
+    """Name of a run, such as `trip with vessel`."""
+    return visible(" with ".join(name for name in (row["event"], row["protection"]) if name) or "the case")
+
+
+def study_sentences(study: dict[str, Any], runs: list) -> list[Sentence]:
+    """Sentences at the top: runs that stopped early or are unreliable, then the protections that hold all limits."""
+    sentences = [Sentence("bad", f"{run_name(row)} stopped early.", f"{result.reason}.")
+             for row, result in runs if result.reason != "finished"]  # fmt: skip
+    sentences += [Sentence("bad", f"{run_name(row)} is not to be trusted.", item.text)
+              for row, result in runs for item in result.warnings if not item.ok]  # fmt: skip
+    if doubted := [item for item in runs if item[1].marks]:
+        marks = [mark for _, result in doubted for mark in result.marks]
+        reasons = {mark.what: mark.text.partition(": ")[2].partition(";")[0] for mark in marks}
+        sentences.append(
+            Sentence("doubt", "Partly not to be trusted:", f"{'; '.join(reasons.values())}.", run_links(doubted))
+        )
+    if not any(result.verdicts for _, result in runs):
+        return [
+            *sentences,
+            Sentence("none", "No limits were stated.", "The study shows what happens, but not if it is allowed."),
+        ]
+    names = [visible(name) or "the unchanged case" for name in study["holds"]]
+    if names:
+        sentences.append(Sentence("good", f"All limits hold in all events with {', '.join(names)}.", ""))
+    else:
+        sentences.append(Sentence("bad", "No protection holds all limits in all events.", ""))
+    if failed := [item for item in runs if run_state(item[1]) == FAILS]:
+        sentences.append(Sentence("bad", "Fails:", "", run_links(failed)))
+    if unsure := [item for item in runs if run_state(item[1]) == OPEN]:
+        reasons = dict.fromkeys(open_reason(result) for _, result in unsure)
+        sentences.append(Sentence("doubt", "Open:", f"{'; '.join(reasons)}.", run_links(unsure)))
+    return sentences
+
+
+def run_state(result) -> str:
+    """Worst verdict of the limits of a run; a run that is not ok fails. "" without limits."""
+    states = [FAILS] * (not result.ok) + [item.state for item in result.verdicts]
+    return next((item for item in (FAILS, OPEN, HOLDS) if item in states), "")
+
+
+def run_links(runs: list) -> tuple[tuple[str, str], ...]:
+    """(name, page) of runs."""
+    return tuple((run_name(row), row["page"]) for row, _ in runs)
+
+
+def run_matrix(runs: list) -> ReportTable:
+    """Table with a row for each run, linked to its report: verdict and the margin of each limit."""
+    names = {verdict.name: verdict.unit for _, result in runs for verdict in result.verdicts}
+    with_error = any(verdict.error is not None for _, result in runs for verdict in result.verdicts)
+    rows = []
+    for row, result in runs:
+        verdicts = {verdict.name: verdict for verdict in result.verdicts}
+        no_margin = not_valid(result.summary) or None
+        margins = [no_margin if key == "margin" and value is None and name in verdicts else value
+                   for name in names for key in ("margin", *["error"] * with_error)
+                   for value in [getattr(verdicts.get(name), key, None)]]  # fmt: skip
+        rows.append([run_name(row), IN_WORDS.get(run_state(result), ""), *margins])
+    heads = ["run", "verdict"]
+    heads += [word for name in names for word in (f"margin of {name}", *[ERROR_HEADER] * with_error)]
+    units = ["", ""] + [span(unit) for unit in names.values() for _ in range(1 + with_error)]
+    bad = frozenset(k for k, (_, result) in enumerate(runs) if run_state(result) == FAILS)
+    return ReportTable("Runs", heads, rows, units, bad, links=[row["page"] for row, _ in runs])
+
+
+def failing_limits(runs: list) -> ReportTable | None:
+    """Table of the limits that fail or are open, with place and time; None without rows."""
+    length, time = (column("", dimension, runs[0][1].case) for dimension in ("length", "time"))
+    pages = [row["page"] for row, result in runs for item in result.verdicts if not item.ok]
+    rows = [[run_name(row), item.name, IN_WORDS[item.state], item.value, item.limit, item.unit, item.margin,
+             span(item.unit), item.place, in_unit(length, item.chainage), in_unit(time, item.time)]
+            for row, result in runs for item in result.verdicts if not item.ok]  # fmt: skip
+    heads = ("run", "limit", "verdict", "value", "allowed", "unit", "margin", "unit", "worst place", "chainage", "time")
+    units = ("",) * 9 + (length.unit, time.unit)
+    return (
+        ReportTable("", heads, rows, units, mixed_units=frozenset({3, 4, 6}), most=MAX_FAILED_ROWS, links=pages)
+        if rows
+        else None
+    )
+
+
+def change_tables(study: dict[str, Any]) -> list[ReportTable]:
+    """Tables of the keys that events and protections set, with their values in TOML."""
+    tables = []
+    for group in ("events", "protections"):
+        rows = [
+            [name, key, inline(value)] for name, keys in study["changes"][group].items() for key, value in keys.items()
+        ]
+        tables += [ReportTable(group.capitalize(), (group[:-1], "key", "value"), rows)] if rows else []
+    return tables
+
+
+def event_figures(event: str | None, number: int, runs: list, figures: dict[str, Any]) -> list[dict[str, Any]]:
+    """Template data of the figures of an event, which overlay the runs of all protections; adds them to `figures`."""
+    own = [(row["protection"] or "", result) for row, result in runs if row["event"] == event]
+    runs_drawn = [(name, result, section_paths(result)) for name, result in own]
+    entries = []
+    for k, first in enumerate(next((paths for *_, paths in runs_drawn if paths), [])[:MAX_SECTIONS]):
+        several = [(name, section_of(result, path)) for name, result, paths in runs_drawn
+                   for path in paths if path.name == first.name]  # fmt: skip
+        height, along = envelope_column(own[0][1], "max_head").unit, envelope_column(own[0][1], "distance").unit
+        figures[f"section-{number}-{k}"] = study_section_figure(several, height, along)
+        entries.append({"id": f"section-{number}-{k}", "name": visible(first.name), "caption": CAPTION})
+    shared = [name for name in own[0][1].probes if all(name in result.units for _, result in own)]
+    for k, probe in enumerate(shared[:MAX_PROBES]):
+        lines = [
+            Series(name or "the case", *thin_series(result.t, result[probe], SERIES_POINTS), seen=True)
+            for name, result in own
+        ]
+        panel = HistoryPanel(probe_quantity(probe), own[0][1].units[probe], lines)
+        figures[f"history-{number}-{k}"] = history_figure(panel, own[0][1].summary["time_unit"], None)
+        entries.append({"id": f"history-{number}-{k}", "name": visible(probe), "caption": ""})
+    return entries
+
+
+def warning_texts(runs: list) -> list[str]:
+    """Warnings of all runs; equal texts once, with the names of their runs."""
+    by_text: dict[str, list[str]] = {}
+    for row, result in runs:
+        for item in result.warnings:
+            by_text.setdefault(item.text, []).append(run_name(row))
+    texts = [
+        f"{text} ({', '.join(names) if len(names) < len(runs) else 'all runs'})" for text, names in by_text.items()
+    ]
+    return [visible(item) for item in texts[:MAX_WARNINGS]]
