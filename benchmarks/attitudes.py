@@ -81,9 +81,7 @@ def ends(weight, w, end, steps):
 
 def tops(quick):
     """Rows of the first table: name, steps, largest error of R by each way; if quick of one top for 1 s."""
-    for name, (weight, w, end, many) in (
-        {"heavy": (*TOPS["loads_body"][:2], 1.0, (40,))}.items() if quick else TOPS.items()
-    ):
+    for name, (weight, w, end, many) in {"heavy": (*TOPS["heavy"][:2], 1.0, (40,))}.items() if quick else TOPS.items():
         found = solve_ivp(by_parameters(weight), (0.0, end), [*START, *w], "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
         exact = attitude.of_euler_parameters(found[:4])
         for steps in many:

@@ -61,9 +61,9 @@ def energy(case, end):
     model = build(load(case, {"numerics.end": end}))
     run = Run(model, fvsolve.initial_state(model), MemorySink(model), None)
     ended = run.go()
-    out = run.slate.evaluate(run.loop.t, run.loop.now, np.inf)[1]
+    out = run.run_data.evaluate(run.loop.t, run.loop.now, np.inf)[1]
     pipes, nodes, total = model.tables.pipes, model.tables.nodes, 0.0
-    for line, (ahead, back) in zip(model.tables.delays, run.slate.along(run.loop.t, out).values(), strict=True):
+    for line, (ahead, back) in zip(model.tables.delays, run.run_data.along(run.loop.t, out).values(), strict=True):
         pipe = pipes[line["pipe"]]
         ahead, back = ahead + 0.5 * pipe["flow"], back - 0.5 * pipe["flow"]
         length = float(pipe["speed"] * line["tau"] * line["stretches"])

@@ -56,7 +56,7 @@ def rates(model: Model, repeats: int) -> tuple[int, float, float]:
 
     def evaluate(times: int) -> None:
         for _ in range(times):
-            model.functions.rhs(0.0, y, dydt, out, loop.slate.handle)
+            model.functions.rhs(0.0, y, dydt, out, loop.run_data.handle)
 
     loop.now[:] = y
     loop.begin(END, NO_LIMIT)

@@ -104,7 +104,7 @@ def memory(kind: str, cells: int, folder: Path) -> str:
     n, state = model.basins[0].mesh.area.size, fvsolve.initial_state(model)
     loop = RunLoop(model)
     fvsolve.advance(model, state, 1e-5)
-    held = arrays(model.tables), arrays(loop.slate.written) + arrays(vars(loop.stepper).values())
+    held = arrays(model.tables), arrays(loop.run_data.written) + arrays(vars(loop.stepper).values())
     return f"tables {held[0] / n:.0f}, loop {held[1] / n:.0f}, peak of the process {(peak() - before) / n:.0f}"
 
 

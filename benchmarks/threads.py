@@ -175,13 +175,13 @@ def sixteen(size: int, wait: float, many: int = 16, stages: int = 2) -> None:
     model = model_of(WATER, size, size)
     loop, y, out = begun(model), initial_state(model).y, model.new_out()
     dydt, step = np.empty_like(y), least([loop], 20)[0][1]
-    bands, cuts = loop.slate.written.bands, np.arange(many + 1) * size // many
+    bands, cuts = loop.run_data.written.bands, np.arange(many + 1) * size // many
 
     def rates(begin: int, stop: int) -> float:
         bands[:], best = (begin, stop), np.inf
         for _ in range(60):
             start = process_time()
-            model.functions.rhs(0.0, y, dydt, out, loop.slate.handle)
+            model.functions.rhs(0.0, y, dydt, out, loop.run_data.handle)
             best = min(best, process_time() - start)
         return best
 

@@ -5,8 +5,8 @@ import sys
 OLDEST_PYTHON = 3, 11  # oldest supported version of Python
 if sys.version_info < OLDEST_PYTHON:
     raise ImportError(
-        f"fvsolve needs Python {OLDEST_PYTHON[0]}.{OLDEST_PYTHON[1]} or later; {sys.executable} is {sys.version.split()[0]}. Create "
-        "the environment with a later version: python3.12 -m venv .venv"
+        f"fvsolve needs Python {OLDEST_PYTHON[0]}.{OLDEST_PYTHON[1]} or later; {sys.executable} is "
+        f"{sys.version.split()[0]}. Create the environment with a later version: python3.12 -m venv .venv"
     )
 
 from fvsolve.lazy_exports import lazy_names  # noqa: E402
@@ -26,7 +26,7 @@ _MODULES = {
     "integrate": "steppers.ode",
     "load": "case",
     "open_run": "run",
-    "register_part": "parts.outside",
+    "register_part": "parts.plugins",
     "run": "run",
     "solve": "solve",
     "tableau": "steppers.tableau",

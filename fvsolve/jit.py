@@ -169,7 +169,7 @@ class Function:
         return python(*arguments)
 
     def code(self, letters: str, kinds: Callable[[], tuple], wrappers: bool = True) -> Code:
-        """Machine code for a signature; doors : with wrappers for calls from Python and C, else without."""
+        """Machine code for a signature; wrappers : with wrappers for calls from Python and C, else without."""
         key = letters if wrappers else f".{letters}"
         if key not in self.codes:
             with COMPILE_LOCK:
@@ -181,19 +181,19 @@ class Function:
         path = self._path(key)
         return None if path is None else store.read(path, self._identity(key))
 
-    def _compiled(self, key: str, kinds: tuple, doors: bool) -> Code:
-        compiler = self.numba if doors else self.numba.within
+    def _compiled(self, key: str, kinds: tuple, wrappers: bool) -> Code:
+        compiler = self.numba if wrappers else self.numba.within
         compiler.compile(kinds)
         compiled = compiler.overloads[kinds]
         if (path := self._path(key)) is not None:
             try:
                 loaded = LOADED_CODE.pop(compiled.fndesc.llvm_func_name, None)
                 store.write(
-                    path, self._identity(key), compiled, loaded or compiled.library._get_compiled_object(), doors
+                    path, self._identity(key), compiled, loaded or compiled.library._get_compiled_object(), wrappers
                 )
             except OSError as error:
                 _warn_not_cached(error.strerror or str(error))
-        return code_of(compiled, doors)
+        return code_of(compiled, wrappers)
 
     def _path(self, key: str) -> Path | None:
         """File in the store; None for closures and local functions, which have no unique name."""

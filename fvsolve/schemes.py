@@ -103,21 +103,45 @@ def fractions(denominator: int, *weights: int) -> Weights:
 
 
 UPWIND3, UPWIND5 = fractions(6, 0, -1, 5, 2, 0), fractions(60, 2, -13, 47, 27, -3)
-SCHEMES = {one.name: one for one in (
-    Scheme("upwind", "upwind", fractions(1, 0, 0, 1, 0, 0), plane="upwind", cavities=True),
-    Scheme("muscl", "muscl", twin="fromm", cavities=True, extra_cells=1),
-    Scheme("upwind5", weights=UPWIND5, shorter="upwind3", plane="upwind5",
-           own_end_factors=(1.0, 1.46, 1.61, 1.22, 1.88, 1.46, 1.25, 1.08)),
-    Scheme("weno5", "weno5", twin="upwind5", shorter="muscl", plane="weno5", branches=(
-        ("upwind5", UPWIND5), ("stencil behind", fractions(6, 2, -7, 11, 0, 0)), ("upwind3", UPWIND3),
-        ("stencil ahead", fractions(6, 0, 0, 2, 5, -1)))),
-    Scheme("linear-upwind", weights=fractions(2, 0, -1, 3, 0, 0), own_end_factors=(1.0, 1.38, 1.21, 1.11, 1.07, 1.03, 1.01)),
-    Scheme("fromm", weights=fractions(4, 0, -1, 4, 1, 0), own_end_factors=(1.0, 1.46, 1.19, 1.08)),
-    Scheme("central", weights=fractions(2, 0, 0, 1, 1, 0)),
-    Scheme("upwind3", weights=UPWIND3, own_end_factors=(1.0, 1.46, 1.61, 1.22, 1.03)),
-)}  # fmt: skip
-LINEAR = dict(sorted(((name, one) for name, one in SCHEMES.items() if not one.limited), key=lambda pair: pair[1].order))
-LIMITED = {name: one for name, one in SCHEMES.items() if one.limited}
+SCHEMES = {
+    scheme.name: scheme
+    for scheme in (
+        Scheme("upwind", "upwind", fractions(1, 0, 0, 1, 0, 0), plane="upwind", cavities=True),
+        Scheme("muscl", "muscl", twin="fromm", cavities=True, extra_cells=1),
+        Scheme(
+            "upwind5",
+            weights=UPWIND5,
+            shorter="upwind3",
+            plane="upwind5",
+            own_end_factors=(1.0, 1.46, 1.61, 1.22, 1.88, 1.46, 1.25, 1.08),
+        ),
+        Scheme(
+            "weno5",
+            "weno5",
+            twin="upwind5",
+            shorter="muscl",
+            plane="weno5",
+            branches=(
+                ("upwind5", UPWIND5),
+                ("stencil behind", fractions(6, 2, -7, 11, 0, 0)),
+                ("upwind3", UPWIND3),
+                ("stencil ahead", fractions(6, 0, 0, 2, 5, -1)),
+            ),
+        ),
+        Scheme(
+            "linear-upwind",
+            weights=fractions(2, 0, -1, 3, 0, 0),
+            own_end_factors=(1.0, 1.38, 1.21, 1.11, 1.07, 1.03, 1.01),
+        ),
+        Scheme("fromm", weights=fractions(4, 0, -1, 4, 1, 0), own_end_factors=(1.0, 1.46, 1.19, 1.08)),
+        Scheme("central", weights=fractions(2, 0, 0, 1, 1, 0)),
+        Scheme("upwind3", weights=UPWIND3, own_end_factors=(1.0, 1.46, 1.61, 1.22, 1.03)),
+    )
+}
+LINEAR = dict(
+    sorted(((name, scheme) for name, scheme in SCHEMES.items() if not scheme.limited), key=lambda pair: pair[1].order)
+)
+LIMITED = {name: scheme for name, scheme in SCHEMES.items() if scheme.limited}
 
 
 def end_rate_factor(scheme: str, cells: int) -> float:

@@ -26,8 +26,10 @@ DIGEST = hashlib.sha256().digest_size
 SUFFIX = ".code"
 CAN_LINK = sys.platform != "win32"  # LLVM's linker can link numba's objects there
 # Environment variables of numba that do not change code; all others are part of the target.
-IGNORED_SETTINGS = re.compile(r"NUMBA_(CACHE|CHROME|COLOR|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"
-                      r"FORCE_CUDA|FULL|HIGHLIGHT|NUM_|NRT_STATS|PARALLEL_DIAG|THREADING|TRACE)")  # fmt: skip
+IGNORED_SETTINGS = re.compile(
+    r"NUMBA_(CACHE|CHROME|COLOR|CUDA|DEBUG(?!INFO)|DEVELOPER|DUMP|DISABLE_(JIT|CUDA|PERF|TYPEINFER)|"
+    r"FORCE_CUDA|FULL|HIGHLIGHT|NUM_|NRT_STATS|PARALLEL_DIAG|THREADING|TRACE)"
+)
 LIBRARY_NUMBERS = itertools.count()  # for unique names of libraries
 
 
@@ -91,11 +93,11 @@ def write_target(folder: Path) -> None:
         _replace(path, json.dumps(target(), indent=1).encode())
 
 
-def write(path: Path, identity: str, compiled, code: bytes, doors: bool) -> None:
-    """Save a function compiled by numba; doors : with wrappers for Python and C. OSError if it cannot be written."""
+def write(path: Path, identity: str, compiled, code: bytes, wrappers: bool) -> None:
+    """Save a function compiled by numba; wrappers : with wrappers for Python and C. OSError if it cannot be written."""
     names = compiled.fndesc
     symbols = {"address": names.llvm_func_name}
-    if doors:
+    if wrappers:
         if compiled.environment.consts:  # Python objects, which a file cannot contain
             return
         symbols |= {"pointer": names.llvm_cfunc_wrapper_name, "python": names.llvm_cpython_wrapper_name}

@@ -123,7 +123,11 @@ FAULTS = [
         "return speed * size / np.pi * np.sin(x) ** 2",
         "return 1.01 * speed * size / np.pi * np.sin(x) ** 2",
     ),
-    Fault("basins/free_surface/surface_patches.py", "dydt[o + i] += flow * weight(", "dydt[o + i] -= flow * weight("),
+    Fault(
+        "basins/free_surface/surface_patches.py",
+        "dydt[o + i] += flow * flow_weight(",
+        "dydt[o + i] -= flow * flow_weight(",
+    ),
     Fault("parts/pipe_sizes.py", "DN_NPS.get(number, number / 25.0)", "DN_NPS.get(number, number / 25.4)"),
     Fault(
         "parts/accumulator/law.py",

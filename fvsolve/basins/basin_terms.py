@@ -11,17 +11,25 @@ COMMON = RhsTerms(package=PACKAGE, observe="basin_probes: observe_flows", power=
 DENSITY_LAWS = RhsTerms(package=PACKAGE, observe="basin_probes: observe_dense_flows")  # all laws but linear
 SHORTAGES = RhsTerms(package=PACKAGE, record="basin_patches: record_patches")
 WALLS = RhsTerms(
-    package=PACKAGE, derive_state="moving_walls: update_geometry", prepare="moving_walls: set_line_speeds", boundary_inflow="moving_walls: add_wall_forces", stretching="moving_walls: stretch_scalar_rates",
-    observe="moving_walls: observe_walls", power="moving_walls: wall_power",
-)  # fmt: skip
+    package=PACKAGE,
+    derive_state="moving_walls: update_geometry",
+    prepare="moving_walls: set_line_speeds",
+    boundary_inflow="moving_walls: add_wall_forces",
+    stretching="moving_walls: stretch_scalar_rates",
+    observe="moving_walls: observe_walls",
+    power="moving_walls: wall_power",
+)
 MOVING_SIDES = RhsTerms(
     package=PACKAGE, derive_state="moving_meshes: update_meshes", prepare="moving_meshes: set_side_speeds"
 )
 FRAMES = RhsTerms(package=PACKAGE, prepare="basin_frames: set_frames")  # before patches
 FRAME_FORCES = RhsTerms(
-    package=PACKAGE, boundary_inflow="frame_forces: add_frame_forces", fluid_response="frame_forces: correct_for_bodies",
-    power="frame_energy: add_power", stored="frame_energy: add_stored",
-)  # fmt: skip
+    package=PACKAGE,
+    boundary_inflow="frame_forces: add_frame_forces",
+    fluid_response="frame_forces: correct_for_bodies",
+    power="frame_energy: add_power",
+    stored="frame_energy: add_stored",
+)
 PATCH_VALUES = RhsTerms(
     package=PACKAGE, outlet_values="basin_scalars: patch_values", observe="basin_scalars: observe_values"
 )

@@ -60,9 +60,22 @@ def advect_on_grids(t, y, dydt, out, handle):
             at, outside = basin["carried"] + q * n, tables.work[ring : ring + basin["outer"]]
             if requested_mode(tables, b) != OFF:
                 by_blocks(
-                    tables.sums, at, basin["scheme"], basin["limiter"], begin, stop, kx, ky, flow_factor(t, basin), flow_x,
-                    flow_y, outside, y, work, dydt[at : at + n],
-                )  # fmt: skip
+                    tables.sums,
+                    at,
+                    basin["scheme"],
+                    basin["limiter"],
+                    begin,
+                    stop,
+                    kx,
+                    ky,
+                    flow_factor(t, basin),
+                    flow_x,
+                    flow_y,
+                    outside,
+                    y,
+                    work,
+                    dydt[at : at + n],
+                )
                 continue
             grid_advection(
                 basin["scheme"], basin["limiter"], kx.size, ky.size, begin, stop, kx, ky, flow_factor(t, basin), flow_x,

@@ -293,7 +293,7 @@ class BasinRows:
 
     def lower_common(self, draft, row) -> None:
         """Fill the columns common to all physics."""
-        numerics, mesh, before = self.case.numerics, self.mesh, draft.room()
+        numerics, mesh, before = self.case.numerics, self.mesh, draft.used_size()
         self.row, row["n"] = row, self.n
         row["kind"], row["deep"], row["given"] = (
             physics_code(type(self).__module__.rpartition(".")[0]),
@@ -341,7 +341,7 @@ class BasinRows:
         row["carried"] = draft.size if self.scalars else -1
         for name in self.scalars:
             draft.states(Numbered(f"{self.name}.{name}", self.n), self.scalar_scale(name))
-        self.memory = 8 * (draft.room() + draft.size - before)
+        self.memory = 8 * (draft.used_size() + draft.size - before)
         place = f"nodes.{self.name}"
         draft.warnings += [Notice("mesh", place, f"basin {self.name}: {note}", "mesh") for note in mesh.notes]
 
@@ -382,8 +382,9 @@ class BasinRows:
                 None,
             )
         if self.max_divergence > ROUNDING * row["fastest"]:
-            reason = f"the velocity has a divergence of up to {self.max_divergence:.3g} 1/s, which concentrates or dilutes scalars"
-            return "velocity", f"{reason}; a stream function has none", self.max_divergence, 0.0
+            reason = f"the velocity has a divergence of up to {self.max_divergence:.3g} 1/s"
+            text = f"{reason}, which concentrates or dilutes scalars; a stream function has none"
+            return "velocity", text, self.max_divergence, 0.0
         radius = ssp_radius(method)
         if numerics.courant > radius:
             advice = (

@@ -4,5 +4,5 @@ from zlib import crc32
 
 
 def physics_code(package: str) -> int:
-    """Code of the physics of a package: each of its compiled files contains `MINE = physics_code(__package__)`."""
+    """Code of the physics of a package: each of its compiled files contains `OWN_CODE = physics_code(__package__)`."""
     return crc32(package.encode())

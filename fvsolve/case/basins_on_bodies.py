@@ -76,7 +76,7 @@ def overturned(nodes: dict[str, Any], poses: dict[str, Any]) -> Faults:
         )
         if not wet or on not in poses or any(nodes[body].joint.kind != "fixed" for body in carriers(on, nodes)):
             continue
-        turn = poses[on].attitude @ getattr(node, "turn", np.eye(3))
+        turn = poses[on].attitude @ getattr(node, "rotation", np.eye(3))
         if turn[2, 2] <= 0.0:
             text = f"its bottom is {np.degrees(np.arccos(turn[2, 2])):.3g} deg off level on {on}, which is fixed"
             yield ("nodes", name, "on"), f"{text}: its contents would run out; expected less than 90 deg"

@@ -7,7 +7,7 @@ from typing import Any
 
 from fvsolve.errors import did_you_mean, listing
 from fvsolve.parts import Pipe
-from fvsolve.parts.table_model import at_most_one
+from fvsolve.parts.table_model import exclusive_key_faults
 from fvsolve.parts.value import ReadContext, Value
 from fvsolve.units import show
 
@@ -90,7 +90,7 @@ def find_faults(table: Mapping[str, Any], setting: ReadContext) -> Iterator[tupl
 def _of_keys(kind: str, given: dict[str, Any], setting: ReadContext) -> Iterator[tuple[tuple, str]]:
     known = values(kind)
     for group in KINDS[kind].alternatives:
-        yield from at_most_one(given, group)
+        yield from exclusive_key_faults(given, group)
     for key, value in given.items():
         if key in known:
             if key not in COMPLETED:

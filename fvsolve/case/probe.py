@@ -43,7 +43,7 @@ class Probe:
     straight: bool = False
 
 
-Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | Pool | Scalar | None"]]
+Kinds = Mapping[str, Mapping[str, "type[Node] | type[Link] | BasinFields | Scalar | None"]]
 
 
 def read_probe(given: object, kinds: Kinds) -> Probe | None:
@@ -144,7 +144,7 @@ def default_probes(kinds: Kinds) -> list[Probe]:
                 if kind is not None
                 else []
             )
-            own = [quantity_name for quantity_name in own if quantity_name not in getattr(kind, "asked", ())]
+            own = [quantity_name for quantity_name in own if quantity_name not in getattr(kind, "on_request", ())]
             for quantity in [*own, *_scalars_of(kind, kinds, "quantities")] if own else []:
                 text = f"{part}.{name}.{quantity}" if name in other else f"{name}.{quantity}"
                 probes.append(_probe(text, part, name, quantity, None, kinds))

@@ -35,7 +35,8 @@ def find_faults(
     )
     if pipes and not fits(memory):
         worst = max(pipes, key=lambda name: pipes[name].cells or 0)
-        text = f"{cells:.3g} cells take about {byte_text(memory)} of memory, and {byte_text(free_memory())} are free; expected fewer"
+        text = f"{cells:.3g} cells take about {byte_text(memory)} of memory, and {byte_text(free_memory())} are free"
+        text += "; expected fewer"
         yield ("links", worst, "cells"), text
     least = LEAST_STEP * max(abs(numerics.start), abs(numerics.end))
     if output.every is not None and not output.every > least:
@@ -47,7 +48,8 @@ def find_faults(
         rows, columns = span / output.every, 1 + len(output.probes)
         if not fits(2 * NUMBER * rows * columns):
             text = f"{output.every:g} s gives {rows:.3g} rows of {columns} numbers, about "
-            text += f"{byte_text(2 * NUMBER * rows * columns)} to read back, and {byte_text(free_memory())} of memory are free"
+            size, free = byte_text(2 * NUMBER * rows * columns), byte_text(free_memory())
+            text += f"{size} to read back, and {free} of memory are free"
             yield ("output", "every"), f"{text}; expected a longer interval or fewer probes"
 
 

@@ -117,7 +117,8 @@ class FluidSpec(Table):
     def expected(cls, given: Any) -> str:
         if not isinstance(given, str):
             return super().expected(given)
-        return f"[fluid] with name = {show('ISO VG 46' if given.casefold() in OIL_WORDS else given)}, its temperature and more"
+        name = "ISO VG 46" if given.casefold() in OIL_WORDS else given
+        return f"[fluid] with name = {show(name)}, its temperature and more"
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         value, usual = self.temperature, TEMPERATURES

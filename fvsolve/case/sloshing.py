@@ -193,7 +193,7 @@ def find_faults(nodes: dict[str, Any], lumped: dict[str, Any], poses: dict[str, 
 def weightless(nodes: dict[str, Any], gravity: float | None) -> Faults:
     """Fault of zero gravity with a free water surface."""
     for name, basin in nodes.items():
-        if gravity == 0.0 and getattr(getattr(basin, "own", None), "sloshes", False):
+        if gravity == 0.0 and getattr(getattr(basin, "physics_type", None), "has_modes", False):
             if not (basin.on and basin.sloshing == "frozen"):
                 yield (
                     ("gravity",),

@@ -14,20 +14,20 @@ __all__ = ["main"]
 COMMANDS = (
     "commands",
     "chart",
-    "closing",
-    "design",
     "energy",
     "failure_map",
-    "handed",
-    "imported",
+    "epanet_import",
     "linearise",
+    "optimise",
     "order",
+    "precompile",
+    "report_commands",
     "response",
+    "scenarios",
     "sensitivity",
     "sizing",
     "stability",
     "sweep",
-    "warm",
 )
 BASIC_COMMANDS = ("run", "check", "list", "new", "schema", "methods", "compare", "view")  # commands of `commands`
 

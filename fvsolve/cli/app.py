@@ -38,7 +38,7 @@ def all_commands(
 
 
 Cases = Annotated[list[str], typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
-OneCase = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
+SingleCase = Annotated[str, typer.Argument(metavar="CASE", help="a case file, or the name of a shipped case")]
 Set = Annotated[list[str], typer.Option("--set", metavar="KEY=VALUE", help="override of a key: links.main.cells=400")]
 Json = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output instead of text")]
 

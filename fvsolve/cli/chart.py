@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json
 from fvsolve.cli.study_options import Dask, Jobs, Out, comma_list, folder_of, method_names, progress_line
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
@@ -15,7 +15,7 @@ from fvsolve.studies.result_table import Column, ResultTable
 
 @app.command()
 def chart(
-    case: OneCase,
+    case: SingleCase,
     scheme: Annotated[
         str | None, typer.Option(metavar="LIST", help="schemes to compare (default upwind,muscl,upwind5,weno5)")
     ] = None,
@@ -71,8 +71,18 @@ def chart(
     folder = folder_of(loaded, "chart", out)
     sizes = [_numbers(name, text) for name, text in (("cells", cells), ("rtol", rtol), ("step", step))]
     with progress_line() as progress:
-        result = study(loaded, None, comma_list(scheme, "--scheme"), method_names(method), *sizes, target, folder, progress,
-                     jobs, dask)  # fmt: skip
+        result = study(
+            loaded,
+            None,
+            comma_list(scheme, "--scheme"),
+            method_names(method),
+            *sizes,
+            target,
+            folder,
+            progress,
+            jobs,
+            dask,
+        )
     paths = write_chart(result, folder)
     if as_json:
         print_json(result.plain() | {"files": paths})

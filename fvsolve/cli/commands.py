@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Cases, Json, OneCase, Set, app, load_case, print_json, value_of
+from fvsolve.cli.app import Cases, Json, Set, SingleCase, app, load_case, print_json, value_of
 from fvsolve.errors import FvsolveError, visible
 
 
@@ -95,7 +95,7 @@ def _judge(result, case) -> None:
 
 @app.command()
 def check(
-    case: OneCase,
+    case: SingleCase,
     set: Set = [],  # noqa: B006
     every: Annotated[bool, typer.Option("--all", help="print all rows of long tables")] = False,
     as_json: Json = False,

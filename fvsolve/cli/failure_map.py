@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json, value_of
+from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json, value_of
 from fvsolve.cli.study_options import Dask, Jobs, Out, clear_files, comma_list, folder_of, method_names, progress_line
 from fvsolve.errors import FvsolveError
 from fvsolve.studies.result_table import Column, ResultTable
@@ -16,7 +16,7 @@ from fvsolve.units import parse
 
 @app.command("failure-map")
 def failure_map(
-    case: OneCase,
+    case: SingleCase,
     scheme: Annotated[
         str | None,
         typer.Option(metavar="A,B", help="schemes, one panel for each (default upwind and that of the case)"),

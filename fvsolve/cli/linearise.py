@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json
 from fvsolve.cli.study_options import Out, clear_files, comma_list, folder_of, warn_replaced
 from fvsolve.studies.result_table import ResultTable, write_csv
 
@@ -34,7 +34,7 @@ def time_of(text: str | None) -> float | None:
 
 @app.command()
 def linearise(
-    case: OneCase,
+    case: SingleCase,
     inputs: Annotated[
         str | None, typer.Option(metavar="A,B", help="inputs, such as valve.opening,lake.pressure (default none)")
     ] = None,

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json
 from fvsolve.cli.study_options import progress_line
 from fvsolve.errors import CaseError, collect_faults
 
 
 @app.command()
 def optimise(
-    case: OneCase,
+    case: SingleCase,
     schedule: Annotated[str, typer.Option(metavar="KEY", help="key of the schedule that is optimised")],
     minimise: Annotated[
         str, typer.Option(metavar="CLAIM", help='peak that is minimised: "max(gate.pressure)", "max(main.head)"')

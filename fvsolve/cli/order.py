@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from fvsolve.cli import terminal
-from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json
 from fvsolve.cli.study_options import Dask, Jobs, Out, clear_files, comma_list, folder_of, method_names, progress_line
 from fvsolve.output.summary_file import plain
 from fvsolve.studies.accuracy.order_picture import NORMS, SHOWN_VARIABLES, study_title, variable_unit
@@ -23,14 +23,14 @@ FILE = columns(
 
 TABLE = (
     Column("cells"), Column("step", "step [s]", ".4g"),
-    *(one for norm in NORMS for one in (Column(norm, words=".4g"), Column(f"order {norm}", "order", ".2f"))),
+    *(column for norm in NORMS for column in (Column(norm, words=".4g"), Column(f"order {norm}", "order", ".2f"))),
     Column("rhs"), Column("seconds", words=".4g"), Column("mark"),
 )  # fmt: skip
 
 
 @app.command()
 def order(
-    case: OneCase,
+    case: SingleCase,
     overrides: Set = [],  # noqa: B006
     refine: Annotated[
         str | None,
@@ -65,9 +65,20 @@ def order(
     loaded = load_case(case, overrides, scheme, method)
     folder = folder_of(loaded, "order", out)
     with progress_line() as progress, ResultCache(folder) as points:
-        studies = study(loaded, refine=refine, key=key, levels=levels, cells=cells, schemes=comma_list(scheme, "--scheme"),
-                      methods=method_names(method), against=reference, out=points, progress=progress,
-                      jobs=jobs, dask=dask)  # fmt: skip
+        studies = study(
+            loaded,
+            refine=refine,
+            key=key,
+            levels=levels,
+            cells=cells,
+            schemes=comma_list(scheme, "--scheme"),
+            methods=method_names(method),
+            against=reference,
+            out=points,
+            progress=progress,
+            jobs=jobs,
+            dask=dask,
+        )
     studies = studies if isinstance(studies, list) else [studies]
     files = [
         ResultTable(FILE, [*file_rows(studies)]).write(

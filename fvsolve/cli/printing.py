@@ -238,8 +238,10 @@ def _fluid_text(case, fluid: dict) -> str:
         unit = column(key, dimension, case)
         if dimension == "modulus":
             unit = column(key, dimension, case, span(unit.unit))
-        texts.append(f"{key.replace('_', ' ')} {'unknown' if fluid[key] is None else _number(_in_unit(unit, fluid[key]))}"
-                    f"{'' if fluid[key] is None else ' ' + unit.unit}")  # fmt: skip
+        texts.append(
+            f"{key.replace('_', ' ')} {'unknown' if fluid[key] is None else _number(_in_unit(unit, fluid[key]))}"
+            f"{'' if fluid[key] is None else ' ' + unit.unit}"
+        )
     name = "" if fluid["name"] == fluid["source"] else f" ({fluid['source']})"
     return f"fluid {fluid['name']}{name}: {', '.join(texts)}"
 

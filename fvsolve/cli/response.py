@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json
 from fvsolve.cli.linearise import AtTime, BeforeJump, time_of
 from fvsolve.cli.study_options import Out, clear_files, folder_of, warn_replaced
 from fvsolve.output.unit_columns import column
@@ -19,7 +19,7 @@ SYMBOLS = {"admittance": "Y", "impedance": "Z"}
 
 @app.command()
 def response(
-    case: OneCase,
+    case: SingleCase,
     port: Annotated[
         str, typer.Option(metavar="NODE", help="node of the port: a reservoir, junction, inflow, chamber or tank")
     ],

@@ -67,7 +67,8 @@ def _show(result) -> None:
         for verdict in verdicts_of(row):
             if verdict.state in (FAILS, OPEN):
                 value = "-" if verdict.value is None else f"{verdict.value:.6g}"
-                text = f"{row_name(row)}: {verdict.name}: {value} {verdict.unit} ({where_and_when(verdict._asdict(), row)})"
+                place = where_and_when(verdict._asdict(), row)
+                text = f"{row_name(row)}: {verdict.name}: {value} {verdict.unit} ({place})"
                 reason = "" if verdict.state == FAILS else f": open, because {undecided_limit_reason(verdict, row)}"
                 terminal.line(console, text + reason, "red" if verdict.state == FAILS else "yellow")
         for text in row.get("resolution", {"reasons": []})["reasons"][:REASONS_SHOWN]:

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json
 from fvsolve.cli.study_options import Dask, Jobs, Out, Seed, clear_files, folder_of, progress_line
 from fvsolve.cli.sweep import ranges
 
 
 @app.command()
 def sensitivity(
-    case: OneCase,
+    case: SingleCase,
     vary: Annotated[list[str], typer.Option("--vary", metavar="KEY=LOW,HIGH", help="range of a key to vary")],
     outcome: Annotated[
         str, typer.Option(metavar="max(PROBE)", help="outcome to analyse: min, max or final of a probe")
@@ -50,7 +50,7 @@ def sensitivity(
 
 @app.command()
 def calibrate(
-    case: OneCase,
+    case: SingleCase,
     parameter: Annotated[list[str], typer.Option(metavar="KEY=LOW,HIGH", help="key to calibrate and its range")],
     seed: Seed = 0,
     jobs: Jobs = 1,

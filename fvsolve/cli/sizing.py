@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, OneCase, Set, app, load_case, print_json
+from fvsolve.cli.app import Json, Set, SingleCase, app, load_case, print_json
 from fvsolve.cli.study_options import progress_line
 from fvsolve.cli.sweep import RANGE_FORMAT, key_and_values
 from fvsolve.errors import CaseError, FvsolveError, collect_faults
@@ -15,7 +15,7 @@ from fvsolve.errors import CaseError, FvsolveError, collect_faults
 
 @app.command()
 def size(
-    case: OneCase,
+    case: SingleCase,
     vary: Annotated[str, typer.Option("--vary", metavar="KEY=LOW,HIGH", help="key to size and its range")],
     goal: Annotated[
         str,
@@ -76,7 +76,7 @@ def _show(result) -> None:
     for text in dict.fromkeys(run.open for run in result.runs if run.open):
         terminal.line(console, f"open: {text}", "yellow")
     if result.value is None:
-        terminal.line(console, _not_found_text(result), "bold red")
+        terminal.line(console, _no_value_text(result), "bold red")
         return
     bracket = "at the end of the range" if result.bracket is None else (
         f"bracket {min(result.bracket):.6g} to {max(result.bracket):.6g}{unit}")  # fmt: skip
@@ -84,7 +84,7 @@ def _show(result) -> None:
     terminal.line(console, line, "green")
 
 
-def _not_found_text(result) -> str:
+def _no_value_text(result) -> str:
     """Text for a failed search: the nearest value, its margin, and the direction in which to search."""
     nearest, values = result.nearest, sorted(run.value for run in result.runs)
     unit = f" {result.unit}" if result.unit else ""

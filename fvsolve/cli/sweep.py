@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from fvsolve.cli.app import Json, OneCase, app, load_case, print_json, value_of
+from fvsolve.cli.app import Json, SingleCase, app, load_case, print_json, value_of
 from fvsolve.cli.study_options import Dask, Jobs, Out, Seed, clear_files, folder_of, progress_line, writable_folder
 from fvsolve.errors import FvsolveError
 
@@ -31,7 +31,7 @@ MAX_ROWS = 100  # greatest number of rows of that table
 
 @app.command()
 def sweep(
-    case: OneCase,
+    case: SingleCase,
     set: Values = [],  # noqa: B006
     points: Annotated[
         Path | None,

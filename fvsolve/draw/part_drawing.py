@@ -108,11 +108,18 @@ def _write_names(stage, scene: DrawnScene, segments, at, blocks, ties) -> tuple[
     ticks = [text.get_window_extent(renderer).extents for text in stage.texts]
     point = figure.dpi / 72.0
     places = naming.place_labels(
-        [item.at for item in labels], sizes, [point * item.gap for item in labels],
+        [item.at for item in labels],
+        sizes,
+        [point * item.gap for item in labels],
         np.vstack([blocks, np.reshape(ticks, (-1, 4))]),
         np.vstack([naming.points_along(np.concatenate([pixels, ties])), axes.transData.transform(stage.cover)]),
-        (EDGE_MARGIN + axes.bbox.x0 * axes.axison, axes.bbox.y0 - EDGE_MARGIN, figure.bbox.x1 - EDGE_MARGIN, axes.bbox.y1 + EDGE_MARGIN),
-    )  # fmt: skip
+        (
+            EDGE_MARGIN + axes.bbox.x0 * axes.axison,
+            axes.bbox.y0 - EDGE_MARGIN,
+            figure.bbox.x1 - EDGE_MARGIN,
+            axes.bbox.y1 + EDGE_MARGIN,
+        ),
+    )
     for text, corner in zip(texts, places, strict=True):
         if corner is None:
             text.remove()

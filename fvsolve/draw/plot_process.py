@@ -60,9 +60,12 @@ class PlotProcess:
         options = {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x200}
         with contextlib.suppress(OSError):  # the system allows no second process
             self.process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "fvsolve.draw.plot_process"], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                env=os.environ | {"PYTHONPATH": path}, **options,
-            )  # fmt: skip
+                [sys.executable, "-P", "-m", "fvsolve.draw.plot_process"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=os.environ | {"PYTHONPATH": path},
+                **options,
+            )
 
     def draw(self, pictures: Iterable[Picture]) -> dict[Path, str]:
         """Write pictures; returns path -> error text for those that could not be drawn."""

@@ -31,7 +31,7 @@ SYMBOLS = {
     "relief-valve": f"{VALVE_BODY} M 0 0 L -.25 .25 L .25 .45 L -.25 .65 L .25 .85 L 0 1",  # its spring
     "surge-anticipating": f"{VALVE_BODY} {VALVE_STEM} * O 0 .75 .25",  # its pilot
     "rupture-disc": "M -.8 -.7 L -.8 .7 L .8 .7 L .8 -.7 Z M -.2 -.7 L .1 -.35 L .2 0 L .1 .35 L -.2 .7",
-    "pressure-reducing": f"{VALVE_BODY} {VALVE_STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z * M 0 0 L 1 .6 L 1 -.6 Z",  # a diaphragm
+    "pressure-reducing": f"{VALVE_BODY} {VALVE_STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z * M 0 0 L 1 .6 L 1 -.6 Z",
     "pressure-sustaining": f"{VALVE_BODY} {VALVE_STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z * M 0 0 L -1 .6 L -1 -.6 Z",
     "flow-control": f"{VALVE_BODY} {VALVE_STEM} M -.5 .6 L -.3 1 L .3 1 L .5 .6 Z",
     "pump": "O 0 0 .9 * M -.4 .7 L -.4 -.7 L .85 0 Z",
@@ -49,7 +49,7 @@ SYMBOLS = {
     "end-stop": "M -1 0 L .2 0 M .2 -.5 L .2 .5 * M .5 -.8 L .5 .8 L .8 .8 L .8 -.8 Z",
     "force": "M -1 0 L .3 0 * M .3 -.4 L .3 .4 L 1 0 Z",
     "torque": "M .5 -.6 L -.2 -.75 L -.75 -.2 L -.7 .4 L -.1 .75 L .4 .6 * M .3 .95 L .8 .3 L 0 .25 Z",
-}  # fmt: skip
+}
 OTHER_NODE, OTHER_LINK = FILLED_BOX, "M -1 0 L 0 .7 L 1 0 L 0 -.7 Z"
 
 WATER = "#8ab6d6"

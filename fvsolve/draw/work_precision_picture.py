@@ -54,8 +54,17 @@ def chart_figure(curves: Sequence[Curve], rows: Sequence[str], columns: Sequence
         _limits(panels, [curve.errors[i][~curve.failed] for curve in curves], floors[i], failed)
         panels[0].set_ylabel(rows[i], fontsize=8.5, color=style.INK)
         if failed:
-            panels[0].text(0.99, FAILED_HEIGHT, "failed", transform=panels[0].transAxes, fontsize=7.5, ha="right", va="center",
-                           color=style.DOUBT, in_layout=False)  # fmt: skip
+            panels[0].text(
+                0.99,
+                FAILED_HEIGHT,
+                "failed",
+                transform=panels[0].transAxes,
+                fontsize=7.5,
+                ha="right",
+                va="center",
+                color=style.DOUBT,
+                in_layout=False,
+            )
     for axes, name in zip(grid[-1], columns, strict=True):
         axes.set_xlabel(name, fontsize=8.5, color=style.INK)
     for axes in grid.flat:
@@ -88,9 +97,17 @@ def _curve(axes, curve: Curve, errors, costs, colour: str, marker: str) -> None:
     lost = curve.failed & np.isfinite(costs) & (costs > 0)
     if lost.any():
         axes.plot(
-            costs[lost], np.full(lost.sum(), FAILED_HEIGHT), color=colour, marker=marker, markersize=4.5, linestyle="none",
-            markerfacecolor="none", transform=axes.get_xaxis_transform(), clip_on=False, in_layout=False,
-        )  # fmt: skip
+            costs[lost],
+            np.full(lost.sum(), FAILED_HEIGHT),
+            color=colour,
+            marker=marker,
+            markersize=4.5,
+            linestyle="none",
+            markerfacecolor="none",
+            transform=axes.get_xaxis_transform(),
+            clip_on=False,
+            in_layout=False,
+        )
 
 
 def _front(axes, curves, i: int, j: int, floor: float) -> None:

@@ -7,7 +7,7 @@ from importlib import import_module
 
 from fvsolve.exact.solution import ExactStart, Solution, law_faults, type_faults
 
-__all__ = ["NAMES", "Solution", "Start", "find_faults", "solution"]
+__all__ = ["NAMES", "Solution", "ExactStart", "find_faults", "solution"]
 
 NAMES = {  # name in the case file -> (module of this package, description)
     "rays": ("rays", "waves in frictionless pipes between reservoirs, junctions and valves, by ray tracing"),
@@ -33,7 +33,7 @@ def find_faults(case) -> Iterator[tuple[tuple, str]]:
     """
     module = _module(case.exact.name)
     yield from law_faults(case)
-    yield from list(type_faults(case, module.NODES, module.LINKS)) or module.misfits(case)
+    yield from list(type_faults(case, module.NODES, module.LINKS)) or module.find_faults(case)
 
 
 def solution(case, start: ExactStart) -> Solution:

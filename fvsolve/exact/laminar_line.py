@@ -181,7 +181,7 @@ class LineDeviation:
 
     def _input(self):
         """(s, transform of the change of mass flow, step of s) along the Bromwich line."""
-        if not hasattr(self, "_line"):
+        if not hasattr(self, "_bromwich_line"):
             span = self.end - self.t0
             step = 2.0 * math.pi / (PERIOD * span)
             count = 512

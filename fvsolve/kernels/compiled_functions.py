@@ -6,7 +6,10 @@ from fvsolve.jit import compile_in_parallel, compile_once, njit
 from fvsolve.kernels import calls
 from fvsolve.kernels.rhs_assembly import CLOSING, PHASES, ModelFeatures
 
-READER_IMPORTS = "from fvsolve.kernels.rhs_assembly import Cast, Pieces; from fvsolve.kernels.compiled_functions import compile_readers; "
+READER_IMPORTS = (
+    "from fvsolve.kernels.rhs_assembly import ModelFeatures, RhsTerms; "
+    "from fvsolve.kernels.compiled_functions import compile_readers; "
+)
 HOOK = {hook: k for k, hook in enumerate(calls.HOOKS)}
 RHS_HOOKS, READER_HOOKS = ("set", "move", "step", "slope", "lift"), ("value", "outside", "events", "bends")
 ENERGY_HOOKS = ("power", "stored")
@@ -29,7 +32,7 @@ class Functions:
             self.rhs = self.compile_job(calls.RHS, rates, calls.rhs_in_turn)
             self.store_hooks(*RHS_HOOKS, *["lead"] * cast.columns)
         self.store_addresses(calls.CLOSE, cast.functions(*CLOSING))
-        self.store_addresses(calls.DERIVE, cast.functions("see"))
+        self.store_addresses(calls.DERIVE, cast.functions("derive_state"))
         self.store_addresses(calls.DAMP, cast.functions("damp"))
         self.observe = self.compile_job(calls.OBSERVE, cast.functions("observe"), calls.observe_in_turn)
         self.store_addresses(calls.RECORD, cast.functions("record"))
@@ -83,10 +86,10 @@ def compile_readers(cast: ModelFeatures) -> tuple:
 @compile_once
 def fused_step_function(needed: bool):
     """Fused step of upwind and Euler under the linear law if `needed`, else an unused function of that type."""
-    found = unused_step
+    step_function = unused_step
     if needed:
-        from fvsolve.kernels.fused_step import fused_step_linear as found
-    return calls.compile_as(found, "ttvvvhv")
+        from fvsolve.kernels.fused_step import fused_step_linear as step_function
+    return calls.compile_as(step_function, "ttvvvhv")
 
 
 @njit

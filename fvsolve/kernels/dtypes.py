@@ -619,7 +619,7 @@ RECORDS = {
     "lines": LINE,
     "pins": PIN,
     "bushings": BUSHING,
-    "rides": MOVING_SEGMENT,
+    "moving_segments": MOVING_SEGMENT,
     "masses": MASS,
     "braces": BRACE,
     "stops": STOP,
@@ -634,14 +634,13 @@ RECORDS = {
 # `Tables`: of a model, read-only; `RunArrays`: written by a run; `HandleTables`: behind a handle, also addresses of
 # functions: `calls`, a row for each job, and `hooks`, a row for each law of devices.
 Tables = namedtuple("Tables", (*RECORDS, "integers", "floats", "profile", "plane", "pieces"))
-RunArrays = namedtuple(
-    "Written",
+RunArrays = namedtuple("RunArrays",
     (
         "clock", "work", "armed", "marks", "scratch", "spare", "seen", "bands", "joint", "sums", "envelope", "extremes",
         "past", "sharp",
     ),
 )  # fmt: skip
-HandleTables = namedtuple("Called", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))
+HandleTables = namedtuple("HandleTables", (*Tables._fields, *RunArrays._fields, "calls", "hooks"))
 MATRICES = ("pieces", "envelope", "extremes")  # float64[:, :]; all others that are not records are float64[:]
 INTEGERS = ("integers", "bands", "joint", "sums", "sharp", "calls", "hooks")  # these are int64
 

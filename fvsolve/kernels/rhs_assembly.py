@@ -54,20 +54,20 @@ class RhsTerms:
     package: str = KERNELS
 
 
-JOBS = tuple(field.name for field in fields(RhsTerms) if field.name != "home")
-PHASES = JOBS[: JOBS.index("agree") + 1]
-CLOSING = PHASES[: PHASES.index("brake") + 1]
+JOBS = tuple(field.name for field in fields(RhsTerms) if field.name != "package")
+PHASES = JOBS[: JOBS.index("reduce_rate") + 1]
+CLOSING = PHASES[: PHASES.index("rate_limits") + 1]
 
 BAROTROPIC = {
-    "store": "barotropic_nodes: known_pressures_barotropic",
-    "close": "barotropic_nodes: solve_nodes_barotropic",
+    "known_pressures": "barotropic_nodes: known_pressures_barotropic",
+    "solve_nodes": "barotropic_nodes: solve_nodes_barotropic",
 }
 NODES = {  # nodes, by the family of the density law
     "linear": RhsTerms(
         known_pressures="linear_nodes: known_pressures_linear", solve_nodes="linear_nodes: solve_nodes_linear"
     ),
     "barotropic": RhsTerms(**BAROTROPIC),
-    "cavitating": RhsTerms(**BAROTROPIC | {"close": "cavitating_nodes: solve_nodes_cavitating"}),
+    "cavitating": RhsTerms(**BAROTROPIC | {"solve_nodes": "cavitating_nodes: solve_nodes_cavitating"}),
 }
 NETWORK = RhsTerms(prepare="network_balance: begin_network", balance="network_balance: balance_network")
 LUMPED = RhsTerms(
@@ -77,30 +77,45 @@ LUMPED = RhsTerms(
 )
 ALONE = RhsTerms(prepare="network_balance: begin_basins")
 PIPES = {
-    "linear": RhsTerms(outgoing_waves="linear_pipes: outgoing_waves_linear", incoming_waves="linear_pipes: incoming_waves_linear", rates="linear_pipes: wave_rates"),
-    "barotropic": RhsTerms(outgoing_waves="barotropic_nodes: outgoing_waves_barotropic", rates="barotropic_pipes: rates_barotropic"),
-    "cavitating": RhsTerms(
-        outgoing_waves="cavitating_pipes: outgoing_states_cavitating", balance="cavitating_nodes: balance_junctions",
-        rates="cavitating_pipes: rates_cavitating", record="cavitating_pipes: record_cavities",
+    "linear": RhsTerms(
+        outgoing_waves="linear_pipes: outgoing_waves_linear",
+        incoming_waves="linear_pipes: incoming_waves_linear",
+        rates="linear_pipes: wave_rates",
     ),
-}  # fmt: skip
+    "barotropic": RhsTerms(
+        outgoing_waves="barotropic_nodes: outgoing_waves_barotropic", rates="barotropic_pipes: rates_barotropic"
+    ),
+    "cavitating": RhsTerms(
+        outgoing_waves="cavitating_pipes: outgoing_states_cavitating",
+        balance="cavitating_nodes: balance_junctions",
+        rates="cavitating_pipes: rates_cavitating",
+        record="cavitating_pipes: record_cavities",
+    ),
+}
 READ = {
-    "linear": RhsTerms(observe="observation: observe_linear", power="linear_energy: power_linear", stored="linear_energy: stored_linear"),
+    "linear": RhsTerms(
+        observe="observation: observe_linear",
+        power="linear_energy: power_linear",
+        stored="linear_energy: stored_linear",
+    ),
     "barotropic": RhsTerms(
         observe="barotropic_pipes: observe_barotropic",
-        power="barotropic_energy: power_barotropic", stored="barotropic_energy: stored_barotropic",
+        power="barotropic_energy: power_barotropic",
+        stored="barotropic_energy: stored_barotropic",
     ),
-}  # fmt: skip
+}
 UNSTEADY_FRICTION = {
     "power": "unsteady_friction.relaxation_energy: add_power",
     "stored": "unsteady_friction.relaxation_energy: add_stored",
 }
 FLUID_LOADS = {
-    "enter": "mechanism.fluid_loads: add_fluid_loads", "accelerate": "mechanism.inertial_coupling: pipe_rate_limit",
-    "follow": "mechanism.inertial_coupling: accelerate_network_flow",
-    "power": "mechanism.fluid_energy: add_power", "stored": "mechanism.fluid_energy: add_stored",
-}  # fmt: skip
-COLUMNS = {"inflow": "rigid_columns: column_inflows", "brake": "rigid_columns: column_rate_limit"}
+    "boundary_inflow": "mechanism.fluid_loads: add_fluid_loads",
+    "accelerate": "mechanism.inertial_coupling: pipe_rate_limit",
+    "fluid_response": "mechanism.inertial_coupling: accelerate_network_flow",
+    "power": "mechanism.fluid_energy: add_power",
+    "stored": "mechanism.fluid_energy: add_stored",
+}
+COLUMNS = {"inflow": "rigid_columns: column_inflows", "rate_limits": "rigid_columns: column_rate_limit"}
 COMPONENTS = {
     "pipes": RhsTerms(record="observation: record_pipes"),
     "valves": RhsTerms(rate_limits="network_balance: valve_rate_limit"),
@@ -109,61 +124,86 @@ COMPONENTS = {
     "clusters": RhsTerms(solve_nodes="node_clusters: solve_clusters"),
     "columns": RhsTerms(column_nodes="rigid_columns: column_pressures", move="rigid_columns: column_rates", **COLUMNS),
     "columns, barotropic": RhsTerms(
-        column_nodes="barotropic_columns: column_pressures_barotropic", move="barotropic_columns: column_rates_barotropic",
+        column_nodes="barotropic_columns: column_pressures_barotropic",
+        move="barotropic_columns: column_rates_barotropic",
         **COLUMNS,
     ),
     "bodies": RhsTerms(
         prepare="mechanism.joints: kinematics",
-        observe="mechanism.body_probes: observe_bodies", power="mechanism.body_energy: power_bodies",
+        observe="mechanism.body_probes: observe_bodies",
+        power="mechanism.body_energy: power_bodies",
         stored="mechanism.body_energy: stored_bodies",
     ),
     "no pins": RhsTerms(accelerate="mechanism.mass_matrix: solve_accelerations"),
-    "pins": RhsTerms(accelerate="mechanism.loop_constraints: solve_pinned_accelerations", observe="mechanism.loop_constraints: observe_pins"),
+    "pins": RhsTerms(
+        accelerate="mechanism.loop_constraints: solve_pinned_accelerations",
+        observe="mechanism.loop_constraints: observe_pins",
+    ),
     "bushings": RhsTerms(
-        move="mechanism.bushings: add_bushing_loads", accelerate="mechanism.bushings: bushing_rate_limit",
-        observe="mechanism.bushings: observe_bushings", power="mechanism.bushings: power_bushings",
+        move="mechanism.bushings: add_bushing_loads",
+        accelerate="mechanism.bushings: bushing_rate_limit",
+        observe="mechanism.bushings: observe_bushings",
+        power="mechanism.bushings: power_bushings",
         stored="mechanism.bushings: stored_bushings",
     ),
     "stretches": RhsTerms(events="mechanism.joints: kinematics_for_events"),
     "lines": RhsTerms(move="mechanism.force_elements: add_element_forces"),
-    "rides": RhsTerms(
-        prepare="mechanism.noninertial_forces: set_segment_drives", known_pressures="mechanism.noninertial_forces: moving_tank_pressures",
-        rates="mechanism.noninertial_forces: add_cell_drives", **FLUID_LOADS,
+    "moving segments": RhsTerms(
+        prepare="mechanism.noninertial_forces: set_segment_drives",
+        known_pressures="mechanism.noninertial_forces: moving_tank_pressures",
+        rates="mechanism.noninertial_forces: add_cell_drives",
+        **FLUID_LOADS,
     ),
-    "rides, barotropic": RhsTerms(
-        prepare="mechanism.noninertial_forces: set_segment_drives", known_pressures="mechanism.noninertial_forces_barotropic: moving_tank_pressures_barotropic",
-        rates="mechanism.noninertial_forces_barotropic: add_cell_drives_barotropic", **FLUID_LOADS,
+    "moving segments, barotropic": RhsTerms(
+        prepare="mechanism.noninertial_forces: set_segment_drives",
+        known_pressures="mechanism.noninertial_forces_barotropic: moving_tank_pressures_barotropic",
+        rates="mechanism.noninertial_forces_barotropic: add_cell_drives_barotropic",
+        **FLUID_LOADS,
     ),
     "masses": RhsTerms(
-        prepare="mass_dynamics: piston_chambers", move="mass_dynamics: mass_rates", observe="mass_dynamics: observe_masses",
-        record="mass_dynamics: record_masses", events="mass_dynamics: mass_events",
+        prepare="mass_dynamics: piston_chambers",
+        move="mass_dynamics: mass_rates",
+        observe="mass_dynamics: observe_masses",
+        record="mass_dynamics: record_masses",
+        events="mass_dynamics: mass_events",
     ),
     "devices": RhsTerms(
-        prepare="devices: set_devices", move="devices: device_rates",
-        observe="devices: observe_devices", record="devices: record_devices",
+        prepare="devices: set_devices",
+        move="devices: device_rates",
+        observe="devices: observe_devices",
+        record="devices: record_devices",
         events="devices: device_events",
-        power="devices: power_devices", stored="devices: stored_devices",
+        power="devices: power_devices",
+        stored="devices: stored_devices",
     ),
     "scalars": RhsTerms(outlet_values="scalar_transport: clear_losses", observe="scalar_transport: observe_scalars"),
-    "carried": RhsTerms(outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"),
+    "carried": RhsTerms(
+        outlet_values="scalar_transport: pipe_outlet_values", scalar_rates="scalar_transport: scalar_rates"
+    ),
     "forces, linear": RhsTerms(observe="pipe_forces: observe_forces_linear"),
     "forces, barotropic": RhsTerms(observe="pipe_forces: observe_forces_barotropic"),
     "forces, cavitating": RhsTerms(observe="pipe_forces: observe_forces_cavitating"),
     "memory": RhsTerms(rates="unsteady_friction.relaxation_terms: add_unsteady_friction", **UNSTEADY_FRICTION),
-    "memory, barotropic": RhsTerms(rates="unsteady_friction.relaxation_terms_barotropic: add_unsteady_friction_barotropic", **UNSTEADY_FRICTION),
+    "memory, barotropic": RhsTerms(
+        rates="unsteady_friction.relaxation_terms_barotropic: add_unsteady_friction_barotropic", **UNSTEADY_FRICTION
+    ),
     "creep, barotropic": RhsTerms(
         rates="viscoelastic_wall.kelvin_voigt_barotropic: add_wall_creep_barotropic",
         power="viscoelastic_wall.wall_energy_barotropic: add_power_barotropic",
         stored="viscoelastic_wall.wall_energy_barotropic: add_stored_barotropic",
     ),
     "creep": RhsTerms(
-        rates="viscoelastic_wall.kelvin_voigt: add_wall_creep", power="viscoelastic_wall.wall_energy: add_power", stored="viscoelastic_wall.wall_energy: add_stored",
+        rates="viscoelastic_wall.kelvin_voigt: add_wall_creep",
+        power="viscoelastic_wall.wall_energy: add_power",
+        stored="viscoelastic_wall.wall_energy: add_stored",
     ),
-}  # fmt: skip
+}
 DELAYS = RhsTerms(
-    outgoing_waves="delay_lines.line_rates: outgoing_line_waves", incoming_waves="delay_lines.line_rates: incoming_line_waves",
-    observe="delay_lines.line_interior: observe_lines", record="delay_lines.history_update: record_lines",
-)  # fmt: skip
+    outgoing_waves="delay_lines.line_rates: outgoing_line_waves",
+    incoming_waves="delay_lines.line_rates: incoming_line_waves",
+    observe="delay_lines.line_interior: observe_lines",
+    record="delay_lines.history_update: record_lines",
+)
 COUPLED = RhsTerms(solve_nodes="delay_lines.line_rates: solve_line_clusters")
 BANDS = RhsTerms(exchange="band_exchange: exchange_states", reduce_rate="band_exchange: reduce_rate")
 BOUNDARY_EXCHANGE = RhsTerms(package="fvsolve.basins", boundary_exchange="row_bands: put_boundary_flows")
@@ -240,7 +280,7 @@ class ModelFeatures:
         if self.bushings:
             yield COMPONENTS["bushings"]
         if self.moving_segments:
-            yield COMPONENTS["rides" if linear else "rides, barotropic"]
+            yield COMPONENTS["moving segments" if linear else "moving segments, barotropic"]
         if self.lines:
             yield COMPONENTS["stretches"]
         if self.masses:

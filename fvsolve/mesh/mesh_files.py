@@ -85,11 +85,11 @@ def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
             warnings.simplefilter("ignore")
             file_mesh = meshio.read(path)
         return file_mesh, tuple(
-            f"meshio: {_one_line(line)}" for line in printed.getvalue().split("Warning:") if line.strip()
+            f"meshio: {_single_line(line)}" for line in printed.getvalue().split("Warning:") if line.strip()
         )
     except (Exception, SystemExit) as error:  # meshio calls exit, or raises errors of any type
         text = printed.getvalue() if isinstance(error, SystemExit) else f"{type(error).__name__}: {error}"
-    text = _one_line(text)
+    text = _single_line(text)
     remedy = "Gmsh: try Mesh.SaveAll = 0, or Mesh.MshFileVersion = 2.2" if path.suffix == ".msh" else ""
     known = sorted(meshio.extension_to_filetypes)
     if path.suffix.lower() not in known:
@@ -97,7 +97,7 @@ def _read_by_meshio(path: Path) -> tuple[Any, tuple[str, ...]]:
     raise MeshError([Fault("", "; ".join(filter(None, [f"meshio cannot read it ({text})", remedy])))], path.name)
 
 
-def _one_line(text: str) -> str:
+def _single_line(text: str) -> str:
     return re.sub(r"\s+", " ", text).strip(" .").removeprefix("Error: ")
 
 

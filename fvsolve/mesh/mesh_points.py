@@ -82,8 +82,16 @@ class MeshPoints:
 
         cells, attempts = [cell], []
         for _ in range(RINGS):
-            cells += sorted({int(near) for c in cells for p in self.mesh.cells[c] if p >= 0
-                             for near in self.cells_of_points[self.first[p] : self.first[p + 1]]} - set(cells))  # fmt: skip
+            cells += sorted(
+                {
+                    int(near)
+                    for c in cells
+                    for p in self.mesh.cells[c]
+                    if p >= 0
+                    for near in self.cells_of_points[self.first[p] : self.first[p + 1]]
+                }
+                - set(cells)
+            )
             away = (self.mesh.centre[cells] - (x, y)) / np.sqrt(self.mesh.area[cell])
             weights, residual = nnls(
                 np.vstack([np.full(len(cells), SUM_WEIGHT), away.T]), np.array([SUM_WEIGHT, 0.0, 0.0])

@@ -24,7 +24,7 @@ def refuse_massless(draft, at: StaticForces) -> None:
         least = RANK_TOLERANCE**2 * (own if row["joint"] in (rec.REVOLUTE, rec.BALL) else 0.0)
         for freedom in draft.freedom_table[row["freedom"] : row["freedom"] + row["freedoms"]]:
             left = at.written.scratch[8 * n + freedom["row"] + freedom["depth"]] ** -2.0
-            if np.isnan(left) and len(draft.ride_table):
+            if np.isnan(left) and len(draft.moving_segment_table):
                 text = "fluid in tall tanks, whose own flow has no inertia in the model, outweighs its carrying body"
                 remedy = "expected wider tanks, a heavier body, or a driven joint"
                 return draft.fault(f"nodes.{name}.mass", f"{text}; {remedy}")

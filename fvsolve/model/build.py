@@ -31,7 +31,7 @@ from fvsolve.model.lowering import lowering_of
 from fvsolve.model.mass_tables import lower_masses
 from fvsolve.model.model import Model
 from fvsolve.model.model_draft import ModelDraft
-from fvsolve.model.moving_networks import lower_rides
+from fvsolve.model.moving_networks import lower_moving_segments
 from fvsolve.model.probe_tables import lower_probes
 from fvsolve.model.resolution import too_few_cells
 from fvsolve.model.scalar_tables import lower_scalars, scale_scalars, start_amounts
@@ -118,7 +118,7 @@ def fill_links(draft: ModelDraft) -> None:
         for end in ("from_node", "to_node"):
             draft.node_table["admittance"][row[end]] += row["admittance"] * end_admittance_ratio(draft, row)
     lower_bodies(draft)
-    lower_rides(draft)
+    lower_moving_segments(draft)
     lower_masses(draft)
     lower_lines(draft)
 
@@ -163,7 +163,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
         settings, layout, draft.pipe_table, draft.node_table, draft.valve_table, draft.column_table,
         draft.cluster_table, schedules, draft.probe_table, draft.body_table, draft.freedom_table,
         np.array(draft.points, rec.POINT), draft.line_table, draft.pin_table, draft.bushing_table,
-        draft.ride_table, draft.mass_table,
+        draft.moving_segment_table, draft.mass_table,
         draft.brace_table, draft.stop_table,
         draft.piston_table, draft.device_table, draft.basin_table, draft.patch_table, draft.scalar_table,
         draft.wall_table, draft.delay_table,
@@ -213,12 +213,12 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
     scalars, layout, at = len(draft.scalar_table), np.zeros(1, rec.LAYOUT), rec.OUT_HEAD
     for name, size in (
         ("pressure", nodes), ("supply", nodes), ("gain", scalars * nodes), ("loss", sum(draft.scalar_table["losses"])),
-        ("net", nodes), ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("led", columns),
-        ("stiffness", draft.moving), ("had", draft.moving), ("swept", draft.moving),
+        ("net", nodes), ("ends", 4 * pipes), ("valve", valves), ("column", columns), ("valve_controlled", columns),
+        ("stiffness", draft.moving), ("outflow_fraction", draft.moving), ("swept", draft.moving),
         ("net_force", len(draft.mass_table)), ("push", len(draft.push_names)),
         ("conductance", valves), ("drive", valves), ("value", scalars * nodes), ("edge", 2 * pipes * scalars),
-        ("carried", 2 * pipes * scalars), ("brought", scalars * nodes), ("wall", len(draft.wall_table)),
-        ("ride", len(draft.ride_table)),
+        ("carried", 2 * pipes * scalars), ("scalar_inflow", scalars * nodes), ("wall", len(draft.wall_table)),
+        ("moving_segment", len(draft.moving_segment_table)),
         ("tank", rec.TANK_OUT * len(draft.basin_table) if len(draft.body_table) else 0),
         ("travel", 2 * len(draft.push_names)), ("along", 3 * len(draft.line_table)),
         ("pin", 3 * len(draft.pin_table)), ("body", rec.BODY_OUT * len(draft.body_table)),
@@ -226,7 +226,7 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
         layout[name], at = at, at + size
     layout["size"] = at
     layout["forces"] = draft.to_work(most_states(draft)) if (draft.probe_table["kind"] == rec.PIPE_FORCE).any() else -1
-    layout["rates"] = draft.to_work(most_states(draft)) if draft.ride_table["loads_body"].any() else -1
+    layout["rates"] = draft.to_work(most_states(draft)) if draft.moving_segment_table["loads_body"].any() else -1
     return layout
 
 

@@ -32,11 +32,11 @@ class Accounts:
     """
 
     def __init__(self, run_data: RunData) -> None:
-        self.slate, self.model = run_data, run_data.model
+        self.run_data, self.model = run_data, run_data.model
         model, case = run_data.model, run_data.model.case
         refuse_unsupported(case)
-        if len(model.tables.rides):
-            run_data.tables.rides["loads_body"] = rec.JOINT_LOAD_READ
+        if len(model.tables.moving_segments):
+            run_data.tables.moving_segments["loads_body"] = rec.JOINT_LOAD_READ
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
             raise FvsolveError("the energy of a basin on a body with an open side is not supported")
         if model.basins and not case.law.linear:
@@ -183,20 +183,20 @@ class Accounts:
 
     def power_at(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Power of every line [W] : float64[lines], at a state; writes its rates and `out`."""
-        self.model.functions.rhs(t, y, dydt, out, self.slate.handle)
+        self.model.functions.rhs(t, y, dydt, out, self.run_data.handle)
         return self.power_by(t, y, dydt, out)
 
     def power_by(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
         """Power of every line [W] at a state whose rates and `out` are given."""
         rows = np.zeros(self.power_count)
-        self.power(t, y, dydt, out, self.slate.handle, rows)
+        self.power(t, y, dydt, out, self.run_data.handle, rows)
         return self.matrix @ rows
 
     def stored_at(self, t: float, y: np.ndarray) -> np.ndarray:
         """Change of the energy of every storing part since the profile [J] : float64[stored]."""
         rows, out = np.zeros(self.stores), self.model.new_out()
-        self.model.functions.rhs(t, y, np.zeros(0), out, self.slate.handle)
-        self.stored(t, y, np.zeros(0), out, self.slate.handle, rows)
+        self.model.functions.rhs(t, y, np.zeros(0), out, self.run_data.handle)
+        self.stored(t, y, np.zeros(0), out, self.run_data.handle, rows)
         return self.holding @ rows
 
 

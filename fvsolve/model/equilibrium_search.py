@@ -77,7 +77,7 @@ def with_equilibrium(case, draft) -> tuple[Any, list[Notice]]:
     else:
         report_unbalanced(at, result.force, result.scale)
     draft.check()
-    case = replace(case, found=moved_nodes(at, result.y))
+    case = replace(case, equilibrium_nodes=moved_nodes(at, result.y))
     nodes, surroundings = case.nodes | case.equilibrium_nodes, (case.ambient_pressure, case.gravity, None, None)
     for keys, text in check.parts(nodes, case.links, *surroundings, at.t, case.meshes, case.lumped):
         draft.fault(".".join(map(str, keys)), f"where forces balance {text}")

@@ -240,7 +240,7 @@ class Model(Displayable):
 
         has = rec.Tables(*(len(table) > 0 for table in self.tables))
         mechanics = [has.clusters, has.columns, has.masses, has.bodies, has.lines, has.pins, has.bushings]
-        mechanics.append(has.rides)
+        mechanics.append(has.moving_segments)
         basins, carried, valves = terms_of_basins(self.basins, has.valves), terms_of_scalars(self.basins), has.valves
         alone = bool(self.basins) and not (self.pipes or valves or has.devices or any(mechanics))
         alone = alone and bool((self.tables.nodes["kind"] == rec.PATCH).all())

@@ -97,7 +97,7 @@ class ModelDraft:
     line_table: np.ndarray = no_rows(rec.LINE)
     pin_table: np.ndarray = no_rows(rec.PIN)
     bushing_table: np.ndarray = no_rows(rec.BUSHING)
-    ride_table: np.ndarray = no_rows(rec.MOVING_SEGMENT)
+    moving_segment_table: np.ndarray = no_rows(rec.MOVING_SEGMENT)
     mass_table: np.ndarray = no_rows(rec.MASS)
     brace_table: np.ndarray = no_rows(rec.BRACE)
     stop_table: np.ndarray = no_rows(rec.STOP)
@@ -177,7 +177,7 @@ class ModelDraft:
         self.work_size += size + -size % CACHE_LINE
         return self.work_size - size - -size % CACHE_LINE
 
-    def room(self) -> int:
+    def used_size(self) -> int:
         """Count of numbers that basins have used up to now."""
         return self.plane_size + self.work_size + len(self.integers)
 
@@ -214,7 +214,7 @@ class ModelDraft:
         if table == "valve":
             table_rows["device"] = table_rows["hooks"] = table_rows["data"] = table_rows["event"] = -1
             table_rows["back"] = 1.0
-        for key in {"ride", "delay"}.intersection(record.names):
+        for key in {"moving_segment", "delay"}.intersection(record.names):
             table_rows[key] = -1
         for name, link, lowering in parts:
             lowering.fill(self, name, link, table_rows[at : at + lowering.rows])

@@ -11,7 +11,7 @@ from fvsolve.kernels import dtypes as rec
 ROUNDING = 1e-9  # specific force times length [J/kg] below which it counts as rounding
 
 
-def lower_rides(draft) -> None:
+def lower_moving_segments(draft) -> None:
     """Fill a row for every pipe cell, every stretch of a rigid column and every node on a body."""
     rows: list[tuple] = []
     links, places = draft.case.conduits, draft.case.places
@@ -26,19 +26,21 @@ def lower_rides(draft) -> None:
         if "cells" in row.dtype.names:
             shares = np.linspace(0.0, 1.0, int(row["cells"]) + 1)[:, None]
             points = ends[0] + shares * (ends[1] - ends[0])
-            rows += [ride_row(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
+            rows += [moving_segment_row(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
         else:
             points = np.array([ends[0], *link.route, ends[1]])
             row["moving_segments"] = len(points) - 1
-            rows += [ride_row(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
+            rows += [moving_segment_row(draft, first.on, points[k : k + 2]) for k in range(len(points) - 1)]
     for node, row in zip(places.values(), draft.node_table, strict=True):
         if getattr(node, "on", None) is None or row["kind"] == rec.PATCH:
             continue
         row["moving_segment"] = len(rows)
         foot, high = np.array(node.place), node.level if row["kind"] == rec.TANK else 0.0
-        body, start, end, swept, rise, heavy = ride_row(draft, node.on, np.array([foot, foot + [0.0, 0.0, high]]))
+        body, start, end, swept, rise, heavy = moving_segment_row(
+            draft, node.on, np.array([foot, foot + [0.0, 0.0, high]])
+        )
         rows.append((body, start, end, swept, -rise, heavy))
-    draft.ride_table = np.array(rows, rec.MOVING_SEGMENT) if rows else np.zeros(0, rec.MOVING_SEGMENT)
+    draft.moving_segment_table = np.array(rows, rec.MOVING_SEGMENT) if rows else np.zeros(0, rec.MOVING_SEGMENT)
     if reads_joint_forces(draft):
         for place, text in moving_network_checks.missing_reactions(draft.case.nodes, draft.case.links):
             draft.fault(".".join(place), f"{text}, but a probe reads forces of joints")
@@ -49,7 +51,7 @@ def reads_joint_forces(draft) -> bool:
     return any(probe.quantity.startswith("joint_") for probe in draft.case.probes)
 
 
-def ride_row(draft, on: str, points: np.ndarray) -> tuple:
+def moving_segment_row(draft, on: str, points: np.ndarray) -> tuple:
     """Row of `rides` for a straight line between two points in axes of a body [m]."""
     rise = (draft.case.poses[on].attitude @ (points[1] - points[0]))[2]
     heavy = (
@@ -64,20 +66,20 @@ def ride_row(draft, on: str, points: np.ndarray) -> tuple:
 
 def driven_at_start(draft, start) -> list[str]:
     """Texts of pipes and columns that the motion of their body drives at the start."""
-    if not len(draft.ride_table):
+    if not len(draft.moving_segment_table):
         return []
     from fvsolve.model.static_forces import DRIVES, MOTION, StaticForces
 
     at = StaticForces(draft, start.t)
     at.run(MOTION, DRIVES)
     first, rho = int(at.layout["moving_segment"]), draft.fluid.density
-    drives = at.out[first : first + len(draft.ride_table)]
+    drives = at.out[first : first + len(draft.moving_segment_table)]
     texts = []
     for kind, names, table in (("pipe", draft.pipe_names, draft.pipe_table),
                                ("rigid column", draft.column_names, draft.column_table)):  # fmt: skip
         for name, row in zip(names, table, strict=True):
             if row["moving_segment"] >= 0:
-                count = int(row["cells" if "cells" in row.dtype.names else "rides"])
+                count = int(row["cells" if "cells" in row.dtype.names else "moving_segments"])
                 push = float(drives[row["moving_segment"] : row["moving_segment"] + count].sum())
                 if abs(push) > ROUNDING:
                     texts.append(

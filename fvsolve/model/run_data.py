@@ -53,8 +53,8 @@ class RunData:
             basins = model.tables.basins.copy()
             self.tables = model.tables._replace(plane=aligned_zeros(model.tables.plane.size), basins=basins)
             self.tables.plane[:] = model.tables.plane
-        if len(model.tables.rides):  # `loads_body` is set where joint forces are read
-            self.tables = self.tables._replace(rides=model.tables.rides.copy())
+        if len(model.tables.moving_segments):  # `loads_body` is set where joint forces are read
+            self.tables = self.tables._replace(moving_segments=model.tables.moving_segments.copy())
         self.clock, self.full_at = self.written.clock[0], -np.inf  # number of history entries at which rings are full
         self.armed, self.marks = self.written.armed, self.written.marks
         self.envelope, self.extremes = self.written.envelope, self.written.extremes
@@ -100,7 +100,7 @@ class RunData:
         if len(self.model.tables.delays) and state is not None and state.memory.size:
             self.past = split_memory(state.memory)[1].copy()
 
-    def room(self) -> float:
+    def history_capacity(self) -> float:
         """Steps that fit before a ring of delay-line history would lose an entry that is still needed.
 
         Enlarges the rings where needed; infinite without delay lines.

@@ -46,7 +46,7 @@ class Couplings:
         self.masses, self.pistons = tables.masses["y"], tables.pistons
         self.braces = [*tables.braces, *tables.stops]
         self.bodies, self.lines, self.points = tables.bodies, tables.lines, tables.points
-        self.rides = tables.rides
+        self.moving_segments = tables.moving_segments
         self.bushings = tables.bushings
         joined = [[self.points[pin[end]]["body"] for end in ("from_point", "to_point")] for pin in tables.pins]
         joined = [[int(self.bodies[i]["root"]) for i in pair] for pair in joined if min(pair) >= 0]
@@ -267,8 +267,8 @@ class Couplings:
                 trees.setdefault(self.tree_root(self.bodies[basin.row["body"]]["root"]), []).append(
                     pattern.all_states(basin)
                 )
-        for index, cells in self.moving_fluid_states() if len(self.rides) else ():
-            trees.setdefault(self.tree_root(self.bodies[self.rides[index]["body"]]["root"]), []).append(cells)
+        for index, cells in self.moving_fluid_states() if len(self.moving_segments) else ():
+            trees.setdefault(self.tree_root(self.bodies[self.moving_segments[index]["body"]]["root"]), []).append(cells)
         for root, cells in trees.items():
             own = [self.tree_states(root, order) for order in (0, 1)]
             if own[0].size == 0:

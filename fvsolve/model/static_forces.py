@@ -11,16 +11,26 @@ from fvsolve.model.run_data import zeros_for_run
 
 PACKAGE = "fvsolve"  # package of the kernel functions
 FOLDER = "kernels.mechanism"
-MOTION, LINES = f"{FOLDER}.joints: kinematics", f"{FOLDER}.lines: push_bodies"
-WEIGH, ACCELERATE = f"{FOLDER}.matrix: weigh", f"{FOLDER}.matrix: accelerate"
-BUSHINGS = f"{FOLDER}.bushings: push_bushings"
-PINNED, GAPS, HOLD = (f"{FOLDER}.pins: {one}" for one in ("accelerate_pinned", "gaps", "hold"))
+MOTION, LINES = f"{FOLDER}.joints: kinematics", f"{FOLDER}.force_elements: add_element_forces"
+WEIGH, ACCELERATE = f"{FOLDER}.mass_matrix: start_mass_matrix", f"{FOLDER}.mass_matrix: solve_accelerations"
+BUSHINGS = f"{FOLDER}.bushings: add_bushing_loads"
+PINNED, GAPS, HOLD = (
+    f"{FOLDER}.loop_constraints: {name}"
+    for name in ("solve_pinned_accelerations", "start_gaps", "add_start_pin_forces")
+)
 # loads on bodies of fluid at rest, in addition to pushes
 FLUID_LOADS = ("basins.basin_frames: set_frames", "basins.frame_forces: add_frame_forces")
 WALL_LOADS = ("basins.moving_walls: push_bodies_at_rest",)
-DRIVES = f"{FOLDER}.rides: set_rides"
-LOADS = f"{FOLDER}.freight: load_networks"
-NETWORKS = (DRIVES, *(f"{FOLDER}.rides: {one}" for one in ("press_tanks", "push_cells", "push_columns")), LOADS)
+DRIVES = f"{FOLDER}.noninertial_forces: set_segment_drives"
+LOADS = f"{FOLDER}.fluid_loads: add_fluid_loads"
+NETWORKS = (
+    DRIVES,
+    *(
+        f"{FOLDER}.noninertial_forces: {name}"
+        for name in ("moving_tank_pressures", "add_cell_drives", "moving_column_rates")
+    ),
+    LOADS,
+)
 NONE = np.zeros(0)
 
 
@@ -65,7 +75,7 @@ class StaticForces:
         rubber = (BUSHINGS,) if len(draft.bushing_table) else ()
         self.pushes = (MOTION, LINES, *rubber, *(FLUID_LOADS if moving_basins else ()))
         self.pushes += WALL_LOADS if (draft.wall_table["body"] >= 0).any() else ()
-        if len(draft.ride_table):
+        if len(draft.moving_segment_table):
             self.pushes += NETWORKS
         if moving_basins:
             self.y, self.tables = (

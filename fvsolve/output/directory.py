@@ -221,8 +221,10 @@ def _refuse_reserved_names(case) -> None:
 def _refuse_full_disk(folder: Path, case) -> None:
     least, free = disk_size(case, LEAST_TEXT, 0), shutil.disk_usage(folder).free
     if least > free:
-        raise RunError(f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free. Expected a "
-                       "longer [output] every, or another directory with --out DIR")  # fmt: skip
+        raise RunError(
+            f"{folder}: history.csv needs at least {byte_text(least)}, but {byte_text(free)} are free. Expected a "
+            "longer [output] every, or another directory with --out DIR"
+        )
 
 
 def existing_pictures(folder: Path) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar
 
-from fvsolve.parts.table_model import Table, at_least_one
+from fvsolve.parts.table_model import Table, missing_key_faults
 from fvsolve.parts.value import SHAPE, Choice, Number, Quantity, UsualRange, between, nonnegative, positive
 
 MODELS = ("none", "steady", "quasi-steady", "unsteady", "hazen-williams", "chezy-manning")
@@ -84,7 +84,7 @@ class Friction(Table):
             return faults
         stray = [key for key in given if key in cls.model_fields and key not in ("model", *allowed)]
         faults += [((key,), f'friction model "{model}" has no {key}') for key in stray]
-        return faults + (at_least_one(given, allowed[:2]) if allowed else [])
+        return faults + (missing_key_faults(given, allowed[:2]) if allowed else [])
 
     def unusual(self) -> Iterator[tuple[tuple[Any, ...], float, float, str]]:
         usual, c = COEFFICIENTS.get(self.model), self.coefficient

@@ -61,8 +61,8 @@ class Table(BaseModel):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         """Faults of incompatible or missing keys : list of (key path, text)."""
-        too_many = [fault for keys in cls.alternatives for fault in at_most_one(given, keys)]
-        return too_many + [fault for keys in cls.needs for fault in at_least_one(given, keys)]
+        too_many = [fault for keys in cls.alternatives for fault in exclusive_key_faults(given, keys)]
+        return too_many + [fault for keys in cls.needs for fault in missing_key_faults(given, keys)]
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:
@@ -198,13 +198,13 @@ def plain_value(value: Any) -> Any:
     return value
 
 
-def at_most_one(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
+def exclusive_key_faults(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
     """Fault if two or more of the keys are given."""
     present = [key for key in keys if key in given]
     return [((present[1],), f"{' and '.join(present)} are given; keep one")] if len(present) > 1 else []
 
 
-def at_least_one(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
+def missing_key_faults(given: dict[str, Any], keys: tuple[str, ...]) -> list[tuple[tuple[Any, ...], str]]:
     """Fault if none of the keys is given."""
     if any(key in given for key in keys):
         return []

@@ -162,15 +162,25 @@ def _layout(y: str, x: str, height: int) -> dict[str, Any]:
             "tickcolor": MUTED, "ticklen": 4, "automargin": True, "exponentformat": "power", "minexponent": 6,
             "separatethousands": True}  # fmt: skip
     return {
-        "height": height, "margin": {"l": 62, "r": 14, "t": TOOLBAR_HEIGHT + 6, "b": 50},
-        "paper_bgcolor": BACKGROUND, "plot_bgcolor": BACKGROUND,
+        "height": height,
+        "margin": {"l": 62, "r": 14, "t": TOOLBAR_HEIGHT + 6, "b": 50},
+        "paper_bgcolor": BACKGROUND,
+        "plot_bgcolor": BACKGROUND,
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
-        "font": {"family": FONT, "size": 12, "color": INK}, "separators": ".\u202f", "hovermode": "x unified",
-        "hoverlabel": {"namelength": -1, "font": {"size": 11, "color": INK}, "bgcolor": BACKGROUND, "bordercolor": HAIR},
-        "dragmode": "zoom", "showlegend": False,
+        "font": {"family": FONT, "size": 12, "color": INK},
+        "separators": ".\u202f",
+        "hovermode": "x unified",
+        "hoverlabel": {
+            "namelength": -1,
+            "font": {"size": 11, "color": INK},
+            "bgcolor": BACKGROUND,
+            "bordercolor": HAIR,
+        },
+        "dragmode": "zoom",
+        "showlegend": False,
         "xaxis": axis | {"title": {"text": escape_markup(x), "standoff": 8}},
         "yaxis": axis | {"title": {"text": escape_markup(y), "standoff": 8}},
-    }  # fmt: skip
+    }
 
 
 def _band(a: float, b: float, colour: str, opacity: float) -> dict[str, Any]:
@@ -185,8 +195,10 @@ def _vertical_line(x: float) -> dict[str, Any]:
 
 def _limits(section: Section, x, k: np.ndarray) -> list[dict[str, Any]]:
     """Traces of the vapour line and of limits; upper and lower limits have different dashes."""
-    return [_line(name, x, packed_array(line[k], "f4"), **(LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]))
-            for name, line in section.lines.items()]  # fmt: skip
+    return [
+        _line(name, x, packed_array(line[k], "f4"), **(LINE_LOOKS.get(name) or LIMIT_LOOKS[name.rpartition(", ")[2]]))
+        for name, line in section.lines.items()
+    ]
 
 
 def _section_layout(sections: list[Section], unit: str, along: str) -> dict[str, Any]:

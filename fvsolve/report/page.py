@@ -31,20 +31,33 @@ def page(result, ways: list[SectionPath]) -> str:
     probes = worst_places.extremes_of_probes(result)
     filled = {
         "invalid": not_valid(result.summary),
-        "title": visible(result.summary["title"] or result.summary["case"]), "run": result.summary,
-        "description": visible(result.case.description), "source": visible(result.case.source),
-        "ended": result.summary.get("ended", ""), "words": reliability.top_sentences(result),
-        "limits": reliability.verdict_table(result), "worst": worst_places.extremes_of_pipes(result, ways) or probes,
-        "sections": _sections(result, sections, figures), "histories": _histories(result, figures),
+        "title": visible(result.summary["title"] or result.summary["case"]),
+        "run": result.summary,
+        "description": visible(result.case.description),
+        "source": visible(result.case.source),
+        "ended": result.summary.get("ended", ""),
+        "words": reliability.top_sentences(result),
+        "limits": reliability.verdict_table(result),
+        "worst": worst_places.extremes_of_pipes(result, ways) or probes,
+        "sections": _sections(result, sections, figures),
+        "histories": _histories(result, figures),
         "probes_left_out": len(result.probes) - len(chosen_probes(result)),
-        "places": _nonempty([*reliability.worst_tables(result), *worst_places.ranked_pipes(result), probes if result.envelope else None]),
+        "places": _nonempty(
+            [*reliability.worst_tables(result), *worst_places.ranked_pipes(result), probes if result.envelope else None]
+        ),
         "model": _nonempty(model_tables.all_tables(result)),
-        "numbers": _nonempty([numerics.settings(result), numerics.ledgers(result), reliability.claim_table(result),
-                           numerics.comparisons(result)]),
+        "numbers": _nonempty(
+            [
+                numerics.settings(result),
+                numerics.ledgers(result),
+                reliability.claim_table(result),
+                numerics.comparisons(result),
+            ]
+        ),
         "told": _warning_texts([notice.text for notice in result.warnings if notice.ok]),
         "happened": _nonempty([numerics.cavities(result), numerics.events(result)]),
         "versions": numerics.versions(result),
-    }  # fmt: skip
+    }
     return render_page("page", filled, figures)
 
 

@@ -97,7 +97,14 @@ def _section_figure(result, way: SectionPath):
     sec = section_of(result, way)
     k, title = sec.drawn_indices(), "\n".join(filter(None, [result.summary["title"], way.name]))
     return section_figure(
-        sec.chainage[k], {name: values[k] for name, values in sec.along.items()}, result.summary["envelope_units"],
-        {name: line[k] for name, line in sec.lines.items()}, head_window([sec], envelope_column(result, "max_head").unit),
-        sec.cavity_spans, sec.violations, [device.chainage for device in sec.devices], sec.labels(), title,
-    )  # fmt: skip
+        sec.chainage[k],
+        {name: values[k] for name, values in sec.along.items()},
+        result.summary["envelope_units"],
+        {name: line[k] for name, line in sec.lines.items()},
+        head_window([sec], envelope_column(result, "max_head").unit),
+        sec.cavity_spans,
+        sec.violations,
+        [device.chainage for device in sec.devices],
+        sec.labels(),
+        title,
+    )

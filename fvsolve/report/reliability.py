@@ -64,8 +64,11 @@ def verdict_sentence(result) -> Sentence:
     """Sentence on the limits of the case: violated, open, all hold, or none stated."""
     verdicts = result.verdicts
     if not verdicts:
-        return Sentence("none", "No limits were stated.", "The case has no [limits], so this report shows what happens, "
-                    "but not if it is allowed.")  # fmt: skip
+        return Sentence(
+            "none",
+            "No limits were stated.",
+            "The case has no [limits], so this report shows what happens, but not if it is allowed.",
+        )
     states = [item.state for item in verdicts]
     failed = [item.name for item, state in zip(verdicts, states, strict=True) if state == FAILS]
     if failed:
@@ -129,9 +132,19 @@ def worst_tables(result) -> list[ReportTable]:
     for check in result.verdicts:
         keys = ((length, "chainage"), (height, "elevation"), (time, "time"))
         errors = any(row["error"] is not None for row in check.worst)
-        rows = [[row["place"], *(in_unit(shown, row[key]) for shown, key in keys), row["value"],
-                 *[row["error"]] * errors, BOUND_WORDS[row["bound"]], row["limit"], row["margin"], IN_WORDS[row["state"]]]
-                for row in check.worst]  # fmt: skip
+        rows = [
+            [
+                row["place"],
+                *(in_unit(shown, row[key]) for shown, key in keys),
+                row["value"],
+                *[row["error"]] * errors,
+                BOUND_WORDS[row["bound"]],
+                row["limit"],
+                row["margin"],
+                IN_WORDS[row["state"]],
+            ]
+            for row in check.worst
+        ]
         bad = frozenset(k for k, row in enumerate(check.worst) if row["state"] == FAILS)
         margin_unit = span(check.unit)
         units = ("", length.unit, height.unit, time.unit, check.unit, *[margin_unit] * errors, "", check.unit,

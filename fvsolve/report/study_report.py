@@ -30,8 +30,10 @@ def study_page(study: dict[str, Any], runs: list[tuple[dict[str, Any], Any]]) ->
     """HTML report of a study; study : data of study.json, runs : (row, `Result`) of each, row["page"] its report."""
     figures: dict[str, Any] = {}
     first = runs[0][1]
-    events = [{"id": f"event-{k}", "name": visible(name or "All runs"), "figures": event_figures(name, k, runs, figures)}
-              for k, name in enumerate(dict.fromkeys(row["event"] for row, _ in runs))]  # fmt: skip
+    events = [
+        {"id": f"event-{k}", "name": visible(name or "All runs"), "figures": event_figures(name, k, runs, figures)}
+        for k, name in enumerate(dict.fromkeys(row["event"] for row, _ in runs))
+    ]
     filled = {
         "title": visible(study["title"] or study["study"]), "said": study, "case": visible(first.summary["case"]),
         "ended": max(result.summary.get("ended", "") for _, result in runs),

@@ -50,13 +50,23 @@ def run_tables(result, sections: list[SectionPath]) -> list[ReportTable]:
     )
     versions = numerics.versions(result)
     contents = [
-        words, reliability.verdict_table(result), *reliability.worst_tables(result),
-        worst_places.extremes_of_pipes(result, sections), *worst_places.ranked_pipes(result), worst_places.extremes_of_probes(result),
-        *(_section_table(result, section_of(result, way)) for way in sections), numerics.cavities(result), numerics.events(result),
-        *model_tables.all_tables(result), numerics.settings(result),
-        numerics.ledgers(result), reliability.claim_table(result), numerics.comparisons(result), notes,
+        words,
+        reliability.verdict_table(result),
+        *reliability.worst_tables(result),
+        worst_places.extremes_of_pipes(result, sections),
+        *worst_places.ranked_pipes(result),
+        worst_places.extremes_of_probes(result),
+        *(_section_table(result, section_of(result, way)) for way in sections),
+        numerics.cavities(result),
+        numerics.events(result),
+        *model_tables.all_tables(result),
+        numerics.settings(result),
+        numerics.ledgers(result),
+        reliability.claim_table(result),
+        numerics.comparisons(result),
+        notes,
         ReportTable("Versions", versions.headers, versions.rows),
-    ]  # fmt: skip
+    ]
     return [item for item in contents if item is not None and item.rows]
 
 

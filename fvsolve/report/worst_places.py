@@ -38,8 +38,18 @@ def extremes_of_pipes(result, ways: list[SectionPath]) -> ReportTable | None:
         pipe = pipes[int(most([envelope[key][name][ends[key]] for key in pipes]))]
         arrays, k = envelope[pipe], ends[pipe]
         chainage = [_chainage(result, legs.get(pipe), arrays["distance"][k])] if legs else []
-        rows.append([words, float(arrays[name][k]), envelope_column(result, name).unit, pipe, float(arrays["distance"][k]),
-                     *chainage, float(arrays["elevation"][k]), float(arrays[when][k])])  # fmt: skip
+        rows.append(
+            [
+                words,
+                float(arrays[name][k]),
+                envelope_column(result, name).unit,
+                pipe,
+                float(arrays["distance"][k]),
+                *chainage,
+                float(arrays["elevation"][k]),
+                float(arrays[when][k]),
+            ]
+        )
     units = [
         envelope_column(result, key).unit for key in ("distance", *["distance"] * bool(legs), "elevation", "t_max")
     ]

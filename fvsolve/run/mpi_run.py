@@ -107,7 +107,7 @@ def serve_rank(make: Callable) -> None:
         return
     try:
         loop = RunLoop(model, comm=comm)
-        loop.stepper.largest = RunChecks(loop.slate).largest_if_needed
+        loop.stepper.largest = RunChecks(loop.run_data).largest_if_needed
         loop.team.serve(*loop.functions)
     except BaseException as error:  # the other ranks wait for this rank
         print(f"fvsolve: rank {comm.rank}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)

@@ -87,10 +87,10 @@ def _all(tasks: list[tuple[str, str]], jobs: int, progress: Callable[[int, str],
     progress(0, "compiling")
     try:
         for count in range(len(tasks)):
-            while started < len(tasks) and started - count < pool.room:
-                pool.give(started, [tasks[started]])
+            while started < len(tasks) and started - count < pool.capacity:
+                pool.submit(started, [tasks[started]])
                 started += 1
-            at, answers, _ = pool.take()
+            at, answers, _ = pool.next_result()
             kind, name = tasks[at]
             if answers is None:
                 raise RunError(f"the process that compiled {kind} {name} has ended; possibly memory was too small")

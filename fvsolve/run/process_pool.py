@@ -23,18 +23,18 @@ class ProcessPool:
     """Pool of up to `size` processes, started when needed; if a process is killed, only its chunk is lost."""
 
     def __init__(self, work: Any, size: int) -> None:
-        self.work, self.room = work, size
+        self.work, self.capacity = work, size
         self.context = get_context("spawn")
         self.idle: list[Worker] = []
         self.busy: list[Worker] = []
 
-    def give(self, chunk: int, tasks: list) -> None:
+    def submit(self, chunk: int, tasks: list) -> None:
         """Start a chunk in a process."""
         worker = self.idle.pop() if self.idle else Worker(self.context, self.work)
         self.busy.append(worker)
-        worker.give(chunk, tasks)
+        worker.submit(chunk, tasks)
 
-    def take(self) -> tuple[int, list | None, float]:
+    def next_result(self) -> tuple[int, list | None, float]:
         """Next finished chunk : (number, answers or None if its process ended, seconds).
 
         Raises an exception of the process.
@@ -70,11 +70,11 @@ class Worker:
         self.pipe, far_end = context.Pipe()
         self.process = context.Process(target=serve, args=(far_end, work), daemon=True)
         self.started, self.chunk = False, -1
-        with _no_interrupts(), _one_thread():
+        with _no_interrupts(), _single_thread():
             self.process.start()
         far_end.close()  # so that the pipe ends with the process
 
-    def give(self, chunk: int, tasks: list) -> None:
+    def submit(self, chunk: int, tasks: list) -> None:
         self.chunk = chunk
         try:
             self.pipe.send(tasks)
@@ -140,7 +140,7 @@ def _no_interrupts() -> Iterator[None]:
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
+def _single_thread() -> Iterator[None]:
     """Limit linear algebra to 1 thread in processes started within the context, unless the environment sets it."""
     unset = [name for name in THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(unset, "1"))

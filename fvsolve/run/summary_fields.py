@@ -12,7 +12,7 @@ from fvsolve.run.result import Comparison, Expectation, Extremes, LimitVerdict, 
 
 EXACT_ROWS = {  # rows with exactly these fields
     "marks": ResultMark._fields, "expectations": Expectation._fields, "verdicts": LimitVerdict._fields,
-    "comparisons": Comparison._fields, "warnings": tuple(one.name for one in fields(Notice)),
+    "comparisons": Comparison._fields, "warnings": tuple(field.name for field in fields(Notice)),
 }  # fmt: skip
 ROWS = EXACT_ROWS | {
     "extremes": Extremes._fields, "probes": ("dimension", "unit"), "methods": ("time", "method"),

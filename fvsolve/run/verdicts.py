@@ -71,8 +71,12 @@ def places(model, summary) -> list[list[dict[str, Any]]]:
             for part in part_extremes(model, summary, extent)
             for row in nearest(model, summary, limit, part, complete)
         ]
-        tables.append([row_of(row, shown, chainage, extent) | shared | {PLACES_KEY: place_margins(model, extent, shown, row)}
-                     for row in nearest_rows])  # fmt: skip
+        tables.append(
+            [
+                row_of(row, shown, chainage, extent) | shared | {PLACES_KEY: place_margins(model, extent, shown, row)}
+                for row in nearest_rows
+            ]
+        )
     return tables
 
 

@@ -41,7 +41,7 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
     loop.now[:] = state.y
     loop.loop_state[loop_indices.T] = state.t
     loop.armed[:] = flags_of(state, model)
-    loop.slate.restore_history(state)
+    loop.run_data.restore_history(state)
     loop.on_switch = lambda: loop.stop_columns(loop.controls[loop_indices.END])
     adaptive = loop.controls[loop_indices.CONTROL] == loop_indices.TOLERANCE
     for end in [*(t for t, _ in model.breaks if state.t < t < until), until]:
@@ -53,14 +53,14 @@ def advance(model: Model, state: State, until: float, inputs: dict[str, float] |
         if first and adaptive and state.memory.size >= 2 + loop.armed.size:
             loop.loop_state[[loop_indices.STEP, loop_indices.ERROR_OLD]] = state.memory[:2]
         code = loop.run(NO_LIMIT)
-        while code == loop_indices.BUDGET_SPENT and automatic.wants_change(loop.stepper):
+        while code == loop_indices.BUDGET_SPENT and automatic.is_change_due(loop.stepper):
             automatic.change(loop.stepper)
             code = loop.run(NO_LIMIT)
         if code != loop_indices.DONE:
             raise FvsolveError(f"advance stopped at t = {loop.t:.6g} s; try a smaller step")
     memory = np.append(loop.loop_state[[loop_indices.STEP, loop_indices.ERROR_OLD]], loop.armed)
     if len(model.tables.delays):
-        memory = np.concatenate([memory, loop.slate.past, [float(loop.slate.past.size)]])
+        memory = np.concatenate([memory, loop.run_data.past, [float(loop.run_data.past.size)]])
     return State(loop.t, loop.now.copy(), memory)
 
 

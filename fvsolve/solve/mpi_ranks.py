@@ -58,7 +58,7 @@ class MpiRanks:
         self.callback_object = CALLBACK(self.exchange)  # kept as long as compiled code has its address
         self.callback, self.yield_address = ctypes.cast(self.callback_object, ctypes.c_void_p).value, yield_address()
         self.board = self.buffer = np.zeros(0)
-        self.member = Worker(self, comm.rank, loop.slate, loop.stepper)
+        self.member = Worker(self, comm.rank, loop.run_data, loop.stepper)
         ranks = range(comm.size)
         self.exchanges = Exchange(comm, [cut.states(k) for k in ranks]), Exchange(comm, [cut.flows(k) for k in ranks])
         self.others = np.ones(cut.sum_count, dtype=bool)
@@ -98,7 +98,7 @@ class MpiRanks:
         now = loop.progress[loop_indices.NOW]
         runs = [(0, loop.model.y_size)] if self.stale else self.cut.common_states()
         small = {name: getattr(loop.stepper, name) for name in COPIED}
-        written = {name: getattr(loop.slate.written, name) for name in WRITTEN}
+        written = {name: getattr(loop.run_data.written, name) for name in WRITTEN}
         states = [loop.stepper.y[now, begin:stop] for begin, stop in runs]
         self.stale = False
         with postponed_interrupts():

@@ -25,7 +25,7 @@ class RunChecks:
     """
 
     def __init__(self, run_data) -> None:
-        self.slate, self.model = run_data, run_data.model
+        self.run_data, self.model = run_data, run_data.model
         model = self.model
         self.moving = model.basins if model.case.numerics.step is not None else []
         self.rates: dict[str, float] = {}
@@ -75,7 +75,7 @@ class RunChecks:
             notices = step_limits(self.model, self.rates, np.inf if self.grown else self.step_doubling.worst()[1])
         step_error = self.step_doubling.notice()
         notices += [] if step_error is None else [step_error]
-        notices += jump_overflow_notices(self.slate.past)
+        notices += jump_overflow_notices(self.run_data.past)
         notices += self.sloshing.notices()
         notices += [] if self.grown is None else [self.grown]
         return notices + [notice for name, ledger in ledgers.items() for notice in ledger_notices(name, ledger)]

@@ -40,7 +40,7 @@ class RunLoop:
 
     def __init__(self, model: Model, structure: Callable[[], Structure] | None = None, threads=1, comm=None) -> None:
         numerics = model.case.numerics
-        self.model, self.slate = model, RunData(model)
+        self.model, self.run_data = model, RunData(model)
         method = method_named(automatic.first_method(numerics.method))
         self.switched: list[tuple[float, int]] = []  # time and number of every event of a device
         self.at_once, self.last_switch = 0, np.nan
@@ -97,11 +97,11 @@ class RunLoop:
             self.controls[loop_indices.CONTROL] = loop_indices.FIXED_STEP
             self.controls[loop_indices.SIZE] = numerics.courant / model.wave_rate
         given = self.controls[loop_indices.CONTROL] == loop_indices.FIXED_STEP
-        self.slate.clock["step"] = self.controls[loop_indices.SIZE] if given else 0.0
+        self.run_data.clock["step"] = self.controls[loop_indices.SIZE] if given else 0.0
         self.team, single_band = None, make_partition(model, 1)
         if method.explicit and numerics.method != automatic.AUTO:
             stepper.shape = blocked_sums(single_band, 0)
-            self.slate.written = self.slate.written._replace(sums=stepper.shape)
+            self.run_data.written = self.run_data.written._replace(sums=stepper.shape)
         if numerics.rtol is not None:  # errors are summed by rows
             stepper.row_blocks, stepper.sums = single_band.row_blocks(0), np.zeros(single_band.sum_count)
         if comm is not None:
@@ -140,14 +140,14 @@ class RunLoop:
         self.controls[loop_indices.END], self.controls[loop_indices.STOP_AT] = end, stop_at
         self.progress[loop_indices.PHASE], self.progress[loop_indices.HAS_LAST_STEP] = loop_indices.FRESH, 0
         self.apply_events()
-        self.slate.clock["limit"] = end
+        self.run_data.clock["limit"] = end
 
     def run(self, budget: float) -> int:
         """Take at most `budget` steps; returns a code of `steppers.slots`, from DONE to CHATTERS."""
-        while (capacity := self.slate.room()) < budget:
+        while (capacity := self.run_data.history_capacity()) < budget:
             code = self.steps(capacity)
             left, budget = self.controls[loop_indices.BUDGET], budget - capacity
-            if code != loop_indices.BUDGET_SPENT or left != 0.0 or automatic.wants_change(self.stepper):
+            if code != loop_indices.BUDGET_SPENT or left != 0.0 or automatic.is_change_due(self.stepper):
                 return code
         return self.steps(budget)
 
@@ -159,7 +159,7 @@ class RunLoop:
             before = self.armed.copy()
             functions, where = self.functions
             if self.team is None:
-                code = self.stepper.call(*functions, self.slate.handle, where, self.armed)
+                code = self.stepper.call(*functions, self.run_data.handle, where, self.armed)
             else:
                 code = self.team.call(functions, where)
             if code == loop_indices.SWITCHED:
@@ -180,7 +180,7 @@ class RunLoop:
     @property
     def armed(self) -> np.ndarray:
         """Flags of the events that have occurred and still hold (a view)."""
-        return self.slate.armed
+        return self.run_data.armed
 
     def record_events(self, before: np.ndarray) -> None:
         """Record the events since the flags were `before`, and apply their immediate effects."""
@@ -197,7 +197,7 @@ class RunLoop:
             self.now[node["y"]] += part
             sums[0 if part > 0.0 else 1, i] += part
         for (_, _, device), row in zip(self.model.devices, self.model.tables.devices, strict=True):
-            device.apply_event(self.slate, row, self.t, self.now, self.stepper.scale)
+            device.apply_event(self.run_data, row, self.t, self.now, self.stepper.scale)
 
     def handle_events(self, before: np.ndarray) -> bool:
         """Record the last events; returns False where they chatter: too many at the same time or in a short span."""
@@ -216,7 +216,7 @@ class RunLoop:
     def evaluate(self, limit: float) -> np.ndarray:
         """Evaluate `out` now, with left limits of schedules from `limit` on; records events that a jump has caused."""
         before = self.armed.copy()
-        out = self.slate.evaluate(self.t, self.now, limit)[1]
+        out = self.run_data.evaluate(self.t, self.now, limit)[1]
         self.record_events(before)
         return out
 
@@ -228,7 +228,7 @@ class RunLoop:
         if not len(self.model.tables.columns) and not self.armed.size:  # no columns and no events to record
             return []
         stopped, out, layout = [], self.evaluate(limit), self.model.layout
-        while (event := separate(self.slate, self.t, self.now, out)) is not None:
+        while (event := separate(self.run_data, self.t, self.now, out)) is not None:
             before = self.armed.copy()
             self.armed[event], self.armed[event + 1] = 1.0, 0.0
             self.record_events(before)
@@ -279,6 +279,6 @@ def fused_step_allowed(model: Model, method: Method) -> bool:
     return bool(
         model.case.law.linear and settings["scheme"] == rec.UPWIND
         and method.explicit and method.stages == 1 and numerics.rtol is None
-        and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.rides)
+        and model.y_size == 2 * model.cells and model.shapes.armed == 0 and not len(model.tables.moving_segments)
         and {*laws.tolist()} <= {rec.FRICTION_NONE, rec.FRICTION_FACTOR}
     )  # fmt: skip

@@ -94,7 +94,7 @@ class Run:
         comm = comm if self.threads > 1 else None
         self.began = time.perf_counter()
         self.loop = self.loop_type(model, threads=self.threads, comm=comm)
-        self.slate = self.loop.slate
+        self.run_data = self.loop.run_data
         self.loop.on_switch = self.stop_columns
         numerics, output = model.case.numerics, model.case.output
         self.start, self.end = numerics.start, numerics.end
@@ -114,7 +114,7 @@ class Run:
         self.loop.loop_state[loop_indices.T] = state.t
         self.budget, self.seconds, self.saved = 1000.0, 0.0, time.perf_counter()
         self.watches = [watch for basin in model.basins for watch in basin.watches(basin.deviations(model.start))]
-        self.checks = RunChecks(self.slate)
+        self.checks = RunChecks(self.run_data)
         self.loop.stepper.largest = self.checks.largest_if_needed
         if self.checks.needs_frequent_checks:
             self.budget = FREQUENT_CHECK_STEPS
@@ -128,15 +128,17 @@ class Run:
             except (ValueError, IndexError, OverflowError):  # damaged checkpoint, or from another solver
                 if comm is None:
                     self.loop.close()
-                raise MemoryMismatch(f"the checkpoint does not match this run (a memory of {state.memory.size} numbers); "
-                                   "start again with --force, or with a State without memory") from None  # fmt: skip
+                raise MemoryMismatch(
+                    f"the checkpoint does not match this run (a memory of {state.memory.size} numbers); "
+                    "start again with --force, or with a State without memory"
+                ) from None
         self.setup = time.perf_counter() - self.began
 
     # memory -------------------------------------------------------------------------------------------------
 
     def memory(self) -> np.ndarray:
         """All data that a resumed run needs in addition to t and y, flat."""
-        arrays = [getattr(self.slate, name).ravel() for name in PERSISTENT]
+        arrays = [getattr(self.run_data, name).ravel() for name in PERSISTENT]
         changes = [x for change in self.changes for x in change]
         switched = [x for event in self.loop.switched for x in event]
         own = [float(self.segment), self.seconds, self.processor, float(len(self.changes)), *changes]
@@ -146,14 +148,14 @@ class Run:
         own += [self.checks.rates.get(watch.name, 0.0) for watch in self.checks.moving]
         views = (view.ravel() for view in self.loop.stepper.restart_arrays())
         own += self.checks.sloshing.restart_data.ravel().tolist()
-        past = self.slate.past
+        past = self.run_data.past
         return np.concatenate([own, *views, *arrays, self.checks.step_doubling.restart_data, past, [float(past.size)]])
 
     def restore(self, memory: np.ndarray) -> None:
         memory, past = split_memory(memory)
-        if (past.size == 0) != (self.slate.past.size == 0):
+        if (past.size == 0) != (self.run_data.past.size == 0):
             raise ValueError("history of delay lines does not match")
-        self.slate.past = past.copy()
+        self.run_data.past = past.copy()
         self.segment, self.seconds, self.processor, changes = int(memory[0]), *map(float, memory[1:3]), int(memory[3])
         if not (0 <= self.segment < len(self.bounds) and changes >= 0 and memory[4 + 3 * changes] >= 0):
             raise ValueError("counts out of range")
@@ -173,7 +175,7 @@ class Run:
         sloshing_data = self.checks.sloshing.restart_data.ravel()
         sloshing_data[:], memory = memory[: sloshing_data.size], memory[sloshing_data.size :]
         step_doubling_data = self.checks.step_doubling.restart_data
-        arrays = [getattr(self.slate, name) for name in PERSISTENT] + [
+        arrays = [getattr(self.run_data, name) for name in PERSISTENT] + [
             *self.loop.stepper.restart_arrays(),
             step_doubling_data,
         ]
@@ -181,7 +183,7 @@ class Run:
             raise ValueError("wrong number of values")
         memory = self.loop.stepper.restore(memory)
         for name in PERSISTENT:
-            array = getattr(self.slate, name).ravel()
+            array = getattr(self.run_data, name).ravel()
             array[:] = memory[: array.size]
             memory = memory[array.size :]
         step_doubling_data[:] = memory
@@ -194,7 +196,7 @@ class Run:
     def row(self, t: float, limit: float) -> np.ndarray:
         """Write the row of the present state at t, with left limits of schedules from `limit` on; returns `out`."""
         out = self.loop.evaluate(limit)
-        self.loop.record(t, self.loop.now, out, self.slate.handle, self.loop.stepper.values)
+        self.loop.record(t, self.loop.now, out, self.run_data.handle, self.loop.stepper.values)
         self.sink.rows(np.array([t]), self.loop.stepper.values[None, : len(self.model.probes)].copy())
         return out
 
@@ -206,7 +208,7 @@ class Run:
 
     def update_extremes(self, rows: np.ndarray) -> None:
         """Update the extremes by rows between steps, which are as accurate as steps; so no row exceeds the extremes."""
-        least, t_min, greatest, t_max = self.slate.extremes
+        least, t_min, greatest, t_max = self.run_data.extremes
         t, values = rows[:, 0], rows[:, 1:]
         at, each = values.argmin(axis=0), np.arange(values.shape[1])
         lower = (extreme := values[at, each]) < least
@@ -225,7 +227,7 @@ class Run:
     def frame(self, t: float, y: np.ndarray, out: np.ndarray) -> None:
         self.check_basins(t, y)
         with postponed_interrupts():  # other ranks may be writing too
-            self.sink.field(t, self.slate.fields(t, y, out))
+            self.sink.field(t, self.run_data.fields(t, y, out))
 
     def pass_outputs(self, t: float, out: np.ndarray) -> None:
         """Count the rows and frames due at a jump or at the end, which are written separately."""
@@ -275,8 +277,8 @@ class Run:
                 len(model.pipes) + 3 * len(model.node_names) + k,
                 model.scale[model.tables.columns[k]["y"]],
             )
-            if abs(flow) > 1e-3 * scale and np.isnan(self.slate.marks[at]):
-                self.slate.marks[at] = t
+            if abs(flow) > 1e-3 * scale and np.isnan(self.run_data.marks[at]):
+                self.run_data.marks[at] = t
 
     def begin_segment(self, jumped: bool) -> None:
         end, jump = self.bounds[self.segment]
@@ -324,7 +326,7 @@ class Run:
                 count = self.loop.loop_state[loop_indices.NEXT_FIELD] - 1
                 due = self.start + count * self.loop.controls[loop_indices.FIELD_EVERY]
                 self.frame(due, self.loop.stepper.y_out, self.loop.stepper.out_row)
-            elif code == loop_indices.BUDGET_SPENT and automatic.wants_change(self.loop.stepper):
+            elif code == loop_indices.BUDGET_SPENT and automatic.is_change_due(self.loop.stepper):
                 self.changes.append(automatic.change(self.loop.stepper))
             elif code == loop_indices.BUDGET_SPENT and self.left <= 0.0:
                 self.pause()
@@ -425,17 +427,17 @@ class Run:
         ledgers = {"mass": mass_ledger(model, loop.now, ledger[:, : len(model.node_names)])}
         ledgers |= scalar_ledgers(model, loop.now, ledger)
         basin_notices = [notice for entry in self.watches for notice in entry.notices()]
-        warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers), *device_notices(self.slate),
-                    *spill_notices(self.slate)]  # fmt: skip
+        warnings = [*self.notices, *basin_notices, *self.checks.warnings(ledgers), *device_notices(self.run_data),
+                    *spill_notices(self.run_data)]  # fmt: skip
         warnings += drift_notices(model, loop.now)
         warnings += split_step_notices(model.case.numerics, loop.stepper.counts())
         ok = reason == "finished" and all(entry.ok for entry in warnings)
         summary = Summary(
-            reason, ok, loop.t, find_marks(self.slate), ledgers, find_extremes(self.slate),
-            find_envelope(self.slate), find_point_envelopes(self.slate), find_watched(self.slate),
+            reason, ok, loop.t, find_marks(self.run_data), ledgers, find_extremes(self.run_data),
+            find_envelope(self.run_data), find_point_envelopes(self.run_data), find_watched(self.run_data),
             loop.stepper.counts(), self.methods(), model.all_cells, self.seconds, self.processor,
             self.setup, [Event(t, *model.events[k]) for t, k in loop.switched],
-            find_cavities(self.slate), warnings, self.threads, self.invalid_from,
+            find_cavities(self.run_data), warnings, self.threads, self.invalid_from,
         )  # fmt: skip
         self.sink.end(summary)
         return summary

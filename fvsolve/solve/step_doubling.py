@@ -123,7 +123,7 @@ class StepDoubling:
         if first:
             self.stepper.discard_history()
         self.stepper.controls[:] = loop.controls
-        return self.stepper.single_step(loop.rhs, loop.slate.handle, int(self.model.layout["supply"]), t, h, y)
+        return self.stepper.single_step(loop.rhs, loop.run_data.handle, int(self.model.layout["supply"]), t, h, y)
 
     def widths(self) -> np.ndarray:
         """Ranges of the states so far, at least the small range of each state."""
@@ -154,5 +154,5 @@ class StepDoubling:
 
 def corrected_store(loop) -> bool:
     """True if a delay line corrected a store for a jump within the last step; half steps have no such correction."""
-    past = loop.slate.past
+    past = loop.run_data.past
     return past.size > 0 and past[CORRECTED_TIME] == loop.t

@@ -28,7 +28,19 @@ from fvsolve.steppers import loop_indices
 from fvsolve.steppers.integrator import Integrator
 from fvsolve.steppers.signatures import JOIN, compiled_as
 
-COPIED = ("memory", "orders", "flags", "ledger", "carry", "g", "g_new", "out", "out_row", "values", "supply")
+COPIED = (
+    "loop_state",
+    "controls",
+    "progress",
+    "ledger",
+    "carry",
+    "g",
+    "g_new",
+    "out",
+    "out_row",
+    "values",
+    "ledger_rates",
+)
 WRITTEN = ("clock", "armed", "marks", "scratch", "spare", "envelope", "extremes", "past")
 
 
@@ -47,7 +59,7 @@ class Worker:
 
     def __init__(self, team, k: int, run_data: RunData, stepper: Integrator) -> None:
         cut, loop = team.cut, team.loop
-        self.loop, self.number, self.slate, self.stepper = loop, k, run_data, stepper
+        self.loop, self.number, self.run_data, self.stepper = loop, k, run_data, stepper
         self.stepper.join, self.stepper.row_blocks = team.join, cut.row_blocks(k)
         self.stepper.sums = np.zeros(cut.sum_count)
         self.own = [
@@ -81,14 +93,14 @@ class Worker:
 
     def open(self) -> None:
         """Collect the written arrays and make their handle; repeated when the history of delay lines has grown."""
-        self.written = self.slate.written._replace(**self.own_arrays)
-        self.handle = self.slate.linked_handle(self.written, self.call_tables)
+        self.written = self.run_data.written._replace(**self.own_arrays)
+        self.handle = self.run_data.linked_handle(self.written, self.call_tables)
 
     def store(self, name: str, values: np.ndarray) -> None:
         """Copy values into an array of `WRITTEN`."""
-        if name == "past" and values.size != self.slate.past.size:
-            self.slate.past = values.copy()
-        getattr(self.slate.written, name)[...] = values
+        if name == "past" and values.size != self.run_data.past.size:
+            self.run_data.past = values.copy()
+        getattr(self.run_data.written, name)[...] = values
 
     def copy_from_loop(self, states: list[slice]) -> None:
         """Copy from the loop the arrays that Python may have changed, and these states."""
@@ -97,7 +109,7 @@ class Worker:
         for name in COPIED:
             getattr(self.stepper, name)[...] = getattr(self.loop.stepper, name)
         for name in WRITTEN:
-            self.store(name, getattr(self.loop.slate.written, name))
+            self.store(name, getattr(self.loop.run_data.written, name))
         self.stepper.times, self.stepper.largest = self.loop.stepper.times, self.loop.stepper.largest
         now = self.loop.progress[loop_indices.NOW]
         for rows in states:
@@ -106,10 +118,10 @@ class Worker:
     def run_steps(self, functions: tuple, where: int) -> int:
         """Run the time loop on this band; returns its code."""
         stepper = self.stepper
-        if self.slate.past is not self.written.past:
+        if self.run_data.past is not self.written.past:
             self.open()
         within, stepper.bounds = stepper.bounds, self.bounds
-        code = stepper.call(*functions, self.handle, where, self.slate.armed)
+        code = stepper.call(*functions, self.handle, where, self.run_data.armed)
         stepper.bounds = within
         return code
 
@@ -123,8 +135,14 @@ class Worker:
 
 def copy_integrator(stepper: Integrator) -> Integrator:
     """Copy of an integrator, with its own arrays except those that steps only read."""
-    copy = Integrator(stepper.method, stepper.scale.size, stepper.ledger_rates.shape[1], stepper.structure, stepper.scale,
-                    stepper.damped)  # fmt: skip
+    copy = Integrator(
+        stepper.method,
+        stepper.scale.size,
+        stepper.ledger_rates.shape[1],
+        stepper.structure,
+        stepper.scale,
+        stepper.damped,
+    )
     copy.stored, copy.carry, copy.bounds = stepper.stored, stepper.carry.copy(), stepper.bounds
     for name in ("out", "out_row", "values", "g", "g_new", "rows"):
         setattr(copy, name, getattr(stepper, name).copy())
@@ -133,7 +151,7 @@ def copy_integrator(stepper: Integrator) -> Integrator:
 
 def band_functions(cut: Partition) -> tuple:
     """(functions of a model with exchange between bands, compiled function that combines partial sums)."""
-    features = replace(cut.model.functions.cast, bands=True, together=cut.exchanges_flows)
+    features = replace(cut.model.functions.cast, bands=True, boundary_exchange=cut.exchanges_flows)
     return functions(features), compiled_as(band_exchange.gather_sums, JOIN)
 
 
@@ -145,7 +163,7 @@ class ThreadTeam:
         self.functions, self.join = band_functions(cut)
         self.board = aligned_zeros(band_exchange.LINE * cut.count)
         self.buffer = aligned_zeros(2 * cut.sum_count)
-        self.members = [Worker(self, 0, loop.slate, loop.stepper)]
+        self.members = [Worker(self, 0, loop.run_data, loop.stepper)]
         self.members += [
             Worker(self, k, RunData(loop.model), copy_integrator(loop.stepper)) for k in range(1, cut.count)
         ]

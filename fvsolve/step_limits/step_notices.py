@@ -263,8 +263,10 @@ def courant_notice(model, check: CourantCheck, method: str) -> Notice:
     else:
         limit = f"waves grow at every Courant number {check.location} ({known})"
         remedy = f"{check.scheme} needs another method, for example ssp-rk3"
-    text = (f"{check.place}: Courant number {check.courant:.6g}: with {scheme}{about} and {method} {limit}; "
-            f"{'it may be wrong' if only_doubtful(check) else 'the numbers are not to be trusted'}; {remedy}")  # fmt: skip
+    text = (
+        f"{check.place}: Courant number {check.courant:.6g}: with {scheme}{about} and {method} {limit}; "
+        f"{'it may be wrong' if only_doubtful(check) else 'the numbers are not to be trusted'}; {remedy}"
+    )
     return Notice("step-limit", check.place, text, key, check.courant, check.limit, only_doubtful(check))
 
 

@@ -16,7 +16,7 @@ from fvsolve.errors import FvsolveError, nearest
 from fvsolve.schemes import LIMITED, LINEAR, Weights
 from fvsolve.steppers.numbers.polynomial import Polynomial
 
-WEIGHTS: dict[str, Weights] = {name: one.weights for name, one in LINEAR.items()}
+WEIGHTS: dict[str, Weights] = {name: scheme.weights for name, scheme in LINEAR.items()}
 
 
 def weights_of(scheme: str) -> Weights:

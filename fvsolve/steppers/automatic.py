@@ -39,7 +39,7 @@ def watch(stepper: Integrator, structure: Structure) -> None:
     stepper.controls[loop_indices.WATCH], stepper.controls[loop_indices.PRICE] = 1.0, step_cost_ratio(structure)
 
 
-def wants_change(stepper: Integrator) -> bool:
+def is_change_due(stepper: Integrator) -> bool:
     """True if the loop returned because the other kind of method would be cheaper."""
     return stepper.loop_state[loop_indices.SWITCH_COUNT] < 0.0
 

@@ -157,10 +157,29 @@ class Integrator:
         rhs(t, self.y[0], self.k[0], self.out, handle)
         self.ledger_rates[0] = self.out[ledger_offset : ledger_offset + self.ledger_rates.shape[1]]
         error = compiled_attempt()(
-            addresses((self.attempt, rhs, *self.algebra, self.join)), handle, self.coefficients, self.shape, self.row_blocks,
-            self.sums, t, h, self.y, 0, 1, self.k, self.ledger_rates, ledger_offset, self.out, self.scale, self.controls,
-            self.loop_state, self.work, self.vectors, self.factors, self.complex_factors,
-        )  # fmt: skip
+            addresses((self.attempt, rhs, *self.algebra, self.join)),
+            handle,
+            self.coefficients,
+            self.shape,
+            self.row_blocks,
+            self.sums,
+            t,
+            h,
+            self.y,
+            0,
+            1,
+            self.k,
+            self.ledger_rates,
+            ledger_offset,
+            self.out,
+            self.scale,
+            self.controls,
+            self.loop_state,
+            self.work,
+            self.vectors,
+            self.factors,
+            self.complex_factors,
+        )
         return self.y[1].copy() if error != loop_indices.NEWTON_FAILED else np.full(y.size, np.nan)
 
     def call(self, fused_step, observe, record, events, rhs, handle, ledger_offset: int, armed: np.ndarray) -> int:
@@ -174,12 +193,42 @@ class Integrator:
             spare = np.zeros((len(self.k) + len(self.vectors), self.scale.size))
             self.spare = spare, np.zeros_like(self.ledger_rates), flat, self.complex_factors.copy()
         return self.run_steps(
-            addresses((self.attempt, fused_step, observe, record, events, rhs, *self.algebra, self.join)), handle,
-            self.coefficients, self.shape, self.row_blocks, self.sums, self.dense, self.controls, self.loop_state, self.times,
-            self.progress, self.y, self.k, self.f_old, self.ledger_rates, ledger_offset, self.ledger, self.scale, self.out,
-            self.out_row, self.values, self.g, self.g_new, armed, self.stored, self.carry, self.y_out, self.rows,
-            *self.bounds, self.work, self.vectors, self.factors, self.complex_factors, *self.spare, self.largest,
-        )  # fmt: skip
+            addresses((self.attempt, fused_step, observe, record, events, rhs, *self.algebra, self.join)),
+            handle,
+            self.coefficients,
+            self.shape,
+            self.row_blocks,
+            self.sums,
+            self.dense,
+            self.controls,
+            self.loop_state,
+            self.times,
+            self.progress,
+            self.y,
+            self.k,
+            self.f_old,
+            self.ledger_rates,
+            ledger_offset,
+            self.ledger,
+            self.scale,
+            self.out,
+            self.out_row,
+            self.values,
+            self.g,
+            self.g_new,
+            armed,
+            self.stored,
+            self.carry,
+            self.y_out,
+            self.rows,
+            *self.bounds,
+            self.work,
+            self.vectors,
+            self.factors,
+            self.complex_factors,
+            *self.spare,
+            self.largest,
+        )
 
 
 # Kinds of methods: module of their steps, and value of KIND in the time loop.

@@ -85,7 +85,7 @@ def _solve_steps(stepper: Integrator, functions: tuple, key: int, t, y0) -> np.n
     progress[loop_indices.PHASE], progress[loop_indices.HAS_LAST_STEP] = loop_indices.FRESH, 0
     code = loop_indices.BUDGET_SPENT
     while code == loop_indices.BUDGET_SPENT:
-        if automatic.wants_change(stepper):
+        if automatic.is_change_due(stepper):
             automatic.change(stepper)
         controls[loop_indices.BUDGET] = NO_LIMIT
         code = stepper.call(*functions, np.array([key]), WHERE, stepper.no_floats)
@@ -200,7 +200,7 @@ def _nothing(t, y, out, handle, values):
     pass
 
 
-def _no_leap(t, h, y, y_new, out, handle, values):
+def _no_fused_step(t, h, y, y_new, out, handle, values):
     pass
 
 
@@ -223,7 +223,7 @@ def _functions(f, t0, y0):
             if dydt.size > 0:
                 _python(t, y, dydt, int(handle[0]))
 
-        return _no_leap, _row, _nothing, _no_events, plain
+        return _no_fused_step, _row, _nothing, _no_events, plain
     return *observers(), _compile(numba.njit(_rhs(f, t0, y0)), RHS)
 
 
@@ -237,7 +237,7 @@ def _compile(function, letters: str) -> DeclaredFunction:
 @compile_once
 def observers() -> tuple:
     """(fused step, observe, record, events) of a system without events, whose rows are its states."""
-    functions = (_no_leap, FUSED_STEP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
+    functions = (_no_fused_step, FUSED_STEP), (_row, OBSERVE), (_nothing, OBSERVE), (_no_events, EVENTS)
     return tuple(_compile(numba.njit(function), letters) for function, letters in functions)
 
 

@@ -193,6 +193,6 @@ def watch(controls, loop_state, h, e, out_rate):
 
 
 @njit(forceinline=True)
-def keeps_length(controls, grow):
+def retains_length(controls, grow):
     """True if an implicit step keeps its length because it may only grow by a small factor."""
     return controls[KIND] == NEWTON_SOLVED and 1.0 <= grow <= DEAD_BAND

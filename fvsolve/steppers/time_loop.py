@@ -80,9 +80,9 @@ from fvsolve.steppers.step_control import (
     closing_step,
     end_of,
     grown,
-    keeps_length,
     next_step,
     reduced,
+    retains_length,
     row_step_end,
     shortest,
     too_short,
@@ -328,7 +328,7 @@ def run_steps(
                 if failure == NEWTON_STUCK:
                     grow = min(grow, 1.0)
                 shortened = last or h == due - loop_state[T] or h < full_h
-                if (not shortened or grow < 1.0) and not keeps_length(controls, grow):
+                if (not shortened or grow < 1.0) and not retains_length(controls, grow):
                     loop_state[STEP] = h * grow
                 loop_state[ERROR_OLD] = e
                 if controls[WATCH] != 0.0 and watch(controls, loop_state, h, e, rate):

@@ -93,7 +93,7 @@ def error_norms(run: Outcome, truth, own: tuple[str, ...] | None = None) -> dict
     for quantity in ("pressure", "flow") if run.model.pipes else ():
         gaps = [by_component[pipe.name, quantity] for pipe in run.model.pipes]
         deviations[quantity] = Deviation(
-            *(np.concatenate([getattr(deviation, key) for deviation in gaps]) for key in ("off", "weights"))
+            *(np.concatenate([getattr(deviation, key) for deviation in gaps]) for key in ("error", "weights"))
         )
     for basin in run.model.basins:
         by_content = {content: by_component.get((basin, content)) for content in basin_fields(basin, run.y)}

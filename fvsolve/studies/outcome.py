@@ -29,7 +29,7 @@ class Outcome:
     y : float64[n]  last state; rows : float64[k, 1 + probes]  time [s], then the probes named in `probes`
     envelope : pipe -> "min_pressure", "max_pressure" [Pa], ... of its cells over the run
     counts : steps, rejections, rhs, ...; seconds : time of stepping alone [s]; processor : its CPU time [s]
-    slate : `RunData` of the run; lines : wave sums of delay lines at the end, see `delay_line_keys.line_averages`
+    run_data : `RunData` of the run; lines : wave sums of delay lines at the end, see `delay_line_keys.line_averages`
     """
 
     reason: str
@@ -49,7 +49,7 @@ class Outcome:
 
     def __getstate__(self) -> dict:
         """State for pickling, without the model: the other process builds it from the same case and keys."""
-        return vars(self) | {"model": None, "slate": None}
+        return vars(self) | {"model": None, "run_data": None}
 
     @property
     def cell_updates(self) -> int:
@@ -128,8 +128,8 @@ def _single_run(model, y, run) -> Outcome:
     names = tuple(probe.text for probe in model.case.probes)
     return Outcome(
         summary.reason, summary.finished, False, summary.t, solver.loop.now.copy(), rows, names,
-        summary.envelope, summary.counts, summary.seconds, solver.processor, model, solver.slate,
-        line_averages(solver.slate, summary.t, solver.loop.stepper.out),
+        summary.envelope, summary.counts, summary.seconds, solver.processor, model, solver.run_data,
+        line_averages(solver.run_data, summary.t, solver.loop.stepper.out),
     )  # fmt: skip
 
 

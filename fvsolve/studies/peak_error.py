@@ -138,8 +138,11 @@ def peak_rows(result: Result, runs: dict[float, Result], unresolved: Unresolved)
                 error += least + abs(sign * extreme[side] - triple[1]) + unresolved.tolerance * span
                 span += 2.0 * least / WIDE_ERROR  # so that the rounding error of a constant does not count as wide
             rows[name][side] = {
-                "value": extreme[side], "error": error, "order": None if unknown else observed_order(triple, has_separation(runs)),
-                "reason": unresolved.reason(parts[name], triple, error, span, extreme["unit"])}  # fmt: skip
+                "value": extreme[side],
+                "error": error,
+                "order": None if unknown else observed_order(triple, has_separation(runs)),
+                "reason": unresolved.reason(parts[name], triple, error, span, extreme["unit"]),
+            }
     return rows
 
 
@@ -229,7 +232,8 @@ def description(runs: dict[float, Result], case: Any) -> str:
     others = " and ".join(f"{factor:g}" for factor in sorted(runs) if factor != 1.0)
     text = f"peaks compared with those at {others} times the resolution"
     if fixed_basins(case):
-        text += f"; cells of {', '.join(fixed_basins(case))} come from files and did not change: their error is not included"
+        text += f"; cells of {', '.join(fixed_basins(case))} come from files and did not change"
+        text += ": their error is not included"
     if has_separation(runs):
         text += "; column separation, so no order of convergence is assumed"
     stopped = [f"{factor:g}" for factor in sorted(runs) if runs[factor].reason != "finished"]

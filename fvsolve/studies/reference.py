@@ -114,7 +114,7 @@ def find_reference(
     lines : True if delay lines are under study, with a reference in cells of any scheme and method
     stiff : True if explicit steps are limited by something other than waves
     exact : True to use the solution named in [exact] of the case, if it applies
-    errands : `RunQueue` that makes the runs, instead of `run`; stages : overrides of its case that give this case
+    queue : `RunQueue` that makes the runs, instead of `run`; stages : overrides of its case that give this case
     Raises FvsolveError if too few runs reach the end: none, or only one if several are required.
     """
     from fvsolve.case import load
@@ -151,13 +151,13 @@ def find_reference(
     return best_reference(references, tuple(failures))
 
 
-def submit_ahead(errands: RunQueue, stages: tuple[dict, ...], kinds: Sequence, tell: Callable[[str], None]) -> Callable:
+def submit_ahead(queue: RunQueue, stages: tuple[dict, ...], kinds: Sequence, report: Callable[[str], None]) -> Callable:
     """Submit all runs of these kinds to a queue, coarse runs first; returns run(case, keys) that gives the results."""
-    tell(", ".join(name for name, _ in kinds))
+    report(", ".join(name for name, _ in kinds))
     by_level = zip(*(trials for _, trials in kinds), strict=True)
-    for _ in errands.run_ahead([RunRequest(capped_outcome, trial, stages) for level in by_level for trial in level]):
+    for _ in queue.run_ahead([RunRequest(capped_outcome, trial, stages) for level in by_level for trial in level]):
         pass
-    return lambda case, keys: errands(case, RunRequest(capped_outcome, keys, stages))
+    return lambda case, keys: queue(case, RunRequest(capped_outcome, keys, stages))
 
 
 def best_reference(references: Sequence[Reference], failures: tuple[str, ...] = ()) -> Reference:

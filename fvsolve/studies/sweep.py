@@ -120,7 +120,7 @@ VARY = Kind(
     'a table of lists, for example {"links.main.cells": [100, 200]}',
 )
 POINTS = Kind(
-    lambda given: PATH.accepts(given) or (ROW.accepts(given) and all(TABLE.accepts(one) for one in given)),
+    lambda given: PATH.accepts(given) or (ROW.accepts(given) and all(TABLE.accepts(row) for row in given)),
     'the path of a CSV file, or a list of tables such as {"links.main.cells": 100}',
 )
 

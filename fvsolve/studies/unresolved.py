@@ -147,9 +147,12 @@ def has_separation(runs: dict[float, Any]) -> bool:
 def coarse_pipes_at_devices(case: Any) -> list[str]:
     """Texts on pipes with too few cells next to devices that respond to waves."""
     pipes, devices = pipes_with_cells(case), answering_parts(case)
-    texts = [f"{name} has {pipe.cells} cell{'' if pipe.cells == 1 else 's'} beside {listing(devices[name], MAX_NAMES)}; "
-             f"set links.{name}.cells = {LEAST_CELLS}"
-             for name, pipe in pipes.items() if pipe.cells < LEAST_CELLS and devices[name]]  # fmt: skip
+    texts = [
+        f"{name} has {pipe.cells} cell{'' if pipe.cells == 1 else 's'} beside {listing(devices[name], MAX_NAMES)}; "
+        f"set links.{name}.cells = {LEAST_CELLS}"
+        for name, pipe in pipes.items()
+        if pipe.cells < LEAST_CELLS and devices[name]
+    ]
     return texts[:MAX_NAMES]
 
 

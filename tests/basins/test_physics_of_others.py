@@ -51,7 +51,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.dtypes import CELL_FIELD, RATE
 
-MINE = kind_of(__package__)
+OWN_CODE = kind_of(__package__)
 
 @njit
 def carry(t, y, dydt, out, handle):
@@ -59,7 +59,7 @@ def carry(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
-        if basin["kind"] != MINE:
+        if basin["kind"] != OWN_CODE:
             continue
         rate, o, nx = basin["speed"] * tables.plane[basin["spacing"]], basin["y"], basin["nx"]
         out[RATE] = max(out[RATE], rate)
@@ -72,7 +72,7 @@ def read(t, y, out, handle, values):
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
-        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == MINE:
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == OWN_CODE:
             values[k] = 0.0
             for m in range(probe["count"]):
                 at = tables.basins[probe["index"]]["y"] + tables.integers[probe["cell"] + m]

@@ -116,8 +116,8 @@ def test_what_a_line_holds_is_what_travels_in_it():
     run = Run(model, fvsolve.initial_state(model), MemorySink(model), None)
     ended = run.go()
     assert ended.ledgers["mass"]["relative"] < 1e-14
-    out = run.slate.evaluate(run.loop.t, run.loop.now, np.inf)[1]
-    r, l = run.slate.along(run.loop.t, out)[0]  # noqa: E741
+    out = run.run_data.evaluate(run.loop.t, run.loop.now, np.inf)[1]
+    r, l = run.run_data.along(run.loop.t, out)[0]  # noqa: E741
     held = float(np.sum(r + l)) * LENGTH / SPEED / r.size
     assert float(run.loop.now[0]) == pytest.approx(held, rel=2e-3)
 
@@ -244,7 +244,7 @@ def test_broken_off_and_resumed(name):
     assert ended[0].reason == ended[1].reason == "finished" and ended[0].ledgers == ended[1].ledgers
     ends = again.state(), whole.state()
     assert ends[0].t == ends[1].t and np.array_equal(ends[0].y, ends[1].y)
-    assert np.array_equal(again.slate.envelope, whole.slate.envelope, equal_nan=True)
+    assert np.array_equal(again.run_data.envelope, whole.run_data.envelope, equal_nan=True)
 
 
 def test_advanced_in_pieces():

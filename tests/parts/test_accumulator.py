@@ -278,5 +278,5 @@ def test_events_that_crowd_are_counted_on_in_a_run_that_is_resumed():
     run.left = 2.0
     assert run.go().reason.startswith("interrupted")
     again = Run(model, run.state(), MemorySink(model), None)
-    for name in ("crowd", "last_switch", "at_once", "switched"):
+    for name in ("recent_events", "last_switch", "at_once", "switched"):
         assert getattr(again.loop, name) == getattr(run.loop, name)

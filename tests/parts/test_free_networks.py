@@ -314,22 +314,26 @@ def momenta(model, t, y):
     found[3:] += turn @ body["inertia"].reshape(3, 3) @ turn.T @ spin
     for i, node in enumerate(tables.nodes):
         r, mass = (
-            tables.rides[node["moving_segment"]]["start"],
+            tables.moving_segments[node["moving_segment"]]["start"],
             node["mass"] + (y[node["y"]] if node["y"] >= 0 else 0.0),
         )
         levels[i] = np.array([0, 0, mass / (node["density"] * node["area"]) if node["kind"] == rec.TANK else 0.0])
         line(mass, r, r + levels[i])
     for pipe in tables.pipes:
         for k in range(n := int(pipe["cells"])):
-            forth, back, ride = y[pipe["y"] + k], y[pipe["y"] + n + k], tables.rides[pipe["moving_segment"] + k]
+            forth, back, ride = (
+                y[pipe["y"] + k],
+                y[pipe["y"] + n + k],
+                tables.moving_segments[pipe["moving_segment"] + k],
+            )
             per = RHO * pipe["area"] if linear else tables.profile[pipe["center"] + k]
             mass = (per + (forth + back) / pipe["speed"]) * pipe["dx"]
             line(mass, ride["start"], ride["end"], pipe["flow"] + forth - back)
     for column in tables.columns:
-        flow, ride = column["flow"] + y[column["y"]], tables.rides[column["moving_segment"]]
+        flow, ride = column["flow"] + y[column["y"]], tables.moving_segments[column["moving_segment"]]
         line(RHO * column["area"] * column["length"], ride["start"], ride["end"], flow)
         for i, sign in ((column["from_node"], -1.0), (column["to_node"], 1.0)):
-            foot = tables.rides[tables.nodes[i]["moving_segment"]]["start"]
+            foot = tables.moving_segments[tables.nodes[i]["moving_segment"]]["start"]
             line(0.0, foot, foot + levels[i], sign * flow)
     return found
 

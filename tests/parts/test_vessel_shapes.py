@@ -258,8 +258,12 @@ def test_its_norm_is_what_its_energy_is_bent_by():
     found = sum(sum(factor * y[k] for k, factor in one.items()) ** 2 for one in
                 device.energy_rows(model, part, row, np.zeros(model.y_size), out))  # fmt: skip
     tables, node = model.tables, model.tables.nodes[row["node"]]
-    both = [law_vessel.stored_energy_change(tables.settings[0], tables.floats, node, int(row["data"]), sign * y[node["y"]],
-                                    sign * y[row["y"]]) for sign in (1.0, -1.0)]  # fmt: skip
+    both = [
+        law_vessel.stored_energy_change(
+            tables.settings[0], tables.floats, node, int(row["data"]), sign * y[node["y"]], sign * y[row["y"]]
+        )
+        for sign in (1.0, -1.0)
+    ]
     assert found == pytest.approx(0.5 * sum(both), rel=1e-4)
 
 

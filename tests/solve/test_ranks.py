@@ -26,7 +26,7 @@ if not MPIEXEC.exists():
 SCRIPT = """
 import json, sys
 import fvsolve
-from fvsolve.run import ranks
+from fvsolve.run import mpi_run as ranks
 cases, out, options = json.loads(sys.argv[1]), sys.argv[2], json.loads(sys.argv[3])
 for name, case in cases.items():
     fvsolve.run(case, out=f"{out}/{name}", **options)
@@ -143,7 +143,7 @@ for name""", 1)  # fmt: skip
 def test_a_rank_that_fails_in_the_middle_ends_all_with_its_message(tmp_path):
     failing = SCRIPT.replace("for name", """
 from mpi4py import MPI
-from fvsolve.solve.mpi_ranks import Ranks
+from fvsolve.solve.mpi_ranks import MpiRanks as Ranks
 def fails(self, name, at):
     raise MemoryError("planted")
 if MPI.COMM_WORLD.rank == 1:

@@ -102,7 +102,7 @@ def told(case, threads: int, state=None):
     loop = run.loop
     cells = [np.asarray(array) for frame in sink.frames for name in ("pool", "sheet") if name in frame
              for array in frame[name].values()]  # fmt: skip
-    kept = [loop.now, *loop.stepper.restart_arrays(), run.slate.marks, run.slate.extremes, sink.table(), *cells]
+    kept = [loop.now, *loop.stepper.restart_arrays(), run.run_data.marks, run.run_data.extremes, sink.table(), *cells]
     return [np.array(one).tobytes() for one in kept], summary
 
 

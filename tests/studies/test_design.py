@@ -212,8 +212,14 @@ def test_ends_that_hold_or_fail_are_said() -> None:
 
 
 def test_ties_follow_in_si() -> None:
-    found = size(still(minimum=3e5), "nodes.lake.head", "80 ft", "250 ft", ties=parse_ties(["links.main.length = 10 * x"]),
-                 rtol=0.01)  # fmt: skip
+    found = size(
+        still(minimum=3e5),
+        "nodes.lake.head",
+        "80 ft",
+        "250 ft",
+        ties=parse_ties(["links.main.length = 10 * x"]),
+        rtol=0.01,
+    )
     assert found.ties == ("links.main.length = 10 * x",)
     assert found.value * 0.3048 == pytest.approx(10.0 + 3e5 / (RHO * GRAVITY), rel=0.02)
 
@@ -251,7 +257,7 @@ def test_what_cannot_be_sized_is_said() -> None:
 def test_all_that_is_wrong_of_a_search_comes_at_once(fvs, tmp_path) -> None:
     (tmp_path / "still.toml").write_text(write(still(minimum=3e5)))
     case = str(tmp_path / "still.toml")
-    status, _, told = fvs("size", case, "--vary", "nodes.lake.head=80,20", "--goal", "lest", "--rtol", "3",
+    status, _, told = fvs("size", case, "--vary", "nodes.lake.head=80,20", "--goal", "minimim", "--rtol", "3",
                           "--dependent", "links.main.length", "--set", "links.mian.cells=3")  # fmt: skip
     assert status == 2 and "5 faults" in told and 'did you mean "minimum"' in told and 'did you mean "main"' in told
     status, _, told = fvs("size", case, "--vary", "nodes.lake.haed=20,80", "--dependent", "links.main.lenght=x")

@@ -38,7 +38,7 @@ def test_a_step_of_the_linear_system_is_one_of_the_program(method, scene):
     for run in (moved, still):
         run.run(40.0)
     _, _, x, before = one.propagate(x, before, 40, np.inf)
-    found = read_history(moved.slate.past, one) - read_history(still.slate.past, one)
+    found = read_history(moved.run_data.past, one) - read_history(still.run_data.past, one)
     assert found == pytest.approx(before[..., 0], abs=1e-6 * np.abs(before).max())
     assert moved.now[one.states] - still.now[one.states] == pytest.approx(
         x[:, 0], abs=1e-6 * np.abs(x).max(initial=0.0)
@@ -55,7 +55,7 @@ def test_runs_fail_at_the_step_that_is_predicted(method):
 
 
 def test_what_check_tells_to_grow_has_a_limit_below_the_step():
-    """Of the runs that tests/limits/test_lines.py holds to what `check` tells, with steps of 10 ms for 30 s."""
+    """Of the runs that tests/step_limits/test_lines.py holds to what `check` tells, with steps of 10 ms for 30 s."""
     for method, volume, grows in (("euler", 0.6, True), ("ssp-rk3", 0.15, True), ("rk4", 0.15, False)):
         made = DelayLineLimits(
             fvsolve.load(vessel(method, 0.01, 30.0, volume)), "upwind", method_named(method), 3000, 30.0

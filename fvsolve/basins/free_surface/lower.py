@@ -24,9 +24,13 @@ from fvsolve.steppers.built_in_methods import AUTO, METHODS
 
 PACKAGE = __package__
 WATER_TERMS = RhsTerms(
-    package=PACKAGE, prepare="patches: patch_pressures", boundary_inflow="patches: patch_flows", observe="surface_probes: observe_water",
-    power="energy: add_power", stored="energy: add_stored",
-)  # fmt: skip
+    package=PACKAGE,
+    prepare="surface_patches: patch_pressures",
+    boundary_inflow="surface_patches: patch_flows",
+    observe="surface_probes: observe_water",
+    power="surface_energy: add_power",
+    stored="surface_energy: add_stored",
+)
 DEPTH_SCALE = 0.1  # [m] of depth
 ROUNDING = 1e-12  # depth over levels and beds below which there is no water
 TINY = 1e-300
@@ -67,7 +71,10 @@ class FreeSurfaceRows(BasinRows):
     def pieces(self, valves: bool) -> Iterator[RhsTerms]:
         kind = "grids" if self.is_grid else "meshes"
         yield RhsTerms(
-            package=PACKAGE, rates=f"moving: rates_on_moving_{kind}" if self.moves else f"rates: rates_on_{kind}"
+            package=PACKAGE,
+            rates=f"surface_moving_walls: rates_on_moving_{kind}"
+            if self.moves
+            else f"surface_cell_rates: rates_on_{kind}",
         )
         yield WATER_TERMS
         if self.part.on is not None:
@@ -75,7 +82,9 @@ class FreeSurfaceRows(BasinRows):
         if self.damped:
             yield RhsTerms(package=PACKAGE, damp="surface_cell_rates: damp_stages")
         if self.moves:
-            yield RhsTerms(package=PACKAGE, power="moving: add_power", stored="moving: add_stored")
+            yield RhsTerms(
+                package=PACKAGE, power="surface_moving_walls: add_power", stored="surface_moving_walls: add_stored"
+            )
         yield SHORTAGES
         if valves:
             yield RhsTerms(package=PACKAGE, rate_limits="surface_patches: limit_inflow_rate")

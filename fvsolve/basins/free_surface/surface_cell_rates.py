@@ -23,7 +23,7 @@ from fvsolve.kernels.stage_sums import (
 )
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 
 
 @njit
@@ -70,7 +70,7 @@ def damp_stages(h, y, rates, quick, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
-        if basin["kind"] == MINE and basin["damped"] == 1:
+        if basin["kind"] == OWN_CODE and basin["damped"] == 1:
             (a, z), n, o = band_cells(tables, b), basin["n"], basin["y"]
             east, north, seen = o + n, o + 2 * n, deviations_of(basin, tables.seen, y)
             damp_flows(
@@ -172,7 +172,7 @@ def rates_on_grids(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
-        if basin["kind"] == MINE and basin["nx"] > 0 and basin["walls"] == 0 and needs_rates(basin, dydt):
+        if basin["kind"] == OWN_CODE and basin["nx"] > 0 and basin["walls"] == 0 and needs_rates(basin, dydt):
             on_grid(tables, b, y, dydt, out, None)
 
 
@@ -193,11 +193,24 @@ def on_mesh(tables, b, y, dydt, out, moves):
     if f >= 0:  # needed for scalars
         flow = work[f : f + basin["faces"]]
     rate = surface_mesh.shallow_rates(
-        normal_gravity(st, plane, basin), basin["scheme"], basin["wide"], plane[basin["mesh"] :], integers[basin["links"] :],
-        plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]], plan, dh, qx, qy, flow,
-        work[through : through + basin["outer_given"]], work[basin["work"] :], rates[:n], rates[n : 2 * n],
-        rates[2 * n :], moves,
-    )  # fmt: skip
+        normal_gravity(st, plane, basin),
+        basin["scheme"],
+        basin["wide"],
+        plane[basin["mesh"] :],
+        integers[basin["links"] :],
+        plane[basin["reflect"] : basin["reflect"] + basin["outer_given"]],
+        plan,
+        dh,
+        qx,
+        qy,
+        flow,
+        work[through : through + basin["outer_given"]],
+        work[basin["work"] :],
+        rates[:n],
+        rates[n : 2 * n],
+        rates[2 * n :],
+        moves,
+    )
     if basin["friction"] != NO_DRAG:
         a, z = band_cells(tables, b)
         add_bed_friction(tables, b, a, z, y, rates, out)
@@ -210,5 +223,5 @@ def rates_on_meshes(t, y, dydt, out, handle):
     tables = open_tables(handle)
     for b in range(tables.basins.size):
         basin = tables.basins[b]
-        if basin["kind"] == MINE and basin["nx"] == 0 and basin["walls"] == 0 and needs_rates(basin, dydt):
+        if basin["kind"] == OWN_CODE and basin["nx"] == 0 and basin["walls"] == 0 and needs_rates(basin, dydt):
             on_mesh(tables, b, y, dydt, out, None)

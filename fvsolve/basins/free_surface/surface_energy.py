@@ -14,7 +14,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import NO_DRAG
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 
 
 @njit(forceinline=True)
@@ -30,12 +30,12 @@ def add_power(t, y, dydt, out, handle, power):
     tables = open_tables(handle)
     patches, layout = tables.patches, tables.layout[0]
     for b in range(tables.basins.size):
-        if tables.basins[b]["kind"] == MINE:
+        if tables.basins[b]["kind"] == OWN_CODE:
             rows = power[basin_first_row(tables, power, b) :]
             water_power(tables.settings[0], tables.basins[b], tables.plane, y, dydt, rows)
     for k in range(patches.size):
         patch, node = patches[k], patches[k]["node"]
-        if tables.basins[patch["basin"]]["kind"] == MINE and patch["moves"] == 0:
+        if tables.basins[patch["basin"]]["kind"] == OWN_CODE and patch["moves"] == 0:
             flow = out[layout["net"] + node] + out[layout["supply"] + node]
             power[basin_first_row(tables, power, patch["basin"]) + 1] += patch_loss(tables, patch, flow, y)
 
@@ -108,7 +108,7 @@ def add_stored(t, y, dydt, out, handle, stored):
     weight = st["rho"] * st["gravity"]
     for b in range(basins.size):
         basin, total = basins[b], 0.0
-        if basin["kind"] != MINE:
+        if basin["kind"] != OWN_CODE:
             continue
         n, o, rest, area = basin["n"], basin["y"], rest_potential(st, basin), plane[basin["area"] :]
         depths, surface = plane[basin["plan"] :], plane[basin["plan"] + n :]

@@ -200,9 +200,16 @@ def column_rates(
         put_limited(scheme, limiter, n, before, here, ring[ring_offset(j + 1, 0) :], low)
         if fifth:
             put_smooth(
-                g, scheme, ring[ring_offset(j - 2, 0) :], before, here, ring[ring_offset(j + 1, 0) :], ring[ring_offset(j + 2, 0) :],
-                low, deep[:n],
-            )  # fmt: skip
+                g,
+                scheme,
+                ring[ring_offset(j - 2, 0) :],
+                before,
+                here,
+                ring[ring_offset(j + 1, 0) :],
+                ring[ring_offset(j + 2, 0) :],
+                low,
+                deep[:n],
+            )
         if j < begin:
             continue
         # faces between rows j - 1 and j
@@ -232,9 +239,16 @@ def column_rates(
         put_limited(scheme, limiter, padded_count, ring[ring_offset(j - 1, -2) :], cell, before, ends)
         if fifth:
             put_smooth(
-                g, scheme, ring[ring_offset(j - 1, -3) :], ring[ring_offset(j - 1, -2) :], cell, before, ring[ring_offset(j - 1, 1) :],
-                ends, deep[:padded_count],
-            )  # fmt: skip
+                g,
+                scheme,
+                ring[ring_offset(j - 1, -3) :],
+                ring[ring_offset(j - 1, -2) :],
+                cell,
+                before,
+                ring[ring_offset(j - 1, 1) :],
+                ends,
+                deep[:padded_count],
+            )
         left, right = ends[HIGH:], ends[1:]
         l, r = (left, right) if fifth else (cell, before)
         if moves is None or moves[0].size == 0:

@@ -2,7 +2,7 @@
 
 from fvsolve.basins import moving_meshes
 from fvsolve.basins.basin_energy import basin_first_row, rest_potential
-from fvsolve.basins.free_surface.surface_cell_rates import MINE, on_grid, on_mesh
+from fvsolve.basins.free_surface.surface_cell_rates import OWN_CODE, on_grid, on_mesh
 from fvsolve.basins.moving_walls import area_growth_rate, grid_motion
 from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
@@ -11,7 +11,7 @@ from fvsolve.kernels.table_handle import open_tables
 @njit(forceinline=True)
 def is_moving(basin):
     """True for water between moving walls."""
-    return basin["kind"] == MINE and basin["walls"] > 0
+    return basin["kind"] == OWN_CODE and basin["walls"] > 0
 
 
 @njit

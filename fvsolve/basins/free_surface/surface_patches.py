@@ -23,7 +23,7 @@ from fvsolve.kernels.dtypes import GN, PATCH, RATE
 from fvsolve.kernels.restrictions import head_drop
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 
 
 @njit
@@ -74,7 +74,7 @@ def patch_pressures(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
-        if basin["kind"] != MINE:
+        if basin["kind"] != OWN_CODE:
             continue
         node, seen = tables.nodes[patch["node"]], deviations_of(basin, tables.seen, y)
         stored, depth, volume, squares = water_at_patch(tables, patch, seen)
@@ -97,7 +97,7 @@ def patch_flows(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
-        if basin["kind"] == MINE:
+        if basin["kind"] == OWN_CODE:
             inflow, seen = out[tables.layout[0]["net"] + patch["node"]], deviations_of(basin, tables.seen, y)
             add_patch_flow(tables, patch, inflow, seen, dydt, out)
 
@@ -155,6 +155,6 @@ def limit_inflow_rate(t, y, dydt, out, handle):
         drop = head_drop(tables, out, k)[1]
         receiver = valves[k]["to_node"] if drop > 0.0 else valves[k]["from_node"]
         for p in range(patches.size if tables.nodes[receiver]["kind"] == PATCH else 0):
-            if patches[p]["node"] == receiver and tables.basins[patches[p]["basin"]]["kind"] == MINE:
+            if patches[p]["node"] == receiver and tables.basins[patches[p]["basin"]]["kind"] == OWN_CODE:
                 wide = sqrt(patch_area(tables, patches[p]) / patches[p]["count"])
                 out[RATE] = max(out[RATE], 2.0 * sqrt(abs(drop) / st["rho"]) / wide)

@@ -7,7 +7,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CELL_FIELD
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 DEPTH = FIRST_OWN
 
 
@@ -17,7 +17,7 @@ def observe_water(t, y, out, handle, values):
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
-        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == MINE:
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == OWN_CODE:
             depth, u, v = read_water(tables, probe, y)
             own = probe["side"] == DEPTH
             values[k] = probe["scale"] * depth + probe["offset"] if own else velocity_value(probe["side"], u, v)

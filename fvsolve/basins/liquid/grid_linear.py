@@ -255,9 +255,30 @@ def grid_rates(
     stretching `wide` of columns or rows, see `basins.cell_stretching`
     """
     row_rates(
-        c, small, scheme, limiter, nx, ny, begin, stop, begin, stop, kx, ky, reflect, side_kinds_of(reflect, nx, ny), r, mx,
-        my, through, work, rate_r, rate_x, rate_y, moves,
-    )  # fmt: skip
+        c,
+        small,
+        scheme,
+        limiter,
+        nx,
+        ny,
+        begin,
+        stop,
+        begin,
+        stop,
+        kx,
+        ky,
+        reflect,
+        side_kinds_of(reflect, nx, ny),
+        r,
+        mx,
+        my,
+        through,
+        work,
+        rate_r,
+        rate_x,
+        rate_y,
+        moves,
+    )
     return c * max_spacing_rate(kx, ky)
 
 

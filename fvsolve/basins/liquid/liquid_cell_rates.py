@@ -19,19 +19,19 @@ from fvsolve.kernels.stage_sums import (
 )
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 
 
 @njit(forceinline=True)
 def on_grid(basin):
     """True for a rectangle of liquid without moving walls that is not on a body."""
-    return basin["kind"] == MINE and basin["nx"] > 0 and basin["walls"] == 0 and basin["frame"] < 0
+    return basin["kind"] == OWN_CODE and basin["nx"] > 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
     """True for a liquid on any other mesh without moving walls that is not on a body."""
-    return basin["kind"] == MINE and basin["nx"] == 0 and basin["walls"] == 0 and basin["frame"] < 0
+    return basin["kind"] == OWN_CODE and basin["nx"] == 0 and basin["walls"] == 0 and basin["frame"] < 0
 
 
 @njit(forceinline=True)

@@ -9,7 +9,7 @@ from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 
 
 @njit
@@ -17,7 +17,7 @@ def add_power(t, y, dydt, out, handle, power):
     """Write the rate of storage of all liquids to `power`."""
     tables = open_tables(handle)
     for b in range(tables.basins.size):
-        if tables.basins[b]["kind"] == MINE:
+        if tables.basins[b]["kind"] == OWN_CODE:
             rows = power[basin_first_row(tables, power, b) :]
             liquid_power(tables.settings[0], tables.basins[b], tables.plane, y, dydt, rows)
 
@@ -40,7 +40,7 @@ def add_stored(t, y, dydt, out, handle, stored):
     st, basins = tables.settings[0], tables.basins
     for b in range(basins.size):
         basin, total = basins[b], 0.0
-        if basin["kind"] != MINE:
+        if basin["kind"] != OWN_CODE:
             continue
         n, o, rest, area = basin["n"], basin["y"], rest_potential(st, basin), tables.plane[basin["area"] :]
         for i in range(n):

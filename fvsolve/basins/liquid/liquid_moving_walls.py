@@ -2,7 +2,7 @@
 
 from fvsolve.basins import moving_meshes, moving_walls
 from fvsolve.basins.basin_energy import basin_first_row, rest_potential
-from fvsolve.basins.liquid.liquid_cell_rates import MINE, linear_grid_rates, mesh_rates, nonlinear_grid_rates
+from fvsolve.basins.liquid.liquid_cell_rates import OWN_CODE, linear_grid_rates, mesh_rates, nonlinear_grid_rates
 from fvsolve.basins.moving_walls import area_growth_rate, speed_of
 from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
@@ -11,7 +11,7 @@ from fvsolve.kernels.table_handle import open_tables
 @njit(forceinline=True)
 def is_moving(basin):
     """True for a liquid between moving walls."""
-    return basin["kind"] == MINE and basin["walls"] > 0
+    return basin["kind"] == OWN_CODE and basin["walls"] > 0
 
 
 @njit(forceinline=True)

@@ -15,7 +15,7 @@ from fvsolve.basins.basin_frames import (
     potential_coefficients,
 )
 from fvsolve.basins.cell_sides import BLOCK, blocks
-from fvsolve.basins.liquid.liquid_cell_rates import MINE, linear_grid_rates, mesh_rates, nonlinear_grid_rates
+from fvsolve.basins.liquid.liquid_cell_rates import OWN_CODE, linear_grid_rates, mesh_rates, nonlinear_grid_rates
 from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import LAW_LINEAR
 from fvsolve.kernels.table_handle import open_tables
@@ -24,13 +24,13 @@ from fvsolve.kernels.table_handle import open_tables
 @njit(forceinline=True)
 def on_grid(basin):
     """True for a rectangle of liquid on a body."""
-    return basin["kind"] == MINE and basin["nx"] > 0 and basin["frame"] >= 0
+    return basin["kind"] == OWN_CODE and basin["nx"] > 0 and basin["frame"] >= 0
 
 
 @njit(forceinline=True)
 def on_mesh(basin):
     """True for a liquid on any other mesh on a body."""
-    return basin["kind"] == MINE and basin["nx"] == 0 and basin["frame"] >= 0
+    return basin["kind"] == OWN_CODE and basin["nx"] == 0 and basin["frame"] >= 0
 
 
 @njit

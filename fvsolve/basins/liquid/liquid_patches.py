@@ -10,7 +10,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import LAW_LOG
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 
 
 @njit
@@ -31,7 +31,7 @@ def patch_pressures(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin, node = tables.basins[patch["basin"]], tables.nodes[patch["node"]]
-        if basin["kind"] != MINE:
+        if basin["kind"] != OWN_CODE:
             continue
         stored, slope = (
             mean_deviation(tables, patch, deviations_of(basin, tables.seen, y)),
@@ -54,7 +54,7 @@ def patch_flows(t, y, dydt, out, handle):
     for k in range(tables.patches.size if dydt.size > 0 else 0):
         patch = tables.patches[k]
         basin = tables.basins[patch["basin"]]
-        if basin["kind"] != MINE:
+        if basin["kind"] != OWN_CODE:
             continue
         inflow = out[tables.layout[0]["net"] + patch["node"]]
         n, flow = basin["n"], inflow / (basin["thickness"] * patch_area(tables, patch))

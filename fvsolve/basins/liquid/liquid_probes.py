@@ -8,7 +8,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CELL_FIELD, LAW_LINEAR, LAW_LOG
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 PRESSURE = FIRST_OWN
 
 
@@ -18,7 +18,7 @@ def observe_liquid(t, y, out, handle, values):
     tables = open_tables(handle)
     for k in range(tables.probes.size):
         probe = tables.probes[k]
-        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == MINE:
+        if probe["kind"] == CELL_FIELD and tables.basins[probe["index"]]["kind"] == OWN_CODE:
             dense, u, v = read_liquid(tables, probe, y)
             own = probe["side"] == PRESSURE
             values[k] = probe["scale"] * dense + probe["offset"] if own else velocity_value(probe["side"], u, v)

@@ -12,7 +12,7 @@ from fvsolve.jit import njit
 from fvsolve.kernels.dtypes import CELL_FIELD
 from fvsolve.kernels.table_handle import open_tables
 
-MINE = physics_code(__package__)
+OWN_CODE = physics_code(__package__)
 
 
 @njit
@@ -43,7 +43,7 @@ def patch_pressures(t, y, dydt, out, handle):
     for k in range(tables.patches.size):
         patch = tables.patches[k]
         basin, node = tables.basins[patch["basin"]], tables.nodes[patch["node"]]
-        if basin["kind"] != MINE:
+        if basin["kind"] != OWN_CODE:
             continue
         table = tables.plane[basin["table"] :]
         deviation, slope = pressure(
@@ -60,7 +60,11 @@ def observe_pressures(t, y, out, handle, values):
     probes = tables.probes
     for k in range(probes.size):
         probe = probes[k]
-        if probe["kind"] != CELL_FIELD or tables.basins[probe["index"]]["kind"] != MINE or probe["side"] != PRESSURE:
+        if (
+            probe["kind"] != CELL_FIELD
+            or tables.basins[probe["index"]]["kind"] != OWN_CODE
+            or probe["side"] != PRESSURE
+        ):
             continue
         basin, total = tables.basins[probe["index"]], 0.0
         table = tables.plane[basin["table"] :]

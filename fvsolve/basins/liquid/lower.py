@@ -15,9 +15,13 @@ from fvsolve.kernels.rhs_assembly import RhsTerms
 
 PACKAGE = __package__
 LIQUID_TERMS = RhsTerms(
-    package=PACKAGE, prepare="patches: patch_pressures", boundary_inflow="patches: patch_flows", observe="liquid_probes: observe_liquid",
-    power="energy: add_power", stored="energy: add_stored",
-)  # fmt: skip
+    package=PACKAGE,
+    prepare="liquid_patches: patch_pressures",
+    boundary_inflow="liquid_patches: patch_flows",
+    observe="liquid_probes: observe_liquid",
+    power="liquid_energy: add_power",
+    stored="liquid_energy: add_stored",
+)
 PRESSURE_SCALE = 1e5  # [Pa]
 STEPS = 8  # midpoint steps up to the height of a cell; the error of each is the cube of its strain
 SMALL = 1e-9  # negligible velocity over the wave speed
@@ -52,7 +56,9 @@ class LiquidRows(BasinRows):
         if self.part.on is not None:
             yield FRAME_FORCES
         if self.moves:
-            yield RhsTerms(package=PACKAGE, power="moving: add_power", stored="moving: add_stored")
+            yield RhsTerms(
+                package=PACKAGE, power="liquid_moving_walls: add_power", stored="liquid_moving_walls: add_stored"
+            )
         yield SHORTAGES
         if self.waves is not None:
             yield RhsTerms(
@@ -65,11 +71,11 @@ class LiquidRows(BasinRows):
         """Term of the rates of its cells."""
         shape = "grids" if self.is_grid else "meshes"
         if self.moves or self.part.on is not None:
-            motion = "moving" if self.moves else "riding"
+            module, motion = ("liquid_moving_walls", "moving") if self.moves else ("liquid_on_body", "accelerated")
             function = "table" if self.waves is not None else "waves" if self.linear and self.is_grid else "rates"
-            return f"{motion}: {function}_on_{motion}_{shape}"
+            return f"{module}: {function}_on_{motion}_{shape}"
         function = "waves" if self.linear and self.is_grid else "rates"
-        return f"{'table' if self.waves is not None else 'rates'}: {function}_on_{shape}"
+        return f"{'liquid_table_law' if self.waves is not None else 'liquid_cell_rates'}: {function}_on_{shape}"
 
     @property
     def has_constant_speed(self) -> bool:

@@ -58,7 +58,7 @@ def store_smooth_values(t, y, state, handle):
 
 
 @njit
-def extremes_beside_jump(t, time, y, state, handle):
+def extremes_at_jump(t, time, y, state, handle):
     """Update extremes by the state beside a jump that arrives at `time`; state : at t, with jumps up to `time`."""
     tables = open_tables(handle)
     past, spare, marks, pipes, nodes = tables.past, tables.spare, tables.marks, tables.pipes, tables.nodes

@@ -9,7 +9,7 @@ admitted and events act (`admit_jumps`).
 
 from fvsolve.jit import njit
 from fvsolve.kernels.calls import CLOSE, run_job
-from fvsolve.kernels.delay_lines.extremes_at_jumps import extremes_beside_jump, store_smooth_values
+from fvsolve.kernels.delay_lines.extremes_at_jumps import extremes_at_jump, store_smooth_values
 from fvsolve.kernels.delay_lines.jump_correction import (
     change_times,
     correct_behind_valves,
@@ -172,7 +172,7 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         past[jump_head(places, line["stretch"] + q, wave) + ARRIVED_COUNT] += 1.0
         times = change_times(past, tables, t, time, sent)
         if not together:
-            extremes_beside_jump(t, time, y, state, handle)
+            extremes_at_jump(t, time, y, state, handle)
         closed = leave_stretch(past, places, tables, y, state, number, q, wave, time, jump - share, times)
         closed = leave_stretch(past, places, tables, y, state, number, q, 1 - wave, time, share, times) and closed
         if not closed:
@@ -180,7 +180,7 @@ def pass_jumps_at_ends(past, places, own, t, y, out, handle):
         number, q, wave, place = earliest_jump(past, places, own, t)
         together = number >= 0 and past[place] + tables.delays[number]["tau"] <= time + time_tolerance(past)
         if not together:
-            extremes_beside_jump(t, time, y, state, handle)
+            extremes_at_jump(t, time, y, state, handle)
     past[ARRIVALS_TIME] = NAN
     return True
 

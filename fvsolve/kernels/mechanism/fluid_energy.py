@@ -107,7 +107,7 @@ def path_energy_rate(tables, out, here, path, change, flow, rate):
 def extra_head(y, out, tables, here, i):
     """Energy per mass supplied to node i in addition to that at rest, in a tank at its surface [J/kg]."""
     st, node, motion = tables.settings[0], tables.nodes[i], tables.scratch
-    r = as_tuple(tables.rides[node["moving_segment"]]["start"])
+    r = as_tuple(tables.moving_segments[node["moving_segment"]]["start"])
     z, more = node["elevation"], 0.0
     if node["kind"] == TANK:
         r = r[0], r[1], r[2] + level_at(y, tables, i)
@@ -129,7 +129,7 @@ def extra_head(y, out, tables, here, i):
 def add_node_power(y, dydt, out, tables, i, power):
     """Add the supply and the energy rate of node i that are due to the motion of its body [W]."""
     node, st, motion = tables.nodes[i], tables.settings[0], tables.scratch
-    here = body_row(tables, tables.rides[node["moving_segment"]]["body"])
+    here = body_row(tables, tables.moving_segments[node["moving_segment"]]["body"])
     segment = node_segment(y, tables, i)
     if node["kind"] == FIXED or node["kind"] == JUNCTION:
         head = st["gravity"] * (height_on_body(out, here, segment[0]) - node["elevation"]) + 0.5 * speed_squared_at(
@@ -147,7 +147,7 @@ def add_node_power(y, dydt, out, tables, i, power):
 def add_node_stored(y, out, tables, i, stored):
     """Add the energy stored at node i that is due to the motion of its body [J]."""
     node = tables.nodes[i]
-    here, z = body_row(tables, tables.rides[node["moving_segment"]]["body"]), node["elevation"]
+    here, z = body_row(tables, tables.moving_segments[node["moving_segment"]]["body"]), node["elevation"]
     if node["kind"] == TANK:
         z, stored[i] = tables.settings[0]["datum"], 0.0
     if node["kind"] == TANK or node["kind"] == CHAMBER:
@@ -223,7 +223,13 @@ def column_extra_energy(y, out, tables, k, here):
 def add_power(t, y, dydt, out, handle, power):
     """Add the power due to the motion of bodies to the power rows of nodes, pipes and columns."""
     tables = open_tables(handle)
-    nodes, pipes, columns, segments, motion = tables.nodes, tables.pipes, tables.columns, tables.rides, tables.scratch
+    nodes, pipes, columns, segments, motion = (
+        tables.nodes,
+        tables.pipes,
+        tables.columns,
+        tables.moving_segments,
+        tables.scratch,
+    )
     for i in range(nodes.size):
         if nodes[i]["moving_segment"] >= 0 and is_fluid_node(nodes[i]["kind"]):
             set_body_motion(tables, out, segments[nodes[i]["moving_segment"]]["body"], ACCELERATION, SPIN_RATE)
@@ -260,7 +266,7 @@ def add_power(t, y, dydt, out, handle, power):
 def add_stored(t, y, dydt, out, handle, stored):
     """Add the energy due to the motion of bodies to the storage rows of nodes, pipes and columns."""
     tables = open_tables(handle)
-    nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.rides
+    nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.moving_segments
     for i in range(nodes.size):
         if nodes[i]["moving_segment"] >= 0 and is_fluid_node(nodes[i]["kind"]):
             set_body_motion(tables, out, segments[nodes[i]["moving_segment"]]["body"], ACCELERATION, SPIN_RATE)

@@ -76,7 +76,7 @@ def subtract_sliding_inertia(out, tables, i, flow_path, slides):
 def add_pipe_inertia(y, out, tables, k):
     """Add a pipe to M: its fluid is fixed across the axis and free along it, except the mass added by waves."""
     pipe, (r, t, span) = tables.pipes[k], pipe_segment(tables, k)
-    i, m = tables.rides[pipe["moving_segment"]]["body"], pipe_moments(tables, y, k, span, 1.0)[0]
+    i, m = tables.moving_segments[pipe["moving_segment"]]["body"], pipe_moments(tables, y, k, span, 1.0)[0]
     add_segment_inertia(out, tables, i, (r, t, m))
     length, slides = pipe["cells"] * pipe["dx"], m[0]
     if tables.settings[0]["law"] == LAW_LINEAR:
@@ -87,7 +87,7 @@ def add_pipe_inertia(y, out, tables, k):
 @njit
 def add_fluid_inertia(y, out, tables):
     """Add the fluid on bodies that forces can move to M in `scratch`."""
-    nodes, segments, pipes, columns = tables.nodes, tables.rides, tables.pipes, tables.columns
+    nodes, segments, pipes, columns = tables.nodes, tables.moving_segments, tables.pipes, tables.columns
     if segments.size == 0:
         return
     for i in range(nodes.size):

@@ -115,7 +115,7 @@ def level_rate(dydt, tables, i):
 @njit(forceinline=True)
 def tank_path(tables, i, high):
     """Flow path from the bottom of the tank at node i to the height `high` above it [m]."""
-    r = tables.rides[tables.nodes[i]["moving_segment"]]["start"]
+    r = tables.moving_segments[tables.nodes[i]["moving_segment"]]["start"]
     return 0.0, 0.0, high, r[1] * high, -r[0] * high, 0.0
 
 
@@ -135,7 +135,7 @@ def vertical_moments(mass, high):
 def node_segment(y, tables, i):
     """Segment (r, t, m) of the fluid at a node."""
     node = tables.nodes[i]
-    r = as_tuple(tables.rides[node["moving_segment"]]["start"])
+    r = as_tuple(tables.moving_segments[node["moving_segment"]]["start"])
     if node["kind"] == TANK:
         return r, (0.0, 0.0, 1.0), vertical_moments(node["mass"] + y[node["y"]], level_at(y, tables, i))
     return r, ZERO_VECTOR, (node["mass"] + y[node["y"]] if node["kind"] == CHAMBER else 0.0, 0.0, 0.0)
@@ -176,8 +176,8 @@ def pipe_segment(tables, k):
     """(r, t, distance between its ends [m]) of a pipe on a body; t is zero if both ends are at the same place."""
     pipe = tables.pipes[k]
     r, s = (
-        tables.rides[pipe["moving_segment"]]["start"],
-        tables.rides[pipe["moving_segment"] + pipe["cells"] - 1]["end"],
+        tables.moving_segments[pipe["moving_segment"]]["start"],
+        tables.moving_segments[pipe["moving_segment"] + pipe["cells"] - 1]["end"],
     )
     x, y, z = s[0] - r[0], s[1] - r[1], s[2] - r[2]
     length = (x * x + y * y + z * z) ** 0.5
@@ -242,12 +242,12 @@ def pipe_load(y, dydt, tables, k):
 def column_path(y, tables, column):
     """Flow path (C, Z) of a column, with the paths in tanks at its ends, in axes of its body."""
     first, last = (
-        tables.rides[column["moving_segment"]]["start"],
-        tables.rides[column["moving_segment"] + column["moving_segments"] - 1]["end"],
+        tables.moving_segments[column["moving_segment"]]["start"],
+        tables.moving_segments[column["moving_segment"] + column["moving_segments"] - 1]["end"],
     )
     x, z, w = 0.0, 0.0, 0.0
     for k in range(column["moving_segments"]):
-        swept = tables.rides[column["moving_segment"] + k]["swept"]
+        swept = tables.moving_segments[column["moving_segment"] + k]["swept"]
         x, z, w = x + swept[0], z + swept[1], w + swept[2]
     i, j = column["from_node"], column["to_node"]
     path = last[0] - first[0], last[1] - first[1], last[2] - first[2], x, z, w
@@ -259,8 +259,8 @@ def column_segment(tables, column, k):
     """(r, t, m) of segment k of a column; the mass of the column is distributed by length."""
     total = 0.0
     for m in range(column["moving_segments"]):
-        total += segment_length(tables.rides[column["moving_segment"] + m])
-    segment = tables.rides[column["moving_segment"] + k]
+        total += segment_length(tables.moving_segments[column["moving_segment"] + m])
+    segment = tables.moving_segments[column["moving_segment"] + k]
     long, mass = segment_length(segment), tables.settings[0]["rho"] * column["area"] * column["length"]
     if not long > 0.0:
         return as_tuple(segment["start"]), ZERO_VECTOR, (mass if total == 0.0 else 0.0, 0.0, 0.0)
@@ -315,7 +315,7 @@ def add_all_fluid_loads(y, dydt, out, tables, least, sign, wide, spin):
 
     wide, spin : offsets in a body row of the acceleration of its origin and of its angular acceleration
     """
-    nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.rides
+    nodes, pipes, columns, segments = tables.nodes, tables.pipes, tables.columns, tables.moving_segments
     for i in range(nodes.size):
         if (
             nodes[i]["moving_segment"] >= 0

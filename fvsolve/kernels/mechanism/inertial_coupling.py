@@ -34,7 +34,7 @@ from fvsolve.kernels.table_handle import open_tables
 @njit
 def path_acceleration(out, tables, segment, path):
     """Acceleration of a body, minus that for q'' = 0, integrated along a flow path on it: C . a + Z . e [m2/s2]."""
-    here = body_row(tables, tables.rides[segment]["body"])
+    here = body_row(tables, tables.moving_segments[segment]["body"])
     a, e, b, c = here + ACCELERATION, here + SPIN_RATE, here + BIAS, here + SPIN_BIAS
     ax, ay, az = rotate_back(out, here + ATTITUDE, out[a] - out[b], out[a + 1] - out[b + 1], out[a + 2] - out[b + 2])
     ex, ey, ez = rotate_back(out, here + ATTITUDE, out[e] - out[c], out[e + 1] - out[c + 1], out[e + 2] - out[c + 2])
@@ -61,7 +61,7 @@ def accelerate_network_flow(t, y, dydt, out, handle):
     Where joint loads are requested (`loads_body` 2), the fluid loads are computed again with the new rates.
     """
     tables = open_tables(handle)
-    pipes, columns, segments = tables.pipes, tables.columns, tables.rides
+    pipes, columns, segments = tables.pipes, tables.columns, tables.moving_segments
     if dydt.size == 0 or tables.freedoms.size == 0:
         return
     add_all_fluid_loads(y, dydt, out, tables, JOINT_LOAD_READ, -1.0, BIAS, SPIN_BIAS)
@@ -86,7 +86,7 @@ def pipe_rate_limit(t, y, dydt, out, handle):
     work, n, damping = tables.scratch, tables.freedoms.size, 0.0
     for k in range(tables.pipes.size):
         pipe = tables.pipes[k]
-        i = tables.rides[pipe["moving_segment"]]["body"] if pipe["moving_segment"] >= 0 else -1
+        i = tables.moving_segments[pipe["moving_segment"]]["body"] if pipe["moving_segment"] >= 0 else -1
         if nearest_free_body(tables, i) < 0:
             continue
         r, direction, _ = pipe_segment(tables, k)
@@ -95,7 +95,17 @@ def pipe_rate_limit(t, y, dydt, out, handle):
         a, b, c = to_world(out, here, direction[0], direction[1], direction[2])
         for m in range(n):
             work[7 * n + m] = 0.0
-        add_body_force(out, tables, i, x + out[here + POSITION], y0 + out[here + POSITION + 1], z + out[here + POSITION + 2],
-                a, b, c, 7 * n)  # fmt: skip
+        add_body_force(
+            out,
+            tables,
+            i,
+            x + out[here + POSITION],
+            y0 + out[here + POSITION + 1],
+            z + out[here + POSITION + 2],
+            a,
+            b,
+            c,
+            7 * n,
+        )
         damping += 2.0 * tables.settings[0]["rho"] * pipe["area"] * pipe["speed"] * mobility(tables, 7 * n)
     out[RATE] = max(out[RATE], damping)

@@ -70,7 +70,7 @@ def segment_drive(motion, r1, r2, wx, wy, wz):
 def set_segment_drives(t, y, dydt, out, handle):
     """Write the drive of all segments, minus that at the start, to out[ride] [J/kg]."""
     tables = open_tables(handle)
-    segments, at, last = tables.rides, tables.layout[0]["moving_segment"], -1
+    segments, at, last = tables.moving_segments, tables.layout[0]["moving_segment"], -1
     for k in range(segments.size):
         segment = segments[k]
         if segment["body"] != last:
@@ -106,7 +106,10 @@ def moving_tank_pressures(t, y, dydt, out, handle):
     for i in range(nodes.size):
         node = nodes[i]
         if node["kind"] == TANK and node["moving_segment"] >= 0:
-            segment, level = tables.rides[node["moving_segment"]], tank_level(node, tables.floats, rho, y[node["y"]])
+            segment, level = (
+                tables.moving_segments[node["moving_segment"]],
+                tank_level(node, tables.floats, rho, y[node["y"]]),
+            )
             out[tables.layout[0]["pressure"] + i] = rho * (
                 bottom_pressure_per_density(tables, out, segment, level) - segment["rest"]
             )

@@ -17,7 +17,7 @@ def moving_tank_pressures_barotropic(t, y, dydt, out, handle):
         node = nodes[i]
         if node["kind"] == TANK and node["moving_segment"] >= 0:
             segment, level = (
-                tables.rides[node["moving_segment"]],
+                tables.moving_segments[node["moving_segment"]],
                 tank_level(node, floats, node["density"], y[node["y"]]),
             )
             h = enthalpy(st, floats, st["ambient"])

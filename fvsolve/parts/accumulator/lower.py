@@ -143,9 +143,11 @@ class ShapedRows(AccumulatorRows, kind=""):
         floats = draft.tables.floats
         empty = -draft.fluid.density * at_start.fluid_volume if start.law.linear else -mass
         floats[at : at + law.NUMBER_COUNT] = [n, at_start.gas, part.volume, 0.0, empty, 0.0]
-        floats[at + self.law.FIRST], floats[at + self.law.LEVEL] = p, at_start.level
+        floats[at + self.law.GAS_PRESSURE], floats[at + self.law.LEVEL] = p, at_start.level
         if part.compressor is not None:
-            floats[at + self.law.BRINGS] = part.compressor.flow * start.case.ambient_pressure / (p * at_start.gas)
+            floats[at + self.law.COMPRESSOR_RATE] = (
+                part.compressor.flow * start.case.ambient_pressure / (p * at_start.gas)
+            )
         node["mass"] = mass
         st = draft.tables.settings[0]
         node["stiffness"] = self.law.pressure_and_stiffness(st, floats, node, int(at), 0.0, 0.0)[1]
@@ -157,7 +159,7 @@ class ShapedRows(AccumulatorRows, kind=""):
 
     def energy(self, model, row, y: float) -> float:
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
-        return self.law.energy_since(st, floats, node, int(row["data"]), y, 0.0)
+        return self.law.stored_energy_change(st, floats, node, int(row["data"]), y, 0.0)
 
 
 class CompressorRows(ShapedRows, kind=""):
@@ -174,7 +176,7 @@ class CompressorRows(ShapedRows, kind=""):
         st, floats, node = model.tables.settings[0], model.tables.floats, model.tables.nodes[row["node"]]
         at, mass, a, rho = int(row["data"]), int(node["y"]), float(y[row["y"]]), model.case.properties.density
         u, change, _, _ = self.law.base_states(st, floats, node, at, float(y[mass]), a)
-        gas, p = floats[at + law.GAS_VOLUME] * math.exp(u), floats[at + self.law.FIRST] + change
+        gas, p = floats[at + law.GAS_VOLUME] * math.exp(u), floats[at + self.law.GAS_PRESSURE] + change
         root = math.sqrt(0.5 * part.exponent * p * gas)
         total = super().energy_rows(model, part, row, y, out)[0][mass]
         rest = math.sqrt(max(0.0, total**2 - (root / (rho * gas)) ** 2))

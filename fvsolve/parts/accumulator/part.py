@@ -10,7 +10,7 @@ from fvsolve.parts.connection.part import Connection, ConnectionTable, with_conn
 from fvsolve.parts.context import CaseContext, Faults
 from fvsolve.parts.junction.part import Junction
 from fvsolve.parts.node import Node
-from fvsolve.parts.table_model import Nested, at_least_one
+from fvsolve.parts.table_model import Nested, missing_key_faults
 from fvsolve.parts.tank.part import Surface
 from fvsolve.parts.value import Number, Quantity, Range, UsualRange, nonnegative, positive
 
@@ -108,7 +108,7 @@ class Accumulator(Node, kind="accumulator"):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
         faults = super().key_faults(given)
-        faults += [(keys, f"no gas; {message}") for keys, message in at_least_one(given, GAS_KEYS)]
+        faults += [(keys, f"no gas; {message}") for keys, message in missing_key_faults(given, GAS_KEYS)]
         shapes = [key for key in SHAPE_KEYS if key in given]
         if not shapes:
             text = "has no effect on a vessel without a shape; give diameter or area, or remove it"

@@ -161,7 +161,7 @@ class MovingWall(PatchNode):
     """A patch that is a moving wall: force on the water (inward), power into the water, travel."""
 
     wall_quantities: ClassVar[dict[str, str]] = {"force": "force", "power": "power", "travel": "position"}
-    quantities: ClassVar[dict[str, str]] = PatchNode.quantities | own
+    quantities: ClassVar[dict[str, str]] = PatchNode.quantities | wall_quantities
 
 
 class Physics(Table):

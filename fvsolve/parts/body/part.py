@@ -207,11 +207,19 @@ class Body(Node, kind="body"):
 
     domain: ClassVar[str] = "spatial"
     quantities: ClassVar[dict[str, str]] = {
-        **POSE_QUANTITIES, **vector_quantities("v", "velocity"), **vector_quantities("w", "angular_velocity"), **vector_quantities("a", "acceleration"),
-        "angle": "angle", "travel": "position", "rate": "angular_velocity",
-        **vector_quantities("joint_f", "force"), **vector_quantities("joint_t", "torque"), "kinetic_energy": "energy",
-        **vector_quantities("momentum_", "momentum"), **vector_quantities("angular_momentum_", "angular_momentum"),
-    }  # fmt: skip
+        **POSE_QUANTITIES,
+        **vector_quantities("v", "velocity"),
+        **vector_quantities("w", "angular_velocity"),
+        **vector_quantities("a", "acceleration"),
+        "angle": "angle",
+        "travel": "position",
+        "rate": "angular_velocity",
+        **vector_quantities("joint_f", "force"),
+        **vector_quantities("joint_t", "torque"),
+        "kinetic_energy": "energy",
+        **vector_quantities("momentum_", "momentum"),
+        **vector_quantities("angular_momentum_", "angular_momentum"),
+    }
 
     mass: Annotated[float, Quantity("mass", positive, "mass of the body and all that is fixed to it [kg]",
                                     UsualRange(1e-6, 1e9, "poppets to ships"))]  # fmt: skip
@@ -243,6 +251,8 @@ class BodyPoint(Node, kind=""):
     kind: ClassVar[str] = "point"
     domain: ClassVar[str] = "spatial"
     quantities: ClassVar[dict[str, str]] = {
-        **vector_quantities("", "position"), **vector_quantities("v", "velocity"), **vector_quantities("a", "acceleration"),
+        **vector_quantities("", "position"),
+        **vector_quantities("v", "velocity"),
+        **vector_quantities("a", "acceleration"),
         **{f"a{axis}_{share}": "acceleration" for axis in "xyz" for share in ACCELERATION_TERMS},
-    }  # fmt: skip
+    }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fvsolve.parts.table_model import Table, at_most_one
+from fvsolve.parts.table_model import Table, exclusive_key_faults
 from fvsolve.parts.value import VALUE, Number, Quantity, UsualRange, nonnegative, positive
 
 DROPS = UsualRange(20.0, 1e8, "millimetres of water to the springs of test rigs")
@@ -47,7 +47,7 @@ class Disc(Table):
 
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list:
-        faults = super().key_faults(given) + at_most_one(given, ("time_constant", "natural_frequency"))
+        faults = super().key_faults(given) + exclusive_key_faults(given, ("time_constant", "natural_frequency"))
         if "natural_frequency" in given and "damping_ratio" not in given:
             faults.append((("natural_frequency",), "needs a damping_ratio, for example 0.3"))
         if "damping_ratio" in given and "natural_frequency" not in given:

@@ -42,7 +42,7 @@ class CurvePoints:
     coefficients: tuple[float, ...] = ()
 
     def table(self) -> dict[str, list[float]]:
-        """What the file would say."""
+        """Table as in a case file."""
         if self.coefficients:
             return {"coefficients": list(self.coefficients)}
         return {"flow": list(self.flow), self.quantity: list(self.value)}
@@ -111,8 +111,14 @@ class HeadCurve(Value):
         flows = np.linspace(0.0, end, 1001)
         rises = np.flatnonzero(np.polynomial.polynomial.polyval(flows, slope) > 0.0)
         if rises.size:
-            raise ValueFault([(("coefficients",), f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; it must fall "
-                                              "as the flow rises")])  # fmt: skip
+            raise ValueFault(
+                [
+                    (
+                        ("coefficients",),
+                        f"the head rises at a flow of {flows[rises[0]]:.4g} m3/s; it must fall as the flow rises",
+                    )
+                ]
+            )
 
     def json(self) -> dict[str, Any]:
         return {"anyOf": [keys_json(keys_of("head", "head")), keys_json(self.polynomial)]}
@@ -181,7 +187,7 @@ class SuterTable:
     torque: tuple[float, ...]
 
     def table(self) -> dict[str, Any]:
-        """What the file would say."""
+        """Table as in a case file."""
         table = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: list(value) if isinstance(value, tuple) else value for name, value in table.items()}
 

@@ -136,9 +136,11 @@ class PumpRows(ShaftLowering, Device, kind="pump"):
                 f"pump {name}: runs at {valve['drive']:.4g} of its rated speed, with a flow that is not on its curve"
             )
         draft.warnings += [
-            *reversed_pump(start, name, part, valve), *unusual_flow(draft, name, part), *estimated_inertia(draft, name, part),
+            *reversed_pump(start, name, part, valve),
+            *unusual_flow(draft, name, part),
+            *estimated_inertia(draft, name, part),
             *rated_point_notes(draft, name, part),
-        ]  # fmt: skip
+        ]
         return moving + self.set_free_shaft(start, part, row, valve)
 
     def fluid_torque(self, start, row, valve) -> float:

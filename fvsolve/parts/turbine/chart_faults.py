@@ -55,15 +55,25 @@ def angle_faults(points: list[tuple[float, float]]) -> list[tuple[str, str]]:
     for k, ((n, q), (m, r)) in enumerate(pairwise(points)):
         across = n * r - q * m
         if abs(across) <= ANGLE_TOLERANCE * math.hypot(n, q) * math.hypot(m, r):
-            return [("", f"points {k + 1} and {k + 2}, {point_text((n, q))} and {point_text((m, r))}, are in line with the origin; "
-                         f"expected different angles, atan2({FLOW}, {SPEED})")]  # fmt: skip
+            return [
+                (
+                    "",
+                    f"points {k + 1} and {k + 2}, {point_text((n, q))} and {point_text((m, r))}, are in line with the "
+                    f"origin; expected different angles, atan2({FLOW}, {SPEED})",
+                )
+            ]
         if across * way < 0.0:
             rule = f"its angle, atan2({FLOW}, {SPEED}), must rise or fall throughout: give the points in their order"
             return [("", f"turns back at point {k + 1}, {point_text((n, q))}; a curve may fold in {SPEED}, but {rule}")]
         way = across
         if (n > 0.0) != (m > 0.0) and (q * abs(m) + r * abs(n)) <= 0.0:
-            return [("", f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at rest, "
-                         "which no head drives")]  # fmt: skip
+            return [
+                (
+                    "",
+                    f"passes from {point_text((n, q))} to {point_text((m, r))} across reverse flow through a runner at "
+                    "rest, which no head drives",
+                )
+            ]
     if not (points[0] if way > 0.0 else points[-1])[0] >= LEAST:
         return [(SPEED, f"is below {LEAST:g} at the end of least angle; a turbine drives at forward speed")]
     return []

@@ -30,8 +30,7 @@ class TurbineRows(ShaftLowering, Device, kind="turbine"):
     small = 1.0  # rad/s
 
     def inputs(self, model, name, part):
-        opening_input = opening_input(model, name)
-        return opening_input | {"speed": Input(ANGULAR_SPEED, int(self.row_of(model, name)["schedule"]))}
+        return opening_input(model, name) | {"speed": Input(ANGULAR_SPEED, int(self.row_of(model, name)["schedule"]))}
 
     def restriction(self, draft, name, link, row) -> None:
         density = draft.fluid.density

@@ -187,8 +187,11 @@ def _delay_line_settings(case: Case, schemes, methods, cells, rtol, step) -> lis
         )
     travel = max(pipe.length / case.wave_speed(name) for name, pipe in pipes(case).items())
     steps = sorted(step or [float(f"{travel / n:.2g}") for n in TRAVEL_PARTS], reverse=True)
-    return [lumped_setting(method, size, "step")
-            for method in dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD]) for size in steps]  # fmt: skip
+    return [
+        lumped_setting(method, size, "step")
+        for method in dict.fromkeys([*(methods or DELAY_LINE_METHODS), DEFAULT_METHOD])
+        for size in steps
+    ]
 
 
 def scheme_method_pairs(

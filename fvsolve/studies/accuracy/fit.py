@@ -265,8 +265,12 @@ def is_clear_line(h, e, first: int, stop: int) -> bool:
 
 def extend_window(h, e, p, first: int, stop: int) -> tuple[int, int]:
     """Window extended by earlier rows on its line, and without a last row that begins to leave the line."""
-    while first > 0 and is_line(h, e, first - 1, stop) and abs(p[first - 1] - line_of(h[first:stop], e[first:stop])[0]) \
-            <= order_tolerance(0.5 * (p[first - 1] + p[first])):  # fmt: skip
+    while (
+        first > 0
+        and is_line(h, e, first - 1, stop)
+        and abs(p[first - 1] - line_of(h[first:stop], e[first:stop])[0])
+        <= order_tolerance(0.5 * (p[first - 1] + p[first]))
+    ):
         first -= 1
     all_changes = np.max(np.abs(np.diff(p[first : stop - 1])), initial=0.0)
     inner_changes = np.max(np.abs(np.diff(p[first : stop - 2])), initial=0.0)

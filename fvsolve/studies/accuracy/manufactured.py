@@ -127,11 +127,11 @@ class RunWithSource:
     """One run with a source, in segments between the kinks and jumps of the case."""
 
     def __init__(self, model, source: UserFunction) -> None:
-        self.model, self.slate, self.source, self.limit = model, RunData(model), source, np.inf
+        self.model, self.run_data, self.source, self.limit = model, RunData(model), source, np.inf
 
     def rates(self, t: float, y: np.ndarray, dydt: np.ndarray) -> None:
         """Rates of the model plus the source."""
-        dydt[:] = self.slate.evaluate(t, y, self.limit)[0]
+        dydt[:] = self.run_data.evaluate(t, y, self.limit)[0]
         for row, pipe in zip(self.model.tables.pipes, self.model.pipes, strict=True):
             mass, momentum = averages(lambda x, name=pipe.name: self.source(name, x, t), pipe.edges)
             o, n = int(row["y"]), pipe.cells
@@ -170,8 +170,8 @@ class RunWithSource:
 
     def row(self, t: float, y: np.ndarray) -> np.ndarray:
         """Row of the history: time and probes."""
-        out = self.slate.evaluate(t, y, self.limit)[1]
-        return np.concatenate([[t], self.slate.observe(t, y, out)])
+        out = self.run_data.evaluate(t, y, self.limit)[1]
+        return np.concatenate([[t], self.run_data.observe(t, y, out)])
 
     def step(self) -> float:
         """Fixed step of the case, or the step for its Courant number [s]."""

@@ -56,24 +56,25 @@ def order(
     """
     if against not in REFERENCE_KINDS:
         raise FvsolveError(
-            f'against = "{against}" is unknown{did_you_mean(against, REFERENCE_KINDS)}. Expected {", ".join(REFERENCE_KINDS)}'
+            f'against = "{against}" is unknown{did_you_mean(against, REFERENCE_KINDS)}. '
+            f"Expected {', '.join(REFERENCE_KINDS)}"
         )
     given = initial, source, exact
     if any(given) and (jobs != 1 or dask is not None):
         raise FvsolveError("initial, source and exact are functions of this process. Expected jobs = 1 and no dask")
     report, studies = progress or (lambda *_: None), []
     pairs = [(scheme, method) for scheme in name_list(schemes) or [None] for method in name_list(methods) or [None]]
-    with cache_in(out) as points, RunQueue(case, jobs, dask) as errands:
+    with cache_in(out) as points, RunQueue(case, jobs, dask) as queue:
         for scheme, method in pairs:
             pair_settings = {"numerics.scheme": scheme, "numerics.method": method}
             settings = {**(set or {}), **{name: value for name, value in pair_settings.items() if value is not None}}
             studies.append(
-                _order_of_pair(case, settings, (refine, key, levels, cells), against, given, points, report, errands)
+                _order_of_pair(case, settings, (refine, key, levels, cells), against, given, points, report, queue)
             )
     return studies[0] if len(studies) == 1 else studies
 
 
-def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points, progress, errands: RunQueue) -> Order:
+def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points, progress, queue: RunQueue) -> Order:
     """Order study of one scheme and method.
 
     rows : refine, key, levels and cells; given : initial, source and exact solution, None if absent
@@ -88,7 +89,7 @@ def _order_of_pair(case, settings: Mapping, rows: tuple, against, given, points,
     if given == (None, None, None):
         from fvsolve.studies.accuracy.order_study import OrderStudy
 
-        return OrderStudy(case, refinement, against, errands, settings).study(points, progress)
+        return OrderStudy(case, refinement, against, queue, settings).study(points, progress)
     from fvsolve.studies.accuracy.manufactured import ManufacturedStudy
 
     refuse_basins(case, "order by functions of pipes")

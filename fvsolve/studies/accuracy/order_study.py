@@ -122,7 +122,7 @@ class OrderStudy:
     def reference(self) -> Reference:
         """Reference of all rows."""
         way = "both" if self.against == "exact" else self.plan.way
-        return self.find_reference(way, self.against != "finer", errands=self.queue)
+        return self.find_reference(way, self.against != "finer", queue=self.queue)
 
     def find_reference(self, way: str, exact: bool, **options) -> Reference:
         """Reference for the finest row, of one kind of runs with another scheme and method.
@@ -287,8 +287,12 @@ class OrderStudy:
             raise FvsolveError(f"no row could be run: {runs[0].reason}")
         sizes = {name: variable_size(good, name) for name in names}
         result, theory = self.fitted_order(rows, "richardson", RICHARDSON, {}, sizes), self.theory()
-        fits = {name: {norm: mark_finest(check_three_differences(fitted, theory[norm]), rows) for norm, fitted in norms.items()}
-                for name, norms in result.fits.items()}  # fmt: skip
+        fits = {
+            name: {
+                norm: mark_finest(check_three_differences(fitted, theory[norm]), rows) for norm, fitted in norms.items()
+            }
+            for name, norms in result.fits.items()
+        }
         return replace(
             result, rows=extrapolate(rows, fits), fits=fits, notes=(*result.notes, *difference_notes(rows, fits))
         )
@@ -394,7 +398,7 @@ def row_notes(rows, doubtful: list[str]) -> list[str]:
     if doubtful:
         names = ", ".join(dict.fromkeys(doubtful))
         notes.append(
-            f'errors of rows marked "{UNCERTAIN}" are less than {REFERENCE_MARGIN:g} times the error of the reference ({names}), so '
-            "they are not reliable. Name an exact solution under [exact], or try fewer levels"
+            f'errors of rows marked "{UNCERTAIN}" are less than {REFERENCE_MARGIN:g} times the error of the reference '
+            f"({names}), so they are not reliable. Name an exact solution under [exact], or try fewer levels"
         )
     return notes

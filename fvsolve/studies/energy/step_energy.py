@@ -42,7 +42,7 @@ class EnergyLoop(RunLoop):
     def run(self, budget: float) -> int:
         """`Loop.run`, one step at a time."""
         code, left, armed = super().run(0.0), budget, self.armed
-        while code == loop_indices.BUDGET_SPENT and left > 0.0 and not automatic.wants_change(self.stepper):
+        while code == loop_indices.BUDGET_SPENT and left > 0.0 and not automatic.is_change_due(self.stepper):
             t, y, rules = self.t, self.now.copy(), armed.copy()
             first_values = self.stepper.k[0].copy(), self.stepper.ledger_rates[0].copy()
             steps = self.loop_state[loop_indices.STEPS]
@@ -112,7 +112,7 @@ class EnergyLoop(RunLoop):
         Stage powers have the value before or after a jump, so that the weights place the jump at a wrong time. Stages
         may lie outside the step.
         """
-        past, total, h = self.slate.past, np.zeros_like(self.total), self.t - t
+        past, total, h = self.run_data.past, np.zeros_like(self.total), self.t - t
         if not past.size or past[JUMPS_TRAVELLING] == 0.0:
             return total
         (_, b, c), separation = self.tableau(), time_tolerance(past)
@@ -222,7 +222,7 @@ class EnergyRun(Run):
 
     def __init__(self, model, state, sink, progress) -> None:
         super().__init__(model, state, sink, progress)
-        self.accounts = Accounts(self.slate)
+        self.accounts = Accounts(self.run_data)
         self.loop.watch(self.accounts, self.on_step)
         self.times, self.totals, self.holdings = [self.loop.t], [self.loop.total.copy()], []
         self.first = self.stored_energy()

@@ -181,8 +181,8 @@ class MapRuns:
             if uncertainty > self.tolerance / 2:
                 raise FvsolveError(
                     "the reference is not accurate enough: its error may be "
-                    f"{uncertainty:.2g} of the range of {reference.uncertainty.worst or 'a probe'}, but the tolerance is "
-                    f"{self.tolerance:g}. Try --tolerance {4 * uncertainty:.1g}, or more cells; if this probe shows "
+                    f"{uncertainty:.2g} of the range of {reference.uncertainty.worst or 'a probe'}, but the tolerance "
+                    f"is {self.tolerance:g}. Try --tolerance {4 * uncertainty:.1g}, or more cells; if this probe shows "
                     "only rounding, remove it from output.probes"
                 )
             self._references[at] = reference

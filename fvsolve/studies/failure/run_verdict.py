@@ -156,6 +156,13 @@ def measure_run(outcome, windows: Sequence[np.ndarray], reference) -> Measures:
         ]
         outside = np.maximum(steps - reference_rows.max(axis=0), reference_rows.min(axis=0) - steps) / widths
         return Measures(
-            outcome.reason, True, False, float(np.max(error)), max(0.0, float(outside.max())), ringing_amplitude(windows, widths),
-            excess_variation(rows, expected, widths), outcome.counts["steps"], outcome.seconds,
-        )  # fmt: skip
+            outcome.reason,
+            True,
+            False,
+            float(np.max(error)),
+            max(0.0, float(outside.max())),
+            ringing_amplitude(windows, widths),
+            excess_variation(rows, expected, widths),
+            outcome.counts["steps"],
+            outcome.seconds,
+        )

@@ -30,7 +30,7 @@ class RecordedRun(CappedRun):
     def pause(self) -> None:
         """Record the probes, and in a long run skip the steps between two windows. Raises GivenUp at the CPU limit."""
         self.check()
-        self.windows[-1].append(self.slate.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
+        self.windows[-1].append(self.run_data.observe(self.loop.t, self.loop.now, self.loop.stepper.out))
         apart = int(self.loop.loop_state[loop_indices.STEPS]) // WINDOW_COUNT
         self.budget = 1.0
         if apart > WINDOW_STEPS and len(self.windows[-1]) >= WINDOW_STEPS:

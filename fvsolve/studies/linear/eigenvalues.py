@@ -82,8 +82,8 @@ def find_eigenvalues(e: Any) -> Spectrum:
     values = np.concatenate(by_place)
     if not values.size:
         raise FvsolveError(
-            f"ARPACK found no eigenvalue of {n} states in time; up to {MAX_DENSE} states all are computed: use fewer cells, "
-            "--set links.NAME.cells=100"
+            f"ARPACK found no eigenvalue of {n} states in time; up to {MAX_DENSE} states all are computed: use fewer "
+            "cells, --set links.NAME.cells=100"
         )
     digits = 9 - int(np.log10(np.abs(values).max()))
     distinct = sort_eigenvalues(np.unique(np.round(np.concatenate([values, values.conj()]), digits)))

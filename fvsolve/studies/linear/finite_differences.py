@@ -42,7 +42,7 @@ def central_differences(
     return 0.5 * (forward + backward), forward - backward
 
 
-def one_sided_differences(
+def single_sided_differences(
     f: Function, x: np.ndarray, direction: np.ndarray, base: np.ndarray, steps: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """One-sided difference along `direction` in place of both: (-3 f(x) + 4 f(x + h) - f(x + 2 h)) / 2 h, twice."""

@@ -16,7 +16,7 @@ from fvsolve.studies.linear.finite_differences import (
     COARSE_STEPS,
     SLOPE_TOLERANCE,
     longest_step_slopes,
-    one_sided_differences,
+    single_sided_differences,
     two_sided_differences,
 )
 from fvsolve.studies.linear.operating_point import OperatingPoint, has_limiter, operating_point
@@ -26,12 +26,27 @@ from fvsolve.validation import FLAG, NAMES, NUMBER, TABLE, TEXT, validated
 
 EULER_PARAMETERS = ("eps_x", "eps_y", "eps_z")
 STATE_UNITS = {
-    "mass": "kg", "excess": "kg", "air": "kg", "forward": "kg/s", "backward": "kg/s", "memory": "kg/s", "flow": "kg/s",
-    "creep": "kg/s", "position": "m", "velocity": "m/s", "speed": "-", "opening": "-",
-    "angle": "rad", "rate": "rad/s", "travel": "m", "travel_rate": "m/s", **dict.fromkeys(("eta", *EULER_PARAMETERS), "-"),
-    **{f"spin_{axis}": "rad/s" for axis in "xyz"}, **{f"centre_{axis}": "m" for axis in "xyz"},
+    "mass": "kg",
+    "excess": "kg",
+    "air": "kg",
+    "forward": "kg/s",
+    "backward": "kg/s",
+    "memory": "kg/s",
+    "flow": "kg/s",
+    "creep": "kg/s",
+    "position": "m",
+    "velocity": "m/s",
+    "speed": "-",
+    "opening": "-",
+    "angle": "rad",
+    "rate": "rad/s",
+    "travel": "m",
+    "travel_rate": "m/s",
+    **dict.fromkeys(("eta", *EULER_PARAMETERS), "-"),
+    **{f"spin_{axis}": "rad/s" for axis in "xyz"},
+    **{f"centre_{axis}": "m" for axis in "xyz"},
     **{f"centre_v{axis}": "m/s" for axis in "xyz"},
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +201,7 @@ def input_column(at, name, input_, value, size, outputs, steps) -> tuple[np.ndar
     if input_.sort.bounded:
         steps = np.concatenate([COARSE_STEPS, steps])
     if value <= low or value >= high:
-        differences, width = one_sided_differences, width if value <= low else -width
+        differences, width = single_sided_differences, width if value <= low else -width
     elif input_.sort.bounded:
         width = np.minimum(width, min(value - low, high - value))
 

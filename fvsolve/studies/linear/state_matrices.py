@@ -31,7 +31,7 @@ TRIAL_DIRECTIONS = 3  # random directions along which A is checked
 def responses(at: OperatingPoint, y: np.ndarray, outputs: int) -> np.ndarray:
     """dy/dt and the first probes at the state y : float64[n + outputs]."""
     model, t = at.model, float(at.t)
-    with model.slate(at.armed) as data:
+    with model.run_data(at.armed) as data:
         dydt, out = data.evaluate(t, y, np.inf)
         values = data.observe(t, y, out)[:outputs] if outputs else np.zeros(0)
     if out[rec.STATUS] != rec.OK or not np.all(np.isfinite(dydt)):

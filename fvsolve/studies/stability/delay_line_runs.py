@@ -45,7 +45,7 @@ class DelayLineRuns(RealRuns):
         loop.now[:] = model.start
         loop.now[system.states] += x
         loop.loop_state[loop_indices.T] = t
-        write_history(loop.slate.past, model.tables.delays, t, system.h, history)
+        write_history(loop.run_data.past, model.tables.delays, t, system.h, history)
         loop.begin(t + 2.0 * self.steps * system.h, NO_LIMIT)
         return loop
 
@@ -76,7 +76,7 @@ class DelayLineRuns(RealRuns):
                 raise TimeoutError
             if any(run.run(budget) != loop_indices.BUDGET_SPENT for run in runs):
                 return np.inf, n
-            moved, base = ((run.now[system.states], read_history(run.slate.past, system)) for run in runs)
+            moved, base = ((run.now[system.states], read_history(run.run_data.past, system)) for run in runs)
             growth = float(system.size((moved[0] - base[0])[:, None], (moved[1] - base[1])[..., None])[0]) / small
             if not growth <= self.threshold:
                 return growth if growth > self.threshold else np.inf, n

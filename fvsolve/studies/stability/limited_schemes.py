@@ -114,11 +114,18 @@ def limited_limit(
     name = limiter or scheme
     counts = tuple(n * steps for n in STEP_FACTORS)
     return LimitedLimit(
-        scheme, limiter, method_named(method).name,
+        scheme,
+        limiter,
+        method_named(method).name,
         {branch: limit_of(weights, branch, method) for branch, weights in branches(scheme, limiter).items()},
-        monotone_limit(name, method), cells, counts,
-        {start: tuple(measured_courant(scheme, limiter, method, u, n) for n in counts) for start, u in start_fields(cells).items()},
-    )  # fmt: skip
+        monotone_limit(name, method),
+        cells,
+        counts,
+        {
+            start: tuple(measured_courant(scheme, limiter, method, u, n) for n in counts)
+            for start, u in start_fields(cells).items()
+        },
+    )
 
 
 def monotone_limit(limiter: str, method: str) -> float | None:

@@ -181,7 +181,7 @@ class RowTask:
                        "too small?")  # fmt: skip
 
     def __getstate__(self) -> dict:
-        return {"sent": self.pickled_case, "asked": self.options, "makers": {}}
+        return {"pickled_case": self.pickled_case, "options": self.options, "makers": {}}
 
 
 class SchemeRows:

@@ -101,9 +101,11 @@ class TooLarge(FvsolveError):
 
 def too_large(states: int, steps: int) -> str:
     """Text of that error."""
-    return (f"{states} states and {steps} steps take longer than {TIME_LIMIT:g} s to predict: give pipes or basins fewer "
-            "cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] (or a greater numerics.cell_time for pipes "
-            "without cells; the limit as a Courant number changes little), or use fewer --steps")  # fmt: skip
+    return (
+        f"{states} states and {steps} steps take longer than {TIME_LIMIT:g} s to predict: give pipes or basins fewer "
+        "cells, --set links.NAME.cells=100 or nodes.NAME.cells=[20,20] (or a greater numerics.cell_time for pipes "
+        "without cells; the limit as a Courant number changes little), or use fewer --steps"
+    )
 
 
 def step_function(method: Method, h: float, e: Any) -> Callable[[np.ndarray], np.ndarray]:

@@ -40,9 +40,9 @@ def energy(case: dict) -> tuple[float, list]:
     model = fvsolve.build(fvsolve.load(case))
     run = Run(model, fvsolve.initial_state(model), MemorySink(model), None)
     warnings = run.go().warnings
-    out = run.slate.evaluate(run.loop.t, run.loop.now, np.inf)[1]
+    out = run.run_data.evaluate(run.loop.t, run.loop.now, np.inf)[1]
     total = 0.5 * float(model.tables.nodes["stiffness"].max()) * float(run.loop.now[-1]) ** 2
-    for line, (r, l) in zip(model.tables.delays, run.slate.along(run.loop.t, out).values(), strict=True):  # noqa: E741
+    for line, (r, l) in zip(model.tables.delays, run.run_data.along(run.loop.t, out).values(), strict=True):  # noqa: E741
         pipe = model.tables.pipes[line["pipe"]]
         r, l = r + 0.5 * pipe["flow"], l - 0.5 * pipe["flow"]  # noqa: E741
         total += float(np.mean(r**2 + l**2) * line["tau"] * line["stretches"] * pipe["speed"] / pipe["area"])
