@@ -1,6 +1,6 @@
 """Choose the quick tests: record what each test costs, and write the others to `tests/durations.json`.
 
-    python tests/choose_quick_tests.py [--seconds 480] [--recording FOLDER]
+    python tests/choose_quick_tests.py [--seconds 415] [--recording FOLDER]
 
 A test costs its own processor time and its share of compiling: the time to compile a function, divided by the number of
 quick tests that call it. The dearest test goes, again and again, until the rest takes the time that is given. A test
@@ -209,7 +209,7 @@ def quick(tests: dict[str, Cost], compiled: dict[str, float], seconds: float) ->
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=480.0, help="processor time of the quick tests (default 480)")
+    parser.add_argument("--seconds", type=float, default=415.0, help="processor time of the quick tests (default 415)")
     parser.add_argument("--recording", type=Path, metavar="FOLDER", help="read a recording, or write one here")
     options = parser.parse_args()
     folder = options.recording or Path(tempfile.mkdtemp(prefix="fvsolve-recording-"))

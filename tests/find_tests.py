@@ -4,21 +4,73 @@
     python tests/find_tests.py fvsolve/steady.py --line 120   tests that run a line
     python tests/find_tests.py --record                       record anew: ten minutes on two cores
 
-The recording has two parts, by coverage.py: the quick tests, for Python; and a small set of quick tests without
-compiling, for what is compiled else (`"uncompiled"` in `tests/durations.json`).
+The recording has two parts, by coverage.py: the quick tests, for Python, and the quick tests of `UNCOMPILED` without
+compilation, for kernels. Tests of the second part that need a compiler, or more than LONGEST, fail as expected.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import signal
 import subprocess
 import sys
 from collections import Counter
 from pathlib import Path
 
+import pytest
+
 TOP = Path(__file__).parents[1]
-RECORDINGS = {"python": {}, "compiled": {"NUMBA_DISABLE_JIT": "1"}}  # name -> environment of its tests
+UNCOMPILED = (
+    "tests/kernels",
+    "tests/fluid",
+    "tests/basins/test_basin.py",
+    "tests/basins/test_faces.py",
+    "tests/parts/test_leak.py",
+    "tests/parts/test_outlets.py",
+    "tests/parts/test_pump.py",
+)
+LONGEST, fail as expected.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+TOP = Path(__file__).parents[1]
+UNCOMPILED = ("tests/kernels", "tests/basins/test_basin.py", "tests/basins/test_faces.py", "tests/parts/test_outlets.py",
+              "tests/parts/test_pump.py", "tests/parts/test_leak.py", "tests/fluid")  # fmt: skip
+LONGEST = 8  # time limit of a test without compilation [s]
+RECORDINGS = {  # name -> environment and paths of its tests
+    "python": ({}, ()),
+    "compiled": (
+        {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(Path(__file__).parent)},
+        ("--quick", "-p", "find_tests", *UNCOMPILED),
+    ),
+}
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    """Fail a test that takes longer than LONGEST; a hook of the plugin of uncompiled tests."""
+
+    def stop(*_):
+        raise TimeoutError(f"longer than {LONGEST} s")
+
+    signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    try:
+        return (yield)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
 
 
 def path_of(name: str) -> Path:
@@ -28,10 +80,10 @@ def path_of(name: str) -> Path:
 def record() -> None:
     """Run the tests of both parts with a context for each test."""
     options = ["-q", "-n", "2", "--dist", "worksteal", "--cov=fvsolve", "--cov-context=test", "--cov-report="]
-    for name, environment in RECORDINGS.items():
+    for name, (environment, paths) in RECORDINGS.items():
         path_of(name).parent.mkdir(exist_ok=True)
         environment = os.environ | environment | {"COVERAGE_FILE": str(path_of(name))}
-        subprocess.run([sys.executable, "-m", "pytest", *options], cwd=TOP, env=environment, check=False)
+        subprocess.run([sys.executable, "-m", "pytest", *options, *paths], cwd=TOP, env=environment, check=False)
 
 
 def tests_of(module: Path, line: int | None) -> Counter:

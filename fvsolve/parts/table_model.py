@@ -61,8 +61,8 @@ class Table(BaseModel):
     @classmethod
     def key_faults(cls, given: dict[str, Any]) -> list[tuple[tuple[Any, ...], str]]:
         """Faults of incompatible or missing keys : list of (key path, text)."""
-        too_many = [fault for keys in cls.alternatives for fault in exclusive_key_faults(given, keys)]
-        return too_many + [fault for keys in cls.needs for fault in missing_key_faults(given, keys)]
+        exclusive_faults = [fault for keys in cls.alternatives for fault in exclusive_key_faults(given, keys)]
+        return exclusive_faults + [fault for keys in cls.needs for fault in missing_key_faults(given, keys)]
 
     @classmethod
     def resolve_keys(cls, given: dict[str, Any], setting: ReadContext) -> dict[str, Any]:

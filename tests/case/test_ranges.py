@@ -44,11 +44,11 @@ SLIPS = {  # settings -> (place, key, value, limit, what the text says)
     ),
     "modulus": (
         {"links.main.wall": {"youngs_modulus": "170 MPa", "thickness": "8 mm"}},
-        "links.main", "wall.youngs_modulus", 170e6, 2e8, "GPa meant?",
+        "links.main", "wall.youngs_modulus", 170e6, 2e8, "is the unit GPa?",
     ),
     "modulus of steel": (
         {"links.main.wall": {"youngs_modulus": "210 MPa", "thickness": "8 mm"}},
-        "links.main", "wall.youngs_modulus", 210e6, 4e8, "GPa meant?",
+        "links.main", "wall.youngs_modulus", 210e6, 4e8, "is the unit GPa?",
     ),
     "modulus in GPa": (
         {"links.main.wall": {"youngs_modulus": 170, "thickness": "8 mm"}},

@@ -188,7 +188,8 @@ class Pipe(Conduit, kind="pipe"):
         for limit, thin, example in SOFT_WALLS:
             if wall.youngs_modulus < limit and wall.thickness < thin * self.diameter:
                 text = (f"{wall.youngs_modulus:g} Pa is below {limit:g} Pa, {example}, for which a wall of "
-                        f"{wall.thickness:g} m is too thin in a bore of {self.diameter:g} m; GPa meant?")  # fmt: skip
+                        f"{wall.thickness:g} m is too thin in a bore of {self.diameter:g} m; "
+                        "is the unit GPa?")  # fmt: skip
                 yield ("wall", "youngs_modulus"), wall.youngs_modulus, limit, text
                 return
 

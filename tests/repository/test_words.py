@@ -1,0 +1,92 @@
+"""Names and texts use words of the field: a list of words may not appear, and docstrings begin as sentences do."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import fvsolve
+
+PACKAGE = Path(fvsolve.__file__).parent
+# Words without content, and metaphors that only the authors understood.
+IN_NAMES = frozenset(
+    """told tell tells said say says asked asks ask wanted wants found made brought bring kept keeps met meet meets
+    meeting led unfelt felt feel meant errand errands crew slate freight laden rung rungs halves ride rides riding
+    ridden hand hands handed bench wiped lean room rooms house door doors misfit misfits lent bent tasted lasting
+    patient unsayable sayable unsaid spelt heeded bears borne bearable beside elsewhere nobody swelling mend mends
+    mended leap leapt wholes what which whose why whether one many""".split()
+)
+IN_TEXTS = re.compile(
+    r"\b(wanted|wants|is none|(?<!there )is no [a-z]+|are none|told|asked for|heeded|nobody|bears|meant)\b"
+)
+PUBLIC = frozenset({"what", "found", "told", "rungs"})  # fields of JSON files
+OPENINGS = re.compile(r"(What|Which|Whether|That|As|The same)\b")
+
+
+def trees():
+    for path in sorted(PACKAGE.rglob("*.py")):
+        yield path.relative_to(PACKAGE).as_posix(), ast.parse(path.read_text(encoding="utf-8"))
+
+
+def names(tree: ast.Module):
+    """Identifiers that a module defines, with their lines."""
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+            yield node.name, node.lineno
+        elif isinstance(node, ast.arg):
+            yield node.arg, node.lineno
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            yield node.id, node.lineno
+        elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+            yield node.attr, node.lineno
+
+
+def words(name: str) -> set[str]:
+    return set(re.findall(r"[a-z]+", re.sub(r"([A-Z])", r"_\1", name).lower()))
+
+
+def docstrings(tree: ast.Module):
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef)) and (text := ast.get_docstring(node)):
+            yield text, getattr(node, "lineno", 1)
+
+
+def texts(tree: ast.Module):
+    """String constants with a blank that are no docstrings: messages, help, descriptions."""
+    own = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Module, ast.FunctionDef, ast.ClassDef))
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value and id(node) not in own:
+            yield node.value, node.lineno
+
+
+def test_no_identifier_has_a_forbidden_word():
+    wrong = [
+        f"{path}:{line} {name}"
+        for path, tree in trees()
+        for name, line in names(tree)
+        if words(name) & IN_NAMES and name not in PUBLIC
+    ]
+    assert wrong == []
+
+
+def test_no_module_has_a_forbidden_word_in_its_name():
+    assert [path for path, _ in trees() if words(path) & IN_NAMES] == []
+
+
+def test_no_message_nor_help_has_a_forbidden_word():
+    wrong = [f"{path}:{line} {text}" for path, tree in trees() for text, line in texts(tree) if IN_TEXTS.search(text)]
+    assert wrong == []
+
+
+def test_no_docstring_begins_with_a_relative_clause():
+    wrong = [
+        f"{path}:{line} {text}" for path, tree in trees() for text, line in docstrings(tree) if OPENINGS.match(text)
+    ]
+    assert wrong == []
