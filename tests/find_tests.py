@@ -5,7 +5,7 @@
     python tests/find_tests.py --record                       record anew: ten minutes on two cores
 
 The recording has two parts, by coverage.py: the quick tests, for Python, and the quick tests of `UNCOMPILED` without
-compilation, for kernels. Tests of the second part that need a compiler, or more than LONGEST, fail as expected.
+compilation, for kernels. Tests of the second part that need a compiler, or more than LIMIT, fail as expected.
 """
 
 from __future__ import annotations
@@ -30,25 +30,7 @@ UNCOMPILED = (
     "tests/parts/test_outlets.py",
     "tests/parts/test_pump.py",
 )
-LONGEST, fail as expected.
-"""
-
-from __future__ import annotations
-
-import argparse
-import os
-import signal
-import subprocess
-import sys
-from collections import Counter
-from pathlib import Path
-
-import pytest
-
-TOP = Path(__file__).parents[1]
-UNCOMPILED = ("tests/kernels", "tests/basins/test_basin.py", "tests/basins/test_faces.py", "tests/parts/test_outlets.py",
-              "tests/parts/test_pump.py", "tests/parts/test_leak.py", "tests/fluid")  # fmt: skip
-LONGEST = 8  # time limit of a test without compilation [s]
+LIMIT = 8  # time of a test without compilation [s]
 RECORDINGS = {  # name -> environment and paths of its tests
     "python": ({}, ()),
     "compiled": (
@@ -60,13 +42,13 @@ RECORDINGS = {  # name -> environment and paths of its tests
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item):
-    """Fail a test that takes longer than LONGEST; a hook of the plugin of uncompiled tests."""
+    """Fail a test that takes longer than LIMIT: a hook for the tests without compilation."""
 
     def stop(*_):
-        raise TimeoutError(f"longer than {LONGEST} s")
+        raise TimeoutError(f"longer than {LIMIT} s")
 
     signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST)
+    signal.setitimer(signal.ITIMER_REAL, LIMIT)
     try:
         return (yield)
     finally:
