@@ -175,14 +175,14 @@ def field_deviations(run: Outcome, truth) -> dict[tuple, Deviation]:
         ):
             deviations[pipe.name, quantity] = Deviation(values - reference_values, lengths, width)
     for basin in model.basins:
-        basin_fields = reference_fields.get(("basin", basin.name))
-        if basin_fields is None:
+        reference_basin = reference_fields.get(("basin", basin.name))
+        if reference_basin is None:
             continue
-        spans = np.ptp(basin_fields, axis=1)
+        spans = np.ptp(reference_basin, axis=1)
         if len(spans) >= 3 and basin.quantities:
             spans[1:3] = spans[1:3].max()
         for (content, values), reference_values, span in zip(
-            basin_fields(basin, run.y).items(), basin_fields, spans, strict=True
+            basin_fields(basin, run.y).items(), reference_basin, spans, strict=True
         ):
             deviations[basin, content] = Deviation(
                 values - reference_values, basin.mesh.area, float(span) if span > CONSTANT else math.nan

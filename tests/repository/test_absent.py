@@ -18,15 +18,15 @@ from fvsolve.model import RunData
 from fvsolve.solve.run_loop import RunLoop
 from fvsolve.steppers import loop_indices
 
-PIPES = {"pipes", "ends", "reconstruction", "limiters", "leap"}
-MASSES = {"masses"}
-BODIES = {"joints", "matrix", "room", "pins", "bushings"}
+PIPES = {"pipes", "ghost_cells", "reconstruction", "limiters", "fused_step"}
+MASSES = {"mass_dynamics"}
+BODIES = {"joints", "mass_matrix", "body_layout", "loop_constraints", "bushings"}
 DEVICES = {"check_valve", "regulator", "pump", "accumulator"}
-MEMORY = {"memory"}  # of unsteady friction
+MEMORY = {"relaxation_terms"}  # of unsteady friction
 IMPLICIT = {"newton", "dirk", "irk", "ros", "differences", "linear_dense", "linear_banded", "linear_sparse"}
-CAVITIES = {"cavitating", "cavitating_nodes", "riemann"}
+CAVITIES = {"cavitating_pipes", "cavitating_nodes", "riemann"}
 JOBS = (*PHASES, "observe", "record", "events")
-SCALARS = {"scalars", "mixing"}
+SCALARS = {"scalar_transport", "node_mixing"}
 ALL = SCALARS | PIPES | MASSES | BODIES | DEVICES | MEMORY | CAVITIES | IMPLICIT
 
 
@@ -89,20 +89,20 @@ def test_other_laws_compile_no_more_for_two_tanks(law, compiling):
 
 
 def test_each_room_is_compiled_where_it_is_used(compiling):
-    assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"leap"}
+    assert files(fvsolve.build(fvsolve.load(line()))) & ALL == PIPES - {"fused_step"}
     found = files(fvsolve.build(fvsolve.load(tanks(method="implicit-euler", step=0.1))))
     assert found & ALL == {"newton", "dirk", "differences", "linear_dense"}
     dyed = line() | {"scalars": {"dye": {}}}
-    assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"leap"} | SCALARS
+    assert files(fvsolve.build(fvsolve.load(dyed))) & ALL == PIPES - {"fused_step"} | SCALARS
     log = line() | {"fluid": {"name": "Water", "law": "log"}}
-    assert files(fvsolve.build(fvsolve.load(log))) & ALL == PIPES - {"leap"}
+    assert files(fvsolve.build(fvsolve.load(log))) & ALL == PIPES - {"fused_step"}
     wet = {**WATER, "law": "mixture", "air_fraction": 1e-6, "cavitation": True}
     found = files(fvsolve.build(fvsolve.load(line(scheme="muscl") | {"fluid": wet})))
     assert found & ALL == CAVITIES | {"reconstruction", "limiters"}
     cylinder = fvsolve.build(fvsolve.load(CASES / "closed-cylinder.toml"))  # law: log
     assert files(cylinder) & (PIPES | MASSES | BODIES) == MASSES
     arm = fvsolve.build(fvsolve.load(bodies({"arm": pendulum()}, 1.0)))
-    assert files(arm) & BODIES == BODIES - {"pins", "bushings"} and not files(arm) & PIPES
+    assert files(arm) & BODIES == BODIES - {"loop_constraints", "bushings"} and not files(arm) & PIPES
 
 
 @pytest.mark.parametrize("law", ["linear", "log"])
@@ -157,7 +157,7 @@ def test_a_basin_alone_has_the_rates_that_it_has_beside_a_link(physics, law):
 
 
 def test_a_basin_compiles_no_links_and_no_other_scheme(compiling):
-    network, fifth = {"restrictions", "curves", "nodes", "patches", "limiters"}, {"fifth_order", "bounds"}
+    network, fifth = {"restrictions", "linear_nodes", "basin_patches", "limiters"}, {"fifth_order", "flux_correction"}
     muscl, weno5 = (files(fvsolve.build(fvsolve.load(pool("transport", False, scheme=s)))) for s in ("muscl", "weno5"))
     assert muscl & (network | fifth) == {"limiters"}
     assert weno5 & (network | fifth) == fifth | {"limiters"}

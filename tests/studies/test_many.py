@@ -31,7 +31,7 @@ class Work:
             raise ValueError("what a task raises")
         return task * task, os.getpid()
 
-    def lost(self, task):
+    def lost_result(self, task):
         return "lost", task
 
 
