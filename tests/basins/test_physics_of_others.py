@@ -26,13 +26,13 @@ SOURCES = {
 """Heat on a belt. Knows its keys."""
 from typing import Annotated, ClassVar
 from fvsolve.parts.basin.part import Physics
-from fvsolve.parts.formula import Formula, Shaped
+from fvsolve.parts.formula import SpatialField, SpatialFieldKey
 from fvsolve.parts.table_model import Table
 from fvsolve.parts.value import Quantity, positive
 
 class Warm(Table):
     """What it starts from."""
-    heat: Annotated[Formula | None, Shaped("number", "of the belt")] = None
+    heat: Annotated[SpatialField | None, SpatialFieldKey("number", "of the belt")] = None
 
 class Belt(Physics, name="belt"):
     """T_t + v T_x = 0."""
@@ -46,12 +46,12 @@ class Belt(Physics, name="belt"):
 ''',
     "rates.py": '''
 """Rates of the cells of a belt, and what probes read there."""
-from fvsolve.basins.physics_codes import kind_of
+from fvsolve.basins.physics_codes import physics_code
 from fvsolve.jit import njit
 from fvsolve.kernels.table_handle import open_tables
 from fvsolve.kernels.dtypes import CELL_FIELD, RATE
 
-OWN_CODE = kind_of(__package__)
+OWN_CODE = physics_code(__package__)
 
 @njit
 def carry(t, y, dydt, out, handle):
@@ -82,14 +82,14 @@ def read(t, y, out, handle, values):
 """A belt lowered to rows of tables."""
 import numpy as np
 from fvsolve.basins.lower_basin import BasinRows
-from fvsolve.kernels.rhs_assembly import Pieces
+from fvsolve.kernels.rhs_assembly import RhsTerms
 
 class BeltRows(BasinRows):
     """One state a cell."""
     units = {"heat": "K"}
 
     def pieces(self, valves):
-        yield Pieces(home=__package__, rates="rates: carry", observe="rates: read")
+        yield RhsTerms(package=__package__, rates="rates: carry", observe="rates: read")
 
     def lower(self, draft, row):
         row["speed"] = self.part.pace
@@ -115,7 +115,7 @@ import json, sys
 import numpy as np
 import fvsolve
 from fvsolve.case.schema import schema
-from fvsolve.model.jacobian_pattern import sparsity
+from fvsolve.model.jacobian_pattern import jacobian_pattern as sparsity
 
 case = json.loads(sys.argv[2])
 

@@ -16,7 +16,7 @@ from fvsolve.draw.plot_process import processor_count
 BEGIN = """
 import sys
 from pathlib import Path
-from fvsolve.draw.plot_process import Painter, Picture
+from fvsolve.draw.plot_process import PlotProcess, Picture
 t = [0.0, 1.0]
 arguments = {"t": t, "values": __import__("numpy").array([t, t]).T, "probes": [("a.level", "m"), ("b.level", "m")]}
 wanted = [Picture(Path(name), "history_figure", arguments) for name in ("one.png", "two.png")]
@@ -64,7 +64,7 @@ def test_without_pictures_there_are_none_until_they_are_asked_for(fork):
 @alone
 def test_a_second_process_draws_and_is_gone_at_the_end(tmp_path):
     code = """
-with Painter(beside=True) as painter:
+with PlotProcess(second_process=True) as painter:
     process = painter.process
     print(painter.draw(wanted), "matplotlib" in sys.modules, process.poll(), Path("two.png").stat().st_size > 5000)
 print(process.poll() is None)
@@ -75,7 +75,7 @@ print(process.poll() is None)
 @alone
 def test_a_second_process_that_dies_loses_nothing(tmp_path):
     code = """
-with Painter(beside=True) as painter:
+with PlotProcess(second_process=True) as painter:
     painter.process.kill()
     print(painter.draw(wanted), Path("one.png").stat().st_size > 5000, Path("two.png").stat().st_size > 5000)
 """
@@ -86,7 +86,7 @@ with Painter(beside=True) as painter:
 def test_what_cannot_be_drawn_is_named_and_the_rest_is_drawn(tmp_path, beside):
     (tmp_path / "fresh-one.png").mkdir()
     code = f"""
-with Painter(beside={beside}) as painter:
+with PlotProcess(second_process={beside}) as painter:
     failed = painter.draw(wanted)
 print(*failed, "IsADirectoryError" in failed[Path("one.png")], Path("two.png").stat().st_size > 5000)
 """
@@ -101,7 +101,7 @@ class Broken:
     def __iter__(self):
         raise KeyboardInterrupt
 arguments["probes"] = Broken()
-with Painter(beside=False) as painter:
+with PlotProcess(second_process=False) as painter:
     try:
         painter.draw(wanted)
     except KeyboardInterrupt:

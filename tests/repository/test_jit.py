@@ -115,7 +115,7 @@ def test_settings_that_change_code_have_a_store_of_their_own(package):
         told = python(package, PROBE, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
         assert told[0] == "12.0"
     assert told[1] == "False" and python(package, PROBE, NUMBA_DEBUG_JIT="0") == ["12.0", "False", "False"]
-    said = "from fvsolve import jit; print(jit.elsewhere())"
+    said = "from fvsolve import jit; print(jit.other_caches())"
     other, own = (python(package, said, **settings) for settings in ({"NUMBA_OPT": "1"}, {}))
     assert " ".join(other).count(jit.store.target()["processor"]) == 3, "two stores and this machine's"
     assert (
@@ -127,7 +127,7 @@ def test_code_of_other_sources_is_named(package):
     python(package, PROBE)
     old = python(package, "from fvsolve import jit; print(jit.source_hash())")[0]
     (package / "units.py").write_text("NEW = 1\n")
-    told = " ".join(python(package, "from fvsolve import jit; print(jit.elsewhere())"))
+    told = " ".join(python(package, "from fvsolve import jit; print(jit.other_caches())"))
     assert f"contains code compiled from other sources ({old}); the present sources are " in told
 
 

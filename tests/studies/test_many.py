@@ -64,10 +64,10 @@ def test_processes_end_with_the_one_that_started_them(tmp_path):
     """Killed, it can tell nobody; what they do would go on for hours."""
     script = """if True:
         import os, signal, sys, time
-        from fvsolve.studies.parallel import many
+        from fvsolve.studies.parallel import run_tasks
         def said(task):
             if task: open(f"{sys.argv[1]}/{os.getpid()}", "w").close(); time.sleep(60.0)
-        if __name__ == "__main__": [*many(said, [0, 1, 2], jobs=2)]"""
+        if __name__ == "__main__": [*run_tasks(said, [0, 1, 2], jobs=2)]"""
     (tmp_path / "script.py").write_text(textwrap.dedent(script))
     (tmp_path / "there").mkdir()
     running = subprocess.Popen([sys.executable, tmp_path / "script.py", tmp_path / "there"])
