@@ -12,7 +12,10 @@ from fvsolve.model.wall_creep import elements
 
 
 def datum_of(model: Model, port: str | None = None) -> float:
-    """Datum of elevations [m]: that of a port if given, else the lowest node; reservoirs given by head do not count."""
+    """Datum of elevations [m]: elevation of the node `port`, or if None of the lowest node.
+
+    Reservoirs given by a head do not count.
+    """
     if port is not None:
         return float(model.elevation[port])
     placed = [model.elevation[name] for name, node in model.case.places.items() if getattr(node, "head", None) is None]
@@ -20,10 +23,11 @@ def datum_of(model: Model, port: str | None = None) -> float:
 
 
 def available_energy(model: Model) -> dict[str, float]:
-    """Energy of the starting profile above that of the same parts at P = 0 [J], an upper bound of released energy.
+    """Energy of every part at the start [J], above its energy at rest and at P = 0 : name -> energy.
 
-    P = p - p_ambient + rho g z, z from the datum in the settings. For a tank P = 0 puts its surface at the datum, or as
-    near to it as its bottom and rim allow.
+    P = p - p_ambient + rho g z is the reduced pressure [Pa], z the elevation above the datum in the settings [m]. A
+    tank at P = 0 has its surface at the datum, or as near to it as its bottom and rim allow. The sum over all parts is
+    an upper bound of the energy that the model can release.
     """
     tables, nodes, energies = model.tables, model.tables.nodes, {}
     datum = float(tables.settings[0]["datum"])
@@ -52,7 +56,10 @@ def available_energy(model: Model) -> dict[str, float]:
 
 
 def vessel_energy_function(model: Model):
-    """Function energy(node row) of a chamber at the start, above that at P = 0 [J]."""
+    """Function of a chamber's NODE row that returns the energy of the chamber at the start, above that at P = 0 [J].
+
+    P is the reduced pressure, as in `available_energy`.
+    """
     st, floats = model.tables.settings[0], model.tables.floats
     if model.case.law.linear:
         return lambda row: 0.5 * row["volume"] * potential(model, row) ** 2 / model.case.properties.bulk_modulus
@@ -71,14 +78,14 @@ def vessel_energy_function(model: Model):
 
 
 def potential(model: Model, row) -> float:
-    """P of a node at the start under the linear law [Pa]."""
+    """Reduced pressure P = p - p_ambient + rho g z of a node at the start [Pa], under the linear density law."""
     st = model.tables.settings[0]
     height = float(row["elevation"] - st["datum"])
     return float(row["pressure"]) - model.case.ambient_pressure + float(st["rho"] * st["gravity"]) * height
 
 
 def pipe_energy(model: Model, k: int) -> float:
-    """Energy of pipe k at the start above that at P = 0 and rest [J]."""
+    """Energy of pipe k at the start [J], above its energy at rest and at the reduced pressure P = 0."""
     row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
     if model.case.law.linear:
         p, flow = potential(model, model.tables.nodes[row["from_node"]]), row["flow"] / row["area"]
@@ -101,7 +108,7 @@ def pipe_energy(model: Model, k: int) -> float:
 
 
 def friction_memory_energy(model: Model, k: int) -> float:
-    """Energy in memory states of unsteady friction of pipe k, for the flow of the start [J]."""
+    """Energy in the memory states of unsteady friction of pipe k [J], for the flow at the start."""
     row, pipe, st = model.tables.pipes[k], model.pipes[k], model.tables.settings[0]
     share, full, square = float(memory_shares(model.tables.floats, row).sum()), st["rho"] * row["area"], 1.0
     if not model.case.law.linear:  # memory states hold velocities
@@ -110,7 +117,7 @@ def friction_memory_energy(model: Model, k: int) -> float:
 
 
 def creep_energy(model: Model, k: int) -> float:
-    """Energy in creep of the wall of pipe k at the start above that at P = 0 [J]."""
+    """Energy in the creep of the wall of pipe k at the start [J], above that at the reduced pressure P = 0."""
     row = model.tables.pipes[k]
     if row["elements"] == 0:
         return 0.0
@@ -129,7 +136,10 @@ def creep_energy(model: Model, k: int) -> float:
 
 
 def tank_energy_above_datum(model: Model, row) -> float:
-    """Energy of a tank above that with its surface at the datum, or as near as its bottom and rim allow [J]."""
+    """Energy of a tank at the start [J], above its energy with the surface at the datum.
+
+    If the bottom or the rim of the tank does not allow this level, the nearest possible level counts.
+    """
     from fvsolve.kernels.linear_energy import tank_energy
     from fvsolve.kernels.tank_levels import tank_level
 

@@ -1,4 +1,4 @@
-"""Start of bodies: balance of joint forces, constraint forces of pins, motion at the start."""
+"""Start of bodies: balance of joint forces, constraint forces of pins, velocities and accelerations at the start."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EQUILIBRIUM_SHARE = (
 
 
 def refuse_massless(draft, at: StaticForces) -> None:
-    """Faults of bodies with a free joint coordinate but no inertia, of their own or of bodies attached to them."""
+    """Add a fault for a body whose joint allows a motion without inertia, of the body or of bodies attached to it."""
     at.run(MOTION, ACCELERATE)
     n = len(draft.freedom_table)
     for name, row in reversed(list(zip(draft.body_names, draft.body_table, strict=True))):
@@ -36,7 +36,7 @@ def refuse_massless(draft, at: StaticForces) -> None:
 
 
 def start_bodies(draft, start) -> list[str]:
-    """Set lengths of lines and balanced forces of joints at the start; return texts of motions."""
+    """Set start lengths of lines of action and balanced forces of joints; return texts of motions at the start."""
     if not len(draft.body_table):
         return []
     at = StaticForces(draft, start.t)
@@ -62,12 +62,15 @@ def start_bodies(draft, start) -> list[str]:
 
 
 def rounding(draft) -> float:
-    """Share of forces below which their sum counts as rounding."""
+    """Fraction of the sum of force magnitudes below which the sum of these forces counts as rounding error."""
     return EQUILIBRIUM_SHARE if draft.case.numerics.initial == "equilibrium" else ROUNDING_SHARE
 
 
 def pin_rows(draft, at: StaticForces) -> np.ndarray:
-    """Rows G of all pins at the start : float64[rows, freedoms]."""
+    """Constraint matrix of all pins at the start : float64[constraints, freedoms].
+
+    The matrix times the joint velocities gives the velocities at which the pins open, one per constrained direction.
+    """
     n, count = len(draft.freedom_table), int(draft.pin_table["rows"].sum())
     if count:
         at.run(*at.pushes, PINNED)
@@ -76,7 +79,10 @@ def pin_rows(draft, at: StaticForces) -> np.ndarray:
 
 
 def start_pins(draft, at: StaticForces) -> np.ndarray:
-    """Set gaps and forces of pins at the start; return the remaining forces of freedoms. Adds faults."""
+    """Set gaps and constraint forces of pins at the start, and add faults of pins.
+
+    Returns the remaining generalised force on each joint freedom : float64[freedoms] [N] or [N m].
+    """
     at.run(*at.pushes, GAPS)
     first = int(at.layout["pin"])
     for k, row in enumerate(draft.pin_table):
@@ -103,7 +109,10 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
 
 
 def redundant_pins(rows: np.ndarray, names: list[str]) -> list[str]:
-    """Names of pins with rows that are zero or linearly dependent on earlier rows."""
+    """Names of pins whose constraint rows are zero or linearly dependent on earlier rows.
+
+    rows : float64[constraints, freedoms]  see `pin_rows`; names : name of the pin of each row
+    """
     dependent, basis = [], np.zeros((0, rows.shape[1]))
     size = np.linalg.norm(rows, axis=1).max()
     for name, row in zip(names, rows, strict=True):
@@ -117,7 +126,10 @@ def redundant_pins(rows: np.ndarray, names: list[str]) -> list[str]:
 
 
 def motion_at_start(draft, accelerations: np.ndarray) -> list[str]:
-    """Texts of velocities and accelerations at the start."""
+    """Texts of the velocities and accelerations of bodies at the start.
+
+    accelerations : float64[freedoms]  [m/s2] or [rad/s2]
+    """
     texts, amount = [], draft.case.amount
     for name, row in zip(draft.body_names, draft.body_table, strict=True):
         pose, own = draft.case.poses[name], accelerations[row["freedom"] : row["freedom"] + row["freedoms"]]

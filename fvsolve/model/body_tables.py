@@ -1,4 +1,4 @@
-"""Tables of bodies, joints, points and lines."""
+"""Tables of bodies, joints, points of bodies, and lines of action of forces between points."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STATES = {  # for each kind: coordinates, then velocities, each with its size of
 
 
 def lower_bodies(draft) -> None:
-    """Fill the tables of bodies and of their freedoms, each body after its parent."""
+    """Fill the tables of bodies and of their degrees of freedom, each body after its parent body."""
     nodes = draft.case.nodes_with_water
     draft.body_names = list(draft.case.poses)
     table = draft.body_table = np.zeros(len(draft.body_names), rec.BODY)
@@ -53,7 +53,7 @@ def lower_bodies(draft) -> None:
 
 
 def fill_body(draft, name: str, body: Body, row) -> None:
-    """Fill the row of a body, and add its states."""
+    """Fill the BODY row of a body, and add the states of its joint."""
     joint, t = body.joint, draft.case.numerics.start
     row["joint"], row["mass"], row["centre"] = KINDS[joint.kind], body.mass, body.centre_of_mass
     row["inertia"], row["axis"] = body.inertia_matrix().ravel(), joint.unit_axis
@@ -83,7 +83,10 @@ def fill_body(draft, name: str, body: Body, row) -> None:
 
 
 def drive_joint(draft, name: str, schedule, row) -> None:
-    """Drive a joint by a schedule. Faults of schedules whose rate jumps: they would need infinite forces."""
+    """Write the schedule that drives a joint to the BODY row.
+
+    Adds a fault if the value or the rate of the schedule jumps during the run, because this needs an infinite force.
+    """
     row["schedule"] = draft.schedules.add(schedule)
     key = "travel" if row["joint"] == rec.PRISMATIC else "angle"
     start, end = draft.case.numerics.start, draft.case.numerics.end  # kinks before the start have no effect
@@ -100,7 +103,10 @@ def drive_joint(draft, name: str, schedule, row) -> None:
 
 
 def rate_jumps(schedule) -> list[tuple[float, bool]]:
-    """Times at which the rate or the value of a schedule jumps : (time, True for a value); a ramp may end level."""
+    """Times at which the value or the rate of a schedule jumps : list of (time [s], True if the value jumps).
+
+    The end of a ramp counts only if its exponent is at most 1; with a greater exponent the ramp ends with zero rate.
+    """
     if schedule.kind != "ramp":
         return break_times(schedule)
     (first, last), n = break_times(schedule), schedule.exponent
@@ -108,7 +114,7 @@ def rate_jumps(schedule) -> list[tuple[float, bool]]:
 
 
 def point_row(draft, place: str) -> int:
-    """Row of the point that a link or a probe names; added on first use."""
+    """Row in the table of points for the point that a link or a probe names; added on first use."""
     if place not in draft.point_index:
         name, position = bodies.body_point(draft.case.nodes, place)
         draft.point_index[place] = len(draft.points)
@@ -117,19 +123,23 @@ def point_row(draft, place: str) -> int:
 
 
 def pose_of(draft, place: str) -> bodies.Pose:
-    """Stated pose of the body of a point; the world's pose for a frame."""
+    """Pose (position and attitude) stated for the body of a point; the pose at rest for a point of the world."""
     return draft.case.as_stated.poses.get(bodies.body_point(draft.case.nodes, place)[0], bodies.AT_REST)
 
 
 def add_line(draft, places: tuple[str | None, str], acts: int = rec.ALONG, direction=(0.0, 0.0, 0.0)) -> int:
-    """Row of a line between two points, whose push is numbered later."""
+    """Add a line of action of a force between two points; return its row in the table of lines.
+
+    acts : ALONG the line between the points, TOWARD a direction of the world, or ABOUT an axis of the second body
+    direction : vector of that direction or axis. `lower_lines` later writes the number of the force element.
+    """
     ends = [-1 if place is None else point_row(draft, place) for place in places]
     draft.lines.append((-1, *ends, acts, tuple(direction), 0.0))
     return len(draft.lines) - 1
 
 
 def lower_lines(draft) -> None:
-    """Fill tables of pins and bushings; number the push of each line."""
+    """Fill the tables of pins and bushings; write the number of its force element to each line of action."""
     draft.pin_names, draft.pin_table = draft.fill("pin", rec.PIN)
     draft.bushing_names, draft.bushing_table = draft.fill("bushing", rec.BUSHING)
     for name, row in zip(draft.bushing_names, draft.bushing_table, strict=True):
@@ -145,7 +155,7 @@ def lower_lines(draft) -> None:
 
 
 def relative_turn(draft, places: tuple[str, str]) -> float:
-    """eps.eps of the deviation (56) of two bodies at the start from their stated relative attitude."""
+    """sin(angle / 2)^2 of the rotation between the stated relative attitude of two bodies and that at the start."""
     relative = []
     for case in (draft.case, draft.case.as_stated):
         here, there = (case.poses.get(bodies.body_point(case.nodes, place)[0], bodies.AT_REST) for place in places)
@@ -154,7 +164,11 @@ def relative_turn(draft, places: tuple[str, str]) -> float:
 
 
 def distance_and_rate(draft, places: tuple[str | None, str], line) -> tuple[float, float]:
-    """Distance between two points at the start [m], and its rate [m/s]."""
+    """Distance between two points at the start [m], and its rate [m/s].
+
+    For a line that acts TOWARD a direction, 0 and the relative velocity in it. For a line that acts ABOUT an axis, 0
+    and the relative angular velocity about it [rad/s].
+    """
     ends = []
     for place in places:
         name, position = (bodies.WORLD, np.zeros(3)) if place is None else bodies.body_point(draft.case.nodes, place)

@@ -1,4 +1,4 @@
-"""Build of a model from a case."""
+"""Assembly of the model of a case."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ from fvsolve.steppers.tableau import method_named
 
 
 def build(case) -> Model:
-    """Build the model of a case, with its starting profile.
+    """Build the model of a case, with its initial steady state.
 
-    Raises CaseError if no start exists: a frictionless pipe between unequal heads, a demand that no link can supply, a
-    node joined only by rigid columns.
+    Raises CaseError if no steady state exists: a frictionless pipe between unequal heads, a demand that no link can
+    supply, a node joined only by rigid columns.
     """
     if not isinstance(case, Case):
         raise FvsolveError(f"build takes a Case, not {type(case).__name__}; expected the result of load()")
@@ -55,7 +55,10 @@ def build(case) -> Model:
 
 
 def build_like(case: Case, like: Model | None = None) -> Model:
-    """Build a model; like : model of a case that differs in few numbers, of which unchanged tables are reused."""
+    """Build the model of a case.
+
+    like : model of a similar case; if only sizes of restrictions differ, its other tables are used again
+    """
     notices = []
     if case.needs_equilibrium:
         steady = replace(case, numerics=case.numerics.model_copy(update={"initial": "steady"}))
@@ -72,7 +75,10 @@ def build_like(case: Case, like: Model | None = None) -> Model:
 
 
 def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collection[str] = ()) -> ModelDraft:
-    """Tables of a case with its profile; draft : tables before the start; unfit : pipes that cannot be delay lines."""
+    """Tables of a case with its initial steady state.
+
+    draft : tables before the start, built if None; unfit : names of pipes that cannot be delay lines
+    """
     draft = draft or tables_before_start(case, unfit)
     draft.check()
     draft.steady = start_profile(draft)
@@ -83,7 +89,7 @@ def tables_with_start(case: Case, draft: ModelDraft | None = None, unfit: Collec
 
 
 def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
-    """Tables of a case before its start is known."""
+    """Tables of a case before its initial steady state is known; unfit : names of pipes that cannot be delay lines."""
     draft = ModelDraft(case)
     draft.followed = line_methods(case, unfit)
     fill_nodes(draft)
@@ -98,7 +104,7 @@ def tables_before_start(case: Case, unfit: Collection[str] = ()) -> ModelDraft:
 
 
 def fill_nodes(draft: ModelDraft) -> None:
-    """Fill a row for every node of the fluid."""
+    """Fill the table of fluid nodes, one NODE row for each."""
     table = draft.node_table = np.zeros(len(draft.case.places), rec.NODE)
     table["y"] = table["shape"] = table["schedule"] = table["row"] = table["moving_segment"] = -1
     table["full"] = np.inf
@@ -108,7 +114,7 @@ def fill_nodes(draft: ModelDraft) -> None:
 
 
 def fill_links(draft: ModelDraft) -> None:
-    """Fill rows of links, devices, bodies and masses."""
+    """Fill the tables of links, devices, bodies and masses."""
     draft.pipe_names, draft.pipe_table = draft.fill("pipe", rec.PIPE)
     lower_delays(draft)
     draft.column_names, draft.column_table = draft.fill("column", rec.COLUMN)
@@ -124,10 +130,11 @@ def fill_links(draft: ModelDraft) -> None:
 
 
 def profile_size(draft: ModelDraft) -> int:
-    """Size of all profiles; sets the offsets of each pipe.
+    """Size of the array `profile`, with data of the initial steady state along pipes; sets the offsets of each pipe.
 
-    A profile has a threshold for each cell. Under laws other than `linear`, masses, fluxes and, for pipes that are not
-    straight, rises follow it.
+    It starts with the sum of both waves at which each cell reaches vapour pressure [kg/s]. Under density laws other
+    than `linear`, each pipe adds masses per length at faces [kg/m], momentum fluxes at faces [N], masses per length at
+    centres and, unless it is straight, rises above its `from` end [m].
     """
     at = draft.cells
     if draft.case.law.linear:
@@ -143,7 +150,7 @@ def profile_size(draft: ModelDraft) -> int:
 
 
 def fill_rises(draft: ModelDraft) -> None:
-    """Set the rise of pipes with a profile from their `from` end, at faces and centres [m]."""
+    """Set the rises above the `from` end at faces and centres of pipes with an elevation profile [m]."""
     for row, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
         if row["rise"] >= 0:
             heights = mesh.profile.at(np.linspace(0.0, mesh.length, 2 * mesh.cells + 1))
@@ -153,7 +160,10 @@ def fill_rises(draft: ModelDraft) -> None:
 
 
 def pack(draft: ModelDraft, profile: np.ndarray) -> None:
-    """Make the tuple of tables and the shapes of run arrays. Records stay the same arrays: later changes reach them."""
+    """Make the tuple of tables and the shapes of run arrays.
+
+    The tuple contains the tables of the draft themselves, so that later changes of their records appear in it.
+    """
     settings = settings_of(draft)
     draft.probe_table = lower_probes(draft)
     schedules, pieces = draft.schedules.tables()
@@ -179,7 +189,7 @@ def pack(draft: ModelDraft, profile: np.ndarray) -> None:
 
 
 def settings_of(draft: ModelDraft) -> np.ndarray:
-    """Settings of a model : SETTINGS[1]."""
+    """Settings of a model, a single record : `kernels.dtypes.SETTINGS`[1]."""
     case, pipes, table = draft.case, draft.pipe_table, np.zeros(1, rec.SETTINGS)
     s = table[0]
     scheme_settings(s, case.numerics.scheme, case.numerics.limiter)
@@ -198,7 +208,7 @@ def settings_of(draft: ModelDraft) -> np.ndarray:
 
 
 def column_rates(draft: ModelDraft):
-    """Angular frequencies of rigid columns between nodes that store [1/s]."""
+    """Natural angular frequencies of rigid columns between nodes with storage [1/s]."""
     stiff = draft.node_table["stiffness"]
     for row in draft.column_table:
         k = stiff[row["from_node"]] + stiff[row["to_node"]]
@@ -206,7 +216,7 @@ def column_rates(draft: ModelDraft):
 
 
 def layout_of(draft: ModelDraft) -> np.ndarray:
-    """Offsets in `out`, which the right-hand side writes in addition to dydt : LAYOUT[1]."""
+    """Offsets in `out`, the array that the right-hand side writes in addition to dydt : `kernels.dtypes.LAYOUT`[1]."""
     nodes, pipes, valves, columns = map(
         len, (draft.node_table, draft.pipe_table, draft.valve_table, draft.column_table)
     )
@@ -231,26 +241,33 @@ def layout_of(draft: ModelDraft) -> np.ndarray:
 
 
 def most_states(draft: ModelDraft) -> int:
-    """Upper bound of the number of states after the start has chosen terms of unsteady friction."""
+    """Upper bound of the number of states, for the greatest possible number of terms of unsteady friction."""
     unsteady = [mesh.cells for mesh in draft.meshes if draft.case.links[mesh.name].friction.model == "unsteady"]
     return draft.size + MAX_TERMS * sum(unsteady)
 
 
 def mark_count(draft: ModelDraft) -> int:
-    """Number of marks of a run; for cavities three for each pipe: first place, greatest volume and its time."""
+    """Number of entries of `marks`, the first times at which the model does not hold.
+
+    Density laws with cavities add three for each pipe: location of the first cavity, greatest cavity volume, and its
+    time.
+    """
     parts = len(draft.pipe_table) + 3 * len(draft.node_table) + len(draft.column_table)
     own = 2 * len(draft.device_table) + len(draft.piston_table)
     return parts + own + (3 * len(draft.pipe_table) if draft.case.law.cavitates else 0)
 
 
 def spare_size(draft: ModelDraft) -> int:
-    """Size of the spare array: nodes without storage at events; with delay lines `out` of two states and values."""
+    """Size of the work array `spare`.
+
+    It contains a copy of `out`; with delay lines two copies, and three values for each probe and node.
+    """
     size, values = int(draft.tables.layout["size"][0]), len(draft.probe_table) + len(draft.node_table)
     return size if not len(draft.delay_table) else 2 * size + 3 * values
 
 
 def scratch_size(draft: ModelDraft) -> int:
-    """Largest size of scratch data of the right-hand side."""
+    """Size of the work array `scratch`: the largest size that a function of the right-hand side needs."""
     scalars, nodes = len(draft.scalar_table), len(draft.node_table)
     most = max([0, *draft.pipe_table["cells"], *draft.delay_table["places"]])
     system = max((c["nodes"] * (c["nodes"] + 4) + 5 * c["valves"] for c in draft.cluster_table), default=0)
@@ -265,7 +282,10 @@ def scratch_size(draft: ModelDraft) -> int:
 
 
 def model_of(draft: ModelDraft) -> Model:
-    """Model of a draft. Its start deviates from the profile in basins only, and by amounts of scalars."""
+    """Build the model of a complete draft.
+
+    The state at the start is zero except in basins that deviate from the initial steady state, and for scalar amounts.
+    """
     case, start = draft.case, basin_start(draft.basins, draft.size)
     start_amounts(draft, start)
     inside = sorted(

@@ -1,4 +1,4 @@
-"""Resolution of cavities: notice of too few cells for laws that model cavitation."""
+"""Notice of too few cells to resolve cavities, for density laws that model cavitation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ ENOUGH = 200  # number of cells from which on there is no notice
 
 
 def coarse_for_cavities(draft) -> list[Notice]:
-    """Notice if the pipe with the longest travel time has too few cells for the law's cavities."""
+    """List with a notice if the pipe with the longest travel time has too few cells to resolve cavities; else empty."""
     pipes = draft.meshes
     if not draft.case.law.cavitates or not pipes:
         return []

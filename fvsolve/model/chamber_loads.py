@@ -12,11 +12,11 @@ ITERATIONS = 3  # iterations for the forces that support bodies
 
 
 def supporting_pressures(draft, start) -> dict[int, float]:
-    """Pressures of closed chambers without a stated pressure that carry loads : node -> pressure [Pa].
+    """Pressures of closed chambers that carry loads and have no stated pressure : node -> pressure [Pa].
 
-    Piston forces come from least squares, so that forces of joints and masses vanish. If both chambers of a cylinder
-    are closed, the chamber that need not push has the pressure that its closed links leave it, ambient without links.
-    A chamber that would have to pull gets none.
+    Forces of pistons are the least-squares solution that balances the forces on joints and masses. If both chambers of
+    a cylinder are closed, the chamber that does not push keeps the pressure of its closed links, or ambient pressure
+    without links. A chamber that would need a pressure below that of cavities is left out.
     """
     pistons = draft.locked
     if not pistons:
@@ -52,25 +52,25 @@ def supporting_pressures(draft, start) -> dict[int, float]:
 
 
 class UnbalancedForces:
-    """Unbalanced forces on joints, then on free masses, for given pushes."""
+    """Unbalanced forces on joint freedoms and on free masses, for given pushes of springs, stops and pistons."""
 
     def __init__(self, draft, t: float) -> None:
         self.draft, self.free = draft, np.flatnonzero(draft.mass_table["y"] >= 0)
         self.joints = StaticForces(draft, t) if len(draft.body_table) else None
 
     def under(self, pushes: np.ndarray) -> np.ndarray:
-        """Forces for these pushes : float64[freedoms + masses]."""
+        """Unbalanced forces for given pushes [N] : float64[freedoms + masses], joints first."""
         joints = [] if self.joints is None else self.joints.under(pushes)
         return np.concatenate([joints, forces_on_masses(self.draft, pushes)[self.free]])
 
     def pins(self) -> np.ndarray:
-        """Rows G of all pins : float64[rows, freedoms + masses]."""
+        """Constraint matrix of all pins, see `pin_rows` : float64[constraints, freedoms + masses], zero for masses."""
         rows = np.zeros((0, 0)) if self.joints is None else pin_rows(self.draft, self.joints)
         return np.pad(rows, ((0, 0), (0, len(self.free))))
 
 
 def find_closed_chambers(draft, start) -> None:
-    """Record closed chambers that can support a load, and sides of pistons with trapped fluid."""
+    """Record the sides of each piston with a closed chamber that can carry a load, and the sides with trapped fluid."""
     for k, row in enumerate(draft.piston_table):
         closed = [side for side in "ab" if is_closed(draft, start, int(row[side]))]
         isolated = [side for side in "ab" if start.connected_nodes(int(row[side])) == [row[side]]]
@@ -79,7 +79,7 @@ def find_closed_chambers(draft, start) -> None:
 
 
 def is_closed(draft, start, i: int) -> bool:
-    """True if a chamber without a stated pressure is connected to no node with a fixed pressure."""
+    """True if chamber i has no stated pressure, and no open path joins it to a node with a fixed pressure."""
     places = list(draft.case.places.values())
     if places[i].initial_pressure is not None:
         return False

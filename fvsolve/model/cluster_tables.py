@@ -1,4 +1,4 @@
-"""Solution method of each node without storage: direct, by a closed root, or by Newton's method with other nodes."""
+"""Solution method of each node without storage: alone, with its valve by a closed formula, or in a group by Newton."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.steady import union
 
 
 def classify_nodes(draft) -> None:
-    """Sort nodes and valves into those with closed roots and clusters solved by Newton's method."""
+    """Choose the solution method of nodes without storage and of valves; fill the table of groups solved by Newton."""
     nodes, valves = draft.node_table, draft.valve_table
     inner = nodes["kind"] == rec.JUNCTION
     short = np.flatnonzero(draft.delay_table["now"] > 0.0)
@@ -77,7 +77,10 @@ def classify_nodes(draft) -> None:
 
 
 def mark_event_ends(draft, group) -> None:
-    """Mark ends of delay lines at junctions whose group contains a device with events."""
+    """Mark ends of delay lines at junctions whose group of connected nodes contains a device with events.
+
+    group : label of the group of each node
+    """
     inner, valves, acting = draft.node_table["kind"] == rec.JUNCTION, draft.valve_table, set()
     for v in valves:
         if v["hooks"] >= 0 or (v["device"] >= 0 and draft.devices[v["device"]][2].events):
@@ -92,9 +95,9 @@ def mark_event_ends(draft, group) -> None:
 
 
 def add_inverse(draft, members, couples) -> int:
-    """Append the inverse of the admittance matrix of nodes joined by short delay lines to `floats`.
+    """Append the inverse of the admittance matrix of nodes joined by short delay lines to `floats`; return its offset.
 
-    Returns its offset. The matrix lies row by row.
+    members : indices of the nodes; couples : rows of the delay lines. The inverse is stored row by row.
     """
     rows, place = {i: k for k, i in enumerate(members)}, len(draft.floats)
     matrix = np.diag(draft.node_table["admittance"][members])
@@ -112,12 +115,18 @@ def add_inverse(draft, members, couples) -> int:
 
 
 def has_closed_root(valves) -> np.ndarray:
-    """True for valves solved by a closed root that is the same in both directions : bool[valves]."""
+    """True for each valve with the square-root law and equal conductance in both directions : bool[valves].
+
+    A closed formula solves these valves.
+    """
     return (valves["hooks"] < 0) & (valves["back"] == 1.0)
 
 
 def store_gates(draft) -> None:
-    """For nodes that only valves and rigid columns join, store these valves and the number of columns."""
+    """Store, for each node that only valves and rigid columns join, these valves and the number of columns.
+
+    Nodes with a demand, and nodes with a valve whose device senses a pressure, are left out.
+    """
     nodes, valves, columns = draft.node_table, draft.valve_table, draft.column_table
     nodes["gates"] = -1
     bare = (nodes["kind"] == rec.JUNCTION) & (nodes["admittance"] == 0.0)
@@ -136,7 +145,11 @@ def store_gates(draft) -> None:
 
 
 def refuse_isolated_groups(draft, members) -> None:
-    """Faults of groups of nodes that only valves join, apart from air valves and rigid columns."""
+    """Add a fault for each group of nodes whose pressure nothing sets.
+
+    Valves join the nodes to each other, and only air valves and rigid columns lead out of the group.
+    members : label of a group -> indices of its nodes
+    """
     nodes, valves, names = draft.node_table, draft.valve_table, list(draft.case.places)
     for group in members.values():
         links = [v for v in valves if {int(v["from_node"]), int(v["to_node"])} & set(group)]
@@ -155,7 +168,7 @@ def refuse_isolated_groups(draft, members) -> None:
 
 
 def is_sensed(draft, device: int) -> bool:
-    """True if a device that is not a vessel reads the pressure of a node."""
+    """True if a device that is not a vessel reads the pressure of a node; device : row of the device, -1 for none."""
     return device >= 0 and draft.device_table["node"][device] >= 0 and not draft.devices[device][2].vessel
 
 
@@ -166,7 +179,10 @@ def has_no_demand(draft, i: int) -> bool:
 
 
 def follows_column(draft, members, ks) -> bool:
-    """True if a single valve takes the flow of a rigid column: its drop follows the flow, smooth at zero."""
+    """True if a single valve with a closed formula joins a single node at the end of a rigid column.
+
+    The flow of the column then sets the drop of the valve, which is smooth at zero flow.
+    """
     ends = np.concatenate((draft.column_table["from_node"], draft.column_table["to_node"]))
     plain = has_closed_root(draft.valve_table)[ks[0]]
     return len(ks) == 1 and len(members) == 1 and members[0] in ends and bool(plain)
@@ -176,10 +192,10 @@ TOLERANCES = 10.0  # tolerances of a vessel: its tolerance grows with its deviat
 
 
 def regularise(draft, ks) -> None:
-    """Bound the slope at zero drop where no pipe end does: laminar flow below Reynolds number 10.
+    """Make valves without an adjacent pipe laminar below Reynolds number 10, to bound their slope at zero drop.
 
-    At a bladder accumulator the bound is at least a drop of 1 Pa, as its neck stores hardly any mass. It is also at
-    least the drop below error control (`tolerated_drop`).
+    They are also laminar below the drop of `tolerated_drop`, and at a bladder accumulator below at least 1 Pa, as its
+    neck stores hardly any mass. ks : rows of the valves
     """
     places, unseen = list(draft.case.places.values()), tolerated_drop(draft, ks)
     for k in ks:
@@ -192,15 +208,16 @@ def regularise(draft, ks) -> None:
 
 
 def set_transition(draft, name: str, link, row) -> None:
-    """Make a restriction laminar below Reynolds number 10."""
+    """Set the flow of a restriction at Reynolds number 10, below which it is laminar [kg/s]."""
     row["transition"] = draft.hydraulics.transition_flow(name, link, 10.0, draft.fault)
 
 
 def tolerated_drop(draft, ks) -> float:
-    """Drop [Pa] whose decay changes each vessel by a few tolerances of a step at most.
+    """Pressure drop [Pa] whose decay changes each adjacent vessel by at most a few error tolerances.
 
-    It is 0 without error control. Below it the slope of a root is unbounded. Linearly implicit steps then alternate in
-    sign: each error is below the tolerance, but none comes nearer to rest. A chamber of 10 l took 1e6 steps in 10 s.
+    It is 0 without error control. Near zero drop the slope of the square-root law is unbounded. Linearly implicit steps
+    then alternate in sign: each error is below the tolerance, but the flow never comes to rest. A chamber of 10 l took
+    1e6 steps in 10 s.
     """
     rtol, nodes = draft.case.numerics.rtol, draft.node_table
     ends = {int(draft.valve_table[k][end]) for k in ks for end in ("from_node", "to_node")}

@@ -1,8 +1,8 @@
 """Forces of bodies and masses in configurations other than that of the start.
 
-Pressures and rates are those of the start. Lines, springs, stops and bushings act as in the configuration; water in
-basins on bodies is level there. Pins, and pistons with closed chambers that support a load, are constraints with given
-forces. Unknowns are freedoms of joints as in the velocities, then positions of masses.
+Pressures and velocities are those of the start. Lines of action, springs, stops and bushings act as in the
+configuration; water in basins on bodies is level there. Pins, and pistons with closed chambers that support a load, are
+constraints with given forces. Unknowns q are displacements along joint freedoms, then positions of masses.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ CHAMBERS, PUSHES = "kernels.mass_dynamics: piston_chambers", "kernels.mass_dynam
 
 
 class Configuration(StaticForces):
-    """Forces on freedoms and masses in any configuration; y : states, deviations from the start."""
+    """Forces on joint freedoms and masses in any configuration.
+
+    A configuration is a state vector y : float64[n], deviations from the start. `size` is the number of unknowns.
+    """
 
     def __init__(self, draft) -> None:
         super().__init__(draft, draft.case.numerics.start)
@@ -36,7 +39,10 @@ class Configuration(StaticForces):
         self.hold(np.zeros(self.count))
 
     def hold(self, sizes: np.ndarray) -> None:
-        """Set the forces of pins, then those of supporting pistons."""
+        """Set the constraint forces : float64[constraints] [N].
+
+        They are the forces of pins, then the forces of supporting pistons in addition to those at the start.
+        """
         at = 0
         for row in self.draft.pin_table:
             row["force"][: row["rows"]] = sizes[at : at + row["rows"]]
@@ -45,7 +51,7 @@ class Configuration(StaticForces):
             self.draft.piston_table[k]["force"] = own + size
 
     def move_to(self, y: np.ndarray) -> None:
-        """Move bodies, lines and water to a configuration, water level again, pressures unchanged."""
+        """Move bodies and lines of action to a configuration, with level water and the pressures of the start."""
         self.y[:] = y
         self.run(*(MOTION,) * (self.freedoms > 0), *(CHAMBERS,) * (len(self.masses) > 0))
         first = int(self.layout["pressure"])
@@ -57,7 +63,7 @@ class Configuration(StaticForces):
                 basin.states_of(self.y)[:] = basin.states_of(level)
 
     def force(self, y: np.ndarray) -> np.ndarray:
-        """Forces of freedoms, then of masses."""
+        """Generalised forces in a configuration : float64[size] [N], [N m], on joint freedoms, then on masses."""
         self.move_to(y)
         if len(self.masses):
             self.run(PUSHES)
@@ -69,7 +75,7 @@ class Configuration(StaticForces):
         return np.concatenate([own, net[self.free]])
 
     def scale(self) -> np.ndarray:
-        """Sum of force magnitudes on each freedom and mass, in the present configuration."""
+        """Sum of force magnitudes on each joint freedom and mass, in the current configuration : float64[size]."""
         sizes, first = np.zeros(self.size), int(self.layout["push"])
         pushes = self.out[first : first + len(self.draft.push_names)].copy()
         if self.freedoms:
@@ -85,7 +91,7 @@ class Configuration(StaticForces):
         return sizes
 
     def rows(self, y: np.ndarray) -> np.ndarray:
-        """Effect of each constraint force of size 1 on freedoms and masses : float64[constraints, size]."""
+        """Generalised forces that each constraint force of magnitude 1 causes : float64[constraints, size]."""
         effects = np.zeros((self.count, self.size))
         if not self.count:
             return effects
@@ -102,7 +108,7 @@ class Configuration(StaticForces):
         return effects
 
     def lever(self, k: int) -> np.ndarray:
-        """Effect of a unit push of piston k on freedoms and masses, in the present configuration."""
+        """Generalised forces that a push of 1 N of piston k causes in the current configuration : float64[size]."""
         effects, piston = np.zeros(self.size), self.draft.piston_table[k]
         if piston["line"] < 0:
             for mass, sign in ((piston["case"], -1.0), (piston["rod"], 1.0)):
@@ -117,7 +123,10 @@ class Configuration(StaticForces):
         return effects
 
     def fluid_stiffness(self, y: np.ndarray) -> np.ndarray:
-        """Stiffness of fluid trapped behind pistons, A^2 K / V of each chamber, in -dF/dq : float64[size, size]."""
+        """Stiffness matrix of the fluid trapped behind pistons : float64[size, size], to be added to `stiffness`.
+
+        Each chamber has the stiffness A^2 K / V: piston area A [m2], bulk modulus K [Pa], volume V [m3].
+        """
         matrix, nodes, first = np.zeros((self.size, self.size)), self.draft.node_table, int(self.layout["stiffness"])
         self.move_to(np.zeros_like(y))
         per_mass = self.out[first : first + self.draft.moving].copy()  # with chambers at their starting mass
@@ -134,7 +143,7 @@ class Configuration(StaticForces):
         return matrix
 
     def gaps(self, y: np.ndarray) -> np.ndarray:
-        """Gaps of constraints [m]."""
+        """Gaps of the constraints in a configuration [m]: of pins, then the travel of supporting pistons."""
         self.move_to(y)
         pin_gaps, travel = [], int(self.layout["travel"])
         if len(self.draft.pin_table):
@@ -146,7 +155,7 @@ class Configuration(StaticForces):
         return np.array([*pin_gaps, *(self.out[travel + 2 * (self.first + k)] for k in self.locked)])
 
     def mass(self, y: np.ndarray) -> np.ndarray:
-        """Mass matrix M : float64[size, size] [kg], [kg m2]."""
+        """Mass matrix of the unknowns : float64[size, size] [kg], [kg m2]."""
         matrix, n = np.zeros((self.size, self.size)), self.freedoms
         if n:
             self.force(y)
@@ -157,7 +166,10 @@ class Configuration(StaticForces):
         return matrix
 
     def stiffness(self, y: np.ndarray) -> np.ndarray:
-        """-dF/dq by differences, with constant constraint forces : float64[size, size]."""
+        """Stiffness matrix -dF/dq by central differences, with constant constraint forces : float64[size, size].
+
+        F : generalised forces; q : unknowns
+        """
         matrix = np.zeros((self.size, self.size))
         for i in range(self.size):
             step = DIFFERENCE_STEP * np.eye(self.size)[i]
@@ -167,13 +179,13 @@ class Configuration(StaticForces):
         return matrix
 
     def moving(self) -> bool:
-        """True if a velocity is stated."""
+        """True if the case states a velocity of a body or mass."""
         poses = self.draft.case.poses.values()
         bodies_move = any(np.any(pose.spin) or np.any(pose.velocity) for pose in poses)
         return bodies_move or bool(np.any(self.masses["velocity"]))
 
     def after_step(self, y: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """States after a step of freedoms and masses; Euler parameters turn about axes of their body."""
+        """State vector after a change `step` of the unknowns; ball joints and free bodies rotate about body axes."""
         new = y.copy()
         for row in self.bodies:
             own, at = step[row["freedom"] : row["freedom"] + row["freedoms"]], int(row["y"])
@@ -189,7 +201,7 @@ class Configuration(StaticForces):
         return new
 
     def angular(self) -> np.ndarray:
-        """True for unknowns that are angles : bool[size]."""
+        """True for each unknown that is an angle : bool[size]."""
         angular = np.zeros(self.size, bool)
         for row in self.bodies:
             slides = {rec.FREE: 3, rec.PRISMATIC: 1}.get(int(row["joint"]), 0)
@@ -197,12 +209,12 @@ class Configuration(StaticForces):
         return angular
 
     def shortest(self) -> float:
-        """Length of the shortest line between two points at the start [m]."""
+        """Length of the shortest line of action between two points at the start [m]; infinite without lines."""
         lengths = self.draft.line_table["length"][self.draft.line_table["acts"] == rec.ALONG]
         return float(min(lengths, default=np.inf))
 
     def attitudes(self) -> dict[str, np.ndarray]:
-        """Rotation matrix of every body in the present configuration, by name."""
+        """Rotation matrix of every body in the current configuration : name -> float64[3, 3]."""
         from fvsolve.kernels.mechanism.body_layout import ATTITUDE
 
         return {name: self.row_of(i)[ATTITUDE : ATTITUDE + 9].reshape(3, 3).copy()
@@ -210,7 +222,7 @@ class Configuration(StaticForces):
 
 
 def rotated(e: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Euler parameters after a rotation by a vector [rad] in axes of the body, (44) applied after e."""
+    """Euler parameters `e` followed by a rotation by a vector [rad] in axes of the body; (44) of docs/course.md."""
     angle = float(np.linalg.norm(rotation))
     half = 0.5 * angle
     eta, eps = np.cos(half), (np.sin(half) / angle if angle > 0.0 else 0.5) * rotation

@@ -1,4 +1,4 @@
-"""History of waves in delay lines as one array: sizes, rings, and its part of a state's memory."""
+"""History of the waves in delay lines as one array: size, ring buffers, and storage in the memory of a state."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ LEAST_STEPS = 16  # steps
 
 
 def set_rings(delays: np.ndarray, longest: float) -> None:
-    """Set ring sizes of stretches: their delay in steps of length `longest` [s] and spare entries, a power of two."""
+    """Set the size of the ring buffer of each segment of delay lines, in entries.
+
+    It holds the delay, in steps of length `longest` [s], and spare entries; sizes are powers of two.
+    """
     if not len(delays):
         return
     count = int(delays["stretches"].sum())
@@ -34,7 +37,7 @@ def set_rings(delays: np.ndarray, longest: float) -> None:
 
 
 def history_size(delays: np.ndarray, wider: int = 1) -> int:
-    """Size of the history array of these lines, with rings `wider` times as long as at first."""
+    """Size of the history array of these delay lines, with ring buffers `wider` times as long as at first."""
     if not len(delays):
         return 0
     count, entries = int(delays["stretches"].sum()), wider * int((delays["ring_size"] * delays["stretches"]).sum())
@@ -43,12 +46,12 @@ def history_size(delays: np.ndarray, wider: int = 1) -> int:
 
 
 def jump_capacity(count: int) -> int:
-    """Jumps of each wave that are stored at once, for this number of stretches."""
+    """Number of jumps of each wave that can be stored at the same time, for `count` segments."""
     return max(LEAST_JUMPS, min(MOST_JUMPS, TOTAL_JUMPS // count))
 
 
 def reset_history(past: np.ndarray, delays: np.ndarray) -> None:
-    """Clear the history and write its sizes."""
+    """Clear the history array and write its sizes."""
     if not len(delays):
         return
     past[:], count = 0.0, int(delays["stretches"].sum())
@@ -59,7 +62,7 @@ def reset_history(past: np.ndarray, delays: np.ndarray) -> None:
 
 
 def ring_factor(past: np.ndarray, delays: np.ndarray) -> int:
-    """Length of rings relative to that at first, from the size of the history."""
+    """Factor by which ring buffers are longer than at first, from the size of the history array."""
     wider = 1
     while history_size(delays, wider) < past.size:
         wider *= 2
@@ -67,9 +70,9 @@ def ring_factor(past: np.ndarray, delays: np.ndarray) -> int:
 
 
 def split_memory(memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Split the memory of a state : (memory without history, history of delay lines).
+    """Split the memory of a state : (memory of the integrator, history of delay lines).
 
-    Raises ValueError if the memory has no such history.
+    Raises ValueError if the memory contains no history.
     """
     size = int(memory[-1]) if memory.size and np.isfinite(memory[-1]) else -1
     if not 0 <= size < memory.size:
@@ -78,12 +81,12 @@ def split_memory(memory: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stored_entries(past: np.ndarray) -> np.ndarray:
-    """Numbers of all entries whose times are stored."""
+    """Indices of all entries whose times are still stored."""
     return np.arange(max(at.PROFILE_ENTRIES, int(past[at.COUNT]) - int(past[at.CAPACITY])), int(past[at.COUNT]))
 
 
 def jump_times(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """Times at which jumps reach ends or middles of stretches, between `begin` and `end` [s], increasing."""
+    """Times at which jumps reach ends or middles of segments, between `begin` and `end` [s], increasing."""
     places, queue = at.offsets_of(past), int(past[at.JUMP_CAPACITY])
     heads = past[places[1] : places[2]].reshape(-1, at.HEAD_SIZE)
     line_of, arrivals = np.repeat(np.arange(len(delays)), delays["stretches"]), []
@@ -98,7 +101,7 @@ def jump_times(past: np.ndarray, delays: np.ndarray, begin: float, end: float) -
 
 
 def steps_left(past: np.ndarray, delays: np.ndarray) -> int:
-    """Steps that can be taken before an entry is lost that is still needed."""
+    """Number of steps that can be taken before an entry is overwritten that is still needed."""
     count, sizes = int(past[at.COUNT]), int(past[at.RING_FACTOR]) * delays["ring_size"]
     if count == 0:
         return int(sizes.min()) - MARGIN_ENTRIES - LEAST_STEPS
@@ -111,7 +114,7 @@ def steps_left(past: np.ndarray, delays: np.ndarray) -> int:
 
 
 def with_doubled_rings(past: np.ndarray, delays: np.ndarray) -> np.ndarray:
-    """History with rings twice as long, with the same entries."""
+    """Copy of the history with ring buffers twice as long, with the same entries."""
     wider = 2 * int(past[at.RING_FACTOR])
     result = np.zeros(history_size(delays, wider))
     result[: at.HEADER_SIZE] = past[: at.HEADER_SIZE]
@@ -131,7 +134,7 @@ def with_doubled_rings(past: np.ndarray, delays: np.ndarray) -> np.ndarray:
 
 
 def jump_overflow_notices(past: np.ndarray) -> list[Notice]:
-    """Notice if there was no storage for some jumps."""
+    """Notice if there was no storage for some jumps, which were smoothed; else an empty list."""
     if not past.size or past[at.GREATEST_UNSTORED_JUMP] == 0.0:
         return []
     share = past[at.GREATEST_UNSTORED_JUMP] / past[at.GREATEST_JUMP]

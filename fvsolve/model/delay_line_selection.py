@@ -1,8 +1,9 @@
-"""Selection of pipes that become delay lines, their division into stretches, and bounds of the error.
+"""Choice of the pipes that become delay lines, their division into segments, and bounds of the error.
 
-Bounds are relative to the greatest jump of a schedule. Friction concentrated in the middle of stretches: a quarter of
-the attenuation of a wave in a stretch. Interpolation of changes that schedules smooth over a time T: derivatives of
-half a cosine. A line shorter than the longest step h: curvature of the wave over its delay, tau (h - tau) / 2.
+Bounds are relative to the greatest jump of a schedule, and have three causes:
+Friction acts in the middle of a segment only: a quarter of the attenuation of a wave in a segment.
+Interpolation of a change that a schedule smooths over a time T: derivatives of half a cosine of duration T.
+A line with a travel time tau shorter than the longest step h: curvature of the wave over it, tau (h - tau) / 2.
 """
 
 from __future__ import annotations
@@ -32,9 +33,10 @@ MAX_ATTENUATION = 0.5  # greatest attenuation of a wave by friction in a line sh
 
 @dataclass(frozen=True)
 class LineMethod:
-    """Method for a pipe, "finite-volume" or "delay-line", the reason, and the steps it implies.
+    """Method for a pipe ("finite-volume" or "delay-line"), the reason for it, and the steps that it implies.
 
-    rate : of lines that limit steps [1/s]; longest : step for which lines are divided [s]
+    rate : cells that a wave crosses per second in the delay line with the longest travel time [1/s]
+    longest : longest step, for which delay lines are divided into segments [s]
     """
 
     pipe_model: str
@@ -44,7 +46,10 @@ class LineMethod:
 
 
 def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
-    """Pipe -> method; unfit : pipes whose error `auto` has estimated to exceed `numerics.delay_tolerance`."""
+    """Method for every pipe : name of the pipe -> LineMethod.
+
+    unfit : names of pipes whose estimated error as delay lines exceeds `numerics.delay_tolerance`
+    """
     pipes = {name: link for name, link in case.links.items() if link.kind == "pipe"}
     methods, lines = {}, []
     for name, link in pipes.items():
@@ -78,7 +83,7 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
 
 
 def reason_for_cells(case, name: str, link) -> str:
-    """Reason why a pipe needs cells; "" for none."""
+    """Reason why a pipe must be computed with cells; "" if it can be a delay line."""
     if not case.law.linear:
         return f'law = "{case.law.name}" changes waves as they travel'
     if case.scalars:
@@ -98,7 +103,7 @@ def reason_for_cells(case, name: str, link) -> str:
 
 
 def lower_delays(draft) -> None:
-    """Fill rows of delay lines; faults of pipes that cannot be delay lines."""
+    """Fill the table of delay lines; add a fault for each pipe that is stated to be a delay line but cannot be one."""
     case, rows = draft.case, []
     for k, name in enumerate(draft.pipe_names):
         link, chosen = case.links[name], draft.followed[name]
@@ -132,9 +137,9 @@ def lower_delays(draft) -> None:
 
 
 def jump_tables(draft) -> dict[str, np.ndarray]:
-    """Tables that replace the model's while a jump is solved: lines shorter than a step as ordinary lines.
+    """Tables that replace those of the model while a jump is solved : name -> table; empty if all lines exceed a step.
 
-    Empty without such lines.
+    In them a line shorter than a step acts like a longer line: its ends are not coupled within the step.
     """
     short = draft.delay_table["now"] > 0.0
     if not short.any():
@@ -156,18 +161,19 @@ def jump_tables(draft) -> dict[str, np.ndarray]:
 
 
 def end_admittance_ratio(draft, pipe) -> float:
-    """Admittance of a pipe's ends relative to that of its waves; less for a line shorter than a step.
+    """Admittance of a pipe at its end nodes, relative to the admittance of its waves.
 
-    The ends of such a line are coupled within the step.
+    It is 1, and less for a delay line shorter than a step, because its ends are coupled within the step.
     """
     beta = draft.delay_table["now"][pipe["delay"]] if pipe["delay"] >= 0 else 0.0
     return float((1.0 - beta) / (1.0 + beta))
 
 
 def divide_lines(draft) -> list[str]:
-    """Divide all lines into stretches by friction at the start.
+    """Divide all delay lines into segments by friction at the start; write their facts for `fvsolve check`.
 
-    Returns names of lines whose bound exceeds the accuracy under `auto`.
+    Returns the names of lines that must be computed with cells instead: under `auto` their error bound exceeds the
+    tolerance, or friction does not balance their pressure drop at the start.
     """
     case, at, unfit = draft.case, 0, []
     facts = draft.steady["lines"] = {}
@@ -217,7 +223,7 @@ def divide_lines(draft) -> list[str]:
 
 
 def fast_schedule_notice(case, name: str, step: float, scale: float, bound: float) -> Notice:
-    """Notice of a schedule that changes too fast for the steps of a delay line."""
+    """Notice of a schedule that changes within `scale` [s], too fast for the steps of a delay line."""
     text = (
         f"{name}: a schedule changes something within {case.step_amount(scale, 3)}, and steps of "
         f"{case.step_amount(step, 3)} may cause an error of its waves of {bound:.2g} of the change; "
@@ -229,8 +235,10 @@ def fast_schedule_notice(case, name: str, step: float, scale: float, bound: floa
 def interpolation_bound(tau: float, step: float, scale: float, ramp: float) -> float:
     """Bound of the error of interpolation between steps, relative to the change of a schedule.
 
-    scale : duration of half a cosine [s], 0 for none; ramp : duration of a straight ramp [s], at whose kinks a
-    polynomial through six entries overshoots by up to a tenth of the change in a step
+    tau : travel time of a segment [s]; step : longest step [s]
+    scale : duration of the fastest smooth change, half a cosine [s]; 0 for none
+    ramp : duration of the fastest straight ramp [s]; 0 for none. At its kinks a polynomial through six entries
+    overshoots by up to a tenth of the change in a step.
     """
     kinks = KINK_OVERSHOOT * step / ramp if ramp > 0.0 else 0.0
     bend = math.pi * step / scale if scale > 0.0 else 0.0
@@ -245,9 +253,9 @@ def interpolation_bound(tau: float, step: float, scale: float, ramp: float) -> f
 
 
 def time_scales(draft) -> tuple[float, float]:
-    """Shortest times of a change by a schedule : (of any shape, of a straight ramp) [s].
+    """Shortest durations of a change of a schedule : (change of any shape, straight ramp) [s].
 
-    0 if there is none except jumps, which are followed exactly.
+    A duration is 0 if no schedule has such a change. Jumps do not count, because they are followed exactly.
     """
     shortest, ramp, schedules = math.inf, math.inf, draft.schedules
     for first, count in schedules.records:
@@ -263,13 +271,13 @@ def time_scales(draft) -> tuple[float, float]:
 
 
 def shape_history(draft) -> None:
-    """Set rings of all lines, and the size of their history in a run."""
+    """Set the ring buffers of all delay lines, and the size of their history array."""
     set_rings(draft.delay_table, longest_step(draft))
     draft.shapes = draft.shapes._replace(past=history_size(draft.delay_table))
 
 
 def longest_step(draft) -> float:
-    """Step for which lines are divided [s]."""
+    """Longest step, for which delay lines are divided into segments [s]; infinite without delay lines."""
     return min(
         (method.longest for method in draft.followed.values() if method.pipe_model == "delay-line"), default=math.inf
     )

@@ -1,4 +1,4 @@
-"""Device table: parts with a compiled law of their own."""
+"""Table of devices: parts with a compiled law of their own."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from fvsolve.model.lowering import Lowering, Restriction, lowering_of
 
 
 class Device(Restriction):
-    """Lowering of a kind of device: its states, and its state in the steady start.
+    """Conversion of a kind of device to table rows: its states, and its state in the steady start.
 
-    mode : code of the kind in its law; quantities : probes, in the order of codes in its `value`
-    sudden : True if only events open it; leads : index of its event that lets it control a rigid column, -1 for none
-    states : names of its states; remedy : advice for events that alternate
+    mode : code of the kind in its law; quantities : names of its probes, in the order of codes in the law's `value`
+    events_only : True if only events open it; states : names of its states; remedy : advice for events that alternate
+    controlling_event : index of the event by which it starts to control a rigid column, -1 for none
     """
 
     is_device, rank = True, 2
@@ -41,19 +41,19 @@ class Device(Restriction):
         return node.initial_pressure
 
     def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
-        """Text of the pressure change at the start."""
+        """Text of the rate of the pressure that a net inflow [kg/s] causes in a vessel at the start."""
         return f"{node.kind} {name}: pressure changes by {amount(row['stiffness'] * inflow, 'pressure', span=True)}/s"
 
     def gate(self, name: str) -> str | None:
-        """Link that a vessel opens and closes in addition."""
+        """Name of a further link that the device opens and closes; None for none."""
         return None
 
     def row_of(self, model, name: str):
-        """DEVICE row of a part."""
+        """DEVICE row of the part `name`."""
         return model.tables.devices[[device_name for device_name, _, _ in model.devices].index(name)]
 
     def probe(self, draft, name: str, probe: Any, row) -> None:
-        """Fill the PROBE row of a quantity of the part."""
+        """Fill the PROBE row of a probe of this part."""
         if probe.quantity in self.quantities:
             row["index"] = draft.device_names.index(draft.inside(name))
             row["kind"], row["side"] = rec.DEVICE_VALUE, self.quantities.index(probe.quantity)
@@ -63,36 +63,40 @@ class Device(Restriction):
             super().probe(draft, name, probe, row)
 
     def states_of(self, draft, name: str, part: Any) -> tuple[str, ...]:
-        """Names of the states of a part."""
+        """Names of the states of this part."""
         return self.states
 
     def scales(self, draft, name: str, part: Any) -> list[float]:
-        """Size of a small deviation of each of its states."""
+        """Size of a small deviation of each state of this part."""
         return []
 
     def revise_state(self, start, part: Any, row) -> bool:
-        """Set the state that a steady solution implies; True if it changed."""
+        """Set the device state that the steady solution implies; True if the state changed."""
         return False
 
     def begin(self, start, part: Any, row) -> list[str]:
-        """Fill in data that depend on the profile; return texts of motions at the start."""
+        """Fill in data that depend on the initial steady state; return texts of motions at the start."""
         return []
 
     def passing_notice(self, model, name: str, part: Any, time: float) -> Notice:
-        """Notice for the result PASSING of its law's `outside`, first at that time."""
+        """Notice that the part was temporarily outside the range of its law, first at `time` [s].
+
+        The function `outside` of the law then returns TEMPORARY.
+        """
         raise NotImplementedError
 
     def apply_event(self, run_data, row, t: float, y: np.ndarray, scale: np.ndarray) -> None:
-        """Apply sudden changes of an event of the device to y, and new sizes of small deviations to `scale`."""
+        """Apply sudden changes of states at an event of the device to y, and new small deviations to `scale`."""
 
     def dissipates(self, part: Any) -> bool:
-        """True if its restriction dissipates drop times flow; else that is energy supplied."""
+        """True if drop times flow in its restriction is dissipated; otherwise it is energy supplied."""
         return True
 
     def energy_rows(self, model, part: Any, row, y: np.ndarray, out: np.ndarray) -> list[dict[int, float]]:
-        """Rows of L with |L dy|^2 the energy [J] that a small deviation dy from y stores in it : state -> factor.
+        """Rows of the energy matrix L that this part adds, each state -> factor.
 
-        For a vessel, m^2 dp/dm / (2 rho) of its mass; none for other devices.
+        |L d|^2 is the energy [J] that a small deviation d of the states from y stores in the part. For a vessel the
+        energy is m^2 dp/dm / (2 rho), m the deviation of its mass [kg]; other devices have none.
         """
         if not self.vessel:
             return []
@@ -101,7 +105,7 @@ class Device(Restriction):
         return [{int(node["y"]): float(np.sqrt(stiffness / (2.0 * model.case.properties.density)))}]
 
     def above(self, model, part: Any, row) -> float:
-        """Energy of the device at the start above its least energy [J]."""
+        """Energy of the device at the start [J], above its least possible energy."""
         return 0.0
 
 
@@ -137,13 +141,19 @@ def lower_devices(draft) -> None:
 
 
 def link_device(valve, device: Device, k: int, row) -> None:
-    """Write the device into its VALVE row: it opens the valve if its law has a `set`; offsets of flags and numbers."""
+    """Write the device to its VALVE row: its number if its law has a function `set`, offsets of flags and numbers.
+
+    The function `set` sets the opening of the valve.
+    """
     valve["device"] = k if calls.hook_of(device.law, "set") is not None else -1
     valve["event"], valve["data"] = row["event"], row["data"] if valve["data"] < 0 else valve["data"]
 
 
 def opening_of(start, k: int) -> float:
-    """Opening x between 0 and 1 at which valve k has its flow of the profile, M |M| = G x^2 dP."""
+    """Opening x between 0 and 1 at which valve k passes its steady flow, M |M| = G x^2 dP.
+
+    M [kg/s] : mass flow; G [kg2/s2/Pa] : conductance fully open; dP [Pa] : pressure drop
+    """
     valve = start.valves[k]
     conductance, drop = start.valve_law(k)
     flow = abs(float(valve["flow"]))

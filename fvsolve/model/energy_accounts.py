@@ -1,4 +1,4 @@
-"""Energy accounts of a model: the part and category of each row of power and of stored energy."""
+"""Energy accounts of a model: assignment of the powers and stored energies from the kernels to parts and categories."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from fvsolve.model.run_data import RunData
 
 @dataclass(frozen=True)
 class Account:
-    """Rows of power that form a line of the ledger, with signs: `category` at `place`."""
+    """Line of the energy ledger: sum of powers, or of stored energies, that kernels write, each with a sign.
+
+    place : name of the part; rows : indices of the powers or energies; signs : sign of each
+    """
 
     category: str  # "supplied" | "stored" | "dissipated" | "scheme" | "law"
     place: str
@@ -26,9 +29,9 @@ class Account:
 
 
 class Accounts:
-    """Rows of power and of stored energy by account, for the run data of a run.
+    """Energy accounts of a model, for the run data of a run.
 
-    Accounts of stored energy in `stored_accounts` and of its rates (category "rate") are in the same order.
+    Accounts of stored energy (`stored_accounts`) and of its rates (category "rate") are in the same order.
     """
 
     def __init__(self, run_data: RunData) -> None:
@@ -75,7 +78,7 @@ class Accounts:
         self.holding = matrix_of(self.stored_accounts, self.stores)
 
     def take(self, count: int) -> int:
-        """First of `count` new rows of power."""
+        """Reserve `count` new rows of power; return the index of the first."""
         self.power_count += count
         return self.power_count - count
 
@@ -84,7 +87,10 @@ class Accounts:
         self.accounts.append(Account(category, place, kind, (row,), (sign,)))
 
     def hold(self, place: str, kind: str, rate: int | None, rows: int = 1) -> None:
-        """Add a part that stores: its next rows of `stored`, and the row of power that is their rate."""
+        """Add an account of a part that stores energy, with its next rows of stored energy.
+
+        rate : row of power that is the time derivative of this energy; None : the rows belong to no account
+        """
         at = self.stores
         self.stores += rows
         if rate is not None:
@@ -178,22 +184,22 @@ class Accounts:
             self.accounts.append(Account("scheme", basin.name, "basin", rows, (1, -1, -1, -1, -1)))
 
     def of(self, category: str) -> list[int]:
-        """Numbers of the lines of a category."""
+        """Indices of the accounts of a category."""
         return [k for k, account in enumerate(self.accounts) if account.category == category]
 
     def power_at(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """Power of every line [W] : float64[lines], at a state; writes its rates and `out`."""
+        """Power of every account at a state [W] : float64[accounts]; writes `dydt` and `out` at that state."""
         self.model.functions.rhs(t, y, dydt, out, self.run_data.handle)
         return self.power_by(t, y, dydt, out)
 
     def power_by(self, t: float, y: np.ndarray, dydt: np.ndarray, out: np.ndarray) -> np.ndarray:
-        """Power of every line [W] at a state whose rates and `out` are given."""
+        """Power of every account [W] : float64[accounts], at a state with given `dydt` and `out`."""
         rows = np.zeros(self.power_count)
         self.power(t, y, dydt, out, self.run_data.handle, rows)
         return self.matrix @ rows
 
     def stored_at(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Change of the energy of every storing part since the profile [J] : float64[stored]."""
+        """Stored energy of each storing part, relative to the initial steady state [J] : float64[stored accounts]."""
         rows, out = np.zeros(self.stores), self.model.new_out()
         self.model.functions.rhs(t, y, np.zeros(0), out, self.run_data.handle)
         self.stored(t, y, np.zeros(0), out, self.run_data.handle, rows)
@@ -201,14 +207,14 @@ class Accounts:
 
 
 def refuse_unsupported(case) -> None:
-    """Raise FvsolveError if the energy of a network on a body is not booked."""
+    """Raise FvsolveError if the case has a network on a body whose energy cannot be computed."""
     faults = [f"{'.'.join(place)}: {text}" for place, text in missing_reactions(case.nodes, case.links)]
     if faults:
         raise FvsolveError(f"the energy of this network on a body is not supported; {'; '.join(faults)}")
 
 
 def matrix_of(accounts: list[Account], rows: int) -> np.ndarray:
-    """Matrix that sums rows with their signs : float64[accounts, rows]."""
+    """Matrix that sums the rows of each account with their signs : float64[accounts, rows]."""
     matrix = np.zeros((len(accounts), rows))
     for k, account in enumerate(accounts):
         matrix[k, list(account.rows)] += account.signs

@@ -26,12 +26,13 @@ ROUNDING_SHARE = 1e-6  # rates below this share of the sum of magnitudes of thei
 
 @dataclass(frozen=True, eq=False)
 class EnergyForm:
-    """Energy |L y|^2 [J] of a deviation y of n states, and coordinates z = forth y with |z|^2 the same energy.
+    """Energy |L d|^2 [J] of a small deviation d of n states, and coordinates z = forward d with |z|^2 that energy.
 
-    rows : sparse float64[m, n]  L, a row for each store; parts : name of the part that stores, for each row
-    forth : sparse float64[r, n], back : sparse float64[n, r]  forth back = 1
-    idle : float64[n, d]  motions that store nothing, such as all positions of a train together; each is small
-    idle_rows : float64[d, n]  amount of each idle motion in a deviation; least : least energy of a small deviation
+    rows : sparse float64[m, n]  matrix L, a row for each store of energy; parts : name of the part of each row
+    forward : sparse float64[r, n], back : sparse float64[n, r]  forward back = 1
+    idle : float64[n, d]  motions without energy, such as a common displacement of all masses of a train; each is small
+    idle_rows : float64[d, n]  matrix that gives the amount of each motion without energy in a deviation
+    least : least energy of a small deviation [J]
     """
 
     rows: Any
@@ -48,24 +49,24 @@ class EnergyForm:
         return self.forward.shape[0]
 
     def seen(self, a: Any) -> Any:
-        """Matrix A in coordinates z: forth A back, dense or sparse like A. Idle motions are left out."""
+        """Matrix A in coordinates z: forward A back, dense or sparse like A. Motions without energy are left out."""
         if isinstance(a, np.ndarray):
             return self.forward @ (a @ self.back.toarray())
         return (self.forward @ a @ self.back).tocsc()
 
     def closed(self, a: Any) -> bool:
-        """True if A maps idle motions to idle motions, so that growth of the others is independent of them."""
+        """True if A maps motions without energy to motions without energy; other motions then grow independently."""
         if self.idle.shape[1] == 0:
             return True
         most = abs(self.forward) @ (abs(a) @ np.abs(self.idle))
         return bool(np.all(np.abs(self.forward @ (a @ self.idle)) <= ROUNDING_SHARE * most))
 
     def suited_to(self, a: Any) -> EnergyForm:
-        """This form if A maps idle motions to idle motions, else the full norm."""
+        """This form if A maps motions without energy to motions without energy, else `full_norm`."""
         return self if self.closed(a) else self.full_norm()
 
     def full_norm(self) -> EnergyForm:
-        """Form with the least weight for idle motions added: a norm of all states."""
+        """Energy form in which motions without energy have the least weight, so that it is a norm of all states."""
         from scipy.sparse import csr_array, hstack, vstack
 
         if self.idle.shape[1] == 0:
@@ -80,16 +81,23 @@ class EnergyForm:
 
 
 def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
-    """Energy form of a deviation from the state y, or from the start if y is None.
+    """Energy form of small deviations from the state y, or from the start if y is None.
 
-    A wave of r [kg/s] stores r^2 dx / (rho A). A memory state of unsteady friction (`kernels.unsteady_friction`) or of
-    a creeping wall (`kernels.viscoelastic_wall`) stores g z^2 dx / (2 n rho A), a chamber or tank m^2 dp/dm / (2 rho),
-    a rigid column M^2 L / (2 rho A), a mass m v^2 / 2, bodies v' M v / 2, the spring of a joint k s^2 / 2, a spring and
-    a stop in contact k (x_j - x_i)^2 / 2, a chamber of a cylinder dp/dm (e - x A e0 / V)^2 / (2 rho) with e0 its excess
-    mass at y. The form is exact for the law `linear` about a profile at rest.
-    Devices give their own `squares`, cells of basins theirs in `basins.lower_energy`. A scalar stores no energy, and no
-    other state depends on it; a deviation of its amount, divided by its greatest possible value, counts as 1e-6 of what
-    the same mass would store. Positions without stiffness, single or combined, store nothing: they are idle.
+    Energy of a deviation, with density rho, area A and cell length dx:
+    wave r [kg/s] in a cell : r^2 dx / (rho A)
+    memory state z [kg/s] of unsteady friction or of a creeping wall, its term with gain g and rate n [1/s] :
+    g z^2 dx / (2 n rho A)
+    excess mass m [kg] in a chamber or tank : m^2 dp/dm / (2 rho)
+    mass flow M [kg/s] in a rigid column of length L : M^2 L / (2 rho A)
+    velocity v of a mass m : m v^2 / 2; velocities v of bodies with mass matrix M : v' M v / 2
+    elongation s of a spring, of a stop in contact, or of the spring of a joint, stiffness k : k s^2 / 2
+    excess mass e [kg] and travel x in a chamber of a cylinder : dp/dm (e - x A e0 / V)^2 / (2 rho), with piston area A,
+    volume V and excess mass e0 at y
+
+    Devices add rows (`energy_rows`), basins weights of their cells (`weights`). The form is exact for the law `linear`
+    about a steady state at rest. A scalar stores no energy, and no other state depends on it; a deviation of its
+    amount, divided by its greatest possible value, counts as 1e-6 of the energy that the same mass would store.
+    Displacements without stiffness store nothing, see `EnergyForm.idle`.
     """
     from scipy.sparse import csr_array
 
@@ -108,10 +116,11 @@ def energy_form(model, y: np.ndarray | None = None) -> EnergyForm:
 
 
 def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
-    """Coordinates of |L y|^2 : by state if a row holds that state alone, else by singular values of joined states.
+    """Energy form of |L d|^2 from the matrix L.
 
-    scale : float64[n]  size of a small deviation of each state, by which states are compared. Raises FvsolveError if a
-    group of joined states is too large.
+    rows : L; parts : name of the part of each row; scale : float64[n]  size of a small deviation of each state
+    A state that is alone in a row is a coordinate; singular values separate groups of states that rows join. Raises
+    FvsolveError if a group is too large.
     """
     from scipy.sparse import coo_array
 
@@ -145,7 +154,7 @@ def form_of(rows: Any, parts: tuple[str, ...], scale: np.ndarray) -> EnergyForm:
 
 
 def split_states(rows: Any) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Split states : (states that have a row of their own, groups of the other states joined by rows)."""
+    """Split states : (indices of states that are alone in their row of L, groups of other states that rows join)."""
     from scipy.sparse.csgraph import connected_components
 
     single = np.diff(rows.tocsr().indptr) == 1
@@ -158,7 +167,10 @@ def split_states(rows: Any) -> tuple[np.ndarray, list[np.ndarray]]:
 
 
 def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
-    """Weights w of states that store w_i d_i^2 of a deviation d from y on their own, 0 of others : float64[n]."""
+    """Weights w of states that store energy independently of other states : float64[n], 0 for other states.
+
+    A deviation d_i of state i from y stores w_i d_i^2 [J].
+    """
     y = np.zeros(model.y_size) if y is None else y
     tables, rho = model.tables, model.case.properties.density
     weights = np.zeros(model.y_size)
@@ -187,7 +199,7 @@ def energy_weights(model, y: np.ndarray | None = None) -> np.ndarray:
 
 
 def weigh_scalars(model, weights: np.ndarray) -> None:
-    """Fill in weights of scalar amounts in pipes and in nodes that store, from weights of the mass there."""
+    """Write the weights of scalar amounts in pipes, tanks and chambers, from the weights of the mass there."""
     tables, rho = model.tables, model.case.properties.density
     for q, scalar in enumerate(tables.scalars):
         share = SCALAR_WEIGHT / greatest_value(model, q) ** 2
@@ -201,12 +213,12 @@ def weigh_scalars(model, weights: np.ndarray) -> None:
 
 
 def greatest_value(model, q: int) -> float:
-    """Greatest possible magnitude of a scalar's values; 1 if all are 0."""
+    """Greatest possible magnitude of the value of scalar q; 1 if all values are 0."""
     return max(map(abs, bounds(model.case, list(model.case.scalars)[q]))) or 1.0
 
 
 def spring_rows(model, y: np.ndarray, elongations: Elongations):
-    """Springs, and stops in contact : (name, row of L)."""
+    """Rows of L for springs, and for stops in contact : (name, state -> factor)."""
     braces, stops = rows_in(model.case, "brace"), rows_in(model.case, "stop")
     for k, ((name, *_), row) in enumerate(zip(braces, model.tables.braces, strict=True)):
         if row["stiffness"] > 0.0:
@@ -218,7 +230,7 @@ def spring_rows(model, y: np.ndarray, elongations: Elongations):
 
 
 def device_rows(model, y: np.ndarray):
-    """Energy stored by devices : (name, row of L)."""
+    """Rows of L for the energy stored by devices : (name, state -> factor)."""
     if not model.devices:
         return
     out = model.evaluate(model.case.numerics.start, y)[1]
@@ -228,9 +240,10 @@ def device_rows(model, y: np.ndarray):
 
 
 def chamber_rows(model, y: np.ndarray, elongations: Elongations):
-    """Moving chambers at y : (state, row of L). The same excess mass e [kg] in less volume is more pressure.
+    """Rows of L for the chambers of cylinders at y : (index of the mass state, state -> factor).
 
-    Between points of bodies the state is the mass: e and the volume gained times the density of the start.
+    The same excess mass e [kg] in less volume has more pressure. If the cylinder joins points of bodies, the mass state
+    is e plus the gained volume times the density at the start.
     """
     nodes, pistons = model.tables.nodes, model.tables.pistons
     per_mass, first = (
@@ -251,7 +264,7 @@ def chamber_rows(model, y: np.ndarray, elongations: Elongations):
 
 
 class Elongations:
-    """Elongation of pushes (springs, stops, cylinders) at a state, and its derivatives by states.
+    """Elongations of force elements (springs, stops, cylinders) at a state, and their derivatives by states.
 
     out : values that the right-hand side writes in addition to dydt
     """
@@ -263,11 +276,14 @@ class Elongations:
         self.first = int(model.layout["travel"])
 
     def travel(self, k: int) -> float:
-        """Elongation of push k [m]."""
+        """Elongation of force element k [m]."""
         return float(self.out[self.first + 2 * k])
 
     def by(self, k: int, i: int, j: int, factor: float) -> dict[int, float]:
-        """Row of `factor` times the elongation of push k, between masses i and j, or between two points."""
+        """Derivatives of `factor` times the elongation of force element k : state -> derivative.
+
+        i, j : masses that it joins; equal if it joins points of bodies
+        """
         places = self.model.tables.masses["y"]
         if i != j:
             return {int(places[m]): sign * factor for m, sign in ((i, -1.0), (j, 1.0)) if places[m] >= 0}
@@ -275,7 +291,10 @@ class Elongations:
 
     @cached_property
     def slopes(self) -> dict[int, np.ndarray]:
-        """Joint coordinate -> d elongation of all pushes / d coordinate."""
+        """Derivatives of elongations by joint coordinates : state -> float64[2 k].
+
+        The values are those of the elongation and its rate for each of the k force elements.
+        """
         tables, slopes = self.model.tables, {}
         last = self.first + 2 * (len(tables.braces) + len(tables.stops) + len(tables.pistons))
         for body in tables.bodies:
@@ -290,7 +309,10 @@ class Elongations:
 
 
 def kinetic_rows(model, y: np.ndarray):
-    """Bodies : (name, row of L), v' M v / 2 = |L v|^2 / 2, with the factor of M from the kernels."""
+    """Rows of L for the kinetic energy of bodies : (name, state -> factor).
+
+    The energy is v' M v / 2 = |F v|^2 / 2: velocities v, mass matrix M = F' F with the factor F from the kernels.
+    """
     bodies, freedoms, n = model.tables.bodies, model.tables.freedoms, len(model.tables.freedoms)
     if not n:
         return
@@ -304,14 +326,14 @@ def kinetic_rows(model, y: np.ndarray):
 
 
 def joint_spring_rows(model):
-    """Springs of joints : (name, row of L)."""
+    """Rows of L for the springs of joints : (name, state -> factor)."""
     for name, body in zip(model.body_names, model.tables.bodies, strict=True):
         if body["stiffness"] > 0.0:
             yield name, {int(body["y"]): float(np.sqrt(0.5 * body["stiffness"]))}
 
 
 def stiffness(model, row) -> float:
-    """Pressure per stored mass [Pa/kg] of a node that stores, in the starting profile."""
+    """Pressure per stored mass [Pa/kg] of a tank or chamber at the start."""
     if row["kind"] == rec.TANK and row["shape"] >= 0:
         floats, at, n = model.tables.floats, int(row["shape"]), int(row["shapes"])
         return float(model.case.gravity / np.interp(row["level"], floats[at : at + n], floats[at + n : at + 2 * n]))

@@ -1,4 +1,4 @@
-"""Results of the search for static equilibrium: bodies and masses in their new places, notices, faults."""
+"""Results of the search for static equilibrium: bodies and masses in their new positions, notices, faults."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MOVE_TOLERANCE = 1e-15  # smaller changes of a length or an angle count as none,
 
 
 def moved_nodes(at: Configuration, y: np.ndarray) -> dict[str, Any]:
-    """Bodies and masses of a case that moved, with their new positions."""
+    """Bodies and masses that moved in the search, with their new positions : name -> part; y : state vector found."""
     draft, nodes = at.draft, {}
     for name, row in zip(draft.body_names, at.bodies, strict=True):
         body, first = draft.case.nodes.get(name), int(row["y"])
@@ -39,7 +39,7 @@ def moved_nodes(at: Configuration, y: np.ndarray) -> dict[str, Any]:
 
 
 def joint_keys(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
-    """Joint keys for coordinates q."""
+    """Keys of a joint with the values that follow from its coordinates q : key -> value."""
     if row["joint"] in (rec.REVOLUTE, rec.PRISMATIC):
         return {"angle" if row["joint"] == rec.REVOLUTE else "travel": constant(float(q[0]))}
     turn = attitude.of_euler_parameters(q[-4:])
@@ -50,12 +50,12 @@ def joint_keys(joint: Any, row, q: np.ndarray) -> dict[str, Any]:
 
 
 def attitude_from(rotation: np.ndarray) -> Attitude:
-    """Attitude by Euler parameters, from a rotation matrix."""
+    """Attitude keys with the Euler parameters of a rotation matrix."""
     return Attitude().model_copy(update={"euler_parameters": tuple(attitude.euler_parameters(rotation).tolist())})
 
 
 def position_notices(case) -> Iterator[Notice]:
-    """Notices of positions that differ from the stated positions."""
+    """Notices of bodies and masses whose equilibrium position differs from the stated position."""
     for name, node in case.equilibrium_nodes.items():
         before = case.nodes[name]
         if node.kind == "mass":
@@ -74,7 +74,10 @@ def position_notices(case) -> Iterator[Notice]:
 
 
 def attitude_notices(case, name: str, free: bool, pose, before) -> Iterator[Notice]:
-    """Notices of the attitude of a body on a ball joint or a free body, and of its distance from the stated one."""
+    """Notice of the equilibrium attitude of a body on a ball joint or a free body; of a free body also its position.
+
+    pose, before : pose in equilibrium, and as stated
+    """
     turn = attitude.axis_angle(attitude.deviation(pose.attitude, before.attitude))[1]
     roll, pitch, yaw = np.degrees(attitude.roll_pitch_yaw(pose.attitude))
     text = f"roll {roll:.6g}, pitch {pitch:.6g}, yaw {yaw:.6g} deg, turned by {math.degrees(turn):.4g} deg"
@@ -87,14 +90,14 @@ def attitude_notices(case, name: str, free: bool, pose, before) -> Iterator[Noti
 
 
 def coordinate_notice(case, name: str, key: str, before: float, now: float, dimension: str) -> Notice:
-    """Notice of a coordinate that differs from its stated value."""
+    """Notice of a coordinate whose equilibrium value `now` differs from its stated value `before`."""
     result, stated = (case.amount(value, dimension, 6) for value in (now, before))
     text = f"{name}: forces balance at {key.removeprefix('joint.')} {result}, stated {stated}"
     return Notice("start", f"nodes.{name}", text, key, now, before)
 
 
 def owner_name(at: Configuration, unknown: int) -> str:
-    """Name of the body or mass of an unknown; for a sloshing mode, of the basin, with which its name begins."""
+    """Name of the body or mass to which an unknown belongs; for a sloshing mode the name of its basin."""
     if unknown >= at.freedoms:
         return at.draft.mass_names[at.free[unknown - at.freedoms]]
     ends = at.bodies["freedom"] + at.bodies["freedoms"]
@@ -102,7 +105,10 @@ def owner_name(at: Configuration, unknown: int) -> str:
 
 
 def report_unbalanced(at: Configuration, force: np.ndarray, scale: np.ndarray) -> None:
-    """Faults of every body and mass with an unbalanced force at the end of the search."""
+    """Add a fault for every body and mass with an unbalanced force at the end of the search.
+
+    force, scale : float64[size]  forces on the unknowns, and sums of their magnitudes
+    """
     angular, unbalanced = at.angular(), np.abs(force) > EQUILIBRIUM_SHARE * scale
     for name in dict.fromkeys(owner_name(at, int(i)) for i in np.flatnonzero(unbalanced)):
         own = np.array([owner_name(at, i) == name for i in range(at.size)])
@@ -117,7 +123,7 @@ def report_unbalanced(at: Configuration, force: np.ndarray, scale: np.ndarray) -
 
 
 def refuse_overturned(at: Configuration, y: np.ndarray) -> None:
-    """Fault of a tank or basin on a body that is overturned in equilibrium."""
+    """Add a fault if a tank or basin on a body is overturned in the equilibrium found."""
     at.out[rec.STATUS] = rec.OK
     at.force(y)
     if at.out[rec.STATUS] != rec.NO_WEIGHT:

@@ -1,6 +1,7 @@
 """Static equilibrium of bodies and masses: Newton's method on forces, for `initial = "equilibrium"`.
 
-With M the mass matrix and K = -dF/dq, steps are taken in M^(1/2) dq. There K has squares of angular frequencies as
+The unknowns q are joint displacements and positions of masses, F the forces on them, M the mass matrix and K = -dF/dq
+the stiffness. Steps are computed in the coordinates M^(1/2) dq: there K has squares of angular frequencies as
 eigenvalues, and lengths and angles have comparable weight. The search runs in the directions that constraints leave
 free. If all eigenvalues are positive, a step is Newton's step. A negative eigenvalue enters by its magnitude, so that
 bodies move away from an unstable position. A position that is stated and in balance is kept, stable or not; so is a
@@ -38,7 +39,11 @@ MAX_REVERSAL = 0.5  # a step may reverse the force along it up to this share
 
 @dataclass(frozen=True)
 class StaticState:
-    """A configuration: states, generalised forces and their scale, rows of constraints and their gaps [m]."""
+    """Configuration and its forces.
+
+    y : state vector; force : forces on the unknowns [N], [N m]; scale : sums of the magnitudes of their parts
+    rows : float64[constraints, size]  constraint matrix; gaps : gaps of the constraints [m]
+    """
 
     y: np.ndarray
     force: np.ndarray
@@ -48,7 +53,7 @@ class StaticState:
 
     @property
     def share(self) -> float:
-        """Greatest unbalanced force, relative to the sum of magnitudes of the forces in it."""
+        """Greatest unbalanced force, relative to the sum of the magnitudes of its parts."""
         return float(np.max(np.abs(self.force) / np.where(self.scale > 0.0, self.scale, 1.0), initial=0.0))
 
     @property
@@ -65,7 +70,7 @@ class StaticState:
 def with_equilibrium(case, draft) -> tuple[Any, list[Notice]]:
     """Case with bodies and masses in static equilibrium, and notices about it : (case, notices).
 
-    draft : tables of the case with its steady start. Bodies with stated velocities stay where they are.
+    draft : tables of the case with its steady start. If a velocity is stated, nothing moves from its stated position.
     Raises CaseError if no equilibrium is found.
     """
     at = Configuration(draft)
@@ -86,7 +91,10 @@ def with_equilibrium(case, draft) -> tuple[Any, list[Notice]]:
 
 
 def evaluate_configuration(at: Configuration, y: np.ndarray) -> StaticState:
-    """Evaluate a configuration. Constraint forces minimise the unbalanced forces, in the norm of M^-1."""
+    """Forces and gaps in the configuration y.
+
+    Constraint forces minimise the unbalanced forces, in the norm of the inverse mass matrix.
+    """
     rows, gaps, sizes = at.rows(y), at.gaps(y), np.zeros(at.count)
     at.hold(sizes)
     force = at.force(y)
@@ -99,7 +107,7 @@ def evaluate_configuration(at: Configuration, y: np.ndarray) -> StaticState:
 
 
 def search(at: Configuration) -> StaticState:
-    """Equilibrium reached by Newton steps, or the best configuration that was visited."""
+    """Equilibrium reached by Newton steps, or if there is none the best configuration that was visited."""
     here = best = evaluate_configuration(at, at.y.copy())
     intended = here.share <= STATED_TOLERANCE
     for _ in range(MAX_STEPS):
@@ -116,9 +124,9 @@ def search(at: Configuration) -> StaticState:
 
 
 def step(at: Configuration, here: StaticState, intended: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Newton step : (step of all unknowns, its part in directions that constraints leave free).
+    """Newton step : (change of all unknowns, its part in the directions that constraints leave free).
 
-    With `intended` the step goes to the nearest equilibrium, stable or not.
+    intended : if True, the step goes to the nearest equilibrium, stable or not
     """
     inverse_root, free, close = free_directions(at, here)
     k = inverse_root @ at.stiffness(here.y) @ inverse_root.T
@@ -135,9 +143,9 @@ def step(at: Configuration, here: StaticState, intended: bool) -> tuple[np.ndarr
 
 
 def free_directions(at: Configuration, here: StaticState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Directions of a step : (L^-1 with M = L L', basis of directions free of constraints, step that closes gaps).
+    """Directions of a step : (L^-1, basis of the directions that constraints leave free, step that closes gaps).
 
-    The basis and the closing step are in the coordinates M^(1/2) dq.
+    L : factor of the mass matrix M = L L'. The basis and the closing step are in the coordinates L' dq.
     """
     inverse_root = np.linalg.inv(np.linalg.cholesky(at.mass(here.y)))
     if not at.count:
@@ -149,7 +157,10 @@ def free_directions(at: Configuration, here: StaticState) -> tuple[np.ndarray, n
 
 
 def limited_step(at: Configuration, here: StaticState, move: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Configuration after a step, shortened to limit rotations, displacements and a reversal of the force along it."""
+    """State vector after a step, shortened to limit rotations, displacements and a reversal of the force along it.
+
+    move : step of all unknowns; free : its part in the directions that constraints leave free
+    """
     angular = at.angular()
     excess = [np.max(np.abs(move[angular]), initial=0.0) / MAX_TURN,
            np.max(np.abs(move[~angular]), initial=0.0) / (MAX_STRETCH * at.shortest())]  # fmt: skip
@@ -162,7 +173,7 @@ def limited_step(at: Configuration, here: StaticState, move: np.ndarray, free: n
 
 
 def instability_notices(at: Configuration, result: StaticState) -> list[Notice]:
-    """Notice if the equilibrium is unstable; closed chambers act as springs."""
+    """Notice if the equilibrium is unstable; closed chambers count as springs."""
     inverse_root, free, _ = free_directions(at, result)
     own = free.T @ inverse_root @ (at.stiffness(result.y) + at.fluid_stiffness(result.y)) @ inverse_root.T @ free
     values, modes = np.linalg.eigh(0.5 * (own + own.T))

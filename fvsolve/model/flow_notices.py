@@ -15,13 +15,13 @@ WIDE_PIPE, WATER_DENSITIES = 0.05, (950.0, 1050.0)
 
 
 def flow_notices(draft: Any) -> list[Notice]:
-    """Notices of high velocity and of laminar water; one of each for all pipes, with the worst pipe."""
+    """Notices of high velocity and of laminar flow of water, at most one of each kind, for the worst pipe."""
     moving = _flows(draft)
     return [*_fast_flow(draft, *moving), *_laminar_flow(draft, *moving)]
 
 
 def _flows(draft: Any) -> tuple[list[str], np.ndarray, np.ndarray]:
-    """Pipes and rigid columns of the file : (names, flows at the start [kg/s], areas [m2])."""
+    """Pipes and rigid columns of the case file : (names, flows at the start [kg/s], areas [m2])."""
     tables = ((draft.pipe_names, draft.pipe_table), (draft.column_names, draft.column_table))
     rows = [(name, row["flow"], row["area"]) for names, table in tables for name, row in zip(names, table, strict=True)
             if name in draft.case.links]  # fmt: skip
@@ -40,7 +40,7 @@ def _fast_flow(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray)
 
 
 def _laminar_flow(draft: Any, names: list[str], flow: np.ndarray, area: np.ndarray) -> list[Notice]:
-    """Notice if the fastest flow of water in wide pipes is laminar: probably units of flow or viscosity."""
+    """Notice if the fastest flow of water in wide pipes is laminar, probably by a wrong unit of flow or viscosity."""
     fluid = draft.fluid
     if not names or not fluid.viscosity or not WATER_DENSITIES[0] <= fluid.density <= WATER_DENSITIES[1]:
         return []

@@ -11,14 +11,17 @@ MANNING = 4.0 ** (10.0 / 3.0) / math.pi**2  # h / L = 10.294 n^2 q^2 / D^(16/3),
 
 
 class Hydraulics:
-    """Coefficients from sizes of parts, the fluid and gravity."""
+    """Coefficients of friction, transition and hydrostatics, from sizes of parts, the fluid and gravity."""
 
     def __init__(self, case) -> None:
         self.case, self.fluid = case, case.properties
         self.rho, self.gravity, self.ambient = self.fluid.density, case.gravity, case.ambient_pressure
 
     def add_head(self, schedules, head, row) -> int:
-        """Add a schedule of head [m] as pressure [Pa] at the row's elevation; unchanged under nonlinear laws."""
+        """Add a schedule of head [m] as pressure [Pa] at the elevation of a node's row; return its index.
+
+        Under nonlinear density laws the schedule remains a head, and the row is marked.
+        """
         if not self.case.law.linear:
             row["head_given"] = 1
             return schedules.add(head)
@@ -27,9 +30,10 @@ class Hydraulics:
         return schedules.add(head, weight, self.ambient - weight * elevation)
 
     def friction(self, name: str, link, row, fault) -> None:
-        """Friction of a pipe or column: dM/dt = -(loss |M| M + ...), see `kernels.steady_friction`.
+        """Set the friction coefficients of a pipe or rigid column in its row, for mass flow M [kg/s].
 
-        For `steady` friction by roughness the factor is set later, from the starting flow.
+        They give dM/dt = -loss |M| M - rough f(Re) |M| M with the Darcy factor f, see `kernels.steady_friction`. For
+        `steady` friction by roughness the factor is set later, from the starting flow.
         """
         area = math.pi / 4.0 * link.diameter**2
         law, row["loss"] = link.friction, link.minor_loss / (2.0 * self.rho * area**2 * link.length) * area
@@ -65,7 +69,10 @@ class Hydraulics:
             row["reynolds"] = link.diameter / (area * self.fluid.viscosity)
 
     def compliance(self, name: str, speed: float, fault) -> float:
-        """Growth of a pipe's area with pressure [1/Pa], by the density law; a negative value is a fault."""
+        """Relative growth of a pipe's area with pressure [1/Pa], from the density law and the wave speed [m/s].
+
+        Adds a fault if it is negative, as the wave speed then exceeds the speed of sound in the fluid.
+        """
         growth = self.case.law.compliance(speed)
         if growth < -1e-9 / self.fluid.bulk_modulus:
             given, sound = (
@@ -76,7 +83,10 @@ class Hydraulics:
         return growth if growth > 1e-9 / self.fluid.bulk_modulus else 0.0
 
     def transition_flow(self, name: str, link, reynolds: float, fault) -> float:
-        """Mass flow [kg/s] at a Reynolds number of the full opening, Re = 4 M / (pi d mu)."""
+        """Mass flow [kg/s] of a fully open restriction at the Reynolds number Re = 4 M / (pi d mu).
+
+        M : mass flow [kg/s]; d : diameter of the opening [m]; mu : viscosity [Pa s]
+        """
         area = link.flow_area()
         if link.diameter is not None:
             area = math.pi / 4.0 * link.diameter**2

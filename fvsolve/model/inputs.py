@@ -1,4 +1,4 @@
-"""Inputs of a model: schedules that can be held at a value, by `part.key`."""
+"""Inputs of a model: schedules that can be held at a value, named `PART.KEY`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 class InputKind(NamedTuple):
-    """Kind of an input: unit, expected value (text), range, and size of a small change [SI]."""
+    """Kind of an input: unit, expected value in words, range of values, and size of a small change [SI]."""
 
     unit: str
     expected: str
@@ -39,7 +39,7 @@ VALUE = InputKind("-", "a finite number")
 
 
 class Input(NamedTuple):
-    """Schedule that can be held; kernels read scale * value + offset."""
+    """Schedule that can be held at a value; kernels read scale * value + offset."""
 
     sort: InputKind
     schedule: int
@@ -51,7 +51,7 @@ class Input(NamedTuple):
 
 
 def inputs_of(model: Model) -> dict[str, Input]:
-    """Inputs of all parts : name `PART.KEY` -> input, see `Lowering.inputs`."""
+    """Inputs of all parts : name `PART.KEY` -> input."""
     case = model.case
     parts = {**case.places, **{name: case.conduits[name] for name in model.valve_names}}
     parts |= {name: link for name, link in case.links.items() if name not in parts}
@@ -63,12 +63,12 @@ def inputs_of(model: Model) -> dict[str, Input]:
 
 
 def opening_input(model: Model, name: str) -> dict[str, Input]:
-    """Opening of a restriction, by its schedule."""
+    """Input "opening" of a restriction : key -> input."""
     return {"opening": Input(OPENING, int(model.tables.valves[model.valve_names.index(name)]["schedule"]))}
 
 
 def scalar_inputs(model: Model, name: str) -> dict[str, Input]:
-    """Values of scalars that flow in from a node, by their names."""
+    """Inputs for the values of scalars that flow in from a node : name of the scalar -> input."""
     i, inputs = model.node_names.index(name), {}
     for q, (scalar, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):
         place = int(model.tables.integers[row["places"] + i])

@@ -1,4 +1,4 @@
-"""The pattern of the Jacobian of a model: cells, nodes and devices, then scalars. Knows who says what."""
+"""Sparsity pattern of the Jacobian of a model."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from fvsolve.model.state_couplings import Couplings
 
 
 def jacobian_pattern(model) -> csc_array:
-    """bool[n + ledger, n]: where d(dydt, supply)/dy may differ from zero at any time, state and opening."""
+    """Sparsity pattern : bool[n + ledger, n], True where a derivative may differ from zero in any state of the model.
+
+    Rows are the rates of the n states, then the flows in the stepper's ledger; columns are the states.
+    """
     n, couplings = model.y_size, Couplings(model)
     pairs = [(np.arange(n), np.arange(n)), *couplings.pairs(), *scalar_pairs(couplings, model)]
     rows, states = (np.concatenate(side) for side in zip(*pairs, strict=True))
@@ -21,7 +24,11 @@ def jacobian_pattern(model) -> csc_array:
 
 
 def lumped_states(model) -> np.ndarray:
-    """States of lumped parts, int64[q]: their pressures are hundreds of bars; restrictions bend over few pascals."""
+    """Indices of the states of lumped parts such as tanks, chambers and masses : int64[q].
+
+    Their pressures are hundreds of bars, while the flow of restrictions bends within few pascals. Empty under density
+    laws whose pressures come from iterations.
+    """
     if model.case.law.name not in ("linear", "log"):  # pressures come from iterations, rougher than rounding
         return np.zeros(0, dtype=np.int64)
     pipes = model.tables.pipes[model.tables.pipes["delay"] < 0]

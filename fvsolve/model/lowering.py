@@ -1,4 +1,4 @@
-"""Lowering of parts: methods of each kind of part that fill its rows of tables."""
+"""Conversion of parts to rows of the model's tables, one class for each kind of part."""
 
 from __future__ import annotations
 
@@ -23,15 +23,16 @@ TYPICAL_DROP = 1e5  # a typical pressure drop [Pa]
 
 
 class Lowering:
-    """Conversion of parts of one kind to rows: their numbers, start, inputs and probes.
+    """Conversion of parts of one kind to table rows: their numbers, start, inputs and probes.
 
     table : for links, the table of their rows: "pipe", "column", "valve", "brace", "stop" or "piston"; "" for places
     rows : number of rows of each part; rank : rows of kinds with greater rank come after those with lesser rank
     law : module of its compiled law, whose functions are named as in `kernels.calls.HOOKS`; if it has a `step`, that
-    gives the flow through its restriction, in place of the root
+    function gives the flow through its restriction, in place of the square-root law
     events : meaning of a zero of each event function, "" if it is not reported
-    acts : True if it is also a device, see `model.device_lowering`
-    books : its name in the energy ledger: for a place, of the energy it supplies ("" for none); for a link, of its row
+    is_device : True if it is also a device, see `model.device_lowering`
+    ledger_name : its name in the energy ledger: for a place, of the energy it supplies ("" for none); for a link, the
+    category of its row
     """
 
     kinds: ClassVar[dict[str, Lowering]] = {}
@@ -48,23 +49,23 @@ class Lowering:
             Lowering.kinds[kind] = cls()
 
     def of(self, part: Any) -> Lowering:
-        """Lowering of this part; another one if the part's keys need other states."""
+        """Conversion of this part; a different object if keys of the part need other states."""
         return self
 
     def numbers(self, draft, name: str, part: Any) -> list[float]:
-        """Numbers of a part, in the order in which its law reads them from the offset `data` of its row."""
+        """Numbers of a part, in the order in which its law reads them from offset `data` of its row."""
         return []
 
     def resize(self, draft, name: str, before: Any, part: Any, row) -> bool:
-        """Update its row to a part that replaces `before`; False if that is not possible."""
+        """Update the row of a part to a part that replaces `before`; False if that is not possible."""
         return False
 
     def inputs(self, model, name: str, part: Any) -> dict[str, Input]:
-        """Key -> schedule that can be held at a value."""
+        """Schedules of a part that can be held at a value : key -> input."""
         return {}
 
     def probe(self, draft, name: str, probe: Any, row) -> None:
-        """Fill the PROBE row of a quantity of the part."""
+        """Fill the PROBE row of a probe of this part."""
         row["kind"], row["index"] = rec.PRESSURE, draft.node_index[name]
 
     # places ---------------------------------------------------------------------------------------------------
@@ -73,28 +74,32 @@ class Lowering:
         """Fill the NODE row of a fluid node."""
 
     def pressure_at_start(self, start, i: int, node: Any, row) -> float | None:
-        """Pressure [Pa] that a node holds in the steady problem, None if flows determine it."""
+        """Pressure [Pa] that node i keeps in the steady start; None if the flows determine it."""
         return None
 
     def motion_text(self, name: str, node: Any, row, inflow: float, flow: float, amount: Callable[..., str]) -> str:
-        """Text of the change that a net inflow [kg/s], [m3/s] causes at the start; "" for none.
+        """Text of the change that a net inflow causes at the start; "" for none.
 
-        amount : as `Case.amount`, numbers in the units of `[output]`
+        inflow, flow : the net inflow [kg/s], and as volume flow [m3/s]; amount : formats numbers in the units of
+        `[output]`
         """
         return f"junction {name}: {amount(flow, 'flow')} more flow in than out"
 
     # links ----------------------------------------------------------------------------------------------------
 
     def fill(self, draft, name: str, link: Any, rows) -> None:
-        """Fill the rows of a link."""
+        """Fill the table rows of a link."""
 
     def row_names(self, name: str) -> list[str]:
-        """Names of its rows in the energy ledger."""
+        """Names of the rows of a link in the energy ledger."""
         return [name]
 
 
 class Restriction(Lowering):
-    """Links with one row in the valve table, by the root M |M| = G dp or a law of their own."""
+    """Links with one row in the valve table, with the square-root law M |M| = G dp or a law of their own.
+
+    M : mass flow [kg/s]; G : conductance [kg2/s2/Pa]; dp : pressure drop [Pa]
+    """
 
     table = "valve"
 
@@ -122,11 +127,11 @@ class Restriction(Lowering):
         return self.law is not None and calls.hook_of(self.law, "step") is not None
 
     def restriction(self, draft, name: str, link: Any, row) -> None:
-        """Fill the fields of its VALVE row that its law does not set."""
+        """Fill the fields of the VALVE row that the part's own law does not set."""
         draft.restriction(name, link, row)
 
     def edge(self, start, k: int) -> Edge | None:
-        """Edge in the steady problem of VALVE row k; None for the root law, open as in `start.shut_valves`."""
+        """Edge of VALVE row k in the steady flow problem; None for the square-root law, which the caller treats."""
         if not self.steps:
             return None
         row, (density_ratio, drive_ratio) = start.valves[k], start.density_ratios.get(k, (1.0, 1.0))
@@ -145,12 +150,19 @@ class Restriction(Lowering):
         return Edge(i, j, newton, math.sqrt(g * density_ratio * TYPICAL_DROP))
 
     def stepper(self, start, k: int, g: float, density_ratio: float):
-        """Function (flow [kg/s], drop [Pa]) -> a, s of its law's `step`, before any event."""
+        """Function (flow [kg/s], drop [Pa]) -> (a, s) of the part's own law, as before any event.
+
+        Its next Newton step changes the flow by a + s d(drop). g : conductance [kg2/s2/Pa]; density_ratio : upstream
+        density over reference density
+        """
         hook = calls.function_address(self.law.step, calls.HOOKS["step"][0])
         return lambda flow, drop: step_at(hook, start.out, start.handle, k, g, float(flow), float(drop), density_ratio)
 
     def follow(self, start, k: int) -> None:
-        """Set the profile's drop to that of its flow; if they do not agree, the restriction counts as not open."""
+        """Set the steady drop of valve k to the drop that belongs to its flow by its own law.
+
+        If the drop found in the steady problem does not agree with the flow, the restriction counts as not open.
+        """
         row, (drop, density_ratio) = start.valves[k], start.valve_drive(k)
         if row["open"] <= 0.0:
             return
@@ -172,7 +184,7 @@ NEWTON_STEPS = 5  # Newton steps from a drop that is accurate to 1e-6
 
 @functools.cache
 def lowering_of(part: type) -> Lowering:
-    """Lowering of a kind of part, from the module `lower` in the package of its declaration."""
+    """Conversion of a kind of part, from the module `lower` in the package of its declaration."""
     package = part.__module__.rpartition(".")[0]
     if find_spec(f"{package}.lower") is not None:
         import_module(f"{package}.lower")
@@ -183,7 +195,7 @@ NO_ROWS = Lowering()  # for parts without rows
 
 
 def links_by_table(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
-    """Table -> (name, link, lowering) of the links with rows in it, in the order of rows."""
+    """Links with rows in each table : table -> list of (name, link, conversion), in the order of rows."""
     tables: dict[str, list[tuple[str, Any, Lowering]]] = {}
     for name, link in case.conduits.items():
         lowering = lowering_of(type(link)).of(link)
@@ -192,5 +204,5 @@ def links_by_table(case) -> dict[str, list[tuple[str, Any, Lowering]]]:
 
 
 def rows_in(case, table: str) -> list[tuple[str, Any, Lowering]]:
-    """Links of one table : (name, link, lowering)."""
+    """Links with rows in one table, in the order of rows : list of (name, link, conversion)."""
     return links_by_table(case).get(table, [])

@@ -1,4 +1,4 @@
-"""Tables of masses on axes and of the forces on them, and their forces at the start."""
+"""Tables of masses on axes and of the springs, stops and cylinders between them, and their forces at the start."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ SMALL_TRAVEL, SMALL_SPEED = 1e-3, 0.1  # of masses without chambers; of masses w
 
 
 class PushLowering(Lowering):
-    """Links between masses, whose quantity is their force."""
+    """Conversion of links between masses; their probes read the force."""
 
     def probe(self, draft, name, probe, row) -> None:
         row["kind"], row["index"] = rec.FORCE, draft.push_names.index(name)
 
 
 class AxisLowering(Lowering):
-    """Parts that move along an axis, or are fixed on it."""
+    """Conversion of masses, which move along an axis, and of frames, which are fixed on it."""
 
     def probe(self, draft, name, probe, row) -> None:
         row["kind"] = rec.POSITION if probe.quantity == "position" else rec.VELOCITY
@@ -31,7 +31,7 @@ class AxisLowering(Lowering):
 
 
 def lower_masses(draft) -> None:
-    """Fill the tables of masses, braces, stops and pistons of a model."""
+    """Fill the tables of masses, braces (springs, dampers, forces), stops and pistons."""
     case = draft.case
     draft.mass_names = [name for name, node in case.nodes.items() if node.domain == "translational"]
     draft.mass_index = {name: i for i, name in enumerate(draft.mass_names)}
@@ -52,23 +52,24 @@ def lower_masses(draft) -> None:
 
 
 def push_ends(link) -> tuple[str | None, str]:
-    """Places that a push joins; the first may be None."""
+    """Names of the two masses or points that a force element joins; the first may be None."""
     return (
         (link.ports["case"], link.ports["rod"]) if "rod" in link.ports else (link.ports.get("from"), link.ports["to"])
     )
 
 
 def are_points(draft, *places: str | None) -> bool:
-    """True if any place is a point of a body or of the world."""
+    """True if any of the names is a point of a body or of the world."""
     return any(place is not None and place not in draft.mass_index for place in places)
 
 
 def join_ports(
     draft, row, ports: tuple[str, str], places: tuple[str | None, str], *line_options
 ) -> tuple[float, float]:
-    """Write what two ports join : (offset of the second at the start [m], its relative velocity [m/s]).
+    """Write the two masses or points that a force element joins to its row.
 
-    how : for points, further arguments of `body_tables.add_line`
+    Returns the offset of the second from the first at the start [m] and its relative velocity [m/s].
+    line_options : for points, further arguments of `body_tables.add_line`
     """
     row["line"] = -1
     if are_points(draft, *places):
@@ -82,9 +83,10 @@ def join_ports(
 
 
 def add_states(draft) -> None:
-    """Add position and velocity of every mass, with their scales.
+    """Add position and velocity of every mass as states, with the size of a small deviation of each.
 
-    A small travel changes a pressure by 1 bar; a small velocity belongs to an oscillation by it.
+    A small travel changes the pressure of an adjacent chamber by 1 bar; a small velocity belongs to an oscillation with
+    this travel as amplitude.
     """
     nodes, masses = draft.node_table, draft.mass_table
     travel, stiffness = np.full(len(masses), SMALL_TRAVEL), np.zeros(len(masses))
@@ -105,14 +107,17 @@ def add_states(draft) -> None:
 
 
 def pushed_masses(draft) -> np.ndarray:
-    """Masses that each push joins : int64[pushes, 2]."""
+    """Indices of the masses that each force element joins : int64[elements, 2], braces, stops, then pistons."""
     ends = ((draft.brace_table, "from_mass", "to_mass"), (draft.stop_table, "from_mass", "to_mass"),
             (draft.piston_table, "case", "rod"))  # fmt: skip
     return np.concatenate([np.column_stack([table[a], table[b]]) for table, a, b in ends])
 
 
 def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
-    """Sum of pushes, and of the force of still water on walls, on each mass : float64[masses] [N]."""
+    """Sum of the forces on each mass from force elements and from still water on moving walls : float64[masses] [N].
+
+    pushes : force of each element [N], in the order of `pushed_masses`
+    """
     total = np.zeros(len(draft.mass_table))
     for push, (first, second) in zip(pushes, pushed_masses(draft), strict=True):
         total[first] -= push
@@ -124,7 +129,7 @@ def forces_on_masses(draft, pushes: np.ndarray) -> np.ndarray:
 
 
 def start_masses(draft, start) -> list[str]:
-    """Set forces at the start and the unbalanced force on each mass; return texts of motions."""
+    """Set forces of elements and the unbalanced force on each mass at the start; return texts of motions."""
     nodes, masses, ambient = draft.node_table, draft.mass_table, draft.case.ambient_pressure
     size = np.zeros(len(masses))
     for row in draft.brace_table:

@@ -30,7 +30,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PipeMesh:
-    """Cells of a pipe from its `from` end: centres x, edges [m], elevation of centres [m], and its profile, if any."""
+    """Cells of a pipe, counted from its `from` end.
+
+    x, edges : centres and edges of cells, as distances along the pipe [m]; elevation : elevations of the centres [m]
+    profile : elevation profile; None for a straight pipe
+    """
 
     name: str
     from_: str
@@ -46,7 +50,7 @@ class PipeMesh:
     ends: tuple[float, float]  # elevations of the pipe's ends [m]
 
     def height(self, distance: Any) -> Any:
-        """Elevation at distances from the `from` end [m]."""
+        """Elevation of the pipe at distances from its `from` end [m]."""
         if self.profile is None:
             return self.ends[0] + (self.ends[1] - self.ends[0]) * (distance / self.length)
         return self.profile.at(distance)
@@ -105,7 +109,7 @@ def as_numbers(name: str, values: Any) -> np.ndarray:
 
 
 def as_limit(limit: Any) -> float:
-    """End of a segment [s], or infinity. Raises FvsolveError if it is not a time."""
+    """End of a segment of a run [s], or infinity. Raises FvsolveError if the argument is not a time."""
     value = as_numbers("limit", limit)
     if value.ndim or np.isnan(value):
         raise FvsolveError(f"limit = {show(value)} is not a time; expected a number of seconds, or infinity")
@@ -113,7 +117,7 @@ def as_limit(limit: Any) -> float:
 
 
 def as_time(t: Any) -> float:
-    """A time [s]. Raises FvsolveError if it is not a finite number."""
+    """Time as a float [s]. Raises FvsolveError if the argument is not a finite number."""
     value = as_numbers("t", t)
     if value.ndim or not np.isfinite(value):
         raise FvsolveError(f"t = {show(t)} is not a time; expected a finite number of seconds")
@@ -126,7 +130,7 @@ class Model(Displayable):
 
     tables : arrays that kernels read, by name; shapes : shapes of the arrays that a run writes, see `RunData`
     scale : float64[n]  size of a small deviation of each state, for relative measures
-    breaks : (time [s], True if a value jumps there), increasing, within the run
+    breaks : times within the run at which steps must end, increasing : (time [s], True if a schedule's value jumps)
     """
 
     case: Case
@@ -185,7 +189,7 @@ class Model(Displayable):
 
     @property
     def ledgers(self) -> int:
-        """Rows of the stepper's ledger: supply of nodes, inflow of each scalar at nodes, decay of each scalar."""
+        """Number of rows of the stepper's ledger: supply of nodes, inflow of scalars at nodes, decay of scalars."""
         return int(self.layout["net"] - self.layout["supply"])
 
     @property
@@ -200,7 +204,7 @@ class Model(Displayable):
 
     @cached_property
     def wave_rates(self) -> np.ndarray:
-        """Cells that a wave crosses per second, for every pipe [1/s]."""
+        """Cells that a wave crosses per second in each pipe : float64[pipes] [1/s]."""
         pipes = self.tables.pipes
         rates = pipes["speed"] / pipes["dx"] * np.where(pipes["delay"] >= 0, pipes["rate_factor"], 1.0)
         rates.flags.writeable = False
@@ -208,7 +212,7 @@ class Model(Displayable):
 
     @property
     def wave_rate(self) -> float:
-        """Cells that the fastest wave crosses per second [1/s]; for basins, the rate at the start."""
+        """Cells that the fastest wave of the model crosses per second [1/s]; in basins at the start."""
         rate = float(self.wave_rates.max(initial=0.0))
         if not self.basins:
             return rate
@@ -226,7 +230,7 @@ class Model(Displayable):
 
     @cached_property
     def places(self) -> tuple:
-        """Memory addresses of the tables, for handles."""
+        """Memory addresses of the tables, by which compiled functions read them."""
         from fvsolve.kernels.table_handle import addresses_of
 
         return addresses_of(self.tables)
@@ -252,17 +256,17 @@ class Model(Displayable):
 
     @property
     def damped(self) -> bool:
-        """True if the stages of explicit steps are divided by friction, see `steppers.semi_implicit`."""
+        """True if explicit steps divide the rates of basins by a factor for friction, see `steppers.semi_implicit`."""
         return bool(self.tables.basins["damped"].any())
 
     @property
     def layout(self):
-        """Offsets in `out`, the array that the right-hand side writes in addition to dydt."""
+        """Record of offsets in `out`, the array that the right-hand side writes in addition to dydt."""
         return self.tables.layout[0]
 
     @cached_property
     def structure(self):
-        """Pattern of the Jacobian, and the linear algebra that suits it or that `numerics.linear_algebra` names."""
+        """Sparsity pattern of the Jacobian, with the linear algebra chosen for it or by `numerics.linear_algebra`."""
         from fvsolve.model.jacobian_pattern import jacobian_pattern, lumped_states
         from fvsolve.steppers.structure import Structure
 
@@ -275,7 +279,7 @@ class Model(Displayable):
         return out
 
     def checked(self, t: Any, y: Any) -> tuple[float, np.ndarray]:
-        """A time and a state as kernels read them.
+        """Time and state in the form that kernels read : (t [s], y : float64[n]).
 
         Raises FvsolveError if the state does not fit this model or is not finite.
         """
@@ -286,7 +290,7 @@ class Model(Displayable):
         return as_time(t), state
 
     def checked_size(self, y: Any) -> np.ndarray:
-        """A state as float64[n]. Raises FvsolveError if it does not fit this model."""
+        """State as float64[n]. Raises FvsolveError if its size does not fit this model."""
         state = as_numbers("y", y)
         if state.shape != (self.y_size,):
             raise FvsolveError(f"y has shape {state.shape}; expected a number for each of the {self.y_size} states "
@@ -313,9 +317,9 @@ class Model(Displayable):
                                'are needed too. Expected rhs(State), or pipe_model = "finite-volume"')  # fmt: skip
 
     def evaluate(self, t: float, y: np.ndarray, limit: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
-        """Right-hand side and `out` at t : (dydt, out), as `rhs`.
+        """Right-hand side and further values at (t, y), see `rhs` : (dydt, out).
 
-        From `limit` [s] on, schedules take their left limit there.
+        From time `limit` [s] on, schedules keep their left limit at `limit`.
         """
         limit = as_limit(limit)
         with self.run_data() as run_data:
@@ -323,9 +327,9 @@ class Model(Displayable):
 
     @contextmanager
     def run_data(self, armed: np.ndarray | float = 0.0) -> Iterator[RunData]:
-        """Run data for evaluating single states, reused by the next call. `armed` : event flags, 0 as at a start.
+        """Context with run data for evaluating single states, which later calls use again.
 
-        Its first occurrences and extremes have no meaning.
+        armed : event flags, 0 as at a start. First occurrences and extremes in these data have no meaning.
         """
         try:
             run_data = self.idle_run_data.pop()  # atomic: no other thread gets the same object
@@ -336,7 +340,7 @@ class Model(Displayable):
         self.idle_run_data.append(run_data)
 
     def jacobian(self, t: float, y: np.ndarray) -> np.ndarray:
-        """df/dy : float64[n, n] by central differences of the scaled states."""
+        """Jacobian df/dy : float64[n, n], by central differences with steps in proportion to `scale`."""
         self.refuse_delay_lines("jacobian")
         return self.jacobian_without_delays(t, y)
 
@@ -355,7 +359,8 @@ class Model(Displayable):
     def observe(self, t: float | State, y: np.ndarray | None = None, limit: float = np.inf) -> np.ndarray:
         """Values of all probes, in the order of `.probes`, at a `State` or at (t, y) : float64[probes] [SI].
 
-        Devices are in the position of a start at (t, y), or as stored in a state that `advance` returned.
+        Devices are in the position of a start at (t, y), or as stored in a state that `advance` returned. From time
+        `limit` [s] on, schedules keep their left limit at `limit`.
         """
         armed, limit, past = 0.0, as_limit(limit), None
         if isinstance(t, State) and y is None:
@@ -390,9 +395,9 @@ class Model(Displayable):
         return self.case.law.cavitates
 
     def fields(self, y: np.ndarray, out: np.ndarray, lines: dict[int, tuple] | None = None) -> dict[str, Any]:
-        """Fields of all pipes and pressures of all nodes at a state, SI; `out` as returned by `evaluate`.
+        """Values along all pipes, in all basins and at all nodes in a state [SI] : name of part -> quantity -> values.
 
-        lines : pipe -> both waves of delay lines, as returned by `RunData.along`
+        out : array that `evaluate` returns; lines : pipe -> both waves of a delay line, as returned by `RunData.along`
         """
         y = self.checked_size(y)
         if np.shape(out) != (int(self.layout["size"]),):
@@ -427,7 +432,7 @@ class Model(Displayable):
         return fields
 
     def contents(self, y: np.ndarray) -> tuple[float, float]:
-        """Mass stored in the starting profile, and change of mass in state y [kg]."""
+        """Mass stored in the initial steady state, and change of mass in state y [kg]."""
         y = self.checked_size(y)
         initial, change = 0.0, 0.0
         for k, row in enumerate(self.tables.pipes):

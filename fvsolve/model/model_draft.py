@@ -23,18 +23,18 @@ from fvsolve.model.state_names import StateNames
 
 
 def no_rows(record: np.dtype) -> Any:
-    """Field for a table without rows."""
+    """Dataclass field for a table that has no rows at first."""
     return field(default_factory=lambda: np.zeros(0, record))
 
 
 def byte_copy(table: np.ndarray) -> np.ndarray:
-    """Copy of a table, by bytes: numpy would copy records field by field."""
+    """Copy of a table, made byte by byte, because numpy would copy records field by field."""
     return np.ndarray(table.shape, table.dtype, bytearray(table.tobytes()))
 
 
 @dataclass(slots=True, eq=False)
 class ModelDraft:
-    """Tables, names and states of a model under construction. Slots: no other attributes can be added."""
+    """Tables, names and states of a model while it is built. It has slots: no other attributes can be added."""
 
     case: Case
     fluid: Any = None
@@ -129,7 +129,10 @@ class ModelDraft:
         self.owned = {f"{name}.{place}" for name, link in case.links.items() for place in link.owns}
 
     def copy_for(self, case: Case) -> ModelDraft:
-        """Copy of packed tables for a case of equal tables; later changes, and arrays of a start, are its own."""
+        """Copy of packed tables for a case with tables of the same shapes.
+
+        Writable tables and lists are copied, so that later changes do not reach the original.
+        """
         copy = object.__new__(ModelDraft)
         tables = {id(source): byte_copy(source) for source in self.tables if source.flags.writeable}
         for name in self.__slots__:
@@ -154,47 +157,50 @@ class ModelDraft:
             raise CaseError(self.faults, str(self.case.path or self.case.name))
 
     def states(self, names: Sequence[str], scale: float | list[float]) -> int:
-        """Offset of new states; `scale` : of each, or of all of them."""
+        """Add states; return the offset of the first.
+
+        scale : size of a small deviation, a number for all of them or a list with one for each
+        """
         self.state_names.add(names)
         self.scale += array("d", scale) if isinstance(scale, list) else array("d", [scale]) * len(names)
         self.size += len(names)
         return self.size - len(names)
 
     def to_plane(self, values: np.ndarray) -> int:
-        """Offset of new values in `plane`, at the start of a cache line."""
+        """Append values to `plane`, the constant data of basins, at the start of a cache line; return their offset."""
         self.pieces_of_plane.append(np.append(np.ravel(values), np.zeros(-values.size % CACHE_LINE)))
         self.plane_size += self.pieces_of_plane[-1].size
         return self.plane_size - self.pieces_of_plane[-1].size
 
     def plane(self) -> np.ndarray:
-        """All values of the plane, aligned to cache lines."""
+        """Array of all values appended by `to_plane`, aligned to cache lines."""
         plane = aligned_zeros(self.plane_size)
         np.concatenate([np.zeros(0), *self.pieces_of_plane], out=plane)
         return plane
 
     def to_work(self, size: int) -> int:
-        """Offset of `size` new numbers in `work`, at the start of a cache line."""
+        """Reserve `size` numbers of the array `work`, at the start of a cache line; return their offset."""
         self.work_size += size + -size % CACHE_LINE
         return self.work_size - size - -size % CACHE_LINE
 
     def used_size(self) -> int:
-        """Count of numbers that basins have used up to now."""
+        """Count of the numbers used so far in `plane`, `work` and `integers`."""
         return self.plane_size + self.work_size + len(self.integers)
 
     def flags(self, name: str, events: tuple[str, ...]) -> int:
-        """Offset in `armed` of new flags, one for each event function of a part."""
+        """Reserve flags in `armed`, one for each event function of a part; return the offset of the first."""
         first = tank_limits.EVENTS * self.tanks + len(self.events)
         self.events += [(name.removesuffix(".inside"), text) for text in events]
         return first
 
     def hooks(self, lowering: Lowering) -> int:
-        """Row of `hooks` of the functions of a law."""
+        """Row of the functions of a part's law in the table `hooks`."""
         law = lowering.law.__name__
         self.laws += [] if law in self.laws else [law]
         return self.laws.index(law)
 
     def inside(self, name: str) -> str:
-        """Name of the inner node of a part with a connection, else of the part itself."""
+        """Name of the inner node of a part that has one, else of the part itself."""
         return f"{name}.inside" if f"{name}.inside" in self.node_index else name
 
     @property
@@ -203,11 +209,11 @@ class ModelDraft:
         return [name for name, _, _ in self.devices]
 
     def device_of(self, name: str) -> Device:
-        """Lowering of a device."""
+        """Conversion object of the device `name`."""
         return self.devices[self.device_names.index(name)][2]
 
     def fill(self, table: str, record: np.dtype) -> tuple[list[str], np.ndarray]:
-        """Rows of a table : (name of the link of each row, rows)."""
+        """Fill the rows of a table from the links of the case : (name of the link of each row, rows)."""
         parts = self.links.get(table, [])
         names = [name for name, _, lowering in parts for _ in range(lowering.rows)]
         table_rows, at = np.zeros(len(names), record), 0
@@ -222,16 +228,16 @@ class ModelDraft:
         return names, table_rows
 
     def ends(self, link, row) -> None:
-        """Write the nodes that a link joins."""
+        """Write the indices of the nodes that a link joins to its row."""
         row["from_node"], row["to_node"] = self.node_index[link.from_], self.node_index[link.to]
 
     def stiff(self) -> int:
-        """New row of a node whose pressure follows its mass by a variable stiffness."""
+        """Number of a new node whose stiffness (pressure per stored mass) is not constant."""
         self.moving += 1
         return self.moving - 1
 
     def restriction(self, name, link, row) -> None:
-        """Set G of a valve from its size, and the flow below which it is laminar."""
+        """Set the conductance of a fully open valve [kg2/s2/Pa], and the flow below which it is laminar [kg/s]."""
         row["conductance"] = 2.0 * self.fluid.density * link.flow_area() ** 2
         if link.laminar_reynolds is not None:
             row["transition"] = self.hydraulics.transition_flow(name, link, link.laminar_reynolds, self.fault)

@@ -99,19 +99,19 @@ def wall_facts(link) -> dict[str, Any]:
 
 
 def pose_facts(pose) -> dict[str, float]:
-    """Place, attitude and velocities of a body at the start."""
+    """Position, attitude, speed and angular speed of a body at the start."""
     place = dict(zip("xyz", pose.place.tolist(), strict=True))
     angles = dict(zip(("roll", "pitch", "yaw"), roll_pitch_yaw(pose.attitude), strict=True))
     return place | angles | {"speed": float(np.linalg.norm(pose.velocity)), "spin": float(np.linalg.norm(pose.spin))}
 
 
 def wall_loss(loss: float, link, rho: float, velocity: float) -> float:
-    """Pressure loss by wall friction [Pa]: total loss minus minor loss."""
+    """Pressure loss by wall friction [Pa]: magnitude of the total loss minus the minor loss."""
     return abs(loss) - link.minor_loss * rho * velocity**2 / 2.0
 
 
 def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
-    """Notice if explicit steps are many because a part is much faster than waves."""
+    """Notice if an explicit method needs very many steps, because a part is much faster than waves."""
     numerics, start = model.case.numerics, model.case.numerics.start
     explicit = numerics.method != AUTO and method_named(numerics.method).explicit
     waves = max([*model.wave_rates, *(basin.max_rate(model.start)[0] for basin in model.basins)], default=0.0)
@@ -130,7 +130,7 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
 
 
 def basin_facts(basin) -> dict[str, Any]:
-    """Mesh, waves at the start and patches of a basin: lengths of faces, areas of the cells behind them."""
+    """Facts about a basin: mesh, waves at the start, and patches (length of faces, area of the cells behind them)."""
     mesh, patches = basin.mesh, {}
     for name in patch_names(mesh):
         faces, part = mesh.patch(name), basin.part.patches.get(name)
@@ -147,13 +147,13 @@ def basin_facts(basin) -> dict[str, Any]:
 
 
 def start_speed(model, k: int) -> float:
-    """Wave speed of pipe k [m/s] in liquid and wall; under `mixture` its mean along the pipe at the start."""
+    """Wave speed of pipe k in its liquid and wall [m/s]; under the law `mixture` the mean along it at the start."""
     mesh = model.pipes[k]
     return model.case.law.wave_speed(model.tables.pipes[k], model.cell_pressure(k, np.zeros(mesh.cells)))
 
 
 def rhs_seconds(model) -> float:
-    """CPU time of one call of the compiled right-hand side, with waves [s]."""
+    """CPU time of one call of the compiled right-hand side [s], at a state with small waves."""
     y = TEST_DEVIATION * model.scale * np.random.default_rng(1).choice([-1.0, 1.0], model.y_size)
     dydt, out = np.zeros(model.y_size), model.new_out()
     rhs, t, shortest, calls = model.functions.rhs, float(model.case.numerics.start), math.inf, 1
@@ -171,7 +171,10 @@ def rhs_seconds(model) -> float:
 
 
 def step_and_reason(model) -> tuple[float | None, str]:
-    """Step at the start [s] and the part that limits it; None if error control chooses it."""
+    """Time step at the start, and the part that limits it : (step [s], text).
+
+    The step is None if error control chooses it.
+    """
     numerics = model.case.numerics
     if numerics.step is not None:
         return numerics.step, "numerics.step"
@@ -202,7 +205,10 @@ def step_and_reason(model) -> tuple[float | None, str]:
 
 
 def fastest_valve(model, rate: float) -> tuple[str, float]:
-    """Valve between two storing nodes whose removal lowers the greatest rate most : (name, remaining rate [1/s])."""
+    """Valve between two nodes with storage whose closing lowers the greatest rate most : (name, remaining rate [1/s]).
+
+    The name is "" if no valve matters.
+    """
     valves, name, least = model.tables.valves, "", rate * (1 - VALVE_SHARE)
     start = model.case.numerics.start
     for k in np.flatnonzero((valves["solve"] == rec.ALONE) & (valves["device"] < 0))[:MAX_VALVES]:
@@ -222,7 +228,7 @@ def velocities(model) -> np.ndarray:
 
 
 def fastest_parts(model) -> str:
-    """Parts other than pipes that can limit the step: storing nodes, rigid columns, masses, bodies, basins."""
+    """Names of all parts other than pipes that can limit the step, as text."""
     stores = [name for name, row in zip(model.node_names, model.tables.nodes, strict=True)
               if row["kind"] not in (rec.FIXED, rec.JUNCTION, rec.PATCH)]  # fmt: skip
     names = [

@@ -1,4 +1,4 @@
-"""Table of stretches of pipes and columns, and of nodes, on bodies; and the inertial forces on them at the start."""
+"""Table of segments of pipes and rigid columns, and of nodes, on moving bodies; their inertial forces at the start."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ROUNDING = 1e-9  # specific force times length [J/kg] below which it counts as r
 
 
 def lower_moving_segments(draft) -> None:
-    """Fill a row for every pipe cell, every stretch of a rigid column and every node on a body."""
+    """Fill a row for every pipe cell, every segment of a rigid column and every node on a body."""
     rows: list[tuple] = []
     links, places = draft.case.conduits, draft.case.places
     for name, row in [*zip(draft.pipe_names, draft.pipe_table, strict=True),
@@ -52,7 +52,7 @@ def reads_joint_forces(draft) -> bool:
 
 
 def moving_segment_row(draft, on: str, points: np.ndarray) -> tuple:
-    """Row of `rides` for a straight line between two points in axes of a body [m]."""
+    """Row of the table `moving_segments` for a straight line between two points, given in axes of the body `on` [m]."""
     rise = (draft.case.poses[on].attitude @ (points[1] - points[0]))[2]
     heavy = (
         rec.JOINT_LOAD_READ
@@ -65,7 +65,7 @@ def moving_segment_row(draft, on: str, points: np.ndarray) -> tuple:
 
 
 def driven_at_start(draft, start) -> list[str]:
-    """Texts of pipes and columns that the motion of their body drives at the start."""
+    """Texts of pipes and rigid columns whose flow is driven by the motion of their body at the start."""
     if not len(draft.moving_segment_table):
         return []
     from fvsolve.model.static_forces import DRIVES, MOTION, StaticForces

@@ -1,4 +1,4 @@
-"""Starting profile under density laws that are not linear."""
+"""Initial steady state under density laws that are not linear."""
 
 from __future__ import annotations
 
@@ -14,7 +14,11 @@ from fvsolve.model.steady_start import PRESSURE_SCALE, SteadyStart
 
 
 class NonlinearStart(SteadyStart):
-    """Steady flow with potentials rho_ref (h(p) + g z); density effects on drops are lagged until convergence."""
+    """Steady flow with the potentials rho_ref (h(p) + g z) [Pa].
+
+    rho_ref : reference density [kg/m3]; h : specific enthalpy [J/kg]; z : elevation [m]. Effects of density on pressure
+    drops are those of the previous solution, until they no longer change.
+    """
 
     def __init__(self, draft) -> None:
         super().__init__(draft)
@@ -47,9 +51,10 @@ class NonlinearStart(SteadyStart):
             self.draft.check()
 
     def jet(self, row, m_from: float, m_to: float) -> tuple[float, float]:
-        """Loss of flow M that leaves a pipe at its `from` and `to` end, over M^2 [Pa s2/kg2].
+        """Loss coefficient rho_ref / (2 m^2) of the flow that leaves a pipe at its `from` and `to` end [Pa s2/kg2].
 
-        rho / (2 m^2), m [kg/m] the mass per length there; none at junctions.
+        m_from, m_to : mass per length there [kg/m]. The coefficient times the square of the mass flow is the pressure
+        loss; it is 0 at junctions.
         """
         ends = ((int(row["from_node"]), m_from), (int(row["to_node"]), m_to))
         back, ahead = (0.5 * self.rho / m**2 if self.at_rest(i) else 0.0 for i, m in ends)
@@ -59,7 +64,7 @@ class NonlinearStart(SteadyStart):
         return self.nodes["kind"][i] != rec.JUNCTION
 
     def correct_drops(self) -> None:
-        """Set corrections of drops relative to constant density, at the present solution."""
+        """Set corrections of pressure drops relative to those at constant density, from the latest solution."""
         potential = self.answer.potential
         names = self.draft.pipe_names
         for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
@@ -91,12 +96,15 @@ class NonlinearStart(SteadyStart):
             self.factor[len(self.valves) + k] = self.dense(int(row["a"]), int(row["b"]))
 
     def dense(self, i: int, j: int) -> float:
-        """(upstream density / rho)(driving pressure / change of potential)."""
+        """Factor on the conductance between nodes i and j, the product of both ratios of `density_and_drive`."""
         density_ratio, drive_ratio = self.density_and_drive(i, j)
         return density_ratio * drive_ratio
 
     def density_and_drive(self, i: int, j: int) -> tuple[float, float]:
-        """Upstream density / rho, and driving pressure / change of potential."""
+        """Ratios for the flow from node i to j : (upstream density over reference density, driving ratio).
+
+        The driving ratio is the driving pressure over the change of potential.
+        """
         z, p = self.nodes["elevation"], [self.pressure(i), self.pressure(j)]
         drop, rho = driving_pressure(self.st, self.floats, p[0], z[i], p[1], z[j])
         change = self.answer.potential[i] - self.answer.potential[j]
@@ -104,7 +112,10 @@ class NonlinearStart(SteadyStart):
         return rho / self.rho, ratio
 
     def march(self, row, mesh, flow: float):
-        """Profile of a pipe : (mass per length at faces, at centres, Bernoulli constant at the `to` end)."""
+        """Steady state along a pipe, integrated from its `from` end : (masses at faces, masses at centres, constant).
+
+        The masses are per length [kg/m]. The constant is h + v^2 / 2 + g z at the `to` end [J/kg].
+        """
         i = int(row["from_node"])
         z = float(self.nodes["elevation"][i])
         start = self.answer.potential[i] / self.rho
@@ -119,7 +130,11 @@ class NonlinearStart(SteadyStart):
         return faces, centers, b_to
 
     def match(self, row, mesh, flow: float):
-        """Profile that ends at the pressure of its `to` node; unbalanced pressure drives the flow."""
+        """Steady state along a pipe that ends at the pressure of its `to` node : (masses at faces, at centres).
+
+        The masses are per length [kg/m]. A pressure difference that friction does not balance drives the flow and
+        enters the pipe's drag.
+        """
         j = int(row["to_node"])
         for sweep in range(20):
             faces, centers, b_to = self.march(row, mesh, flow)
@@ -170,7 +185,7 @@ class NonlinearStart(SteadyStart):
         return self.pressure_of_mass(row, self.mass_at(k, fraction)), self.height(row, mesh, fraction)
 
     def mass_at(self, k: int, fraction: float) -> float:
-        """Mass per length of the profile at a fraction of pipe k, linear between faces and centres."""
+        """Mass per length of the steady state at a fraction of pipe k [kg/m], linear between faces and centres."""
         row, mesh = self.pipes[k], self.draft.meshes[k]
         profile, n = self.draft.tables.profile, mesh.cells
         masses = np.empty(2 * n + 1)
@@ -182,7 +197,10 @@ class NonlinearStart(SteadyStart):
         return m if row["rise"] < 0 else self.mass_between(row, mesh, fraction, m)
 
     def mass_between(self, row, mesh, fraction: float, m: float) -> float:
-        """Mass per length at a place between faces and centres, corrected for its height above their line."""
+        """Mass per length [kg/m] between a face and a centre, where the pipe is not straight.
+
+        m : mass per length by linear interpolation, to be corrected for the height of the pipe above the straight line
+        """
         rises = self.draft.tables.profile[row["rise"] : row["rise"] + 2 * mesh.cells + 1]
         straight = np.interp(fraction, np.linspace(0.0, 1.0, rises.size), rises)
         excess = mesh.profile.at(fraction * mesh.length) - mesh.profile.elevation[0] - straight

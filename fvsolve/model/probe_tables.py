@@ -1,4 +1,4 @@
-"""Probe table: what each probe reads, with scale and offset, in SI units."""
+"""Table of probes: data that each probe reads, with scale and offset, in SI units."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.model.probe_weights import lower_position
 
 
 def lower_probes(draft) -> np.ndarray:
-    """Probe table of a case. Pressures of the profile are filled in later, by `probe_offsets`."""
+    """Table of the probes of a case. Pressures of the initial steady state are filled in later, by `probe_offsets`."""
     case, table = draft.case, np.zeros(len(all_probes(draft.case)), rec.PROBE)
     parts = {"nodes": {**case.places, **case.nodes}, "links": {**case.links, **case.conduits}}
     for row, probe in zip(table, all_probes(case), strict=True):
@@ -30,12 +30,15 @@ def lower_probes(draft) -> np.ndarray:
 
 
 def all_probes(case) -> list:
-    """All that is read after every step: probes, then quantities watched for their extremes only."""
+    """All probes that are read after every step: those of the case, then quantities of which only extremes are kept."""
     return [*case.probes, *case.extreme_probes]
 
 
 def scalar_probe(draft, row, probe) -> None:
-    """Probe of a scalar at a node or along a pipe, there by linear interpolation between cell centres."""
+    """Fill the row of a probe of a scalar at a node or along a pipe.
+
+    Along a pipe its value is interpolated linearly between cell centres.
+    """
     row["scalar"] = list(draft.case.scalars).index(probe.quantity)
     if probe.part == "nodes":
         row["kind"], row["index"] = rec.NODE_SCALAR, draft.node_index[draft.inside(probe.name)]
@@ -45,7 +48,7 @@ def scalar_probe(draft, row, probe) -> None:
 
 
 def lower_body_point(draft, row, probe) -> None:
-    """Probe of a quantity at a named point."""
+    """Fill the row of a probe at a named point of a body or of the world."""
     from fvsolve.kernels.mechanism.body_probes import POINT_QUANTITIES
 
     row["kind"], row["side"] = rec.POINT_VALUE, POINT_QUANTITIES.index(probe.quantity)
@@ -53,7 +56,7 @@ def lower_body_point(draft, row, probe) -> None:
 
 
 def lower_basin_point(draft, row, probe) -> None:
-    """Cells of a basin that a probe reads, and their weights."""
+    """Fill the row of a probe at a point of a basin: the cells that it reads, and their weights."""
     if probe.name in draft.case.lumped:
         return lower_surface(draft, row, probe)
     k = list(draft.case.meshes).index(probe.name)
@@ -71,7 +74,7 @@ def lower_basin_point(draft, row, probe) -> None:
 
 
 def lower_surface(draft, row, probe) -> None:
-    """Probe of depth at a point of a basin with sloshing modes."""
+    """Fill the row of a probe of depth at a point of a basin with sloshing modes."""
     case, basin = draft.case, draft.case.nodes[probe.name]
     arguments = basin, case.lumped[probe.name]
     modes, shares = sloshing.surface_factors(*arguments, *probe.point, case.properties.density, case.gravity)
@@ -82,7 +85,10 @@ def lower_surface(draft, row, probe) -> None:
 
 
 def probe_offsets(draft, start) -> None:
-    """Set scale and offset of every probe, and start pressures of watched quantities along pipes, from the profile."""
+    """Set scale and offset of every probe from the initial steady state.
+
+    Also sets the steady pressures of watched quantities along pipes.
+    """
     count = len(draft.case.probes)
     draft.watched_start = np.full(len(draft.probe_table) - count, np.nan)
     for k, (row, probe) in enumerate(zip(draft.probe_table[count:], draft.case.extreme_probes, strict=True)):
@@ -98,7 +104,10 @@ def probe_offsets(draft, start) -> None:
 
 
 def linear_offsets(draft, start, row, probe) -> None:
-    """Offsets for the law `linear`: value = scale * (deviation of pressure or flow) + offset."""
+    """Set scale and offset of a probe under the linear law.
+
+    Its value is scale * (deviation of pressure or flow) + offset.
+    """
     weight = draft.fluid.density * draft.case.gravity
     row["scale"], row["offset"] = 1.0, 0.0
     if row["kind"] in (rec.VALVE_FLOW, rec.COLUMN_FLOW, rec.PIPE_FLOW, rec.SPOOL_FLOW):
@@ -119,7 +128,10 @@ def linear_offsets(draft, start, row, probe) -> None:
 
 
 def barotropic_offsets(draft, start, row, probe) -> None:
-    """Offsets that convert pressure to gauge pressure or head, and the profile's mass per length at the probe."""
+    """Set the offset of a probe under nonlinear laws, which converts pressure to gauge pressure or head.
+
+    Also sets the steady mass per length at the probe.
+    """
     if row["kind"] == rec.DEVICE_VALUE:
         return
     if row["kind"] in (rec.PIPE_PRESSURE, rec.PIPE_FLOW):

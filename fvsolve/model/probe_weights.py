@@ -12,9 +12,9 @@ TIE_TOLERANCE = 1e-6  # in cells; two sets of cells that differ by less count as
 
 
 def lower_position(draft, row, fraction: float, degree: int | None = None) -> None:
-    """Set the position of a probe along its pipe: an end, or cells and weights of a polynomial.
+    """Set the position of a probe along its pipe: an end, or cells and weights of a polynomial through their means.
 
-    degree : of the polynomial; by default that of the scheme
+    degree : degree of the polynomial; if None, that of the scheme
     """
     if fraction in (0.0, 1.0):
         row["side"] = -1 if fraction == 0.0 else 1
@@ -28,10 +28,11 @@ def lower_position(draft, row, fraction: float, degree: int | None = None) -> No
 
 @functools.lru_cache(maxsize=4096)
 def cells_around(x: float, degree: int, n: int) -> tuple[int, np.ndarray]:
-    """First cell that is read at x cells from the `from` end, and weights of the cells.
+    """First cell that a probe reads, and weights of this and the following cells.
 
-    The nearest degree + 1 cells are read. If two such sets are equally near, as at a face for an even degree, the
-    result is the mean of both, so that a pipe drawn in the opposite direction reads the same value.
+    x : position in cells from the `from` end; n : number of cells. The nearest degree + 1 cells are read. If two such
+    sets are equally near, as at a face for an even degree, the result is the mean of both, so that a pipe drawn in the
+    opposite direction reads the same value.
     """
     middle = x - 0.5 * (degree + 1)
     firsts = sorted({int(np.clip(round(middle + side), 0, n - degree - 1)) for side in (-TIE_TOLERANCE, TIE_TOLERANCE)})
@@ -42,7 +43,10 @@ def cells_around(x: float, degree: int, n: int) -> tuple[int, np.ndarray]:
 
 
 def reading_weights(x: float, degree: int) -> np.ndarray:
-    """Weights w with sum w_k (average over [k, k+1]) = value at x, exact for polynomials up to `degree`."""
+    """Weights of the means of degree + 1 cells in the value at x, exact for polynomials up to `degree`.
+
+    Cell k lies between k and k + 1.
+    """
     powers = np.arange(degree + 1)
     cells = np.arange(degree + 1)[:, None]
     averages = ((cells + 1.0) ** (powers + 1) - cells ** (powers + 1.0)) / (powers + 1)

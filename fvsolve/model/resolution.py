@@ -14,7 +14,6 @@ from fvsolve.parts.schedule import Schedule
 
 # Number of cells from which peaks at a valve are accurate to a tenth of their rise, for closures at once or within
 # five travel times (tests/model/test_resolution.py); `fromm` and `central` overshoot jumps by more, with any number.
-# they rise (tests/model/test_resolution.py); `fromm` and `central` overshoot jumps by more, whatever the cells.
 SCHEME_CELLS, OTHER_CELLS = {"upwind": 40, "weno5": 6}, 10  # for these schemes, and for all others
 SLOW_EVENT = 100.0  # travel times: for longer events the liquid is practically rigid
 SHORT_PIPE = 0.1  # of the longest travel time: shorter pipes count only next to fast events
@@ -24,7 +23,10 @@ COSTLY_RATIO = 10.0  # steps shorter by this factor than those of other pieces o
 
 
 def too_few_cells(draft: Any) -> list[Notice]:
-    """Notices of pipes behind an event, and of a piece next to a check valve or vessel or with a short step."""
+    """Notices of pipes with too few cells for waves of an event, or next to a check valve or accumulator.
+
+    If there is none of the second kind, also of a piece of a cut pipe with far shorter steps than other pieces.
+    """
     table = draft.pipe_table
     if not len(table):
         return []
@@ -33,7 +35,7 @@ def too_few_cells(draft: Any) -> list[Notice]:
 
 
 def events(case: Any) -> Iterator[tuple[str, float]]:
-    """Changes within the run that a case states : (dotted key, duration [s]), duration 0 for a sudden change."""
+    """Changes that a case states within its run : (dotted key, duration [s]); the duration of a sudden change is 0."""
     span = case.numerics.start, case.numerics.end
     for group in ("nodes", "links"):
         for name, part in getattr(case, group).items():
@@ -46,7 +48,10 @@ def events(case: Any) -> Iterator[tuple[str, float]]:
 
 
 def duration(schedule: Schedule, start: float, end: float) -> float:
-    """Duration of a schedule's whole range at its steepest slope between two times [s]; inf without change."""
+    """Time that a schedule needs to cross its whole range at its steepest slope between `start` and `end` [s].
+
+    It is inf if the schedule does not change.
+    """
     if schedule.kind == "harmonic":
         return schedule.wave[2] / math.pi
     t, changes = schedule.time, np.abs(np.diff(schedule.value))
@@ -84,7 +89,10 @@ def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
 
 
 def _diffusion(draft: Any) -> np.ndarray:
-    """Numerical diffusion of upwind with Euler's method, relative to upwind alone: 1 - Courant number; else 1."""
+    """Numerical diffusion in each pipe, relative to that of its scheme with small steps : float64[pipes].
+
+    It is 1 - Courant number for upwind with Euler's method, else 1.
+    """
     numerics, rate = draft.case.numerics, draft.pipe_table["speed"] / draft.pipe_table["dx"]
     if numerics.scheme != "upwind" or numerics.method != "euler" or numerics.rtol is not None:
         return np.ones(len(rate))
@@ -92,7 +100,7 @@ def _diffusion(draft: Any) -> np.ndarray:
 
 
 def _near_events(draft: Any, durations: dict[str, float], travel: np.ndarray) -> np.ndarray:
-    """Pipes with a schedule at an end that changes within a few of their travel times : bool[pipes]."""
+    """True for each pipe with a schedule at an end that changes within a few of its travel times : bool[pipes]."""
     case, shortest = draft.case, {}
     for key, time in durations.items():
         group, name, key_name = (*key.split("."), "", "")[:3]
@@ -103,7 +111,7 @@ def _near_events(draft: Any, durations: dict[str, float], travel: np.ndarray) ->
 
 
 def _near_answering(draft: Any, cells: np.ndarray) -> list[Notice]:
-    """Notice of pipes and pieces too short for their waves to reach a check valve or vessel next to them."""
+    """Notice of pipes with too few cells for their waves to reach a check valve or accumulator next to them."""
     if not (cells < LEAST_CELLS).any():
         return []
     case, parts_at = draft.case, answering_parts(draft.case)
@@ -120,7 +128,7 @@ def _near_answering(draft: Any, cells: np.ndarray) -> list[Notice]:
 
 
 def answering_parts(case: Any) -> dict[str, list[str]]:
-    """Pipe -> check valves and vessels at its ends."""
+    """Check valves and accumulators at the ends of each pipe : pipe -> names."""
     parts_at: dict[str, list[str]] = {name: [name] for name, node in case.nodes.items() if node.kind == "accumulator"}
     for name, link in case.links.items():
         for node in link.ports.values() if link.kind == "check-valve" else ():
@@ -130,7 +138,7 @@ def answering_parts(case: Any) -> dict[str, list[str]]:
 
 
 def _costly_piece(draft: Any, cells: np.ndarray) -> list[Notice]:
-    """Notice of the piece of a cut pipe that needs far shorter steps than the other pieces."""
+    """Notice of a piece of a cut pipe that needs far shorter steps than the other pieces of this pipe."""
     case, numerics = draft.case, draft.case.numerics
     if numerics.courant is None:
         return []
@@ -148,7 +156,7 @@ def _costly_piece(draft: Any, cells: np.ndarray) -> list[Notice]:
 
 
 def _cut_pipe(case: Any, piece: str) -> str | None:
-    """Name of the cut pipe of a piece; None for a pipe that is not cut."""
+    """Name of the cut pipe to which a piece belongs; None for a pipe that is not cut."""
     name = piece.rpartition("-")[0]
     route = case.routes.get(name)
     return name if route is not None and piece in route.pipes and is_cut(name, route.pipes) else None
@@ -166,7 +174,7 @@ def _location(case: Any, name: str) -> str:
 
 
 def _advice(case: Any, name: str) -> str:
-    """Keys that give a pipe enough cells."""
+    """Text of keys and values that give a pipe enough cells."""
     own, pipe = f"links.{name}.cells = {LEAST_CELLS}", _cut_pipe(case, name)
     if pipe is None:
         return own

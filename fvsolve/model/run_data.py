@@ -19,14 +19,14 @@ CACHE_LINE = 8  # floats of a cache line
 
 
 def aligned_zeros(size: int) -> np.ndarray:
-    """Zeros whose first element starts a cache line."""
+    """Array of zeros whose first element starts a cache line."""
     buffer = np.zeros(size + CACHE_LINE)
     first = -(buffer.ctypes.data // 8) % CACHE_LINE
     return buffer[first : first + size]
 
 
 def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:
-    """Arrays that a run writes, of these shapes, filled with zeros."""
+    """Arrays that a run writes, filled with zeros; shapes : shape of each."""
     arrays = {name: np.zeros(shape) for name, shape in shapes._asdict().items() if name not in rec.INTEGERS}
     arrays |= {name: np.zeros(getattr(shapes, name), dtype=np.int64) for name in shapes._fields if name in rec.INTEGERS}
     arrays |= {"clock": np.zeros(1, rec.CLOCK), "work": aligned_zeros(shapes.work)}
@@ -38,12 +38,13 @@ def zeros_for_run(shapes: rec.RunArrays) -> rec.RunArrays:
 
 
 class RunData:
-    """Mutable data of one run. Created anew for each run; the model itself is read-only and shared by runs.
+    """Mutable data of one run, created anew for each run. The model itself is read-only and shared by runs.
 
-    clock : end of the segment (schedules take their left limit there) and the given step, see `records.CLOCK`
-    armed : 1.0 while the condition of an event holds; marks : first times at which the model does not hold [s]
-    envelope, extremes : least and greatest value of each cell, and of each probe and watched quantity, with their times
-    bands : for each basin, first row (of a mesh: first cell) computed here, and the one after the last
+    clock : end of the segment (schedules take their left limit there) and the given step, see `kernels.dtypes.CLOCK`
+    armed : flag of each event, 1.0 while its condition holds; marks : first times at which the model does not hold [s]
+    envelope : least and greatest value of each cell, with their times; extremes : the same of probes, watched
+    quantities
+    bands : for each basin, first row (of a mesh: first cell) that this thread computes, and the one after its last
     joint : see `kernels.band_exchange`, empty if one thread computes all; sums : see `kernels.stage_sums`
     """
 
@@ -67,12 +68,12 @@ class RunData:
 
     @cached_property
     def handle(self) -> np.ndarray:
-        """Handle of the model's tables, these arrays and the functions to call, as compiled functions take it."""
+        """Handle of the model's tables, these arrays and the functions to call, an argument of compiled functions."""
         functions = self.model.functions
         return self.linked_handle(self.written, (functions.calls, functions.hooks))
 
     def linked_handle(self, written: rec.RunArrays, callables: tuple) -> np.ndarray:
-        """Handle of the tables with these written arrays and these functions."""
+        """Handle of the model's tables with other written arrays and functions."""
         from fvsolve.kernels.table_handle import addresses_of, linked_handles
 
         model = self.model
@@ -81,7 +82,7 @@ class RunData:
         return linked_handles(shared, sharp, written, callables)
 
     def reset(self, armed: np.ndarray | float = 0.0) -> None:
-        """Reset for another state: flags as given, no waves in delay lines."""
+        """Reset for another state: event flags as given, and no waves in delay lines."""
         self.armed[:], self.clock["limit"] = armed, np.inf
         reset_history(self.past, self.model.tables.delays)
 
@@ -96,12 +97,12 @@ class RunData:
         self.__dict__.pop("handle", None)
 
     def restore_history(self, state) -> None:
-        """Restore the history of delay lines from the memory of a state; without memory it stays empty."""
+        """Restore the history of delay lines from the memory of a state; without memory the history stays empty."""
         if len(self.model.tables.delays) and state is not None and state.memory.size:
             self.past = split_memory(state.memory)[1].copy()
 
     def history_capacity(self) -> float:
-        """Steps that fit before a ring of delay-line history would lose an entry that is still needed.
+        """Number of steps that fit before a ring of delay-line history would lose an entry that is still needed.
 
         Enlarges the rings where needed; infinite without delay lines.
         """
@@ -116,7 +117,7 @@ class RunData:
         return float(self.full_at - count)
 
     def along(self, t: float, out: np.ndarray, parts: int = 1) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-        """Pipe -> both waves of a delay line in the middle of each of `parts` equal parts of its cells [kg/s]."""
+        """Waves along delay lines : pipe -> (forward, backward) [kg/s], in the middle of `parts` parts of each cell."""
         waves = {}
         if len(self.model.tables.delays):
             from fvsolve.kernels.delay_lines.line_interior import waves_along_line_number
@@ -137,7 +138,10 @@ class RunData:
         return dydt, out
 
     def set_flags(self, t: float, y: np.ndarray) -> None:
-        """Set the flags of all events to the conditions at (t, y). Iterates, as devices may depend on other devices."""
+        """Set the flags of all events to the conditions at (t, y).
+
+        Iterates, because devices may depend on other devices.
+        """
         if not self.armed.size:
             return
         g = np.zeros(self.armed.size)
@@ -149,7 +153,7 @@ class RunData:
                 return
 
     def fields(self, t: float, y: np.ndarray, out: np.ndarray) -> dict[str, Any]:
-        """Fields as in `Model.fields`, with least and greatest pressures of pipes up to now."""
+        """Values as in `Model.fields`, with the least and greatest pressures in pipes up to now."""
         fields = self.model.fields(y, out, self.along(t, out))
         fields["out"] = out
         for k, (pipe, row) in enumerate(zip(self.model.pipes, self.model.tables.pipes, strict=True)):

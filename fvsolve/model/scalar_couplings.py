@@ -1,4 +1,4 @@
-"""States that rates of scalars can depend on: in addition to cells and masses, the flows that carry scalars."""
+"""States on which the rates of scalars can depend: amounts, masses, and flows that carry scalars."""
 
 from __future__ import annotations
 
@@ -15,7 +15,10 @@ LIMITER_CELLS = 2  # cells that a limited value at a face reads on each side; at
 
 
 class ScalarCouplings:
-    """Couplings of one scalar, in addition to those of the flow that carries it."""
+    """Couplings of one scalar: pairs (rate, state on which it depends).
+
+    They are in addition to the couplings of the flow that carries the scalar.
+    """
 
     def __init__(self, couplings, model, q: int) -> None:
         self.of, self.row = couplings, model.tables.scalars[q]
@@ -39,25 +42,28 @@ class ScalarCouplings:
         self.values = self.mixed_values()
 
     def own(self, i: int) -> list:
-        """States that set the value of a node that stores, or of a patch."""
+        """States that set the scalar's value at node i if it stores or is a patch of a basin; else none."""
         if i in self.of.patches:
             return [self.behind(i), self.of.behind(i, 1)]
         return [self.places[i], self.of.own(i)] if self.stores[i] else []
 
     def behind(self, i: int) -> np.ndarray:
-        """Amounts in the cells behind a patch."""
+        """States of the amounts in the basin cells behind patch i."""
         row = self.of.patches[i]
         cells = self.of.integers[row["first"] : row["first"] + row["count"]]
         return pattern.amount_states(self.of.basins[row["basin"]], self.q, cells)
 
     def edge(self, pipe, right: int) -> list[np.ndarray]:
-        """Amounts and waves of the cells that give the value at an end of a pipe."""
+        """States of amounts and waves in the cells that give the value at an end of a pipe; right : 1 for `to`."""
         n = int(pipe["cells"])
         cells = np.arange(n)[::-1][: LIMITER_CELLS + 1] if right else np.arange(n)[: LIMITER_CELLS + 1]
         return [self.row["y"] + pipe["cell"] + cells, pipe["y"] + cells, pipe["y"] + n + cells]
 
     def mixed_values(self) -> list[np.ndarray]:
-        """For each node, the states that set its value: its own, or all that flow into its group."""
+        """For each node, the states that set the scalar's value there.
+
+        In a group of nodes without storage these are the states of all flows into the group.
+        """
         inner, valves = self.of.inner, [ends_of(valve) for valve in self.of.valves]
         group = union(len(inner), [(i, j) for i, j in valves if inner[i] and inner[j]])
         enter: list[list] = [[] for _ in group]
@@ -70,7 +76,7 @@ class ScalarCouplings:
         return [joined[group[i]] if inner[i] else unique_states(*self.own(i)) for i in range(len(group))]
 
     def pairs(self) -> Iterator[Pairs]:
-        """All couplings except those of a state with itself."""
+        """All couplings of the scalar except those of a state with itself."""
         sources = [[self.values[i], *self.through[i]] for i in range(len(self.values))]
         for valve in self.of.valves:
             i, j = ends_of(valve)
@@ -92,7 +98,7 @@ class ScalarCouplings:
                 yield all_pairs(self.close(pipe, right), self.read(pipe, right, i))
 
     def boundary_pairs(self, basin) -> Iterator[Pairs]:
-        """Flow through the open boundary of a basin, booked to its patches, on the cells there."""
+        """Couplings of the flow through the open boundary of a basin, booked at its patches, with the cells there."""
         nodes = [i for i, row in self.of.patches.items() if self.of.basins[row["basin"]] is basin]
         if basin.row["through"] >= 0:
             behind = [self.of.integers[row["first"] :][: row["count"]] for row in map(self.of.patches.get, nodes)]
@@ -101,7 +107,10 @@ class ScalarCouplings:
             yield all_pairs(self.ledger + np.array(nodes), read)
 
     def decay_pairs(self) -> Iterator[Pairs]:
-        """Decay, on the amounts and masses that decay: a single row for all, or a row for each state."""
+        """Couplings of the decay in the ledger with the amounts and masses that decay.
+
+        The ledger has a single row for the decay of all states, or a row for each state.
+        """
         rows = self.loss + np.arange(self.row["losses"])
         pick = (lambda k: rows[k]) if rows.size > 1 else (lambda k: np.repeat(rows, np.size(k)))
         for pipe in self.of.pipes:
@@ -117,7 +126,7 @@ class ScalarCouplings:
                 yield pick(basin.row["lost"] + cells), first + cells
 
     def inside(self, pipe) -> Iterator[Pairs]:
-        """Cells on their neighbours: amounts, masses, and the flows between cells."""
+        """Couplings of the amount in each cell of a pipe with amounts and waves in neighbouring cells."""
         n = int(pipe["cells"])
         cells, at = np.arange(n), self.row["y"] + pipe["cell"]
         for offset in range(-self.wide, self.wide + 1):
@@ -126,12 +135,12 @@ class ScalarCouplings:
                 yield at + here, first + here + offset
 
     def close(self, pipe, right: int) -> np.ndarray:
-        """Cells whose flows depend on the end of a pipe."""
+        """States of the amounts in cells whose flows depend on an end of a pipe; right : 1 for its `to` end."""
         cells = self.row["y"] + pipe["cell"] + np.arange(pipe["cells"])
         return (cells[::-1] if right else cells)[: self.wide]
 
     def read(self, pipe, right: int, i: int) -> np.ndarray:
-        """States that enter these flows in addition to adjacent cells."""
+        """States on which the flows near an end of a pipe depend, in addition to those of adjacent cells."""
         enters, leaves = self.of.sides(pipe, right)
         reach = self.of.reach
         return unique_states(
@@ -140,6 +149,6 @@ class ScalarCouplings:
 
 
 def scalar_pairs(couplings, model) -> Iterator[Pairs]:
-    """Couplings of all scalars of a model."""
+    """Couplings of all scalars of a model, see `ScalarCouplings`."""
     for q in range(len(model.tables.scalars)):
         yield from ScalarCouplings(couplings, model, q).pairs()

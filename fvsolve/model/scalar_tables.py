@@ -1,4 +1,4 @@
-"""Scalar table: amounts as states, values at nodes, balances of a run."""
+"""Table of scalars: amounts as states, values at nodes, and balances of a run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ STORES = (rec.TANK, rec.CHAMBER)
 
 
 def lower_scalars(draft) -> None:
-    """Fill the table of scalars, states for their amounts and schedules for their values."""
+    """Fill the table of scalars; add states for their amounts and schedules for their values."""
     case, pipes, nodes, basins = draft.case, draft.pipe_table, draft.node_table, draft.basin_table
     draft.scalar_table = np.zeros(len(case.scalars), rec.SCALAR)
     for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
@@ -46,7 +46,7 @@ def explicit(method: str) -> bool:
 
 
 def bounds(case, name: str) -> tuple[float, float]:
-    """Least and greatest possible value of a scalar: those stated in the case, as mixing stays between them."""
+    """Least and greatest possible value of a scalar: those in the case, because mixing stays between them."""
     scalar = case.scalars[name]
     values = [scalar.initial] + [scalar.ambient] * (scalar.decay > 0.0)
     patches = [patch for basin in case.meshes for patch in case.nodes[basin].patches.values()]
@@ -60,7 +60,7 @@ def bounds(case, name: str) -> tuple[float, float]:
 
 
 def scale_scalars(draft) -> None:
-    """Set masses per length of the profile, and scales of amounts, from the starting profile."""
+    """Set steady masses per length in pipes, and the size of a small deviation of each scalar amount."""
     profile, rho = draft.tables.profile, draft.fluid.density
     for k, row in enumerate(draft.pipe_table if len(draft.case.scalars) else ()):
         strain = (draft.profiles[k] - draft.fluid.pressure) / (rho * row["speed"] ** 2)
@@ -78,12 +78,15 @@ def scale_scalars(draft) -> None:
 
 
 def indices_at_nodes(draft, row) -> np.ndarray:
-    """State of the amount, or schedule, of a scalar at every node."""
+    """For each node, the index of the state of a scalar's amount, or of the schedule of its value : int64[nodes].
+
+    It is -1 at a node with neither.
+    """
     return np.array(draft.integers[row["places"] : row["places"] + len(draft.node_table)], dtype=int)
 
 
 def start_amounts(draft, y: np.ndarray) -> None:
-    """Write amounts of all scalars at the start into a state."""
+    """Write the amounts of all scalars at the start into the state vector y."""
     case, profile = draft.case, draft.tables.profile
     for row, (name, scalar) in zip(draft.scalar_table, case.scalars.items(), strict=True):
         for pipe, mesh in zip(draft.pipe_table, draft.meshes, strict=True):
@@ -97,7 +100,7 @@ def start_amounts(draft, y: np.ndarray) -> None:
 
 
 def amount_indices(model) -> np.ndarray:
-    """Indices of all amounts in pipes and nodes in the state."""
+    """Indices of the states that are scalar amounts in pipes and nodes : int64[m]."""
     if not len(model.tables.scalars):
         return np.zeros(0, dtype=int)
     count = model.cells + int(np.isin(model.tables.nodes["kind"], STORES).sum())
@@ -105,7 +108,7 @@ def amount_indices(model) -> np.ndarray:
 
 
 def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
-    """Values of all scalars in the cells of pipe k."""
+    """Values of all scalars in the cells of pipe k : name -> float64[cells]."""
     pipe, values = model.tables.pipes[k], {}
     n, o = int(pipe["cells"]), int(pipe["y"])
     for row, name in zip(model.tables.scalars, model.case.scalars, strict=True):
@@ -116,13 +119,13 @@ def pipe_values(model, k: int, y: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def node_values(model, i: int, out: np.ndarray) -> dict[str, float]:
-    """Values of all scalars at node i, from `out` of the right-hand side."""
+    """Values of all scalars at node i : name -> value; out : array that the right-hand side writes."""
     at, nodes = int(model.layout["value"]), len(model.node_names)
     return {name: float(out[at + q * nodes + i]) for q, name in enumerate(model.case.scalars)}
 
 
 def total_amount(model, q: int, y: np.ndarray) -> float:
-    """Amount of scalar q in all pipes, nodes and basins [kg, times its unit]."""
+    """Amount of scalar q in all pipes, nodes and basins [kg times the unit of the scalar]."""
     pipes, nodes, row = model.tables.pipes, model.tables.nodes, model.tables.scalars[q]
     total = 0.0
     for pipe in pipes:
@@ -134,9 +137,9 @@ def total_amount(model, q: int, y: np.ndarray) -> float:
 
 
 def scalar_ledgers(model, y: np.ndarray, ledger: np.ndarray) -> dict[str, dict[str, Any]]:
-    """Balance of each scalar: initial, final, inflow, outflow, decayed, remainder [kg, times its unit].
+    """Balance of each scalar in a run: initial, final, inflow, outflow, decayed, remainder [kg times its unit].
 
-    ledger : float64[2, m]  inflow, and outflow as a negative number
+    ledger : float64[2, m]  integrals of positive rates, and of negative rates, of each row of the stepper's ledger
     """
     ledgers, n = {}, len(model.node_names)
     for q, (name, row) in enumerate(zip(model.case.scalars, model.tables.scalars, strict=True)):

@@ -1,4 +1,4 @@
-"""Schedules as polynomial pieces for kernels, and times at which steps must end."""
+"""Schedules as pieces (polynomial, power, wave) for kernels, and the times at which steps must end."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Schedules:
     )  # (index, time) -> value, after all are added
 
     def add(self, schedule, scale: float = 1.0, offset: float = 0.0) -> int:
-        """Index of a new schedule whose value is scale * value + offset."""
+        """Add a schedule with the value scale * value + offset; return its index."""
         if schedule.kind == "constant":
             pieces = [[-np.inf, 0.0, 0.0, schedule.first * scale + offset, *(0.0 * scale,) * 3]]
         else:
@@ -50,7 +50,10 @@ class Schedules:
         return len(self.records) - 1
 
     def add_part(self, schedule, side: int) -> int:
-        """Index of the positive part of side * value; it has kinks where it reaches zero."""
+        """Add the positive part of side * value of a schedule, side 1 or -1; return its index.
+
+        It has kinks where the value is zero; steps must end there.
+        """
         index = self.add(schedule, side)
         first, count = self.records[index]
         if schedule.kind == "harmonic":
@@ -64,7 +67,7 @@ class Schedules:
         return index
 
     def tables(self) -> tuple[np.ndarray, np.ndarray]:
-        """Arrays that kernels read : (schedules, pieces)."""
+        """Arrays that kernels read : (first piece and number of pieces of each schedule, float64[pieces, 7])."""
         rows = np.array(self.rows, dtype=np.float64).reshape(-1, PIECE_COLUMNS)
         return np.array(self.records, dtype=[("first", "i8"), ("pieces", "i8")]).astype(SCHEDULE), rows
 
@@ -72,7 +75,9 @@ class Schedules:
 def schedule_pieces(schedule) -> np.ndarray:
     """Pieces of a schedule : float64[pieces, 7].
 
-    Columns: start, kind, origin, then a, b, c, d of a polynomial, or v0, v1, duration, exponent of a power.
+    Columns: start time [s], kind, origin [s], then four numbers. Polynomial (kind 0): a, b, c, d of a + b s + c s^2 + d
+    s^3, s the time since the origin. Power (1): v0, v1, duration, exponent. Wave (2): mean, amplitude, angular
+    frequency, phase.
     """
     t, v = schedule.time, schedule.value
     if schedule.kind == "harmonic":
@@ -99,7 +104,7 @@ def schedule_pieces(schedule) -> np.ndarray:
 
 
 def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
-    """Coefficients of scale * value + offset."""
+    """Last four columns of pieces (see `schedule_pieces`) for the value scale * value + offset."""
     values, nonpolynomial = pieces[:, 3:] * scale, pieces[:, 1] != 0
     values[:, 0] += offset
     if not nonpolynomial.any():
@@ -111,7 +116,7 @@ def scaled(pieces: np.ndarray, scale: float, offset: float) -> np.ndarray:
 
 
 def break_times(schedule) -> list[tuple[float, bool]]:
-    """Times of kinks and jumps at which steps must end : (time, True if the value jumps)."""
+    """Times of kinks and jumps of a schedule, at which steps must end : (time [s], True if the value jumps)."""
     t, v = schedule.time, schedule.value
     if schedule.kind in ("constant", "harmonic"):
         return []
@@ -132,13 +137,13 @@ def break_times(schedule) -> list[tuple[float, bool]]:
 
 
 def piece_slope(piece: np.ndarray, t: float) -> float:
-    """d/dt of a polynomial piece."""
+    """Derivative of a polynomial piece at time t."""
     s = t - piece[2]
     return piece[4] + s * (2.0 * piece[5] + s * 3.0 * piece[6])
 
 
 def positive_part(pieces: np.ndarray) -> tuple[list[list[float]], list[float]]:
-    """Pieces of max(0, value), and times at which a piece crosses zero between its ends."""
+    """Positive part of a schedule : (pieces of max(0, value), times at which the value crosses zero inside a piece)."""
     rows, crossings = [], []
     for k, piece in enumerate(pieces):
         start, end = piece[0], pieces[k + 1, 0] if k + 1 < len(pieces) else np.inf
@@ -153,7 +158,7 @@ def positive_part(pieces: np.ndarray) -> tuple[list[list[float]], list[float]]:
 
 
 def wave_roots(piece: list[float], span: tuple[float, float]) -> list[float]:
-    """Times between both ends of `span` at which a wave is zero, increasing."""
+    """Times within `span` at which the value of a wave piece is zero, increasing."""
     mean, amplitude, frequency, phase = piece[3:]
     if abs(mean) >= abs(amplitude):
         return []
@@ -168,7 +173,7 @@ def wave_roots(piece: list[float], span: tuple[float, float]) -> list[float]:
 
 
 def piece_value(piece: np.ndarray, t: float) -> float:
-    """Value of a piece at a time within it."""
+    """Value of a polynomial or power piece at a time within it."""
     s = t - piece[2]
     if piece[1] == 0:
         return piece[3] + s * (piece[4] + s * (piece[5] + s * piece[6]))

@@ -1,4 +1,4 @@
-"""Schemes and limiters as the codes and weights that kernels read."""
+"""Codes and weights of schemes and limiters that kernels read."""
 
 import functools
 
@@ -16,7 +16,7 @@ def family(scheme: str) -> int:
 
 
 def scheme_settings(settings, scheme: str, limiter: str) -> None:
-    """Write family, weights, degree and limiter into the settings record."""
+    """Write the code, weights and degree of a scheme, and the code of a limiter, to the settings record."""
     row, settings["limiter"] = SCHEMES[scheme], CODES[limiter]
     settings["scheme"], settings["degree"] = family(scheme), row.degree
     if settings["scheme"] == rec.LINEAR:
@@ -27,6 +27,9 @@ def scheme_settings(settings, scheme: str, limiter: str) -> None:
 
 @functools.cache
 def face_differences(scheme: str) -> tuple:
-    """Weights of a linear scheme for the difference of two faces, see `records.SETTINGS`."""
+    """Weights of cells in the difference of a linear scheme's values at two faces : (inside, enter, leave).
+
+    They are fields of `kernels.dtypes.SETTINGS`: inside a pipe, at the end where a wave enters, where it leaves.
+    """
     row = SCHEMES[scheme]
     return difference_rows([float(w) for w in row.weights], row.degree)

@@ -1,4 +1,4 @@
-"""Steady starting profile, filled into the tables of a draft."""
+"""Initial steady state, filled into the tables of a draft."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fvsolve.model.wall_creep import limit_creep_step
 
 
 def start_profile(draft) -> dict[str, Any]:
-    """Fill the profile's numbers into the tables of a draft; return the facts for `check`."""
+    """Compute the initial steady state and fill it into the tables of a draft; return facts for `fvsolve check`."""
     if draft.case.law.linear:
         start = SteadyStart(draft)
     else:

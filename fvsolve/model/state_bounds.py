@@ -1,4 +1,4 @@
-"""Bounds of states: depths are at least 0; amounts of scalars stay within the bounds of all values."""
+"""Bounds of states: depths are at least 0; amounts of scalars stay within the bounds of the scalar's values."""
 
 from __future__ import annotations
 
@@ -10,7 +10,12 @@ NO_STATE = -1
 
 
 def state_bounds(model) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds (at, by) as arguments of `steppers.output_rows.limit_to_bounds`; depths before the amounts they bound."""
+    """Bounds of states, arguments of `steppers.output_rows.limit_to_bounds` : (at, by).
+
+    at : int64[3 q]  a bounded state, and up to two states that give the amount of which it is a share, else -1
+    by : float64[q, 4]  base and gain of this amount, least share, greatest share
+    Bounds of depths come first, because depths bound the amounts of scalars.
+    """
     rows = [*depths(model)]
     for q in range(len(model.tables.scalars)):
         rows += [*in_pipes(model, q), *in_nodes(model, q), *in_basins(model, q)]
@@ -21,13 +26,16 @@ def state_bounds(model) -> tuple[np.ndarray, np.ndarray]:
 
 
 def bound_rows(states, first, second, base, gain, least, most) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of bounds for states; arguments are arrays, or numbers for all states."""
+    """Bounds of `states` : (int64[q, 3], float64[q, 4]), see `state_bounds`; arguments are arrays or numbers.
+
+    A state lies between `least` and `most` times base + gain (y[first] + y[second]).
+    """
     at = np.column_stack(np.broadcast_arrays(states, first, second)).astype(np.int64)
     return at, np.column_stack(np.broadcast_arrays(base, gain, least, most, np.zeros(len(at)))[:4])
 
 
 def depths(model):
-    """Depth of water in cells is at least 0."""
+    """Bounds that keep depths of water in basin cells at 0 or above."""
     for basin in model.basins:
         if basin.deep:
             states = int(basin.row["y"]) + np.arange(basin.n)
@@ -35,7 +43,7 @@ def depths(model):
 
 
 def in_pipes(model, q: int):
-    """Amounts per length, bounded by the mass per length of both waves."""
+    """Bounds of a scalar's amounts per length in pipes, by the mass per length that follows from both waves."""
     row, profile = model.tables.scalars[q], model.tables.profile
     for pipe in model.tables.pipes:
         n, k = int(pipe["cells"]), np.arange(pipe["cells"])
@@ -45,7 +53,7 @@ def in_pipes(model, q: int):
 
 
 def in_nodes(model, q: int):
-    """Amounts in tanks and chambers, bounded by the mass there."""
+    """Bounds of a scalar's amounts in tanks and chambers, by the mass there."""
     row, nodes = model.tables.scalars[q], model.tables.nodes
     places = model.tables.integers[row["places"] : row["places"] + len(nodes)]
     for node, place in zip(nodes, places, strict=True):
@@ -54,7 +62,7 @@ def in_nodes(model, q: int):
 
 
 def in_basins(model, q: int):
-    """Amounts per area, bounded by the depth."""
+    """Bounds of a scalar's amounts per area in basins, by the depth."""
     row = model.tables.scalars[q]
     for basin in model.basins:
         if basin.row["carried"] < 0:

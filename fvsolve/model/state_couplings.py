@@ -1,10 +1,10 @@
-"""Couplings of states: the states that the rate of each state can depend on, from the tables of a model.
+"""Couplings of states: the states on which the rate of each state can depend, from the tables of a model.
 
-Cells of a pipe depend on their neighbours within the reach of the scheme. At a node, the node reads the edge cells of
-all its pipes, and the cells that look beyond an end depend on all of these. Tanks, chambers and given pressures
-separate groups of nodes: their pressure is their own, except that chambers of cylinders also depend on their masses.
-Cells of a basin depend on the cells around them (`basins.lower_pattern`). A patch is a node whose pressure is set by
-the cells behind it.
+Cells of a pipe depend on their neighbours within the reach of the scheme. A node depends on the edge cells of all its
+pipes, and cells whose stencil crosses a pipe end depend on the same cells. Tanks, chambers and given pressures separate
+groups of nodes: their pressure follows from their own states, except that chambers of cylinders also depend on their
+masses. Cells of a basin depend on the cells around them (`basins.lower_pattern`). A patch is a node whose pressure is
+set by the cells behind it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Pairs = tuple[np.ndarray, np.ndarray]  # rows, and the state that each depends o
 
 
 def reach_of(scheme: str, settings) -> Reach:
-    """Reach of a model's scheme, also for pipes shorter than it."""
+    """Numbers of cells that a scheme reads in a model; with cavities both waves read cells on both sides."""
     reach = SCHEMES[scheme].reach
     if settings["floor"] > 0.0:  # cavities: both waves depend on both sides
         return Reach(reach.behind, reach.behind, 2 * reach.behind - 1, 3)
@@ -30,7 +30,7 @@ def reach_of(scheme: str, settings) -> Reach:
 
 
 class Couplings:
-    """Couplings of a model while they are collected."""
+    """Couplings of a model: pairs (rate, state on which it depends), both by index."""
 
     def __init__(self, model) -> None:
         tables = model.tables
@@ -57,7 +57,7 @@ class Couplings:
         self.sets = self.pressures()  # for each node, the states that set its pressure
 
     def pairs(self) -> Iterator[Pairs]:
-        """All couplings except those of a state with itself."""
+        """All couplings of the model except those of a state with itself."""
         for pipe in self.pipes:
             if pipe["delay"] >= 0:
                 yield all_pairs(unique_states(pipe["y"]), unique_states(*(self.sets[i] for i in ends_of(pipe))))
@@ -77,7 +77,7 @@ class Couplings:
         yield from self.moving_fluid_pairs()
 
     def boundary_pairs(self) -> Iterator[Pairs]:
-        """Flow through open patches, on the cells there."""
+        """Couplings of the flow through open patches of basins with the cells there."""
         for i, row in self.patches.items():
             basin, behind = self.basins[row["basin"]], row["ring"] + row["faces"]
             if row["open"]:
@@ -87,20 +87,23 @@ class Couplings:
     # nodes ------------------------------------------------------------------------------------------------------
 
     def joints(self) -> list:
-        """Links whose ends are solved together: valves, short delay lines, columns that valves can control."""
+        """Links whose end nodes are solved together: valves, short delay lines, columns that valves can control."""
         return [*self.valves, *self.short, *(column for column in self.columns if self.is_controlled(column))]
 
     def is_controlled(self, column) -> bool:
-        """True if at some openings a column's flow follows the valves at its end."""
+        """True if the flow of a rigid column follows the valves at its end at some openings."""
         return any(self.nodes["gates"][i] >= 0 for i in ends_of(column))
 
     def own(self, i: int) -> np.ndarray:
-        """State of the mass stored in node i, or none."""
+        """Index of the state of the mass stored in node i; empty if it stores none."""
         y = self.nodes["y"][i]
         return np.array([y] if y >= 0 else [], dtype=np.int64)
 
     def behind(self, i: int, quantities: int | None = None) -> np.ndarray:
-        """States of the cells behind a patch: of the first quantities of its basin, or of all; none for other nodes."""
+        """States of the cells behind patch i; empty for other nodes.
+
+        quantities : number of quantities of the basin that are included, from the first on; None for all
+        """
         if i not in self.patches:
             return unique_states()
         row = self.patches[i]
@@ -108,7 +111,7 @@ class Couplings:
         return pattern.cell_states(self.basins[row["basin"]], cells, quantities)
 
     def pressure_states(self, i: int) -> np.ndarray:
-        """States that set the pressure of a node that stores: its mass, its cells, its piston's position."""
+        """States that set the pressure of node i if it stores or is a patch: mass, basin cells, piston positions."""
         if i in self.patches:
             return unique_states(self.behind(i, 1), *(self.walls["y"][self.walls["basin"] == self.patches[i]["basin"]]))
         of_devices = (self.device_states(row) for row in self.devices if row["row"] >= 0 and row["node"] == i)
@@ -116,17 +119,17 @@ class Couplings:
         return unique_states(self.own(i), *of_pistons, *of_devices)
 
     def device_states(self, device) -> np.ndarray:
-        """States of a device."""
+        """Indices of the states of a device."""
         return device["y"] + np.arange(device["states"] if device["y"] >= 0 else 0)
 
     def opening_states(self, link) -> np.ndarray:
-        """States that open and close a link."""
+        """Indices of the states that open and close a link."""
         if "device" not in link.dtype.names or link["device"] < 0:
             return unique_states()
         return self.device_states(self.devices[link["device"]])
 
     def places(self, row, order: int) -> np.ndarray:
-        """Positions (`order` 0) or velocities (1) of the parts that a row joins, if they are states."""
+        """States of the positions (`order` 0) or velocities (1) of the masses or bodies that a row joins."""
         if row["line"] >= 0:
             ends = (self.points[k]["body"] for k in self.ends_of_line(row) if k >= 0)
             return unique_states(*(self.chain_states(i, order) for i in ends if i >= 0))
@@ -134,12 +137,12 @@ class Couplings:
         return np.array([self.masses[row[end]] + order for end in ends if self.masses[row[end]] >= 0], dtype=np.int64)
 
     def ends_of_line(self, row) -> tuple[int, int]:
-        """Points that the line of a push joins."""
+        """Rows of the two points of a force element's line of action."""
         line = self.lines[row["line"]]
         return int(line["from_point"]), int(line["to_point"])
 
     def chain_states(self, i: int, order: int) -> np.ndarray:
-        """Coordinates (`order` 0) or velocities (1) of body i and of all bodies that carry it."""
+        """States of the coordinates (`order` 0) or velocities (1) of body i and of all bodies that carry it."""
         parts = [unique_states()]
         while i >= 0:
             parts.append(self.joint_states(self.bodies[i], order))
@@ -147,24 +150,28 @@ class Couplings:
         return unique_states(*parts)
 
     def joint_states(self, body, order: int) -> np.ndarray:
-        """Coordinates or velocities of a joint; with 3 or more freedoms, 3 of them have 4 Euler parameters."""
+        """States of the coordinates (`order` 0) or velocities (1) of a joint.
+
+        A joint with three or more freedoms has one coordinate more, because four Euler parameters describe its
+        rotation.
+        """
         count = int(body["freedoms"])
         if not count:
             return unique_states()
         return body["rate"] + np.arange(count) if order else body["y"] + np.arange(count + (count >= 3))
 
     def tree_states(self, root: int, order: int) -> np.ndarray:
-        """Coordinates or velocities of a tree of bodies and of trees that pins tie to it."""
+        """States of the coordinates (`order` 0) or velocities (1) of a tree of bodies and trees that pins tie to it."""
         return unique_states(
             *(self.joint_states(body, order) for body in self.bodies if self.tree_root(body["root"]) == root)
         )
 
     def tree_root(self, root: int) -> int:
-        """First root of all trees that pins tie together."""
+        """Root body that stands for all trees that pins tie to the tree of the body `root`."""
         return self.ties[root]
 
     def spatial(self) -> Iterator[Pairs]:
-        """Bodies: all bodies of a tree on each other, and on other trees and chambers that push them."""
+        """Couplings of bodies: with all bodies of their tree, and with the trees and chambers that push them."""
         for root in np.unique([self.tree_root(root) for root in self.bodies["root"]]):
             own = [self.tree_states(root, order) for order in (0, 1)]
             yield all_pairs(unique_states(*own), unique_states(*own))
@@ -184,7 +191,10 @@ class Couplings:
             yield all_pairs(unique_states(*(self.tree_states(root, 1) for root in roots)), unique_states(*read))
 
     def pressures(self) -> list[np.ndarray]:
-        """For each node, the states that set its pressure: its own, or all that enter its group."""
+        """For each node, the states that set its pressure.
+
+        In a group of nodes without storage these are the states of all flows into the group.
+        """
         ends = map(ends_of, self.joints())
         group = union(len(self.nodes), [(i, j) for i, j in ends if self.inner[i] and self.inner[j]])
         enter: list[list] = [[] for _ in group]
@@ -202,7 +212,7 @@ class Couplings:
         return [joined[group[i]] if self.inner[i] else self.pressure_states(i) for i in range(len(group))]
 
     def stored(self) -> Iterator[Pairs]:
-        """Flow into tanks, chambers, patches and given pressures: their mass, and their row of the ledger."""
+        """Couplings of the masses in tanks, chambers and patches, and of the ledger, with the flows into them."""
         into = [[self.pressure_states(i)] for i in range(len(self.nodes))]
         for pipe in self.pipes:
             for right, i in enumerate(ends_of(pipe)):
@@ -222,12 +232,12 @@ class Couplings:
             yield all_pairs(unique_states(self.own(i), self.behind(i), self.size + i), unique_states(*into[i]))
 
     def column_pairs(self) -> Iterator[Pairs]:
-        """Flow of columns on the pressures of both ends."""
+        """Couplings of the flow of rigid columns with the pressures at both ends."""
         for column in self.columns:
             yield all_pairs(unique_states(column["y"]), unique_states(*(self.sets[i] for i in ends_of(column))))
 
     def moving(self) -> Iterator[Pairs]:
-        """Positions of masses on their velocities, and these on adjacent masses and chambers."""
+        """Couplings of positions of masses with their velocities, and of these with adjacent masses and chambers."""
         at = self.masses[self.masses >= 0]
         yield at, at + 1
         for row in [*self.braces, *self.pistons]:
@@ -240,14 +250,14 @@ class Couplings:
         yield from self.spatial()
 
     def device_pairs(self) -> Iterator[Pairs]:
-        """States of devices on themselves, and on pressures at their ends and at the node they sense."""
+        """Couplings of states of devices with each other, with pressures at their ends and at the node they sense."""
         for row in self.devices:
             ends = ends_of(self.valves[row["valve"]]) if row["valve"] >= 0 else ()
             read = [self.sets[i] for i in (*ends, row["node"]) if i >= 0]
             yield all_pairs(self.device_states(row), unique_states(self.device_states(row), *read))
 
     def wall_pairs(self) -> Iterator[Pairs]:
-        """Cells on position and velocity of walls of their basin, and bodies on the cells at their walls."""
+        """Couplings of basin cells with moving walls of the basin, and of bodies with the cells at their walls."""
         for wall in self.walls:
             basin, mass = self.basins[wall["basin"]], self.masses[wall["mass"]] if wall["mass"] >= 0 else -1
             speed = unique_states(mass + 1) if mass >= 0 else unique_states()
@@ -260,7 +270,10 @@ class Couplings:
             yield all_pairs(speed, unique_states(wall["y"], pattern.cell_states(basin, cells)))
 
     def moving_fluid_pairs(self) -> Iterator[Pairs]:
-        """Fluid on bodies, and the bodies it moves: all states on each other and on chambers that push the bodies."""
+        """Couplings of fluid on bodies and of the bodies that it moves.
+
+        They depend on each other, and on chambers that push the bodies.
+        """
         trees: dict[int, list] = {}
         for basin in self.basins:
             if basin.row["body"] >= 0:
@@ -278,7 +291,7 @@ class Couplings:
             yield all_pairs(both, unique_states(*cells, *own, *pushing))
 
     def moving_fluid_states(self) -> Iterator[tuple[int, np.ndarray]]:
-        """Fluid on bodies : (row of `rides`, its states and those that set its pressures)."""
+        """Fluid on bodies : (row of `moving_segments`, its states and those that set its pressures)."""
         for i, node in enumerate(self.nodes):
             if node["moving_segment"] >= 0:
                 yield node["moving_segment"], unique_states(self.own(i), self.sets[i])
@@ -291,12 +304,12 @@ class Couplings:
     # pipes ------------------------------------------------------------------------------------------------------
 
     def coupled(self, pipe) -> bool:
-        """True if the rates of both waves depend on all states that either of them reads."""
+        """True if the rate of each wave depends on all states that the rate of either wave reads."""
         rough = pipe["friction"] in (rec.FRICTION_ROUGH, rec.FRICTION_HAZEN)
         return bool(not self.linear or rough or (pipe["loss"] != 0.0 and not self.upwind))
 
     def inside(self, pipe) -> Iterator[Pairs]:
-        """Cells on their neighbours."""
+        """Couplings of the waves in cells of a pipe with the waves in neighbouring cells."""
         cells = np.arange(pipe["cells"])
         stencil = np.arange(-self.reach.behind, self.reach.ahead + 1)
         local = [0] if pipe["loss"] != 0.0 else []
@@ -309,9 +322,9 @@ class Couplings:
                     yield pipe["y"] + wave * cells.size + here, first + here + offset
 
     def friction_memory_pairs(self, pipe) -> Iterator[Pairs]:
-        """Unsteady friction: waves on its memory states, and these on the waves of their cell.
+        """Couplings of waves with memory states of unsteady friction, and of these with the waves in their cell.
 
-        Where density changes, the memory is of the velocity, by two points of a cell that depend on its neighbours.
+        Under nonlinear laws the memory is that of the velocity, which depends on neighbouring cells too.
         """
         n = int(pipe["cells"])
         cells = np.arange(n)
@@ -327,7 +340,10 @@ class Couplings:
                     yield pipe["memory"] + k * n + here, wave + here + offset
 
     def creep_pairs(self, pipe) -> Iterator[Pairs]:
-        """Creep of walls: waves and elements of a cell on each other, and on the waves that give its mean pressure."""
+        """Couplings of wall creep: waves and creep states of a cell with each other.
+
+        Creep states also depend on the waves that set the mean pressure of their cell.
+        """
         n = int(pipe["cells"])
         cells, waves = np.arange(n), (pipe["y"], pipe["y"] + n)
         strains = [pipe["strain"] + k * n for k in range(pipe["elements"])]
@@ -341,19 +357,25 @@ class Couplings:
                 yield wave + cells, strain + cells
 
     def sides(self, pipe, right: int) -> tuple[np.ndarray, np.ndarray]:
-        """Cells at an end, nearest first : (of the wave that enters, of the wave that leaves)."""
+        """States of the waves in cells at an end of a pipe, nearest cell first : (entering wave, leaving wave).
+
+        right : 1 for the `to` end of the pipe
+        """
         forward = pipe["y"] + np.arange(pipe["cells"])
         backward = forward + pipe["cells"]
         return (backward[::-1], forward[::-1]) if right else (forward, backward)
 
     def edge_cells(self, pipe, right: int) -> np.ndarray:
-        """Edge cells that a node reads at an end of a pipe."""
+        """States of the edge cells that a node reads at an end of a pipe."""
         enters, leaves = self.sides(pipe, right)
         edge = slice(self.reach.leaving)
         return leaves[edge] if self.linear else unique_states(leaves[edge], enters[edge])
 
     def beyond(self, pipe) -> Iterator[Pairs]:
-        """Cells that look beyond an end: on the polynomial there and, where the wave enters, on the node."""
+        """Couplings of cells whose stencil crosses a pipe end.
+
+        They depend on the polynomial that continues the waves there and, where a wave enters, on the node.
+        """
         for right, i in enumerate(ends_of(pipe)):
             enters, leaves = self.sides(pipe, right)
             near, last = slice(self.reach.behind), slice(max(self.reach.ahead, 1))
@@ -371,10 +393,10 @@ def ends_of(link) -> tuple[int, int]:
 
 
 def unique_states(*parts) -> np.ndarray:
-    """Unique indices of states."""
+    """Sorted indices of states, each once, from arrays or numbers."""
     return np.unique(np.concatenate([np.zeros(0, dtype=np.int64), *(np.atleast_1d(part) for part in parts)]))
 
 
 def all_pairs(rows: np.ndarray, states: np.ndarray) -> Pairs:
-    """All given rows on all given states."""
+    """Couplings of all given rows with all given states : (row, state) of each pair."""
     return np.repeat(rows, states.size), np.tile(states, rows.size)

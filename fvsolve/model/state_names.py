@@ -1,4 +1,4 @@
-"""Names of states; those of cells are made on request, as a mesh can have millions of cells."""
+"""Names of states; names of cells are made on request, because a mesh can have millions of cells."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class StateNames(Sequence):
         return repr(list(self))
 
     def single(self) -> Iterator[tuple[int, str]]:
-        """Index and name of states that are not numbered cells."""
+        """Index and name of each state that is not a numbered cell."""
         for first, part in zip(self.firsts, self.parts, strict=True):
             if not isinstance(part, Numbered):
                 yield from enumerate(part, first)

@@ -1,4 +1,4 @@
-"""Forces of joints at rest, computed by the kernels without a run."""
+"""Forces on joints at the start, computed by the kernels without a run."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ NONE = np.zeros(0)
 
 
 def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray, out: np.ndarray, rates=NONE) -> None:
-    """Call these kernel functions only, as the right-hand side does."""
+    """Call the named kernel functions in turn, in the way of the right-hand side.
+
+    pieces : names "MODULE: FUNCTION" below the package
+    """
     from fvsolve.kernels import calls  # not loaded for cases without bodies
     from fvsolve.kernels.rhs_assembly import load_function
 
@@ -48,12 +51,18 @@ def call_pieces(tables: tuple, pieces: tuple[str, ...], t: float, y: np.ndarray,
 
 
 def arrays_without_seen(shapes: rec.RunArrays) -> rec.RunArrays:
-    """Run arrays without `seen`, so that kernels read the state as given: none of them reads wetted cells."""
+    """Arrays that a run writes, with an empty `seen`, so that kernels read the state as given.
+
+    `seen` would hold the state with wetted cells, which these kernels do not read.
+    """
     return zeros_for_run(shapes)._replace(seen=np.zeros(0))
 
 
 def mass_factor(model, y: np.ndarray) -> np.ndarray:
-    """Data that `solve_accelerations` leaves in `scratch` at a state: from 8 freedoms on, L of the mass matrix L'L."""
+    """Work array `scratch` as `solve_accelerations` leaves it at a state.
+
+    From index 8 * freedoms on it holds the factor L of the mass matrix M = L' L, by the rows of `freedoms`.
+    """
     written, t = arrays_without_seen(model.shapes), model.case.numerics.start
     written.clock["limit"] = np.inf
     call_pieces((*model.tables, *written), (MOTION, ACCELERATE), t, y.copy(), model.new_out())
@@ -63,7 +72,10 @@ def mass_factor(model, y: np.ndarray) -> np.ndarray:
 
 
 class StaticForces:
-    """Forces of joints at the start, as in the kernels, and their unbalanced part."""
+    """Forces on joints at the start, computed as in a run, and their unbalanced part.
+
+    A freedom is a degree of freedom of a joint; generalised forces are in [N] or [N m].
+    """
 
     def __init__(self, draft, t: float) -> None:
         self.draft, self.t = draft, t
@@ -85,34 +97,34 @@ class StaticForces:
         self.run(MOTION)
 
     def run(self, *pieces: str) -> None:
-        """Call kernel functions of mechanisms as the right-hand side does."""
+        """Call the named kernel functions of bodies and joints."""
         rates = np.zeros(self.draft.size) if LOADS in pieces else NONE
         call_pieces((*self.tables, *self.written), pieces, self.t, self.y, self.out, rates)
 
     def rates(self) -> np.ndarray:
-        """Velocities of all freedoms at the start."""
+        """Velocities of all freedoms at the start : float64[freedoms] [m/s], [rad/s]."""
         return np.concatenate([row["speed"][: row["freedoms"]] for row in self.draft.body_table])
 
     def forces(self) -> np.ndarray:
-        """Forces of all freedoms from loads in `out`, minus inertial forces of the bodies' motion."""
+        """Generalised forces on all freedoms from loads in `out`, minus inertial forces : float64[freedoms]."""
         n = len(self.draft.freedom_table)
         self.run(WEIGH)
         return self.written.scratch[6 * n : 7 * n].copy()
 
     def accelerations(self) -> np.ndarray:
-        """Accelerations of all freedoms after a call of `solve_accelerations` [rad/s2] or [m/s2]."""
+        """Accelerations of all freedoms after a call of `solve_accelerations` : float64[freedoms] [m/s2], [rad/s2]."""
         n = len(self.draft.freedom_table)
         return self.written.scratch[6 * n : 7 * n].copy()
 
     def loads(self) -> np.ndarray:
-        """Force and torque of every body, a view of `out` : float64[bodies, 6]."""
+        """Force [N] and torque [N m] on every body : float64[bodies, 6], a view of `out`."""
         from fvsolve.kernels.mechanism.body_layout import FORCE
 
         first, count = int(self.layout["body"]), len(self.draft.body_table)
         return self.out[first : first + rec.BODY_OUT * count].reshape(count, rec.BODY_OUT)[:, FORCE : FORCE + 6]
 
     def under(self, pushes: np.ndarray) -> np.ndarray:
-        """Forces of all freedoms from weights and these pushes."""
+        """Generalised forces on all freedoms from weights, fluid and given pushes of force elements [N]."""
         self.run(MOTION)
         at = int(self.layout["push"])
         self.out[at : at + pushes.size] = pushes
@@ -120,10 +132,10 @@ class StaticForces:
         return self.forces()
 
     def sizes(self, pushes: np.ndarray) -> np.ndarray:
-        """Upper bound of the magnitude of all loads on each freedom : float64[freedoms].
+        """Upper bound of the sum of magnitudes of all loads on each freedom : float64[freedoms].
 
-        Magnitude of forces times distance from the joint, in any direction: a load perpendicular to the motion of a
-        freedom acts on it by rounding only.
+        A load counts as its magnitude times its distance from the joint, whatever its direction, because a load
+        perpendicular to the motion of a freedom acts on it by rounding errors.
         """
         draft, first = self.draft, int(self.layout["push"])
         self.run(MOTION)
@@ -149,7 +161,7 @@ class StaticForces:
         return sum((self.reach(*arguments) for arguments in loads), np.zeros(len(draft.freedom_table)))
 
     def at_ends(self, row, force: float, torque: float) -> list[tuple]:
-        """Loads on two points, as arguments of `reach`."""
+        """Loads on the two points of a line of action, as arguments of `reach`."""
         ends = [self.tables.points[row[end]] for end in ("from_point", "to_point") if row[end] >= 0]
         return [(int(point["body"]), point["place"], force, torque) for point in ends if point["body"] >= 0]
 
@@ -158,7 +170,7 @@ class StaticForces:
         return self.out[int(self.layout["body"]) + rec.BODY_OUT * i :][: rec.BODY_OUT]
 
     def position_of(self, point: int) -> np.ndarray:
-        """Position of a point in the present configuration [m]."""
+        """Position of a point in the current configuration [m]."""
         from fvsolve.kernels.mechanism.body_layout import ATTITUDE, POSITION
 
         i, place = int(self.tables.points[point]["body"]), self.tables.points[point]["place"]
@@ -168,9 +180,9 @@ class StaticForces:
         return body_row[POSITION : POSITION + 3] + body_row[ATTITUDE : ATTITUDE + 9].reshape(3, 3) @ place
 
     def reach(self, i: int, place: np.ndarray, force: float, torque: float) -> np.ndarray:
-        """Largest effect of a force on body i at a place in its axes, and of a torque, on each freedom.
+        """Largest possible effect of a force [N] and torque [N m] on each freedom, in any direction.
 
-        Needs S in scratch.
+        i, place : body and point in its axes at which they act. `forces` must have written the joint axes to `scratch`.
         """
         from fvsolve.kernels.mechanism.body_layout import ARM, ATTITUDE
 
@@ -187,6 +199,6 @@ class StaticForces:
         return effects
 
     def by(self, loads: np.ndarray) -> np.ndarray:
-        """Forces of freedoms under these forces and torques of bodies."""
+        """Generalised forces on all freedoms from given forces and torques on bodies : float64[bodies, 6]."""
         self.loads()[:] = loads
         return self.forces()

@@ -1,4 +1,4 @@
-"""Starting profile of a run, from which the state deviates: pressures, flows, and motions at the start."""
+"""Initial steady state of a run: pressures, flows, and motions at the start. States are deviations from it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ ROUNDING_SHARE = 1e-12  # flows below this share of the flow scale are zero
 
 
 class SteadyStart:
-    """Steady flow problem of a case and its solution, with the same density in all pressure drops."""
+    """Steady flow problem of a case and its solution, with the same density in all pressure drops.
+
+    Potentials are p + rho g z [Pa], flows mass flows [kg/s].
+    """
 
     def __init__(self, draft) -> None:
         self.draft, self.case, self.law = draft, draft.case, draft.case.law
@@ -72,12 +75,12 @@ class SteadyStart:
 
     @cached_property
     def run_arrays(self) -> rec.RunArrays:
-        """Arrays that runs write, before any event."""
+        """Arrays that a run writes, as before any event."""
         return zeros_for_run(self.draft.shapes)
 
     @cached_property
     def handle(self) -> np.ndarray:
-        """Handle of the tables for compiled laws."""
+        """Handle of the tables, by which compiled laws read them."""
         return make_handle((*self.draft.tables, *self.run_arrays))
 
     def pressure(self, i: int) -> float:
@@ -89,7 +92,7 @@ class SteadyStart:
         return self.law.density(self.pressure(i)) if hasattr(self, "answer") else self.law.rho
 
     def schedule_value(self, schedule: int) -> float:
-        """Value of a schedule up to the start."""
+        """Value of a schedule at the start, its left limit."""
         values, key = self.draft.schedules.known_values, (int(schedule), self.t)
         if key not in values:
             schedules, pieces = self.draft.tables.schedules, self.draft.tables.pieces
@@ -97,7 +100,7 @@ class SteadyStart:
         return values[key]
 
     def solve(self) -> None:
-        """Solve the steady state in which the state of every device agrees with its pressures and flows."""
+        """Solve for the steady state in which the state of every device agrees with its pressures and flows."""
         random, devices = Random(0), list(zip(self.draft.devices, self.draft.device_table, strict=True))
         for turn in range(MAX_REVISIONS):
             self.balance()
@@ -116,7 +119,7 @@ class SteadyStart:
         self.draft.check()
 
     def scatter(self, random: Random) -> None:
-        """Set regulating devices to random states: revisions from their states did not converge."""
+        """Set regulating devices to random states, after revisions of their states did not converge."""
         for k in sorted(self.valve_modes):
             if random.random() < 0.5:
                 self.shut = self.shut | {k}
@@ -138,7 +141,7 @@ class SteadyStart:
         return self.answer.flow[len(self.pipes) + len(self.columns) :][: len(self.valves)]
 
     def balance(self) -> None:
-        """Solve the steady state with devices in their present states."""
+        """Solve for the steady state with devices in their current states."""
         self.fixed_potentials, self.demand = self.boundary_values()
         held = self.fixed_potentials
         pipes = [self.friction_edge(mesh.name, row, mesh.length) for mesh, row in
@@ -161,7 +164,7 @@ class SteadyStart:
         self.pipe_flow, self.column_flow, self.valve_flow = flow[:n], flow[n:m], flow[m : m + len(valves)]
 
     def boundary_values(self) -> tuple[np.ndarray, np.ndarray]:
-        """Fixed potentials (nan where unknown) and demands of junctions [kg/s]."""
+        """Fixed potentials of nodes [Pa], nan where unknown, and demands of junctions [kg/s]."""
         held, demand = np.full(len(self.nodes), np.nan), np.zeros(len(self.nodes))
         for i, (node, row) in enumerate(zip(self.case.places.values(), self.nodes, strict=True)):
             if row["kind"] == rec.JUNCTION:
@@ -173,12 +176,12 @@ class SteadyStart:
         return held, np.zeros_like(demand) if self.rest else demand
 
     def set_supporting_pressures(self, pressures: dict[int, float]) -> bool:
-        """Set pressures of closed chambers that support bodies; True if there are any."""
+        """Set the pressures of closed chambers that support loads : node -> pressure [Pa]; True if there are any."""
         self.loads = pressures
         return bool(pressures)
 
     def connected_nodes(self, i: int) -> list[int]:
-        """Nodes that open links join to node i, including node i."""
+        """Nodes that open links join to node i, directly or through other nodes, including node i."""
         group = union(len(self.nodes), [(edge.i, edge.j) for edge in self.edges if not edge.shut])
         return [j for j in range(len(self.nodes)) if group[j] == group[i]]
 
@@ -188,7 +191,10 @@ class SteadyStart:
         return any(np.any((table["from_node"] == i) | (table["to_node"] == i)) for table in tables)
 
     def friction_edge(self, name: str, row, length: float) -> Edge:
-        """Edge of a pipe or column: drop = (L / A) drag(M)."""
+        """Edge of a pipe or rigid column in the steady problem: its potential drop is length / area times its drag.
+
+        The drag [kg/s2] is the friction of the mass flow, see `kernels.steady_friction.drag`.
+        """
         law = tuple(row[key] for key in ("friction", "loss", "rough", "roughness", "reynolds"))
         per = length / row["area"]
         least = drag_slope(*law, 1e-6 * self.draft.fluid.density * float(row["area"]))
@@ -214,7 +220,10 @@ class SteadyStart:
         return Edge(i, j, newton, first, drop=drop)
 
     def valve_edge(self, k: int) -> Edge:
-        """Edge of a valve: M |M| = G dP, with the chord of the root as slope."""
+        """Edge of a valve in the steady problem, M |M| = G dP, with the slope of a chord of the root.
+
+        M : mass flow [kg/s]; G : conductance [kg2/s2/Pa]; dP : drop of potential [Pa]
+        """
         row = self.valves[k]
         own = self.valve_lowering(k).edge(self, k)
         if own is not None:
@@ -241,14 +250,14 @@ class SteadyStart:
         return Edge(i, j, newton, math.sqrt(g * PRESSURE_SCALE))
 
     def valve_lowering(self, k: int):
-        """Lowering that sets the state of valve k: that of its device, or of its own part."""
+        """Conversion object that sets the state of valve k: that of its device, or of the valve itself."""
         if self.valves[k]["device"] >= 0:
             return self.draft.devices[self.valves[k]["device"]][2]
         link = self.case.conduits[self.draft.valve_names[k]]
         return lowering_of(type(link)).of(link)
 
     def conductance(self, k: int) -> float:
-        """Conductance of a valve at the start [kg2/s2/Pa]; a device holds its valve open or shut."""
+        """Conductance of valve k at the start [kg2/s2/Pa]; if a device controls it, it is fully open or shut."""
         row = self.valves[k]
         if row["device"] >= 0:
             return 0.0 if k in self.shut else float(row["conductance"])
@@ -258,7 +267,7 @@ class SteadyStart:
         return conductance_of(self.draft.tables, k, opening)
 
     def leak_edge(self, k: int) -> Edge:
-        """Edge of the leakage past a piston: M = rho leakage dP."""
+        """Edge of the leakage past piston k in the steady problem: mass flow = density * leakage * pressure drop."""
         row = self.pistons[k]
         g = row["leakage"] * self.draft.fluid.density * self.factor.get(len(self.valves) + k, 1.0)
         i, j = int(row["a"]), int(row["b"])
@@ -267,11 +276,17 @@ class SteadyStart:
         return Edge(i, j, lambda flow, present: (1.0 / g, 1.0, present - flow / g))
 
     def leak_flow(self, row, p_a: float, p_b: float) -> float:
-        """Mass flow from A to B past a piston, as `kernels.mass_dynamics.leak_flow` [kg/s]."""
+        """Leakage past a piston from chamber A to B [kg/s], as `kernels.mass_dynamics.leak_flow`.
+
+        p_a, p_b : pressures in the chambers [Pa]
+        """
         return self.law.density(max(p_a, p_b)) * row["leakage"] * (p_a - p_b)
 
     def report_faults(self, held) -> None:
-        """Faults of parts for which no steady state exists, by name."""
+        """Add a fault for each part for which no steady state exists.
+
+        held : float64[n]  fixed potentials of nodes [Pa]
+        """
         names = list(self.case.places)
         for i in (i for i in self.answer.no_solution if self.demand[i] != 0.0):
             drawn = self.demand[i] / self.draft.fluid.density
@@ -298,9 +313,9 @@ class SteadyStart:
         self.draft.check()
 
     def report_frictionless(self) -> None:
-        """Notices of frictionless columns between unequal heads, and of loops without friction.
+        """Add notices of frictionless pipes and columns between unequal heads, and of loops without friction.
 
-        In such loops friction does not set the flow split.
+        Friction does not determine the distribution of flow in such loops.
         """
         # fixed nodes count as a single node: paths between them close loops
         merged = {i: -1 for i, potential in enumerate(self.fixed_potentials) if not np.isnan(potential)}
@@ -332,7 +347,10 @@ class SteadyStart:
             self.draft.warnings.append(Notice("start", f"links.{next(iter(loops))}" if loops else "links", text))
 
     def freeze_factors(self) -> None:
-        """Set factors of `steady` friction by roughness: at the starting flow; at rest, fully rough."""
+        """Set the constant factors of `steady` friction by roughness, from the starting flow.
+
+        Without flow at the start the factor is that of fully rough flow.
+        """
         rows = [*zip(self.draft.pipe_names, self.pipes, self.pipe_flow, strict=True),
                 *zip(self.draft.column_names, self.columns, self.column_flow, strict=True)]  # fmt: skip
         for name, row, flow in rows:
@@ -364,7 +382,10 @@ class SteadyStart:
         return drag(*law)
 
     def fill_pipes(self) -> None:
-        """Set pressure profiles linear between the ends; pressure that friction does not balance drives the flow."""
+        """Set the steady pressures along pipes, linear between the ends.
+
+        Pressure that friction does not balance drives the flow.
+        """
         profile, self.unbalanced_drops = self.draft.tables.profile, {}
         for k, (row, mesh) in enumerate(zip(self.pipes, self.draft.meshes, strict=True)):
             row["flow"] = self.pipe_flow[k]
@@ -377,7 +398,7 @@ class SteadyStart:
             profile[cells] = (self.draft.fluid.vapor_pressure - pressure) * row["admittance"]
 
     def set_unbalanced_drop(self, mesh, row, change: float) -> bool:
-        """Set a pipe's drag to a drop of potential [Pa] that friction does not balance; False if friction does."""
+        """Set the drag of a pipe to balance its drop of potential `change` [Pa]; False if friction balances it."""
         excess = change - row["drag"] / row["area"] * mesh.length
         if abs(excess) <= 1e-10 * (PRESSURE_SCALE + abs(change)):
             return False
@@ -392,7 +413,7 @@ class SteadyStart:
         return self.nodes["elevation"][row["from_node"]] + row["slope"] * fraction * mesh.length
 
     def profile_at(self, k: int, fraction: float) -> tuple[float, float]:
-        """Pressure [Pa] of the profile and elevation [m] at a fraction of pipe k."""
+        """Steady pressure [Pa] and elevation [m] at a fraction of the length of pipe k."""
         row, mesh = self.pipes[k], self.draft.meshes[k]
         z = self.height(row, mesh, fraction)
         potential = self.answer.potential[row["from_node"]] - row["drag"] / row["area"] * fraction * mesh.length
@@ -425,20 +446,23 @@ class SteadyStart:
                 row["drop"] = abs(flow) * flow / here
 
     def begin_devices(self) -> None:
-        """Fill in data of every device that depend on the profile."""
+        """Fill in data of every device that depend on the initial steady state."""
         for (_, part, device), row in zip(self.draft.devices, self.draft.device_table, strict=True):
             self.moving += device.begin(self, part, row)
 
     def set_point_tolerance(self, end: str) -> float:
-        """Tolerance for a set point, from rounding: pressure [Pa] if `end` is given, else flow [kg/s]."""
+        """Tolerance of a regulated pressure [Pa], or if `end` is "" of a regulated flow [kg/s], from rounding."""
         return 1e-6 * PRESSURE_SCALE if end else 1e-6 * self.flow_scale
 
     def valve_drive(self, k: int) -> tuple[float, float]:
-        """Drive of valve k in the profile : (drop [Pa], density in the valve relative to reference)."""
+        """Drive of valve k in the steady state : (drop [Pa], density in the valve over reference density)."""
         return float(self.valves[k]["drop"]), 1.0
 
     def valve_law(self, k: int) -> tuple[float, float]:
-        """Law of valve k in the profile : (conductance fully open at the density in the valve, drop that drives it)."""
+        """Law of valve k in the steady state : (fully open conductance [kg2/s2/Pa], drop that drives the flow [Pa]).
+
+        The conductance is that at the density in the valve.
+        """
         drop, denser = self.valve_drive(k)
         return float(self.valves[k]["conductance"]) * denser, drop
 

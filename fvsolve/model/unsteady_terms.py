@@ -1,7 +1,8 @@
 """Weighting functions of unsteady friction, and their approximation by sums of exponentials.
 
-tau = 4 nu t / D^2 is dimensionless time, s its Laplace variable. A sum is fitted to the transform of W along s = i w,
-the value for a wave of that frequency, over all w that cells resolve and that fit into the run.
+The weighting function W(tau) depends on the dimensionless time tau = 4 nu t / D^2: kinematic viscosity nu, time t,
+diameter D. s is the Laplace variable of tau. A sum is fitted to the transform of W along s = i w, i the imaginary unit,
+the value for a wave of dimensionless angular frequency w, over all w that cells resolve and that fit into the run.
 """
 
 from __future__ import annotations
@@ -26,9 +27,10 @@ MAX_ZEROS = 8  # greatest number of zeros of J_2 that are used as exact decays
 
 
 def zielke(s: np.ndarray) -> np.ndarray:
-    """Transform of Zielke's W = sum of exp(-j^2 tau) over the zeros j of J_2, from the exact laminar profile.
+    """Laplace transform W(s) of Zielke's weighting function, from the exact laminar velocity profile.
 
-    s (1 + 8/s + 4 W(s)) is the exact laminar s I_0(x) / I_2(x), x = sqrt(s); Zielke, J. Basic Eng. 90 (1968) 109.
+    W(tau) is the sum of exp(-j^2 tau) over the zeros j of the Bessel function J_2. s (1 + 8/s + 4 W(s)) is the exact
+    laminar s I_0(x) / I_2(x), x = sqrt(s), with modified Bessel functions I; Zielke, J. Basic Eng. 90 (1968) 109.
     """
     from scipy.special import ive
 
@@ -37,16 +39,17 @@ def zielke(s: np.ndarray) -> np.ndarray:
 
 
 def inverse_root(s: np.ndarray) -> np.ndarray:
-    """Transform of W = 1 / sqrt(pi tau), Vardy and Brown's W = A* exp(-B* tau) / sqrt(tau) without A* and B*."""
+    """Laplace transform of W = 1 / sqrt(pi tau), Vardy and Brown's function without its coefficients A* and B*."""
     return 1.0 / np.sqrt(np.asarray(s, dtype=complex))
 
 
 def vardy_brown(reynolds: float, roughness: float) -> tuple[float, float]:
-    """(A*, B*) of W = A* exp(-B* tau) / sqrt(tau) in turbulent flow; roughness relative to the diameter.
+    """Coefficients (A*, B*) of W = A* exp(-B* tau) / sqrt(tau) in turbulent flow.
 
-    Smooth walls, A* = 1 / (2 sqrt(pi)), B* = Re^k / 12.86, k = log10(15.29 / Re^0.0567): Vardy and Brown, J. Sound
-    Vib. 259 (2003) 1011. Fully rough walls, A* = 0.0103 sqrt(Re) (e/D)^0.39, B* = 0.352 Re (e/D)^0.41: Vardy and Brown,
-    J. Sound Vib. 270 (2004) 233. Between both, the pair with the greater A*.
+    reynolds : Reynolds number Re; roughness : relative to the diameter, e/D. Smooth walls, A* = 1 / (2 sqrt(pi)), B* =
+    Re^k / 12.86, k = log10(15.29 / Re^0.0567): Vardy and Brown, J. Sound Vib. 259 (2003) 1011. Fully rough walls, A* =
+    0.0103 sqrt(Re) (e/D)^0.39, B* = 0.352 Re (e/D)^0.41: Vardy and Brown, J. Sound Vib. 270 (2004) 233. The result is
+    the pair with the greater A*.
     """
     smooth = 0.5 / math.sqrt(math.pi), reynolds ** math.log10(15.29 / reynolds**0.0567) / 12.86
     rough = 0.0103 * math.sqrt(reynolds) * roughness**0.39, 0.352 * reynolds * roughness**0.41
@@ -56,9 +59,9 @@ def vardy_brown(reynolds: float, roughness: float) -> tuple[float, float]:
 def terms(
     weighting: str, reynolds: float, roughness: float, cell: float, span: float, accuracy: float
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """(m, n) of W = sum of m exp(-n tau), and the highest frequency w at which it is accurate, in units of tau.
+    """Terms of W as a sum of m exp(-n tau) : (m, n, highest angular frequency w at which it is accurate).
 
-    cell : travel time of a wave through a cell; span : duration of the run; both as tau
+    w is in units of 1 / tau. cell : travel time of a wave through a cell, as tau; span : duration of the run, as tau
     """
     top = 2.0 ** math.floor(math.log2(FASTEST_DECAY / cell))
     top = max(top, 512.0) if weighting == "zielke" else top
@@ -77,11 +80,12 @@ def _power_of_two(x: float) -> float:
 
 @functools.lru_cache(maxsize=256)
 def fit(transform: str, top: float, low: float, accuracy: float) -> tuple[np.ndarray, np.ndarray]:
-    """Fit of nonnegative m and increasing n <= top, as few as possible, to a transform W(i w) from w = low on.
+    """Weights and decays (m, n) whose sum of m / (s + n) fits a transform W(s) at s = i w, from w = low on.
 
-    The relative error is at most `accuracy`; where decays up to `top` cannot follow, at most 2 (w / top)^3. As top is
-    near the travel time of a cell, that is third order in the cell size. Decays are in geometric progression; m is from
-    nonnegative least squares of (sum of m / (s + n)) / W(s) - 1 at s = i w. The result is checked at every w.
+    All m are nonnegative, n is increasing and at most `top`, and there are as few terms as possible. The relative error
+    is at most `accuracy`; where decays up to `top` cannot follow, at most 2 (w / top)^3. As 1 / top is near the travel
+    time of a cell, that is third order in the cell size. Decays are in geometric progression; m follows from
+    nonnegative least squares of (sum of m / (s + n)) / W(s) - 1. The result is checked at every w.
     """
     exact, heads = (zielke, _zeros()) if transform == "zielke" else (inverse_root, [np.zeros(0)])
     w = np.geomspace(min(low, 0.01 * top), LAST_FREQUENCY * top, 32 + int(10 * math.log(max(top / low, 4.0))))
@@ -95,7 +99,7 @@ def fit(transform: str, top: float, low: float, accuracy: float) -> tuple[np.nda
 
 
 def _zeros() -> list[np.ndarray]:
-    """First squared zeros of J_2: none of them, up to ZEROS of them."""
+    """Squares of the first zeros of the Bessel function J_2: lists of 0 to MAX_ZEROS of them."""
     from scipy.special import jn_zeros
 
     squares = jn_zeros(2, MAX_ZEROS) ** 2
@@ -103,7 +107,7 @@ def _zeros() -> list[np.ndarray]:
 
 
 def _decays(starts, low: float, top: float, count: int):
-    """Sets of `count` decays: geometric from about `low` to `top`, or following given first decays."""
+    """Sets of `count` decays to try: geometric from about `low` to `top`, or continued from the given first decays."""
     for given in starts:
         if given.size == 0:
             yield from (np.geomspace(bottom * low, top, count) for bottom in SLOWEST_DECAYS)
@@ -113,7 +117,10 @@ def _decays(starts, low: float, top: float, count: int):
 
 
 def _weights(w, value, tolerance, n):
-    """Best nonnegative sum with decays n : (greatest relative error over its tolerance, m, n)."""
+    """Best nonnegative weights m of a sum with decays n : (greatest relative error over its tolerance, m, n).
+
+    w, value, tolerance : frequencies, and the transform and its tolerance there
+    """
     from scipy.optimize import nnls
 
     shares = 1.0 / (1j * w[:, None] + n) / (tolerance * value)[:, None]
@@ -123,13 +130,13 @@ def _weights(w, value, tolerance, n):
 
 
 def reserve_terms(draft, row) -> None:
-    """Reserve floats for the terms of a pipe, which depend on its flow at the start."""
+    """Reserve space in `floats` for the terms of a pipe, which depend on its flow at the start."""
     row["term"] = len(draft.floats)
     draft.floats += [0.0] * (2 * MAX_TERMS)
 
 
 def add_terms(draft) -> dict[str, dict]:
-    """Add terms and states of pipes with unsteady friction, from flows at the start; return facts for `check`."""
+    """Add terms and states of pipes with unsteady friction, from flows at the start; return facts for `fvsolve check`."""
     facts, settings, floats = {}, draft.tables.settings[0], draft.tables.floats
     numerics, fluid = draft.case.numerics, draft.fluid
     for name, row, mesh in zip(draft.pipe_names, draft.pipe_table, draft.meshes, strict=True):
@@ -167,6 +174,9 @@ def add_terms(draft) -> dict[str, dict]:
 
 
 def memory_shares(floats: np.ndarray, row) -> np.ndarray:
-    """g / n of every term of a pipe: a memory state z stores (g / n) z^2 / (2 rho A) per length."""
+    """Ratio g / n of gain and rate of every unsteady friction term of a pipe : float64[terms].
+
+    A memory state z [kg/s] stores the energy (g / n) z^2 / (2 rho A) per length, rho the density and A the area.
+    """
     pairs = floats[row["term"] : row["term"] + 2 * row["terms"]].reshape(-1, 2)
     return pairs[:, 0] / pairs[:, 1]

@@ -1,4 +1,4 @@
-"""Model tables derived from those of another case that differs only in sizes of restrictions."""
+"""Model tables derived from those of a similar case, in which only sizes of restrictions differ."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CHANGING_FIELDS = ("nodes", "links", "raw", "read")  # fields of a case that dif
 
 
 def with_new_sizes(packed: ModelDraft, case: Case) -> ModelDraft | None:
-    """Copy of packed tables with the restrictions of a case; None if the case differs in anything else."""
+    """Copy of packed tables with the restrictions of a case; None if the case differs in more than their sizes."""
     before = packed.case
     changed = changed_links(before, case)
     if changed is None or packed.plane_size or not all(name in packed.valve_names for name in changed):
@@ -27,7 +27,7 @@ def with_new_sizes(packed: ModelDraft, case: Case) -> ModelDraft | None:
 
 
 def changed_links(before: Case, case: Case) -> list[str] | None:
-    """Names of links that changed; None if anything else changed."""
+    """Names of the links that differ between two cases; None if anything else differs."""
     same = all(
         getattr(before, field.name) is getattr(case, field.name)
         for field in fields(Case)

@@ -16,9 +16,9 @@ from fvsolve.validation import TABLE, instance_of, validated
 def vary(model: Model, set: Mapping[str, Any]) -> Model:
     """Build the model of the same case with changed keys, for example `{"links.valve.area": 0.002}`.
 
-    The result is identical to the bit to that of a fresh build, with its faults and notices. Only the parts that the
-    keys affect are read again, and those that read a file or a signal. The starting profile is solved from scratch, so
-    that its last digits do not depend on the earlier model. `model` is not changed. Raises CaseError.
+    The result is identical to the bit to a model built from the changed file, with its faults and notices. Only parts
+    that the keys affect, and parts that read a file or a signal, are read again. The initial steady state is solved
+    from scratch, so that its last digits do not depend on the earlier model. `model` is not changed. Raises CaseError.
     """
     case = load(model.case, dict(set))
     try:

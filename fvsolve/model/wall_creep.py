@@ -1,4 +1,4 @@
-"""Kelvin-Voigt elements of creeping pipe walls: coefficients, states, limit of the step."""
+"""Kelvin-Voigt elements of creeping pipe walls: coefficients, states, and the limit that they set to steps."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def add_creep(draft, name: str, link, row) -> None:
-    """Coefficients and states of a pipe's Kelvin-Voigt elements; faults where creep is not supported."""
+    """Add coefficients and states of a pipe's Kelvin-Voigt elements; add faults where creep is not supported."""
     if not link.creep_elements:
         return
     place = f"links.{name}.wall.creep"
@@ -24,21 +24,23 @@ def add_creep(draft, name: str, link, row) -> None:
 
 
 def gains(link, density: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients of every element : (G / tau, 1 / tau) [1/s].
+    """Coefficients of every Kelvin-Voigt element of a pipe : (gain G / tau [1/s], rate 1 / tau [1/s]).
 
-    G = c D K J / e is the volume that it takes up, relative to that of the elastic wall and the liquid together.
+    tau : retardation time [s]. G is the final volume that the element takes up, relative to the volume that wall and
+    liquid take up elastically: G = c D K J / e, with restraint factor c, diameter D, elastic modulus K = rho a^2, creep
+    compliance J, wall thickness e.
     """
     growth, time = np.array(link.creep_elements).T
     return growth * density * speed**2 / time, 1.0 / time
 
 
 def elements(floats: np.ndarray, row) -> np.ndarray:
-    """Gain and rate of every element of a pipe : float64[elements, 2]."""
+    """Gain and rate of every Kelvin-Voigt element of a pipe [1/s] : float64[elements, 2]."""
     return floats[row["element"] : row["element"] + 2 * row["elements"]].reshape(-1, 2)
 
 
 def mass_in_creep(floats: np.ndarray, row, y: np.ndarray) -> float:
-    """Mass in the volume that a wall has gained by creep since the profile [kg]."""
+    """Mass in the volume that a wall has gained by creep since the start [kg]."""
     total, n = 0.0, int(row["cells"])
     for k, (gain, rate) in enumerate(elements(floats, row)):
         at = row["strain"] + k * n
@@ -47,7 +49,7 @@ def mass_in_creep(floats: np.ndarray, row, y: np.ndarray) -> float:
 
 
 def limit_creep_step(draft, unsteady: dict) -> dict[str, dict]:
-    """Creep data for `check`; raise the rate that limits explicit steps to that of the fastest element."""
+    """Raise the rate that limits explicit steps to that of the fastest creep element; return facts for `check`."""
     result, settings = {}, draft.tables.settings[0]
     for name, row in zip(draft.pipe_names, draft.pipe_table, strict=True):
         if row["elements"] == 0:
