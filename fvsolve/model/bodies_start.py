@@ -91,14 +91,14 @@ def start_pins(draft, at: StaticForces) -> np.ndarray:
     names = [name for name, row in zip(draft.pin_names, draft.pin_table, strict=True) for _ in range(row["rows"])]
     for name in dict.fromkeys(redundant_pins(rows, names)):
         text = "it is redundant: in some direction joints or other pins already prevent its opening"
-        draft.fault(f"links.{name}", f"{text}. For a loop in a plane give its axis, else remove one pin")
+        draft.fault(f"links.{name}", f"{text}. Give the key `axis` for a loop in a plane, else remove one pin")
     slips = dict(zip(names, rows @ at.rates(), strict=True))
     for name, slip in slips.items():
         if abs(slip) > PIN_RATE_TOLERANCE:
             rate = draft.case.amount(abs(slip), "velocity")
             draft.fault(
                 f"links.{name}",
-                f"velocities at the start open it at {rate}. Expected initial velocities that agree with it",
+                f"velocities at the start separate its two points at {rate}. Expected velocities that keep it closed",
             )
     draft.check()
     forces = at.out[int(at.layout["pin"]) :][: 3 * len(draft.pin_table)].reshape(-1, 3)

@@ -73,7 +73,7 @@ def classify_nodes(draft) -> None:
         if nodes["solve"][i] == rec.ALONE:
             name = list(draft.case.places)[i]
             draft.fault(f"nodes.{name}", "only rigid columns join it, so nothing sets its pressure; "
-                       "give it a chamber volume, or make one of its links a pipe")  # fmt: skip
+                       "make it a chamber, or make one of its links a pipe")  # fmt: skip
 
 
 def mark_event_ends(draft, group) -> None:
@@ -164,7 +164,7 @@ def refuse_isolated_groups(draft, members) -> None:
             joins = [name for name, v in zip(draft.valve_names, valves, strict=True) if int(v["from_node"]) in group]
             reason, span = f"{listing(joins)} {'joins' if len(joins) == 1 else 'join'} it", ""
         draft.fault(f"nodes.{place}", f"{reason} to {other}, and only rigid columns join beyond, so nothing sets their "
-                    f"pressure{span}; give {other} a chamber volume, or make one of the columns a pipe")  # fmt: skip
+                    f"pressure{span}; make {other} a chamber, or make one of the columns a pipe")  # fmt: skip
 
 
 def is_sensed(draft, device: int) -> bool:

@@ -139,8 +139,8 @@ def jump_overflow_notices(past: np.ndarray) -> list[Notice]:
         return []
     share = past[at.GREATEST_UNSTORED_JUMP] / past[at.GREATEST_JUMP]
     text = (
-        f"more than {int(past[at.JUMP_CAPACITY])} jumps were travelling in one pipe: some of them, up to {share:.3g} "
-        "of the greatest, were smoothed over a step; raise numerics.delay_tolerance, so that fewer are stored, or set "
-        'pipe_model = "finite-volume"'
+        f"more than {int(past[at.JUMP_CAPACITY])} jumps were travelling in one pipe: some of them, of up to "
+        f"{share:.3g} times the greatest jump, were smoothed over a step; raise `numerics.delay_tolerance`, so that "
+        'fewer are stored, or set pipe_model = "finite-volume"'
     )
     return [Notice("jumps", "numerics", text, "delay_tolerance", float(share), None)]

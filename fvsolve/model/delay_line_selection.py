@@ -58,7 +58,7 @@ def line_methods(case, unfit: Collection[str] = ()) -> dict[str, LineMethod]:
         if line == "finite-volume" or need:
             methods[name] = LineMethod("finite-volume", need or f'pipe_model = "{line}"')
         elif name in unfit:
-            methods[name] = LineMethod("finite-volume", "its bound as a delay line is above numerics.delay_tolerance")
+            methods[name] = LineMethod("finite-volume", "its error as a delay line may exceed numerics.delay_tolerance")
         else:
             lines.append(name)
     if not lines:
@@ -98,7 +98,7 @@ def reason_for_cells(case, name: str, link) -> str:
         probe.quantity == "force" and (probe.part, probe.name) == ("links", name)
         for probe in (*case.probes, *case.extreme_probes)
     ):
-        return "its force is requested, which is computed from cells"
+        return "a probe reads its force, which is computed from cells"
     return ""
 
 
@@ -225,8 +225,8 @@ def divide_lines(draft) -> list[str]:
 def fast_schedule_notice(case, name: str, step: float, scale: float, bound: float) -> Notice:
     """Notice of a schedule that changes within `scale` [s], too fast for the steps of a delay line."""
     text = (
-        f"{name}: a schedule changes something within {case.step_amount(scale, 3)}, and steps of "
-        f"{case.step_amount(step, 3)} may cause an error of its waves of {bound:.2g} of the change; "
+        f"{name}: a schedule changes its value within {case.step_amount(scale, 3)}, and steps of "
+        f"{case.step_amount(step, 3)} may cause an error in the waves of this pipe of {bound:.2g} times the change; "
         f'expected shorter steps, or pipe_model = "finite-volume"'
     )
     return Notice("lines", f"links.{name}", text, "pipe_model", bound, case.numerics.delay_tolerance)

@@ -41,9 +41,10 @@ class Accounts:
         if len(model.tables.moving_segments):
             run_data.tables.moving_segments["loads_body"] = rec.JOINT_LOAD_READ
         if any(basin.part.on is not None and basin.opening for basin in model.basins):
-            raise FvsolveError("the energy of a basin on a body with an open side is not supported")
+            raise FvsolveError("the energy of a basin on a body with an open side is not supported; expected closed "
+                               "sides, or a basin that no body carries")  # fmt: skip
         if model.basins and not case.law.linear:
-            raise FvsolveError('the energy of basins is computed for law = "linear" only')
+            raise FvsolveError('the energy of basins is computed for law = "linear" only; expected this density law')
         self.power, self.stored = model.functions.energies
         if model.basins and len(model.tables.bodies):  # include loads of the fluid in basins on bodies, for its work
             run_data.tables.basins["loads_body"] = 1

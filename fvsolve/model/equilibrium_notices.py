@@ -117,7 +117,7 @@ def report_unbalanced(at: Configuration, force: np.ndarray, scale: np.ndarray) -
         text = f'"equilibrium" finds no position where its forces balance: {" and ".join(residuals)} remain'
         remedy = (
             "support it by a spring, a cylinder or a driven joint, state a position nearer to equilibrium, "
-            'or use "steady"'
+            'or use initial = "steady"'
         )
         at.draft.fault(f"nodes.{name}", f"{text}; {remedy}")
 
@@ -131,4 +131,4 @@ def refuse_overturned(at: Configuration, y: np.ndarray) -> None:
     where = int(at.out[rec.WHERE]) - len(at.draft.basins)
     name = list(at.draft.case.places)[where] if where >= 0 else at.draft.basins[where].name
     text = "in the equilibrium found it is turned over, and its contents would run out"
-    at.draft.fault(f"nodes.{name}", f'{text}; hold its body upright, state another position, or use "steady"')
+    at.draft.fault(f"nodes.{name}", f'{text}; hold its body upright, state another position, or use initial = "steady"')

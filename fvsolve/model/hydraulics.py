@@ -42,7 +42,7 @@ class Hydraulics:
         if law.model == "none":
             return
         if law.model == "unsteady" and not self.fluid.viscosity:
-            fault(f"links.{name}.friction", '"unsteady" needs the fluid\'s viscosity; give fluid.viscosity')
+            fault(f"links.{name}.friction", '"unsteady" needs the fluid\'s viscosity; give the key `fluid.viscosity`')
             return
         if law.model == "hazen-williams":
             row["friction"] = rec.FRICTION_HAZEN
@@ -61,7 +61,7 @@ class Hydraulics:
         elif not self.fluid.viscosity:
             fault(
                 f"links.{name}.friction",
-                "roughness needs the fluid's viscosity; give fluid.viscosity, or a factor",
+                "the key `roughness` needs the fluid's viscosity; give `fluid.viscosity`, or the key `factor`",
             )
         else:
             row["friction"], row["rough"] = rec.FRICTION_ROUGH, per_factor
@@ -79,7 +79,7 @@ class Hydraulics:
                 self.case.amount(speed_value, "velocity", 6) for speed_value in (speed, self.fluid.sound_speed)
             )
             fault(f"links.{name}.wave_speed", f"{given} is faster than sound in the fluid, {sound}; expected at most "
-                  'that, or law = "linear"')  # fmt: skip
+                  'this speed, or law = "linear"')  # fmt: skip
         return growth if growth > 1e-9 / self.fluid.bulk_modulus else 0.0
 
     def transition_flow(self, name: str, link, reynolds: float, fault) -> float:
@@ -96,6 +96,6 @@ class Hydraulics:
         viscosity = self.fluid.viscosity
         if not viscosity:
             if link.laminar_reynolds is not None:
-                fault(f"links.{name}.laminar_reynolds", "needs the fluid's viscosity; give fluid.viscosity")
+                fault(f"links.{name}.laminar_reynolds", "needs the fluid's viscosity; give the key `fluid.viscosity`")
             viscosity = 1e-6 * self.rho  # water's: it only bounds the slope at zero drop
         return reynolds * math.pi / 4.0 * diameter * viscosity

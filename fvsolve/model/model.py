@@ -380,8 +380,8 @@ class Model(Displayable):
             or not 0 <= k < len(self.pipes)
             or waves.shape != (self.pipes[k].cells,)
         ):
-            raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; expected a number for each cell of one of "
-                               f"{len(self.pipes)} pipes, counted from 0")  # fmt: skip
+            raise FvsolveError(f"waves has shape {waves.shape} for pipe {k}; expected a number for each cell of "
+                               f"the pipe, and a pipe number less than {len(self.pipes)}")  # fmt: skip
         return self.case.law.cell_pressure(self.tables.pipes[k], self.profiles[k], self.tables.profile, waves)
 
     def head(self, pressure: np.ndarray, elevation) -> np.ndarray:

@@ -121,7 +121,7 @@ def cost_notices(model, steps: int | None, set_by: str) -> list[Notice]:
     ratio, count = rate / waves, steps or math.ceil((numerics.end - start) * rate / STABILITY_LIMIT)
     if ratio <= COSTLY_RATIO or count <= COSTLY_STEPS:
         return []
-    reason = set_by if numerics.rtol is None else "it"
+    reason = set_by if numerics.rtol is None else "a part that is faster than waves"
     text = (
         f"{numerics.method}: about {count} steps, {ratio:.3g} times as many as waves need ({reason}); "
         'method = "auto" or "rodas-5p" with rtol = 1e-6 is not limited by it'
@@ -200,7 +200,7 @@ def step_and_reason(model) -> tuple[float | None, str]:
         return numerics.courant / rate, f"links.{valve}: its flow responds at once to the nodes it joins{others}"
     part = fastest_parts(model) + (", faster than every pipe cell" if len(own) else "")
     if len(own) and rate > STIFF_RATIO * own.max():
-        part += f', {rate / own.max():.3g} times; rtol with method = "rodas-5p" is not limited by it'
+        part += f', by a factor of {rate / own.max():.3g}; rtol with method = "rodas-5p" is not limited by it'
     return numerics.courant / rate, part
 
 

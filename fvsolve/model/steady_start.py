@@ -309,7 +309,7 @@ class SteadyStart:
                 )
         if not self.draft.faults and not self.answer.converged:
             self.draft.fault("numerics.initial", "no steady state was found; check for demands that cannot be supplied "
-                             'and frictionless paths between unequal heads, or use "rest"')  # fmt: skip
+                             'and frictionless paths between unequal heads, or use initial = "rest"')  # fmt: skip
         self.draft.check()
 
     def report_frictionless(self) -> None:
@@ -362,7 +362,7 @@ class SteadyStart:
             else:
                 e = row["roughness"]
                 factor = (2.0 * math.log10(3.7 / e)) ** -2 if e > 0.0 else 0.0
-                text = f"{name}: no flow at the start; its steady factor is the fully rough one, {factor:.4g}"
+                text = f"{name}: no flow at the start; its friction factor is that of fully rough flow, {factor:.4g}"
                 self.draft.warnings.append(Notice("start", f"links.{name}", text, "friction", factor))
             row["loss"] += row["rough"] * factor
             row["rough"], row["friction"] = 0.0, rec.FRICTION_FACTOR

@@ -136,7 +136,7 @@ def reserve_terms(draft, row) -> None:
 
 
 def add_terms(draft) -> dict[str, dict]:
-    """Add terms and states of pipes with unsteady friction, from flows at the start; return facts for `fvsolve check`."""
+    """Add terms and states of pipes with unsteady friction, from flows at the start; return facts for `check`."""
     facts, settings, floats = {}, draft.tables.settings[0], draft.tables.floats
     numerics, fluid = draft.case.numerics, draft.fluid
     for name, row, mesh in zip(draft.pipe_names, draft.pipe_table, draft.meshes, strict=True):
@@ -148,14 +148,14 @@ def add_terms(draft) -> dict[str, dict]:
         weighting = law.weighting or ("zielke" if reynolds < LAMINAR else "vardy-brown")
         if weighting == "vardy-brown" and reynolds == 0.0:
             reason = "vardy-brown needs the Reynolds number of the start, but there is no flow"
-            draft.fault(f"links.{name}.friction.weighting", f"{reason}; expected an initial flow, or zielke")
+            draft.fault(f"links.{name}.friction.weighting", f"{reason}; expected an initial flow, or `zielke`")
             continue
         cell, span = unit * row["dx"] / row["speed"], unit * (numerics.end - numerics.start)
         accuracy = ACCURACY if law.accuracy is None else law.accuracy
         try:
             m, n, highest = terms(weighting, reynolds, (law.roughness or 0.0) / mesh.diameter, cell, span, accuracy)
         except ArithmeticError as error:
-            draft.fault(f"links.{name}.friction.accuracy", f"{error}; give a greater accuracy or more cells")
+            draft.fault(f"links.{name}.friction.accuracy", f"{error}; give a greater number, or more cells")
             continue
         gain, rate = 4.0 * unit * m, unit * n
         floats[row["term"] : row["term"] + 2 * m.size] = np.column_stack([gain, rate]).ravel()

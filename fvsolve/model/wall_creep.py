@@ -15,7 +15,7 @@ def add_creep(draft, name: str, link, row) -> None:
             place, "takes up liquid, into which scalars are not followed; remove either the scalars or the creep"
         )
     if any(getattr(draft.case.places[end], "on", None) for end in link.ports.values()):
-        draft.fault(place, "is not supported for a pipe on a body")
+        draft.fault(place, "is not supported for a pipe on a body; remove the creep")
     numbers = np.column_stack(gains(link, draft.fluid.density, float(row["speed"])))
     row["elements"], row["element"] = len(numbers), len(draft.floats)
     draft.floats += numbers.ravel().tolist()

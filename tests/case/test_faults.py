@@ -790,12 +790,12 @@ CANNOT_START = {
     "no viscosity": (
         SCENE.replace("viscosity = 1e-3\n", ""),
         {},
-        "line 28: links.main.friction: roughness needs the fluid's viscosity",
+        "line 28: links.main.friction: the key `roughness` needs the fluid's viscosity",
     ),
     "no viscosity for a table that is set": (
         SCENE.replace("viscosity = 1e-3\n", ""),
         {"links.main.friction": {"model": "steady", "roughness": 1e-4}},
-        "--set links.main.friction: roughness needs the fluid's viscosity",
+        "--set links.main.friction: the key `roughness` needs the fluid's viscosity",
     ),
     "no viscosity for a part that is set": (
         SCENE.replace("viscosity = 1e-3\n", ""),

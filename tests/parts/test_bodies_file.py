@@ -127,7 +127,7 @@ def test_a_loop_that_is_not_closed_is_told_by_how_much_and_one_held_twice_by_whi
     )
     nodes, links = parallelogram()
     nodes["two"]["joint"]["rate"] = 0.5
-    assert "links.loop: velocities at the start open it at" in told(nodes, links)
+    assert "links.loop: velocities at the start separate its two points at" in told(nodes, links)
 
 
 def test_a_probe_that_a_joint_has_not_is_refused():

@@ -103,7 +103,7 @@ def test_a_limit_on_force_is_held_against_every_step_and_leg() -> None:
 
 
 def test_what_has_no_force_is_named() -> None:
-    with pytest.raises(fvsolve.CaseError, match="its force is requested"):
+    with pytest.raises(fvsolve.CaseError, match="a probe reads its force"):
         fvsolve.run(shut(), set={"numerics.pipe_model": "delay-line", "numerics.method": "rk4"})
     case = shut()
     case["links"]["main"]["bends"] = [600.0, 900.0]
