@@ -46,8 +46,8 @@ class NonlinearStart(SteadyStart):
         if np.max(changes) > 1e-9:
             draft, worst = self.draft, int(np.argmax(changes))
             names = [*self.case.places, *draft.pipe_names, *draft.column_names, *draft.valve_names, *self.case.links]
-            draft.fault("numerics.initial", f"no steady state was found: {names[worst]} does not converge when densities "
-                        'change with pressure; check the heads around it, or use initial = "rest"')  # fmt: skip
+            draft.fault("numerics.initial", f"no steady state was found: {names[worst]} does not converge with "
+                        'variable density; check the heads around it, or use initial = "rest"')  # fmt: skip
             self.draft.check()
 
     def jet(self, row, m_from: float, m_to: float) -> tuple[float, float]:

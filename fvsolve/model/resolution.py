@@ -82,8 +82,9 @@ def _behind_events(draft: Any, cells: np.ndarray) -> list[Notice]:
     least, name = math.ceil(needed[worst]), draft.pipe_names[worst]
     took, passed = (case.amount(time, "time") for time in (durations[key], cell[worst]))
     text = (
-        f"{name}: {_cells(cells[worst])} with a travel time of {passed} each, too few for "
-        f"the waves of {key}, a change within {took}; with {scheme} peaks are accurate to a tenth from links.{name}.cells = {least} on{_others(draft, few, worst)}"
+        f"{name}: {_cells(cells[worst])} with a travel time of {passed} each, too few for the waves of {key}, a change "
+        f"within {took}; with {scheme} peaks are accurate to a tenth from "
+        f"links.{name}.cells = {least} on{_others(draft, few, worst)}"
     )
     return [Notice("range", f"links.{name}", text, "cells", float(cells[worst]), float(least))]
 
