@@ -1,6 +1,8 @@
-"""Rotations: matrices, Euler angles, axis and angle, Euler parameters, and their rates; (30) to (58) of the course.
+"""Rotations: matrices, Euler angles, axis and angle, Euler parameters, and their rates.
 
-R is `R^a_b`, float64[3, 3]: it transforms components in axes b to those in axes a (35). Angles [rad], rates [rad/s].
+Numbers (30) to (58) are equations of docs/course.md. A rotation matrix R, or `R^a_b`, is float64[3, 3] and transforms
+components in axes b to components in axes a (35). R' is its transpose, R_d a desired attitude, w an angular velocity.
+Angles are in [rad], rates in [rad/s]; `u x` is the skew-symmetric matrix of the cross product with u.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ EDGE = 1e-12  # cosine of pitch, or sine of the second classical Euler angle, be
 
 
 def skew(u: Vector) -> Matrix:
-    """Skew-symmetric matrix of `u x`, (32): skew(u) @ v = u x v (33), (34)."""
+    """Skew-symmetric matrix of the cross product, (32) to (34): skew(u) @ v = u x v."""
     x, y, z = u
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
@@ -34,7 +36,10 @@ def unit(u: Vector) -> np.ndarray:
 
 
 def defect(matrix: Matrix) -> tuple[float, float]:
-    """Deviation of a matrix from SO(3) (36): (greatest |entry| of R'R - I, determinant); (0, 1) for a rotation."""
+    """Deviation of a matrix R from a rotation, (36) : (greatest magnitude of an entry of R'R - I, determinant).
+
+    It is (0, 1) for a rotation.
+    """
     return float(np.abs(matrix.T @ matrix - np.eye(3)).max()), float(np.linalg.det(matrix))
 
 
@@ -45,30 +50,33 @@ def nearest(matrix: Matrix) -> Matrix:
 
 
 def about_x(phi: float) -> Matrix:
-    """R_x(phi), (37)."""
+    """Rotation matrix R_x(phi) about the x axis, (37)."""
     c, s = math.cos(phi), math.sin(phi)
     return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def about_y(theta: float) -> Matrix:
-    """R_y(theta), (38)."""
+    """Rotation matrix R_y(theta) about the y axis, (38)."""
     c, s = math.cos(theta), math.sin(theta)
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
 def about_z(psi: float) -> Matrix:
-    """R_z(psi), (39)."""
+    """Rotation matrix R_z(psi) about the z axis, (39)."""
     c, s = math.cos(psi), math.sin(psi)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def of_roll_pitch_yaw(roll: float, pitch: float, yaw: float) -> Matrix:
-    """R_z(yaw) R_y(pitch) R_x(roll), (40); its entry (1, 1) is cos(yaw) cos(pitch), misprinted in the summary."""
+    """Rotation matrix R_z(yaw) R_y(pitch) R_x(roll), (40).
+
+    Its first entry is cos(yaw) cos(pitch), misprinted in the summary of the course.
+    """
     return about_z(yaw) @ about_y(pitch) @ about_x(roll)
 
 
 def roll_pitch_yaw(rotation: Matrix) -> tuple[float, float, float]:
-    """(roll, pitch, yaw) of (40), pitch from -pi/2 to pi/2.
+    """Angles (roll, pitch, yaw) of a rotation, (40), with pitch from -pi/2 to pi/2.
 
     At pitch +-pi/2 roll and yaw rotate about the same axis, and only yaw -+ roll is defined: yaw is set to 0. Near it
     both angles are sensitive to small changes, but their rotation is the given one.
@@ -80,12 +88,15 @@ def roll_pitch_yaw(rotation: Matrix) -> tuple[float, float, float]:
 
 
 def of_zyz(psi: float, theta: float, phi: float) -> Matrix:
-    """R_z(psi) R_y(theta) R_z(phi), the classical Euler angles (41)."""
+    """Rotation matrix R_z(psi) R_y(theta) R_z(phi) of the classical Euler angles, (41)."""
     return about_z(psi) @ about_y(theta) @ about_z(phi)
 
 
 def zyz(rotation: Matrix) -> tuple[float, float, float]:
-    """(psi, theta, phi) of (41), theta from 0 to pi; at both limits only psi +- phi is defined: psi is set to 0."""
+    """Classical Euler angles (psi, theta, phi) of a rotation, (41), with theta from 0 to pi.
+
+    At theta = 0 or pi only psi +- phi is defined: psi is set to 0.
+    """
     tilt = math.hypot(rotation[0, 2], rotation[1, 2])  # sin(theta)
     psi = math.atan2(rotation[1, 2], rotation[0, 2]) if tilt > EDGE else 0.0
     turned = about_z(-psi) @ rotation  # R_y R_z
@@ -93,13 +104,19 @@ def zyz(rotation: Matrix) -> tuple[float, float, float]:
 
 
 def of_axis(axis: Vector, angle: float) -> Matrix:
-    """cos(angle) I + sin(angle) k x + (1 - cos(angle)) k k', (43); k : unit vector of `axis`, invariant (42)."""
+    """Rotation matrix about an axis by an angle, (43): cos(angle) I + sin(angle) k x + (1 - cos(angle)) k k'.
+
+    k is the unit vector of `axis`, which the rotation does not change (42).
+    """
     k = unit(axis)
     return math.cos(angle) * np.eye(3) + math.sin(angle) * skew(k) + (1.0 - math.cos(angle)) * np.outer(k, k)
 
 
 def axis_angle(rotation: Matrix) -> tuple[np.ndarray, float]:
-    """(axis, angle) of (43), angle from 0 to pi; the axis of the identity is x."""
+    """Axis and angle of a rotation, (43) : (unit vector, angle from 0 to pi).
+
+    The axis of the identity is x.
+    """
     e = euler_parameters(rotation)
     length = float(np.linalg.norm(e[1:]))
     axis = e[1:] / length if length else np.array([1.0, 0.0, 0.0])
@@ -107,16 +124,20 @@ def axis_angle(rotation: Matrix) -> tuple[np.ndarray, float]:
 
 
 def of_euler_parameters(e: Any) -> Matrix:
-    """I + 2 eta eps x + 2 eps x eps x, (45), of e = (eta, eps), normalised first: a rotation even if e has drifted."""
+    """Rotation matrix of the Euler parameters e = (eta, eps), (45): I + 2 eta eps x + 2 (eps x)(eps x).
+
+    They are normalised first, so that the result is a rotation even if e has drifted.
+    """
     eta, *eps = unit(e)
     cross = skew(eps)
     return np.eye(3) + 2.0 * eta * cross + 2.0 * cross @ cross
 
 
 def euler_parameters(rotation: Matrix) -> np.ndarray:
-    """(eta, eps) of (44), eta = cos(angle / 2) not negative, eps = axis sin(angle / 2) : float64[4].
+    """Euler parameters (eta, eps) of a rotation, (44) : float64[4].
 
-    Computed from the column of 4 e e' with the largest diagonal entry, to avoid division by a small number.
+    eta = cos(angle / 2) is not negative; eps = axis sin(angle / 2). Computed from the column of 4 e e' with the largest
+    diagonal entry, to avoid division by a small number.
     """
     r, trace = rotation, np.trace(rotation)
     four = np.empty((4, 4))
@@ -128,62 +149,86 @@ def euler_parameters(rotation: Matrix) -> np.ndarray:
 
 
 def transform(rotation: Matrix, origin: Vector) -> Matrix:
-    """T^a_b of (46), (47) : float64[4, 4], from R^a_b and the position of the origin of b in axes a."""
+    """Homogeneous transformation T^a_b, (46), (47) : float64[4, 4].
+
+    rotation : R^a_b; origin : position of the origin of axes b, in axes a
+    """
     result = np.eye(4)
     result[:3, :3], result[:3, 3] = rotation, origin
     return result
 
 
 def inverse(transformation: Matrix) -> Matrix:
-    """T^b_a of T^a_b: R' and -R' r."""
+    """Inverse T^b_a of a homogeneous transformation T^a_b: rotation R' and origin -R' r, r the origin of T^a_b."""
     back = transformation[:3, :3].T
     return transform(back, -back @ transformation[:3, 3])
 
 
 def angular_velocity(rotation: Matrix, rate: Matrix) -> np.ndarray:
-    """w^a_ab with w x = R' R^T, (48), from a rotation and its derivative; R^T w is w^b_ab, in axes b (49)."""
+    """Angular velocity w of axes b relative to axes a, in axes a, with w x = dR/dt R' (48) : float64[3].
+
+    rate : dR/dt. R' w is the angular velocity in axes b (49).
+    """
     return unskew(rate @ rotation.T)
 
 
 def rotation_rate(rotation: Matrix, w: Vector) -> Matrix:
-    """dR/dt = (w^a x) R, first form of (49); with w in axes b it is R (w^b x), second form."""
+    """Derivative dR/dt = (w x) R of a rotation, first form of (49); w is in axes a.
+
+    With w in axes b the derivative is R (w x), the second form.
+    """
     return skew(w) @ rotation
 
 
 def jacobian_roll_pitch_yaw(pitch: float, yaw: float) -> Matrix:
-    """E with w^a_ab = E (roll', pitch', yaw'): the axes of (51) after the preceding rotations, (53).
+    """Matrix E with angular velocity w = E (roll', pitch', yaw'), (53); primes are rates, w is in axes a.
 
-    det E = cos(pitch). So its inverse, needed to integrate the angles, grows like 1 / cos(pitch).
+    Its columns are the axes of (51) after the preceding rotations. det E = cos(pitch), so its inverse, needed to
+    integrate the angles, grows like 1 / cos(pitch).
     """
     before = about_z(yaw)
     return np.column_stack([before @ about_y(pitch)[:, 0], before[:, 1], [0.0, 0.0, 1.0]])
 
 
 def jacobian_zyz(psi: float, theta: float) -> Matrix:
-    """E with w^a_ab = E (psi', theta', phi'), (53); det E = -sin(theta)."""
+    """Matrix E with angular velocity w = E (psi', theta', phi'), (53); primes are rates, w is in axes a.
+
+    det E = -sin(theta)
+    """
     before = about_z(psi)
     return np.column_stack([[0.0, 0.0, 1.0], before[:, 1], before @ about_y(theta)[:, 2]])
 
 
 def euler_parameters_rate(e: Any, w: Vector) -> np.ndarray:
-    """de/dt from w = w^b_ab: eta' = -eps . w / 2, eps' = (eta w + eps x w) / 2, derived from (44) and (49).
+    """Derivative of Euler parameters e = (eta, eps) : float64[4], from the angular velocity w in axes b.
 
-    eta^2 + eps . eps stays constant, whatever its value.
+    deta/dt = -eps . w / 2, deps/dt = (eta w + eps x w) / 2, derived from (44) and (49). eta^2 + eps . eps stays
+    constant, whatever its value.
     """
     eta, eps, w = e[0], np.asarray(e[1:], dtype=float), np.asarray(w, dtype=float)
     return 0.5 * np.concatenate([[-eps @ w], eta * w + np.cross(eps, w)])
 
 
 def derivative(rotation: Matrix, u: Vector, rate: Vector, w: Vector) -> np.ndarray:
-    """du^a/dt = R (du^b/dt + w^b x u^b), (54), (55): rate : derivative in axes b; u, w : in axes b."""
+    """Derivative in axes a of a vector given in axes b, (54), (55): R (du/dt + w x u).
+
+    u : vector; rate : du/dt, its derivative in axes b; w : angular velocity of b relative to a; all in axes b
+    """
     return rotation @ (np.asarray(rate, dtype=float) + np.cross(w, u))
 
 
 def deviation(rotation: Matrix, desired: Matrix) -> Matrix:
-    """R~ = R R_d', (56): rotation, in axes a, from the desired attitude R_d to the present attitude R."""
+    """Deviation R R_d' of an attitude R from a desired attitude R_d, (56).
+
+    It is the rotation, in axes a, from the desired to the present attitude.
+    """
     return rotation @ desired.T
 
 
 def deviation_velocity(turn: Matrix, w: Vector, desired: Vector) -> np.ndarray:
-    """w~ with dR~/dt = (w~ x) R~, (58): w - R~ w_d, both in axes a; (57) omits R~, valid near R~ = I."""
+    """Angular velocity of the deviation `turn`, (58): w - turn w_d, in axes a.
+
+    w, desired : angular velocities w of the body and w_d of its desired attitude, in axes a. Equation (57) omits the
+    factor `turn`, which is valid near the identity.
+    """
     return np.asarray(w, dtype=float) - turn @ np.asarray(desired, dtype=float)

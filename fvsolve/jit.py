@@ -1,9 +1,9 @@
 """Compilation of functions by `njit`, and the folder of compiled code.
 
-Numba checks only the file of a compiled function. After an edit in another file that it calls, the old machine code
-would run. Here each function is cached in a folder named by the hash of all sources that compiled code can depend on,
-in a subfolder for the machine; site-packages stays unchanged. Functions called by Python or by address are stored a
-second time, in a form that is loaded without numba (`store`).
+Numba checks only the file of a compiled function. After an edit in another file, whose functions it calls, the old
+machine code would run. Here each function is cached in a folder named by the hash of all sources that compiled code can
+depend on, in a subfolder for the machine; site-packages stays unchanged. Functions that Python calls, or that are
+called by address, are stored a second time, in a form that is loaded without numba (`store`).
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ COMPILING = os.environ.get("NUMBA_DISABLE_JIT", "0") in ("", "0")
 def cache_folder() -> Path:
     """Folder of cached data: compiled code and fluid properties.
 
-    `FVSOLVE_CACHE` if set, else the cache folder of the user; if not writable, a folder below the temporary folder.
+    It is `FVSOLVE_CACHE` if set, else the cache folder of the user; if not writable, a folder below the temporary
+    folder.
     """
     for folder in (_preferred_folder(), Path(tempfile.gettempdir()) / f"fvsolve-cache-{_user()}"):
         if _writable(folder):
@@ -71,12 +72,12 @@ def cache_folder() -> Path:
 
 @functools.cache
 def source_hash() -> str:
-    """Hash of all sources of compiled code, sixteen hexadecimal digits: sha256 over names and bytes."""
+    """Hash of all sources of compiled code: sixteen hexadecimal digits of the sha256 of file names and contents."""
     return _digest(PACKAGE, _sources())
 
 
 def add_sources(folder: Path) -> None:
-    """Allow caching of functions of modules in a folder outside the package, under the hash of all its sources."""
+    """Allow caching of functions defined in a folder outside the package, under the hash of all sources in it."""
     folder = Path(folder).resolve()
     EXTRA_FOLDERS[folder] = f"outside/{_digest(folder, sorted(folder.rglob('*.py')))}"
 
@@ -95,7 +96,7 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
     Arrays are not reference counted (`_nrt=False`): each count is an atomic operation, and with the tables of a
     model the counts cost microseconds per step. So compiled code allocates no memory; a function that must allocate
     sets `_nrt=True`. The GIL is released during a call from Python (`nogil=True`).
-    Use it bare or with options of numba. With `NUMBA_DISABLE_JIT=1` it returns the plain function.
+    Use the decorator bare or with options of numba. With `NUMBA_DISABLE_JIT=1` it returns the plain function.
     Only functions of `SOURCE_ROOTS` and of added folders are cached, because the hash does not cover other files.
     """
     if function is None:
@@ -106,9 +107,10 @@ def njit(function: Callable | None = None, /, **options: Any) -> Callable:
 
 
 class Function:
-    """Function for calls from compiled code and from Python; its machine code comes from the store, else from numba.
+    """Function that `njit` returns, for calls from compiled code and from Python.
 
-    `.py_func` is the plain function, `.numba` its numba dispatcher; numba is imported only if something is compiled.
+    Its machine code comes from the store, or else from numba, which is imported only if something is compiled.
+    `.py_func` is the plain function, `.numba` its numba dispatcher.
     """
 
     def __init__(self, function: Callable, options: dict[str, Any]) -> None:
@@ -122,13 +124,13 @@ class Function:
 
     @functools.cached_property
     def folder(self) -> str | None:
-        """Folder of its machine code below the code folder; None if no hash covers its source."""
+        """Subfolder of the code folder for this function's machine code; None if no hash covers its source."""
         home = Path(self.__code__.co_filename).resolve()
         return "" if home in _sources() else next((EXTRA_FOLDERS[f] for f in home.parents if f in EXTRA_FOLDERS), None)
 
     @functools.cached_property
     def numba(self):
-        """Dispatcher of numba for this function."""
+        """Numba dispatcher of this function."""
         with COMPILE_LOCK:
             return _dispatcher()(self.py_func, self.folder is not None, self.folder or "", **self.targetoptions)
 
@@ -142,16 +144,19 @@ class Function:
         return _attribute_of, (self.__module__, self.__qualname__)
 
     def declare(self, letters: str, kinds: Callable[[str], tuple]) -> DeclaredFunction:
-        """Compile for a single signature; calls from Python accept no other.
+        """Compile the function for a single signature; calls from Python then accept no other.
 
-        letters : signature; kinds(letters) : numba types of the arguments
+        letters : signature, see `kernels.calls`; kinds(letters) : numba types of the arguments
         """
         if self.declared is None:
             self.declared = DeclaredFunction(self, letters, self.code(letters, lambda: kinds(letters)))
         return self.declared
 
     def address(self, letters: str, kinds: Callable[[str], tuple]) -> int:
-        """Address for calls from compiled code, compiled for a signature."""
+        """Address of the function compiled for a signature, for calls from compiled code.
+
+        letters, kinds : as in `declare`
+        """
         return self.code(letters, lambda: kinds(letters), wrappers=False).address
 
     def __call__(self, *arguments: Any) -> Any:
@@ -169,7 +174,11 @@ class Function:
         return python(*arguments)
 
     def code(self, letters: str, kinds: Callable[[], tuple], wrappers: bool = True) -> Code:
-        """Machine code for a signature; wrappers : with wrappers for calls from Python and C, else without."""
+        """Machine code for a signature, loaded from the store or compiled.
+
+        letters : signature; kinds() : numba types of the arguments
+        wrappers : True for code with wrappers for calls from Python and C
+        """
         key = letters if wrappers else f".{letters}"
         if key not in self.codes:
             with COMPILE_LOCK:
@@ -196,7 +205,7 @@ class Function:
         return code_of(compiled, wrappers)
 
     def _path(self, key: str) -> Path | None:
-        """File in the store; None for closures and local functions, which have no unique name."""
+        """File for the machine code of a signature; None for closures and local functions without a unique name."""
         if self.folder is None or "<" in self.__qualname__ or self.py_func.__closure__ or not store.CAN_LINK:
             return None
         digest = hashlib.sha256(self._identity(key).encode()).hexdigest()[:12]
@@ -208,7 +217,7 @@ class Function:
 
 
 def _attribute_of(module: str, name: str) -> Any:
-    """Attribute of a module."""
+    """Object `name` of a module, imported by its name."""
     return getattr(importlib.import_module(module), name)
 
 
@@ -240,14 +249,17 @@ class DeclaredFunction:
 
 @functools.cache
 def plain_kinds() -> dict:
-    """Letter -> numba type of a number, or of an array of numbers."""
+    """Numba types of numbers and arrays of numbers : letter of a signature -> type."""
     types = _numba().types
     kinds = {"t": types.float64, "i": types.int64, "b": types.boolean, "c": types.complex128}
     return kinds | {letter: types.Array(getattr(types, kind), axes, "C") for letter, (kind, axes) in ARRAYS.items()}
 
 
 def declare_function(function: Callable, letters: str, kinds: Callable[[str], tuple]) -> Callable:
-    """Compile a function for a single signature; return it unchanged if compilation is disabled."""
+    """Compile a function for a single signature; return it unchanged if compilation is disabled.
+
+    letters, kinds : as in `Function.declare`
+    """
     return function.declare(letters, kinds) if isinstance(function, Function) else function
 
 
@@ -258,7 +270,10 @@ WRITABLE, COLUMNS = 0x501, 2  # numpy flags: C-contiguous, aligned and writable;
 
 
 def signature_of(argument: Any) -> str:
-    """Signature of an argument in the letters of `kernels.calls`; in brackets for other arrays; else KeyError."""
+    """Signature of an argument: a letter of `kernels.calls`, or for other arrays and tuples a text in brackets.
+
+    Raises KeyError for any other type.
+    """
     if type(argument) is not np.ndarray:
         if isinstance(argument, tuple):
             return f"({type(argument).__qualname__} {''.join(map(signature_of, argument))})"
@@ -271,13 +286,16 @@ def signature_of(argument: Any) -> str:
 
 @functools.cache
 def _dtype_text(kind: np.dtype) -> str:
-    """Short text of a dtype; for records a hash of names and offsets of their fields."""
+    """Short text for a dtype; for records a hash of the names and offsets of their fields."""
     text = f"{kind.descr} {kind.itemsize} {kind.alignment}" if kind.names else ""
     return hashlib.sha256(text.encode()).hexdigest()[:12] if text else kind.str
 
 
 def compile_once(function: Callable) -> Callable:
-    """`functools.cache` for functions that compile: concurrent calls of threads wait and get the same result."""
+    """Decorate a function that compiles so that it runs once for the same arguments, also if several threads call it.
+
+    Concurrent calls wait for the first call and get its result, as from `functools.cache`.
+    """
     cached = functools.cache(function)
 
     @functools.wraps(function)
@@ -289,12 +307,15 @@ def compile_once(function: Callable) -> Callable:
 
 
 def inline(function: Callable) -> Callable:
-    """`njit` with forced inlining, for functions called from a single place: passing arrays costs nothing."""
+    """Decorate a function like `njit`, with forced inlining, so that passing arrays costs nothing.
+
+    It suits functions that are called from a single place.
+    """
     return njit(function, forceinline=True)
 
 
 class Intrinsic:
-    """`numba.extending.intrinsic`, created at first use by compiled code; numba is not imported before."""
+    """Replacement of `numba.extending.intrinsic` that imports numba only when compiled code first uses the function."""
 
     def __init__(self, define: Callable) -> None:
         functools.update_wrapper(self, define)
@@ -313,12 +334,12 @@ class Intrinsic:
 
 
 def is_cold() -> bool:
-    """True if nothing of this version has been compiled on this machine yet."""
+    """True if the code folder is empty, so that functions of this version must be compiled first."""
     return COMPILING and not any(code_folder().glob(f"*{store.SUFFIX}"))
 
 
 def other_caches() -> str:
-    """Text about compiled code in the cache that cannot be used here; "" if there is none."""
+    """Text about cached code from other machines or sources, which cannot be used here; "" if there is none."""
     own = code_folder()
     folders = {path.parent for path in cache_folder().glob(f"code/*/*/*{store.SUFFIX}")}
     machines = sorted(path.name for path in folders if path.parent == own.parent and path != own)
@@ -335,10 +356,10 @@ def other_caches() -> str:
 
 @contextlib.contextmanager
 def compile_in_parallel(code: str, cached: str):
-    """Context in which a second process runs `code` to compile other functions; halves the time of a cold start.
+    """Context in which a second process runs the Python text `code` to compile functions.
 
-    cached : name of a function that it compiles; if the store contains this function, no process is started. Functions
-    that the second process does not compile are compiled by the caller.
+    It halves the time of a cold start. cached : name of a function that the process compiles; if the store contains
+    this function, no process is started. Functions that the process does not compile are compiled by the caller.
     """
     if not COMPILING or (os.cpu_count() or 1) < 2 or any(code_folder().glob(f"{cached}-*{store.SUFFIX}")):
         yield
@@ -364,7 +385,7 @@ def _sources() -> tuple[Path, ...]:
 
 @functools.cache
 def _numba():
-    """The module numba, imported when something is compiled; its warning about first-class functions is disabled."""
+    """Module numba, imported when something is first compiled; its warning about first-class functions is disabled."""
     import numba
     from numba.core.errors import NumbaExperimentalFeatureWarning
 
@@ -377,7 +398,7 @@ def _dispatcher() -> type:
     """Dispatcher class of numba, extended by a second dispatcher for calls from compiled code.
 
     Numba adds two wrappers to each function, for calls from Python and from C. With twenty arrays to unpack they are
-    larger than the function. Functions for compiled code have no wrappers, which saves a fifth of the compile time.
+    larger than the function. The second dispatcher compiles without wrappers, which saves a fifth of the compile time.
     """
     numba = _numba()
     from numba.core.registry import CPUDispatcher
@@ -457,7 +478,10 @@ def _warn_not_cached(reason: str) -> None:
 
 @functools.cache
 def code_folder() -> Path:
-    """Folder of code compiled from these sources for this machine; the oldest folders of other sources are deleted."""
+    """Folder of code compiled from these sources for this machine.
+
+    It is created if missing; the oldest folders of other sources are deleted.
+    """
     folder = cache_folder() / "code" / source_hash()
     own = folder / store.target()["name"]
     own.mkdir(parents=True, exist_ok=True)
@@ -469,7 +493,7 @@ def code_folder() -> Path:
 
 
 def _prune(present: Path) -> None:
-    """Delete all but the newest other generations; another process may do the same at this time."""
+    """Delete the folders of other sources except the newest; another process may do this at the same time."""
     others = []
     for path in present.parent.iterdir():
         try:

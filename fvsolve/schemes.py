@@ -1,7 +1,7 @@
 """Schemes and limiters as data: weights of cell averages in the value at a face.
 
 A linear scheme is a single entry here: order, reach, ends and step limits are derived from its weights. A limited
-scheme has a kernel too (`kernels.reconstruction`, `kernels.limiters`); in smooth solutions it equals its linear twin.
+scheme has a kernel too (`kernels.reconstruction`, `kernels.limiters`); in smooth solutions it equals a linear scheme.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ Weights = tuple[Fraction, ...]
 
 
 class Reach(NamedTuple):
-    """Numbers of cells that a scheme reads, for a wave that runs forward."""
+    """Numbers of cells that the rate of a cell depends on, for a wave that runs forward."""
 
     behind: int  # cells before a cell, in its rate
     ahead: int  # cells after it
@@ -27,17 +27,17 @@ class Reach(NamedTuple):
 
 @dataclass(frozen=True)
 class Scheme:
-    """Reconstruction of the value at a face from averages of upstream cells.
+    """Reconstruction of the value at a face from averages of the cells around it.
 
-    family : the kernel
+    family : kernel that computes the scheme
     weights : of cells u-2 .. u+2 in the value at the face after cell u; None for a limited scheme
     twin : linear scheme that a limited scheme equals in smooth solutions
     shorter : scheme for pipes of fewer than `LEAST_CELLS` cells; plane : scheme for basins on rectangles
     cavities : True if the scheme can treat the edge of a cavity; stencils of other schemes reach across it
-    extra_cells : cells read at an end where a wave leaves, in addition to its polynomial
-    end_factors : factors on the rate of a pipe of 1, 2, 3, ... cells because of its ends: 0.9, or 0.9 times the limit
-    of a long pipe if that is less, over the Courant number above which ssp-rk3 is unstable between an open and a shut
-    end (tests/limits/test_ends.py); at least 1
+    extra_cells : cells read at an end where a wave leaves, in addition to those of the polynomial there
+    own_end_factors : factors on the rate (cells crossed per second) of a pipe of 1, 2, 3, ... cells because of its
+    ends, at least 1. They are 0.9, or 0.9 times the limit of a long pipe if that is less, over the Courant number above
+    which ssp-rk3 is unstable between an open and a shut end (tests/limits/test_ends.py).
     """
 
     name: str
@@ -53,31 +53,31 @@ class Scheme:
 
     @property
     def limited(self) -> bool:
-        """True if its weights depend on the solution."""
+        """True if the weights of the scheme depend on the solution."""
         return self.weights is None
 
     @property
     def smooth(self) -> Scheme:
-        """Linear scheme that it equals in smooth solutions: itself, or its twin."""
+        """Linear scheme that this scheme equals in smooth solutions: itself, or its twin."""
         return SCHEMES[self.twin] if self.limited else self
 
     @cached_property
     def degree(self) -> int:
-        """Highest degree of polynomials whose value at the face follows exactly from their cell averages."""
+        """Highest degree of polynomials for which the scheme gives the exact value at a face from cell averages."""
         degree = 0
         while self.exact(degree + 1):
             degree += 1
         return degree
 
     def exact(self, degree: int) -> bool:
-        """True if it gives x^degree at x = 1 exactly from averages over cells [k, k + 1]."""
+        """True if the scheme gives the exact value of x^degree at the face x = 1, from means over cells [k, k + 1]."""
         power = degree + 1
         averages = (Fraction((k + 1) ** power - k**power, power) for k in STENCIL)
         return sum(w * average for w, average in zip(self.smooth.weights, averages, strict=True)) == 1
 
     @property
     def order(self) -> int:
-        """Order of its error in dx in smooth solutions."""
+        """Order of the error in the cell length, in smooth solutions."""
         return self.degree + 1
 
     @cached_property
@@ -88,17 +88,17 @@ class Scheme:
 
     @property
     def end_factors(self) -> tuple[float, ...]:
-        """Factors on the rate of a short pipe because of its ends: those of its linear scheme."""
+        """Factors on the rate of a pipe of 1, 2, 3, ... cells because of its ends: those of the linear scheme."""
         return self.smooth.own_end_factors
 
     def for_basin(self, rectangle: bool) -> Scheme:
-        """Scheme for basins on a rectangle, or on an unstructured mesh."""
+        """Scheme that basins use in place of this one; rectangle : True for a grid, False for an unstructured mesh."""
         scheme = SCHEMES[self.plane]
         return scheme if rectangle or scheme.degree <= 1 else SCHEMES["muscl"]
 
 
 def fractions(denominator: int, *weights: int) -> Weights:
-    """Fractions of integer weights and their common denominator."""
+    """Weights as fractions, from integers over a common denominator."""
     return tuple(Fraction(w, denominator) for w in weights)
 
 
@@ -145,15 +145,16 @@ LIMITED = {name: scheme for name, scheme in SCHEMES.items() if scheme.limited}
 
 
 def end_rate_factor(scheme: str, cells: int) -> float:
-    """Factor on the rate of the cells of a pipe because of its ends; 1 for a long pipe."""
+    """Factor on the rate (cells crossed per second) of a pipe because of its ends; 1 for a long pipe."""
     factors = SCHEMES[scheme].end_factors
     return factors[cells - 1] if cells <= len(factors) else 1.0
 
 
 class Limiter(NamedTuple):
-    """Limiter of `kernels.limiters`, whose codes are in this order.
+    """Limiter of slopes; its code in `kernels.limiters` is its position in `LIMITERS`.
 
-    tangents : (derivative of its slope by the difference behind, by the difference ahead) for each nonzero branch
+    tangents : for each branch with a slope, the derivatives of the slope by the differences to the cells behind and
+    ahead
     overshoot : on unstructured meshes with least-squares slopes, bound of the values at sides relative to those of
     neighbouring cells: 1 for no overshoot, more as linear fields need on distorted meshes
     """
@@ -163,7 +164,10 @@ class Limiter(NamedTuple):
 
     @property
     def branches(self) -> dict[str, Weights]:
-        """Weights of muscl for fixed switches, by name: linear schemes, or twice the slope behind or ahead."""
+        """Weights of the linear schemes that muscl equals, one for each branch of the limiter : name -> weights.
+
+        A branch that is no scheme of its own has twice the slope to the cell behind, or to the cell ahead.
+        """
         half = [(Fraction(), Fraction()), *((a / 2, b / 2) for a, b in self.tangents)]
         schemes = [(ZERO, -a, 1 + a - b, b, ZERO) for a, b in half]
         known = {scheme.weights: name for name, scheme in LINEAR.items()}
@@ -171,7 +175,7 @@ class Limiter(NamedTuple):
 
     @property
     def steepest(self) -> Fraction:
-        """Greatest ratio of its slope to the smaller difference."""
+        """Greatest ratio of the limited slope to the smaller of the two differences."""
         return max(max(pair) for pair in self.tangents)
 
 
@@ -184,5 +188,5 @@ LIMITERS = {
 
 
 def branches(scheme: str, limiter: str) -> dict[str, Weights]:
-    """Weights of the linear schemes that a limited scheme equals for fixed switches, by name."""
+    """Weights of the linear schemes that a limited scheme equals, one for each of its branches : name -> weights."""
     return LIMITERS[limiter].branches if scheme == "muscl" else dict(SCHEMES[scheme].branches)

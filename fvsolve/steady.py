@@ -1,8 +1,8 @@
 """Steady state of a network of resistances: pressures and flows.
 
-Potentials are P = p + rho g z [Pa], flows are mass flows [kg/s]. A node has a given potential or balances its flows;
-along an edge the potential decreases by drop(M). All edges and nodes are solved together by Newton (Todini and Pilati
-1988). In a loop without friction the flows are those of least norm.
+Potentials are P = p + rho g z [Pa], flows are mass flows M [kg/s]. A node has a given potential or balances its flows;
+along an edge (link) the potential decreases by drop(M). All edges and nodes are solved together by Newton's method
+(Todini and Pilati 1988). In a loop without friction the flows are those of least norm.
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ SMALL = 1e-9  # relative residual below which a node counts as balanced
 
 @dataclass
 class Edge:
-    """Link with its Newton row alpha dM - beta d(drop) = gamma.
+    """Link from node i to node j in the steady problem, with its linear equation in each Newton step.
 
-    row : (alpha, beta, gamma) as a function of flow [kg/s] and present potential drop [Pa]; None keeps `flow` fixed
-    shut : no flow; potentials of nodes behind it may be estimated from its other side
+    The equation is alpha dM - beta d(drop) = gamma, for changes of the mass flow M [kg/s] and of the potential drop
+    [Pa].
+    row : function (flow, drop) -> (alpha, beta, gamma); None keeps the flow at `flow`
+    shut : True if there is no flow; potentials of nodes behind the link may be estimated from its other side
     """
 
     i: int
@@ -44,7 +46,7 @@ class Edge:
 
 @dataclass
 class SteadyState:
-    """Potentials [Pa] of nodes, flows [kg/s] of edges, nodes without balance.
+    """Solution of a steady problem: potentials of nodes [Pa], flows of edges [kg/s], nodes without a solution.
 
     split : True if the flows of a loop are not unique; then they are those of least norm
     """
@@ -91,9 +93,10 @@ def _no_drop(flow: float) -> float:
 
 
 def _quiet(held, demand, edges) -> set[int]:
-    """Edges without flow: all given potentials that they connect agree to rounding, and there is no demand.
+    """Indices of edges in parts of the network without flow.
 
-    Otherwise rounding of a head would drive a flow: by M |M| = G dP it is the square root of the rounding error.
+    There all given potentials agree to rounding, and there is no demand. Otherwise rounding of a head would drive a
+    flow: by M |M| = G dP it is the square root of the rounding error (mass flow M, conductance G, potential drop dP).
     """
     fed = {i for edge in edges if edge.row is None and edge.flow != 0.0 for i in (edge.i, edge.j)}
     quiet = set()
@@ -112,7 +115,7 @@ def _group_of(groups, i):
 
 
 def union(n: int, pairs) -> list[int]:
-    """Label of the connected set of each of n items, joined by pairs."""
+    """Label of the connected set to which each of n items belongs; pairs : items that are connected."""
     label = list(range(n))
 
     def root(i: int) -> int:
@@ -126,7 +129,7 @@ def union(n: int, pairs) -> list[int]:
 
 
 def _components(held, edges):
-    """(sets of nodes joined by edges with unknown flow, those sets without a given potential)."""
+    """Connected sets of nodes : (all sets joined by edges with unknown flow, the sets without a given potential)."""
     joined = [(edge.i, edge.j) for edge in edges if edge.row is not None and not edge.shut]
     groups: dict[int, set[int]] = {}
     for i, label in enumerate(union(held.size, joined)):
@@ -136,7 +139,10 @@ def _components(held, edges):
 
 
 def _references(held, demand, edges, parts, free_sets):
-    """For sets connected only by fixed flows: (nodes whose balance is dropped, edges that determine the potential)."""
+    """Equations for the sets of nodes without a given potential that edges with a fixed flow join to known potentials.
+
+    Returns (nodes whose balance is dropped, fixed edge that determines the potential -> its set).
+    """
     dropped: set[int] = set()
     entries: dict[int, frozenset[int]] = {}
     known = {i for group in parts if group not in free_sets for i in group}
@@ -156,20 +162,24 @@ def _references(held, demand, edges, parts, free_sets):
 
 
 def _enters(edge, group, known) -> bool:
-    """True if an edge with a fixed flow leads from a known potential into a set."""
+    """True if an edge with a fixed flow joins a set of nodes to a node with a known potential."""
     if edge.row is not None or edge.drop is None:
         return False
     return (edge.i in group and edge.j in known) or (edge.j in group and edge.i in known)
 
 
 def _dead_end(group, demand, edges):
-    """Node of a set that is most like a dead end: fewest links, no demand."""
+    """Node of a set that is most like a dead end: without demand, with the fewest links."""
     count = {i: sum(i in (edge.i, edge.j) for edge in edges) for i in group}
     return min(sorted(group), key=lambda i: (demand[i] != 0.0, count[i]))
 
 
 def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors):
-    """Newton on flows of `active` edges and potentials of `nodes`: a row for each edge, balance and anchored set."""
+    """Newton's method on the flows of `active` edges and the potentials of `nodes`; writes them to `result`.
+
+    The system has a row for each edge in `rows`, each balance of a node, and each node in `anchors`, whose potential is
+    kept because nothing determines it.
+    """
     column = {("flow", e): k for k, e in enumerate(active)}
     column |= {("node", i): len(active) + k for k, i in enumerate(nodes)}
     if not column:
@@ -207,7 +217,7 @@ def _newton(result, edges, active, rows, nodes, balances, demand, scale, anchors
 
 
 def _columns(column, e, edge) -> tuple[int, ...]:
-    """Columns of the row of an edge in the order of its values; -1 for a quantity that is not an unknown."""
+    """Columns of the Newton row of edge e, in the order of `_edge_row`; -1 for a quantity that is not an unknown."""
     if edge.held_potential is not None:
         return (column["node", edge.held_potential[0]],)
     flow = column.get(("flow", e), -1)
@@ -216,7 +226,7 @@ def _columns(column, e, edge) -> tuple[int, ...]:
 
 
 def _edge_row(values, columns, e, edge, result, scale) -> float:
-    """Append the values of the row of an edge in scaled unknowns; return its right-hand side."""
+    """Append the values of the Newton row of edge e in scaled unknowns to `values`; return its right-hand side."""
     if edge.held_potential is not None:
         values.append(1.0)
         return (edge.held_potential[1] - result.potential[edge.held_potential[0]]) / scale[0]
@@ -242,7 +252,7 @@ def _edge_row(values, columns, e, edge, result, scale) -> float:
 def _solve(places, values, right, size, result):
     """Least-norm solution of the Newton system; sets `result.split` if the system is singular.
 
-    places : row times size plus column of each value. The solution is NaN if a number of the system is not finite.
+    places : index of each value in the matrix, row * size + column. The solution is NaN if a number is not finite.
     """
     if not (np.isfinite(values).all() and np.isfinite(right).all()):
         return np.full(size, np.nan)
@@ -264,9 +274,9 @@ def _solve(places, values, right, size, result):
 
 
 def _solve_sparse(values, i, j, right, size):
-    """(solution, True if the system is singular) of a large sparse system.
+    """Solution of a large sparse system A x = b : (x, True if the system is singular).
 
-    If singular: r + A x = b, A' r = DAMPING x, so that x minimises |A x - b|^2 + DAMPING |x|^2.
+    If it is singular: r + A x = b, A' r = DAMPING x, so that x minimises |A x - b|^2 + DAMPING |x|^2.
     """
     from scipy.sparse import bmat, csc_matrix, identity
     from scipy.sparse.linalg import splu
@@ -284,7 +294,10 @@ def _solve_sparse(values, i, j, right, size):
 
 
 def _through_shut(result, held, edges, free_sets, floating):
-    """Potentials of sets behind shut links: the limit of equal small leaks through the links, sum sqrt|dP| sign = 0."""
+    """Set the potentials of sets of nodes behind shut links, in which nothing else determines them.
+
+    They are the limit of equal small leaks through these links, with zero sum of the flows sign(dP) sqrt|dP|.
+    """
     groups = [group for group in free_sets if group & floating]
     for _ in range(60):
         moved = 0.0

@@ -1,7 +1,7 @@
 """Machine code on disk, loaded by llvmlite without numba.
 
-A file contains a function for a single signature: the relocatable object compiled by numba, and its symbols. Its folder
-is named by the target: all that machine code depends on apart from the sources.
+A file contains a function for a single signature: the object code compiled by numba, and its symbols. The name of its
+folder follows from the target: all properties on which machine code depends, apart from the sources.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class Code(NamedTuple):
 
 @functools.cache
 def target() -> dict[str, str]:
-    """Properties that machine code depends on apart from sources: processor, versions, settings of numba.
+    """Properties on which machine code depends apart from sources: processor, versions, settings of numba.
 
-    name : name of the folder, made of the processor and eight digits of the hash of all properties
+    The entry `name` is the name of the folder: the processor and eight digits of the hash of all properties.
     """
     import llvmlite
     import numpy
@@ -73,7 +73,7 @@ def target() -> dict[str, str]:
 
 @functools.cache
 def numba_version() -> str:
-    """Version of numba, read without importing it."""
+    """Version of numba, read without importing numba."""
     folder = numba_folder()
     text = (folder / "_version.py").read_text(encoding="utf-8") if folder else ""
     match = re.search(r'version"?\s*[:=]\s*["\']([^"\']+)', text)
@@ -87,14 +87,19 @@ def numba_folder() -> Path | None:
 
 
 def write_target(folder: Path) -> None:
-    """Write the properties of the target to its folder, once."""
+    """Write the properties of the target to the file target.json in a folder, unless it exists."""
     path = folder / "target.json"
     if not path.exists():
         _replace(path, json.dumps(target(), indent=1).encode())
 
 
 def write(path: Path, identity: str, compiled, code: bytes, wrappers: bool) -> None:
-    """Save a function compiled by numba; wrappers : with wrappers for Python and C. OSError if it cannot be written."""
+    """Save a function compiled by numba to a file. Raises OSError if the file cannot be written.
+
+    identity : text that identifies function and signature; compiled : result of numba's compilation; code : its object
+    code
+    wrappers : True if the code has wrappers for calls from Python and C
+    """
     names = compiled.fndesc
     symbols = {"address": names.llvm_func_name}
     if wrappers:
@@ -120,7 +125,11 @@ def _replace(path: Path, data: bytes) -> None:
 
 
 def read(path: Path, identity: str) -> Code | None:
-    """Load a function from a file; None if there is no file, or if it cannot be used, with a warning."""
+    """Load a function from a file; None if its code is missing, damaged or cannot be used.
+
+    Code for another target, and code that cannot be linked, cause a warning.
+    identity : text that must identify function and signature, as in `write`
+    """
     try:
         content = path.read_bytes()
     except OSError:
@@ -151,7 +160,10 @@ def _warn(text: str) -> None:
 
 
 def _link(symbols: dict[str, str], needed: list[str], object_code: bytes, identity: str) -> Code:
-    """Link machine code in a library of its own, so that symbols of different functions do not conflict."""
+    """Link object code to a library of its own, so that symbols of different functions do not conflict.
+
+    symbols : name of each entry point of the function; needed : names of symbols of numba and Python that it uses
+    """
     from llvmlite import binding
 
     built = binding.JITLibraryBuilder().add_object_img(object_code).add_current_process()
@@ -174,7 +186,7 @@ def _link(symbols: dict[str, str], needed: list[str], object_code: bytes, identi
 
 @functools.cache
 def linker():
-    """Linker of LLVM for this process."""
+    """Linker of LLVM for code that this process runs."""
     from llvmlite import binding
 
     binding.initialize_native_target()
@@ -185,7 +197,10 @@ def linker():
 
 @functools.cache
 def runtime_symbols() -> dict[str, int]:
-    """Addresses of functions and objects of numba and Python that machine code uses and that are not found by name."""
+    """Addresses of functions and objects of numba and Python that machine code uses : symbol -> address.
+
+    The linker does not find these symbols by itself.
+    """
     import builtins
 
     addresses = {"_Py_NoneStruct": id(None)}

@@ -1,4 +1,4 @@
-"""Checks of the arguments of public functions by kinds: numbers, names, arrays, paths."""
+"""Checks of the arguments of public functions: numbers, names, arrays, paths."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fvsolve.units import show
 
 
 class Kind(NamedTuple):
-    """Kind of an argument: a test, and the expected value in words."""
+    """Kind of an argument: test that accepts a value, and the expected value in words."""
 
     accepts: Callable[[Any], bool]
     expected: str
@@ -29,7 +29,7 @@ def is_number(value: Any) -> bool:
 
 
 def is_row(value: Any, holds: Callable[[Any], bool]) -> bool:
-    """True if the argument is a list or tuple whose items all pass the test `holds`; text does not count."""
+    """True if the argument is a list or tuple whose items all pass the test `holds`; False for text."""
     return isinstance(value, Sequence) and not isinstance(value, (str, bytes)) and all(holds(item) for item in value)
 
 
@@ -38,7 +38,10 @@ def is_name(value: Any) -> bool:
 
 
 def is_array(value: Any, kinds: str, least: int, most: int, finite: bool = True) -> bool:
-    """True for numbers of these numpy kinds ("f", "c", ...) in an array of `least` to `most` dimensions."""
+    """True if the argument is a number or array of certain numpy kinds ("f", "c", ...).
+
+    It has `least` to `most` dimensions; with `finite`, all numbers are finite.
+    """
     try:
         array = np.asarray(value)
     except (TypeError, ValueError):  # rows of different lengths, objects without conversion
@@ -47,7 +50,7 @@ def is_array(value: Any, kinds: str, least: int, most: int, finite: bool = True)
 
 
 def instance_of(kind: type) -> Kind:
-    """Kind of the instances of a class of fvsolve."""
+    """Kind of an argument that must be an instance of a class."""
     return Kind(lambda value: isinstance(value, kind), f"a {kind.__name__}")
 
 
@@ -75,7 +78,10 @@ NAMES = Kind(lambda value: is_name(value) or is_row(value, is_name), "a name or 
 
 
 def validated(**kinds: Kind) -> Callable:
-    """Decorate a function: its arguments of these names must be of these kinds or their defaults; else FvsolveError."""
+    """Decorate a function so that it checks arguments: each must be of its kind, or its default; else FvsolveError.
+
+    kinds : name of an argument -> Kind
+    """
 
     def decorate(function: Callable) -> Callable:
         signature = inspect.signature(function)
