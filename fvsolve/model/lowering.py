@@ -25,14 +25,14 @@ TYPICAL_DROP = 1e5  # a typical pressure drop [Pa]
 class Lowering:
     """Conversion of parts of one kind to table rows: their numbers, start, inputs and probes.
 
-    table : for links, the table of their rows: "pipe", "column", "valve", "brace", "stop" or "piston"; "" for places
+    table : for links, the table of their rows: "pipe", "column", "valve", "brace", "stop" or "piston"; "" for nodes
     rows : number of rows of each part; rank : rows of kinds with greater rank come after those with lesser rank
     law : module of its compiled law, whose functions are named as in `kernels.calls.HOOKS`; if it has a `step`, that
     function gives the flow through its restriction, in place of the square-root law
     events : meaning of a zero of each event function, "" if it is not reported
     is_device : True if it is also a device, see `model.device_lowering`
-    ledger_name : its name in the energy ledger: for a place, of the energy it supplies ("" for none); for a link, the
-    category of its row
+    ledger_name : for a node, name of the energy it supplies in the energy ledger ("" for none); for a link, category of
+    its row in the ledger
     """
 
     kinds: ClassVar[dict[str, Lowering]] = {}

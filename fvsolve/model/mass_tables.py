@@ -66,7 +66,7 @@ def are_points(draft, *places: str | None) -> bool:
 def join_ports(
     draft, row, ports: tuple[str, str], places: tuple[str | None, str], *line_options
 ) -> tuple[float, float]:
-    """Write the two masses or points that a force element joins to its row.
+    """Write to the row of a force element the two masses or points that it joins.
 
     Returns the offset of the second from the first at the start [m] and its relative velocity [m/s].
     line_options : for points, further arguments of `body_tables.add_line`

@@ -228,7 +228,7 @@ class ModelDraft:
         return names, table_rows
 
     def ends(self, link, row) -> None:
-        """Write the indices of the nodes that a link joins to its row."""
+        """Write the indices of the nodes at both ends of a link to its row."""
         row["from_node"], row["to_node"] = self.node_index[link.from_], self.node_index[link.to]
 
     def stiff(self) -> int:

@@ -128,7 +128,10 @@ class SteadyStart:
                 del self.valve_modes[k]
 
     def across(self, k: int) -> tuple[float, float]:
-        """Potentials at both ends of valve k in the latest solution [Pa]; -inf where demands are not supplied."""
+        """Potentials at both ends of valve k in the latest solution [Pa].
+
+        At a node that cannot be supplied the potential is -inf, at a node whose inflow finds no way out inf.
+        """
         potentials = []
         for i in (int(self.valves[k][end]) for end in ("from_node", "to_node")):
             unserved = i in self.answer.no_solution
