@@ -143,7 +143,8 @@ def test_limits_and_points_that_are_watched_change_nothing(case):
     watched = told(case | {"limits": limits})
     alike(told(case), watched)
     if watched.result and watched.result.ok:
-        assert [one.ok for one in watched.result.verdicts] == [True, True, True]
+        allowed = {"holds", "open"} if watched.result.marks else {"holds"}  # open below the pressure of vapour
+        assert {one.state for one in watched.result.verdicts} <= allowed
 
 
 @examples(6)

@@ -110,7 +110,7 @@ def test_a_report_of_many_long_sections_probes_and_frames_stays_below_six_megaby
     found = fvsolve.run(case, out=tmp_path / "run", pictures=False)
     (way,) = section_paths(found)
     text = page(found, [way] * 40)
-    assert 5e6 < len(text.encode()) < 6e6 and "152 probes that swing less are not drawn" in text
+    assert 5e6 < len(text.encode()) < 6e6 and "152 probes with smaller ranges are not drawn" in text
 
 
 def test_words_of_a_case_are_data_and_never_markup(closure):
